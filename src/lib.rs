@@ -1,0 +1,4 @@
+//! trupose: guided kinematic calibration of industrial robot arms from measured distances.
+
+pub mod kinematics;
+pub mod units;

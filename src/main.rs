@@ -1,0 +1,2 @@
+//! The `trupose` program.
+fn main() {}
