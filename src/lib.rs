@@ -1,4 +1,6 @@
 //! trupose: guided kinematic calibration of industrial robot arms from measured distances.
 
+pub mod geometry;
+pub mod identification;
 pub mod kinematics;
 pub mod units;

@@ -1,0 +1,590 @@
+//! Identification of kinematic errors from distances between measured points.
+//!
+//! Method: "A distance error based industrial robot kinematic calibration method", Industrial Robot 41/5 (2014) 439–446. Only
+//! distances enter, so the instrument is never registered to the robot base. What the paper leaves open is settled as follows:
+//!
+//! - **Scaling.** Every parameter is measured in units of its expected deviation ([`FreeParameter::expected`]).
+//! - **Identifiability.** The rank comes from a clear gap in the singular values; blind directions are named ([`Observability`]).
+//! - **Prior.** A zero-mean prior with the expected deviations ([`Prior::Expected`]), or the minimum-norm solution of the paper.
+//! - **Weighting.** M points give M(M−1)/2 distances but only 3M − 6 independent values. Weighted with their true covariance the
+//!   distances are the position problem with the rigid motion projected out ([`Weighting::Covariance`]); the paper's choice is
+//!   [`Weighting::Uniform`]. Standard deviations are right for either.
+//! - **Outliers** are points, found with a robust loss and then removed for real.
+//! - **Chirality** is checked: distances cannot see a mirrored frame.
+//!
+//! Vectors and matrices over parameters follow the order of [`Problem::parameters`]; lengths in metres, angles in radians. Nothing
+//! here reads a file, a clock or a random number.
+
+#![warn(missing_docs)]
+
+mod linearise;
+mod observability;
+mod pairs;
+pub mod plausibility;
+mod problem;
+mod robust;
+mod solver;
+pub mod verification;
+
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+use thiserror::Error;
+
+pub use linearise::ArmModel;
+pub use observability::{BlindGroup, Observability};
+pub use problem::{FreeParameter, Length, LengthEnd, Observations, PointSample, Problem, SharedPoint, TargetAt};
+
+use crate::geometry::{principal_spread, register};
+use crate::kinematics::ParameterId;
+use crate::units::{MICROMETRE, to_mm};
+use linearise::{Evaluation, Weights, length_rows};
+use solver::{Basis, Linearised, Solve};
+
+/// How pairs of points are weighted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Weighting {
+    /// With the covariance that pairs really have: cost O(M), about 10 % better parameters.
+    #[default]
+    Covariance,
+    /// All pairs alike, as the paper has it: cost O(M²).
+    Uniform,
+}
+
+/// What is assumed about the deviations before measuring.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Prior {
+    /// Zero mean, expected deviations as standard deviations.
+    #[default]
+    Expected,
+    /// Nothing: the minimum-norm solution in rad and mm, as in the paper. Badly determined parameters may run away.
+    None,
+}
+
+/// How samples are trusted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Outliers are found with a robust loss, named and removed.
+    #[default]
+    Robust,
+    /// Every sample counts.
+    LeastSquares,
+}
+
+/// Where the measurement σ comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SigmaSource {
+    /// Every reading has its own.
+    Readings,
+    /// The operator gave it.
+    Option,
+    /// The instrument of the profile.
+    Instrument,
+    /// Estimated from the residuals of this fit.
+    Residuals,
+}
+
+/// How to identify.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Weighting of the pairs.
+    pub weighting: Weighting,
+    /// Prior on the deviations.
+    pub prior: Prior,
+    /// Treatment of outliers.
+    pub estimator: Estimator,
+    /// Largest number of solver steps; 1 is the paper's single linear step.
+    pub iterations: usize,
+    /// Standard deviation of a coordinate [m] and where it comes from; `None`: estimated from the residuals.
+    pub sigma: Option<(f64, SigmaSource)>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            weighting: Weighting::default(),
+            prior: Prior::default(),
+            estimator: Estimator::default(),
+            iterations: 100,
+            sigma: None,
+        }
+    }
+}
+
+/// One step of the solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iteration {
+    /// Cost after the step: weighted square sum of residuals plus the prior's share.
+    pub cost: f64,
+    /// Largest change of a parameter, in expected deviations.
+    pub step: f64,
+    /// Damping that was needed, relative to the diagonal of the normal matrix.
+    pub damping: f64,
+    /// The step could not be expected to lower the cost any more.
+    pub negligible: bool,
+}
+
+/// Why the solver stopped. In every case but [`Self::NonFinite`] the parameters are the best found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TerminationReason {
+    /// The step or the expected decrease of the cost became negligible.
+    Converged,
+    /// The allowed number of steps was taken; parameters are those after the last one.
+    IterationLimit,
+    /// No step lowers the cost although the gradient is not zero.
+    NoImprovement,
+    /// A number overflowed; parameters are not usable.
+    NonFinite,
+}
+
+/// The measurement σ of a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sigma {
+    /// What balanced data and prior [m]; with own σ per reading their root mean square.
+    pub used: f64,
+    /// Where it comes from.
+    pub source: SigmaSource,
+    /// What the residuals say [m]: root mean square per coordinate, corrected for the parameters fitted; `None` without
+    /// enough data.
+    pub from_residuals: Option<f64>,
+}
+
+impl Sigma {
+    /// How much larger the residuals are than σ promised; 1 where they fit.
+    pub fn excess(&self) -> f64 {
+        self.from_residuals.map_or(1.0, |residual| (residual / self.used).max(1.0))
+    }
+}
+
+/// One identified parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Which parameter.
+    pub id: ParameterId,
+    /// Nominal value [m] or [rad].
+    pub nominal: f64,
+    /// Identified − nominal [m] or [rad].
+    pub deviation: f64,
+    /// Standard deviation of the deviation [m] or [rad].
+    pub sigma: f64,
+    /// Expected deviation [m] or [rad].
+    pub expected: f64,
+    /// Whether it can be found on its own; if not, a [`BlindGroup`] says what can.
+    pub identifiable: bool,
+}
+
+/// Why a sample was rejected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RejectionReason {
+    /// Too far from where the rest of the data says it should be.
+    Outlier,
+    /// Its point fits the configuration of another rejected sample, and the reverse: two rows were swapped.
+    SwappedWith(usize),
+}
+
+/// A sample that does not count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rejected {
+    /// Index of the place, in the order of [`Observations::places`].
+    pub place: usize,
+    /// Distance from the prediction of the model fitted without it [m].
+    pub residual: f64,
+    /// The same in robust standard deviations of the accepted samples.
+    pub ratio: f64,
+    /// Likely cause.
+    pub reason: RejectionReason,
+}
+
+/// The result of an identification.
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// The identified arm and targets.
+    pub model: ArmModel,
+    /// Every free parameter.
+    pub estimates: Vec<Estimate>,
+    /// Covariance of the deviations, n × n ([m] and [rad]).
+    pub covariance: DMatrix<f64>,
+    /// What the data can tell.
+    pub observability: Observability,
+    /// Measurement σ.
+    pub sigma: Sigma,
+    /// Samples left out, with reasons.
+    pub rejected: Vec<Rejected>,
+    /// Steps of the solver.
+    pub iterations: Vec<Iteration>,
+    /// Why it stopped.
+    pub termination: TerminationReason,
+    /// Pose of each instrument station in the base of the identified arm.
+    pub base_from_station: Vec<Isometry3<f64>>,
+    /// Measured − predicted in the base [m] for every place, in-sample: for finding outliers, never to be shown as accuracy.
+    pub residuals: Vec<Vector3<f64>>,
+}
+
+impl Identification {
+    /// Whether the place was left out.
+    pub fn is_rejected(&self, place: usize) -> bool {
+        self.rejected.iter().any(|rejected| rejected.place == place)
+    }
+
+    /// Correlation of two parameters, −1 … 1; zero where one has no uncertainty.
+    pub fn correlation(&self, i: usize, j: usize) -> f64 {
+        let product = self.covariance[(i, i)] * self.covariance[(j, j)];
+        if product > 0.0 { self.covariance[(i, j)] / product.sqrt() } else { 0.0 }
+    }
+}
+
+/// Misuse, or data from which nothing can be identified.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum IdentificationError {
+    /// A parameter that the arm or its targets do not have.
+    #[error("the arm has no parameter '{parameter}'")]
+    UnknownParameter {
+        /// Its name.
+        parameter: String,
+    },
+    /// An expected deviation that is not a positive number.
+    #[error("the expected deviation of '{parameter}' is {expected}; it must be positive")]
+    ExpectedDeviation {
+        /// Its name.
+        parameter: String,
+        /// What was given.
+        expected: f64,
+    },
+    /// A configuration with the wrong number of joints.
+    #[error("sample {sample} has {given} joint values; the arm has {joints} joints")]
+    Joints {
+        /// Index of the place.
+        sample: usize,
+        /// Values given.
+        given: usize,
+        /// Joints of the arm.
+        joints: usize,
+    },
+    /// A target that does not exist.
+    #[error("sample {sample} names target {target}; there are {targets}")]
+    Target {
+        /// Index of the place.
+        sample: usize,
+        /// Index given.
+        target: usize,
+        /// Number of targets.
+        targets: usize,
+    },
+    /// NaN or infinity in the data.
+    #[error("sample {sample} has a number that is not finite")]
+    NotFinite {
+        /// Index of the place.
+        sample: usize,
+    },
+    /// A length that is not positive, or ends at a shared point that does not exist.
+    #[error("measured length {length} is not usable (value {value} m)")]
+    Length {
+        /// Index of the length.
+        length: usize,
+        /// What was given [m].
+        value: f64,
+    },
+    /// Nothing that a distance could be made of.
+    #[error("there is nothing to identify from: at least three measured points, a shared point seen twice, or a length are needed")]
+    NoData,
+    /// No parameter is free.
+    #[error("no parameter is free to be identified")]
+    NoParameters,
+    /// The minimum-norm solution needs a rank, and there is no clear gap.
+    #[error("the rank is not clear (largest gap in the singular values {gap:.1}); without a prior the solution would be a guess")]
+    RankUnclear {
+        /// The largest ratio of neighbouring singular values that could have been the gap.
+        gap: f64,
+    },
+    /// The points fit only when mirrored.
+    #[error(
+        "the measured points are a mirror image of the robot's: residual {:.3} mm mirrored, {:.3} mm as given",
+        to_mm(*mirrored), to_mm(*proper)
+    )]
+    Mirrored {
+        /// Root mean square residual of the best proper registration [m].
+        proper: f64,
+        /// The same with one axis reversed [m].
+        mirrored: f64,
+    },
+    /// The solver ran into numbers that are not finite.
+    #[error("the solver ran into numbers that are not finite; the data do not describe this robot")]
+    Diverged,
+}
+
+/// Smallest σ that is ever assumed [m]: below the resolution of any instrument, above the arithmetic.
+const SMALLEST_SIGMA: f64 = 1e-3 * MICROMETRE;
+/// First guess of σ where it is estimated [m].
+const FIRST_SIGMA: f64 = 50.0 * MICROMETRE;
+/// Rounds of estimating σ, and the relative change that ends them.
+const SIGMA_ROUNDS: usize = 50;
+const SIGMA_TOLERANCE: f64 = 1e-4;
+/// A mirrored registration must be this much better than the proper one to be called the truth.
+const MIRROR_RATIO: f64 = 0.4;
+
+/// Identifies the free parameters of `problem`. `progress` sees every step of the solver as it is taken.
+///
+/// # Errors
+/// Misuse of the problem, a rank that cannot be decided where one is needed, or a mirrored frame. Not having converged is not
+/// an error but a [`TerminationReason`].
+pub fn identify(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&Iteration),
+) -> Result<Identification, IdentificationError> {
+    problem.check()?;
+    if problem.parameters.is_empty() {
+        return Err(IdentificationError::NoParameters);
+    }
+    let observability = Observability::new(problem);
+    let nominal = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
+    check_chirality(problem, &nominal, None)?;
+    let basis = Basis::new(problem, settings.prior, &observability)?;
+
+    let mut fit = Fit {
+        problem,
+        settings,
+        basis: &basis,
+        weights: Weights::uniform(problem, settings.sigma.map_or(FIRST_SIGMA, |(sigma, _)| sigma.max(SMALLEST_SIGMA))),
+        iterations: Vec::new(),
+        progress,
+    };
+    let mut at = fit.solve(robust::start(basis.transform.ncols()));
+    if settings.estimator == Estimator::Robust {
+        let floor = fit.weights.sigma.min(settings.sigma.map_or(f64::INFINITY, |(sigma, _)| sigma)).max(SMALLEST_SIGMA);
+        let floor = if settings.sigma.is_some() { floor } else { SMALLEST_SIGMA };
+        let solve =
+            Solve { problem, weighting: settings.weighting, basis: &basis, weights: &fit.weights };
+        let trust = robust::find_outliers(&solve, &at.0, floor, settings.iterations, &mut fit.iterations);
+        if trust != fit.weights.trust {
+            fit.weights.trust = trust;
+            at = fit.solve(at.0.z.clone());
+        }
+    }
+    let (at, termination) = at;
+    if termination == TerminationReason::NonFinite || !at.x.iter().all(|value| value.is_finite()) {
+        return Err(IdentificationError::Diverged);
+    }
+    check_chirality(problem, &at.model, Some(&fit.weights))?;
+    let Fit { weights, iterations, .. } = fit;
+    Ok(summarise(Solved { problem, settings, basis: &basis, weights, iterations, termination, at, observability }))
+}
+
+/// The running state of an identification.
+struct Fit<'a, 'p> {
+    problem: &'a Problem<'p>,
+    settings: &'a Settings,
+    basis: &'a Basis,
+    weights: Weights,
+    iterations: Vec<Iteration>,
+    progress: &'a mut dyn FnMut(&Iteration),
+}
+
+impl Fit<'_, '_> {
+    /// Solves with the weights as they are; where σ is estimated, repeats with the σ of the residuals until both agree.
+    fn solve(&mut self, start: DVector<f64>) -> (Linearised, TerminationReason) {
+        let mut z = start;
+        let mut rounds = 0;
+        loop {
+            let solve = Solve {
+                problem: self.problem,
+                weighting: self.settings.weighting,
+                basis: self.basis,
+                weights: &self.weights,
+            };
+            let before = self.iterations.len();
+            let left = self.settings.iterations.saturating_sub(before).max(usize::from(before == 0));
+            let (at, termination) = solve.run(z, left, &mut self.iterations);
+            for iteration in &self.iterations[before..] {
+                (self.progress)(iteration);
+            }
+            rounds += 1;
+            let stop = termination != TerminationReason::Converged || rounds >= SIGMA_ROUNDS;
+            let estimated = self.settings.sigma.is_none().then(|| residual_sigma(&solve, &at)).flatten();
+            let Some(sigma) = estimated.map(|sigma| sigma.max(SMALLEST_SIGMA)) else { return (at, termination) };
+            // Without a prior σ only scales the cost: the solution is the same.
+            let settled = (sigma / self.weights.sigma - 1.0).abs() < SIGMA_TOLERANCE || self.settings.prior == Prior::None;
+            self.weights.sigma = sigma;
+            if settled || stop {
+                return (solve_with(self, at.z), termination);
+            }
+            z = at.z;
+        }
+    }
+}
+
+/// Linearises once more with the final weights.
+fn solve_with(fit: &Fit<'_, '_>, z: DVector<f64>) -> Linearised {
+    Solve { problem: fit.problem, weighting: fit.settings.weighting, basis: fit.basis, weights: &fit.weights }.linearise(z)
+}
+
+/// σ of a coordinate from the residuals [m]: square sum over independent values less the parameters that the data (not the
+/// prior) determined. Lengths that come with their own σ do not count.
+fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<f64> {
+    let Solve { problem, weights, basis, .. } = solve;
+    let observations = problem.observations;
+    let mut square = 0.0;
+    let mut values = 0.0;
+    let stations = at.points.base_from_station.len();
+    let mut seen = vec![0.0; stations];
+    for (index, sample) in observations.points.iter().enumerate() {
+        if weights.trust[index] > 0.0 {
+            square += at.points.of_places[index].norm_squared();
+            seen[sample.station] += 3.0;
+        }
+    }
+    values += seen.iter().map(|values| (values - 6.0_f64).max(0.0)).sum::<f64>();
+    let mut place = observations.points.len();
+    for shared in &observations.shared {
+        let seats = (place..place + shared.at.len()).filter(|&index| weights.trust[index] > 0.0);
+        let count = seats.clone().count();
+        square += seats.map(|index| at.points.of_places[index].norm_squared()).sum::<f64>();
+        values += 3.0 * count.saturating_sub(1) as f64;
+        place += shared.at.len();
+    }
+    if observations.lengths.iter().any(|length| length.sigma.is_none()) {
+        let evaluation = Evaluation::new(problem, &at.model);
+        let rows = length_rows(problem, &evaluation, weights);
+        for (length, residual) in observations.lengths.iter().zip(&rows.residuals) {
+            if length.sigma.is_none() {
+                square += (residual * weights.sigma).powi(2);
+                values += 1.0;
+            }
+        }
+    }
+    let data = basis.transform.transpose() * (&at.normal.gram * &basis.transform);
+    let determined = solve.hessian(at).cholesky().map(|factor| factor.solve(&data).trace())?;
+    let freedom = values - determined;
+    (freedom >= 1.0).then(|| (square / freedom).sqrt())
+}
+
+/// A finished solve.
+struct Solved<'a, 'p> {
+    problem: &'a Problem<'p>,
+    settings: &'a Settings,
+    basis: &'a Basis,
+    weights: Weights,
+    iterations: Vec<Iteration>,
+    termination: TerminationReason,
+    at: Linearised,
+    observability: Observability,
+}
+
+fn summarise(solved: Solved<'_, '_>) -> Identification {
+    let Solved { problem, settings, basis, weights, iterations, termination, at, observability } = solved;
+    let solve = Solve { problem, weighting: settings.weighting, basis, weights: &weights };
+    let from_residuals = residual_sigma(&solve, &at);
+    let readings = problem.observations.points.iter().map(|sample| sample.sigma).collect::<Option<Vec<f64>>>();
+    let sigma = match (readings.filter(|readings| !readings.is_empty()), settings.sigma) {
+        (Some(readings), _) => {
+            let mean = readings.iter().map(|sigma| sigma * sigma).sum::<f64>() / readings.len() as f64;
+            Sigma { used: mean.sqrt(), source: SigmaSource::Readings, from_residuals }
+        }
+        (None, Some((used, source))) => Sigma { used, source, from_residuals },
+        (None, None) => Sigma { used: weights.sigma, source: SigmaSource::Residuals, from_residuals },
+    };
+    let covariance = covariance(&solve, &at, sigma.excess());
+    let estimates = problem
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(index, parameter)| Estimate {
+            id: parameter.id,
+            nominal: nominal_value(problem, parameter.id),
+            deviation: at.x[index],
+            sigma: covariance[(index, index)].max(0.0).sqrt(),
+            expected: parameter.expected,
+            identifiable: observability.is_identifiable(index),
+        })
+        .collect();
+    let floor = settings.sigma.map_or(SMALLEST_SIGMA, |(sigma, _)| sigma);
+    let rejected = rejected(problem, &at, &weights, floor);
+    Identification {
+        model: at.model,
+        estimates,
+        covariance,
+        observability,
+        sigma,
+        rejected,
+        iterations,
+        termination,
+        base_from_station: at.points.base_from_station,
+        residuals: at.points.of_places,
+    }
+}
+
+/// Nominal value of a parameter of the problem [m] or [rad].
+fn nominal_value(problem: &Problem<'_>, id: ParameterId) -> f64 {
+    match id {
+        ParameterId::Link { .. } => problem.chain.parameter(id).unwrap_or(0.0),
+        ParameterId::Target { target, axis } => problem.targets.get(target).map_or(0.0, |point| point[axis.index()]),
+    }
+}
+
+/// Covariance of the deviations: `T H⁻¹ (excess² · cov(gradient) + Λ) H⁻¹ Tᵀ` with `H = TᵀGT + Λ`. For independent rows and no
+/// excess this is the posterior `T H⁻¹ Tᵀ`.
+fn covariance(solve: &Solve<'_, '_>, at: &Linearised, excess: f64) -> DMatrix<f64> {
+    let t = &solve.basis.transform;
+    let n = t.nrows();
+    let Some(factor) = solve.hessian(at).cholesky() else { return DMatrix::from_element(n, n, f64::NAN) };
+    let gradient_covariance = at.normal.gradient_covariance.as_ref().unwrap_or(&at.normal.gram);
+    let mut middle = t.transpose() * (gradient_covariance * t) * (excess * excess);
+    for index in 0..middle.nrows() {
+        middle[(index, index)] += solve.basis.prior_weight;
+    }
+    let left = factor.solve(&middle);
+    let inner = factor.solve(&left.transpose());
+    t * inner * t.transpose()
+}
+
+/// The samples without trust, with the likely cause.
+fn rejected(problem: &Problem<'_>, at: &Linearised, weights: &Weights, floor: f64) -> Vec<Rejected> {
+    let places: Vec<usize> = (0..weights.trust.len()).filter(|&place| weights.trust[place] <= 0.0).collect();
+    let sigma = robust::robust_sigma(problem, &at.points.of_places, &weights.trust, floor);
+    let limit = robust::REJECT_AT * sigma;
+    let points = &problem.observations.points;
+    let predicted = |place: usize| at.model.point_in_base(&points[place].at);
+    let measured = |place: usize| at.points.base_from_station[points[place].station] * points[place].point;
+    let swapped = |place: usize| {
+        places.iter().copied().find(|&other| {
+            other != place
+                && place < points.len()
+                && other < points.len()
+                && (measured(other) - predicted(place)).norm() <= limit
+                && (measured(place) - predicted(other)).norm() <= limit
+        })
+    };
+    places
+        .iter()
+        .map(|&place| {
+            let residual = at.points.of_places[place].norm();
+            let reason = swapped(place).map_or(RejectionReason::Outlier, RejectionReason::SwappedWith);
+            Rejected { place, residual, ratio: residual / sigma, reason }
+        })
+        .collect()
+}
+
+/// Distances cannot see a mirrored frame; the registration can.
+fn check_chirality(
+    problem: &Problem<'_>,
+    model: &ArmModel,
+    weights: Option<&Weights>,
+) -> Result<(), IdentificationError> {
+    let samples = &problem.observations.points;
+    let predicted = model.points_in_base(samples.iter().map(|sample| &sample.at));
+    let stations = samples.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
+    for station in 0..stations {
+        let members = samples.iter().zip(&predicted).enumerate().filter(|(index, (sample, _))| {
+            sample.station == station && weights.is_none_or(|weights| weights.trust[*index] > 0.0)
+        });
+        let pairs = members.map(|(_, (sample, predicted))| (1.0, *predicted, sample.point));
+        let reversed = pairs.clone().map(|(weight, from, to)| (weight, Point3::new(-from.x, from.y, from.z), to));
+        let (Some(proper), Some(mirrored)) = (register(pairs), register(reversed)) else { continue };
+        let spread = principal_spread(predicted.iter());
+        // Points in a plane are their own mirror image: nothing can be said, and nothing is wrong.
+        let decidable = spread[2] > 3.0 * mirrored.rms;
+        if decidable && mirrored.rms < MIRROR_RATIO * proper.rms {
+            return Err(IdentificationError::Mirrored { proper: proper.rms, mirrored: mirrored.rms });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,182 @@
+//! What identification is given: the nominal arm, the free parameters and the observations.
+
+use nalgebra::Point3;
+
+use super::IdentificationError;
+use crate::kinematics::{KinematicChain, ParameterId};
+
+/// A parameter to identify, with the deviation one expects of it: the scale of the problem and the width of the prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeParameter {
+    /// Which parameter.
+    pub id: ParameterId,
+    /// Expected deviation from nominal, one standard deviation [m] or [rad]; positive.
+    pub expected: f64,
+}
+
+/// A configuration and the target that was observed there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetAt {
+    /// Pendant configuration [rad] or [m].
+    pub configuration: Vec<f64>,
+    /// Index of the target.
+    pub target: usize,
+}
+
+/// One measured point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointSample {
+    /// Where the arm stood and what was measured.
+    pub at: TargetAt,
+    /// Index of the instrument station: points of one station share an unknown frame.
+    pub station: usize,
+    /// Coordinates in the frame of the station [m].
+    pub point: Point3<f64>,
+    /// Standard deviation of each coordinate [m], where the reading has one.
+    pub sigma: Option<f64>,
+}
+
+/// Configurations in which the target sits in one and the same unknown point, as a ball in a socket.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SharedPoint {
+    /// The configurations.
+    pub at: Vec<TargetAt>,
+}
+
+/// One end of a measured length.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LengthEnd {
+    /// The target at a configuration.
+    Target(TargetAt),
+    /// The shared point with this index.
+    SharedPoint(usize),
+}
+
+/// A measured length between two points of which no coordinates are known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Length {
+    /// From here …
+    pub from: LengthEnd,
+    /// … to here.
+    pub to: LengthEnd,
+    /// Measured length [m].
+    pub length: f64,
+    /// Its standard deviation [m], where it is known.
+    pub sigma: Option<f64>,
+}
+
+/// Everything that was observed. All three kinds enter one estimate and none of them knows the robot base.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Observations {
+    /// Measured points.
+    pub points: Vec<PointSample>,
+    /// Shared points.
+    pub shared: Vec<SharedPoint>,
+    /// Measured lengths.
+    pub lengths: Vec<Length>,
+}
+
+impl Observations {
+    /// Number of independent values in the observations: 3 per point less 6 per station, 3 per seat less 3 per shared point,
+    /// one per length.
+    pub fn independent_values(&self) -> usize {
+        let stations = self.points.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
+        let of_station = |station: usize| self.points.iter().filter(|sample| sample.station == station).count();
+        let points: usize = (0..stations).map(|station| (3 * of_station(station)).saturating_sub(6)).sum();
+        let shared: usize = self.shared.iter().map(|shared| 3 * shared.at.len().saturating_sub(1)).sum();
+        points + shared + self.lengths.len()
+    }
+
+    /// All places where the target was observed, in a fixed order: points, shared points, lengths.
+    pub fn places(&self) -> impl Iterator<Item = &TargetAt> {
+        let lengths = self.lengths.iter().flat_map(|length| [&length.from, &length.to]).filter_map(|end| match end {
+            LengthEnd::Target(at) => Some(at),
+            LengthEnd::SharedPoint(_) => None,
+        });
+        self.points.iter().map(|sample| &sample.at).chain(self.shared.iter().flat_map(|shared| &shared.at)).chain(lengths)
+    }
+}
+
+/// An identification problem: checked once, then trusted by everything below.
+#[derive(Clone, Debug)]
+pub struct Problem<'a> {
+    /// Nominal arm.
+    pub chain: &'a KinematicChain,
+    /// Nominal target coordinates in the flange frame [m], one per target.
+    pub targets: &'a [Point3<f64>],
+    /// Parameters to identify, in the order of all vectors and matrices.
+    pub parameters: &'a [FreeParameter],
+    /// What was observed.
+    pub observations: &'a Observations,
+}
+
+impl Problem<'_> {
+    /// The ids of the parameters, in order.
+    pub fn parameter_ids(&self) -> Vec<ParameterId> {
+        self.parameters.iter().map(|parameter| parameter.id).collect()
+    }
+
+    /// Checks sizes, indices and finiteness.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn check(&self) -> Result<(), IdentificationError> {
+        for parameter in self.parameters {
+            let known = match parameter.id {
+                ParameterId::Target { target, .. } => target < self.targets.len(),
+                ParameterId::Link { .. } => self.chain.parameter(parameter.id).is_some(),
+            };
+            if !known {
+                return Err(IdentificationError::UnknownParameter { parameter: parameter.id.to_string() });
+            }
+            if !(parameter.expected.is_finite() && parameter.expected > 0.0) {
+                return Err(IdentificationError::ExpectedDeviation {
+                    parameter: parameter.id.to_string(),
+                    expected: parameter.expected,
+                });
+            }
+        }
+        for (index, place) in self.observations.places().enumerate() {
+            if place.configuration.len() != self.chain.dof() {
+                return Err(IdentificationError::Joints {
+                    sample: index,
+                    given: place.configuration.len(),
+                    joints: self.chain.dof(),
+                });
+            }
+            if place.target >= self.targets.len() {
+                return Err(IdentificationError::Target {
+                    sample: index,
+                    target: place.target,
+                    targets: self.targets.len(),
+                });
+            }
+            if !place.configuration.iter().all(|value| value.is_finite()) {
+                return Err(IdentificationError::NotFinite { sample: index });
+            }
+        }
+        for (index, sample) in self.observations.points.iter().enumerate() {
+            let sigma_ok = sample.sigma.is_none_or(|sigma| sigma.is_finite() && sigma > 0.0);
+            if !(sample.point.coords.iter().all(|value| value.is_finite()) && sigma_ok) {
+                return Err(IdentificationError::NotFinite { sample: index });
+            }
+        }
+        for (index, length) in self.observations.lengths.iter().enumerate() {
+            let sigma_ok = length.sigma.is_none_or(|sigma| sigma.is_finite() && sigma > 0.0);
+            if !(length.length.is_finite() && length.length > 0.0 && sigma_ok) {
+                return Err(IdentificationError::Length { length: index, value: length.length });
+            }
+            for end in [&length.from, &length.to] {
+                if let LengthEnd::SharedPoint(shared) = end
+                    && *shared >= self.observations.shared.len()
+                {
+                    return Err(IdentificationError::Length { length: index, value: length.length });
+                }
+            }
+        }
+        if self.observations.independent_values() == 0 {
+            return Err(IdentificationError::NoData);
+        }
+        Ok(())
+    }
+}
