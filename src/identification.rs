@@ -348,7 +348,7 @@ pub fn identify(
         iterations: Vec::new(),
         progress,
     };
-    let mut at = fit.solve(robust::start(basis.transform.ncols()));
+    let mut at = fit.solve(DVector::zeros(basis.transform.ncols()));
     if settings.estimator == Estimator::Robust {
         let floor = fit.weights.sigma.min(settings.sigma.map_or(f64::INFINITY, |(sigma, _)| sigma)).max(SMALLEST_SIGMA);
         let floor = if settings.sigma.is_some() { floor } else { SMALLEST_SIGMA };

@@ -4,7 +4,7 @@
 //! keep the full efficiency of least squares: the robust loss only finds the outliers, which are then removed for real and the
 //! rest is fitted with full weights.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::Vector3;
 
 use super::Iteration;
 use super::linearise::Weights;
@@ -14,9 +14,6 @@ use super::solver::{Linearised, Solve};
 /// A point further off than this many robust standard deviations is rejected. Real arms have heavy tails (gravity, backlash,
 /// gear harmonics): good points of the measured UR5 set reach five.
 pub(crate) const REJECT_AT: f64 = 6.0;
-/// A largest residual beyond this many robust standard deviations starts the robust search: more than Gaussian noise of a few
-/// dozen points shows.
-const SUSPECT_AT: f64 = 4.0;
 /// Median of the norm of three standard normal numbers (chi distribution, 3 degrees of freedom).
 const MEDIAN_CHI_3: f64 = 1.538_172_254_455_052;
 /// Each step of the graduated search makes the loss this much less convex (Yang et al. 2020, "Graduated non-convexity for
@@ -67,7 +64,7 @@ pub(crate) fn find_outliers(
     let residuals = &least_squares.points.of_places;
     let sigma = robust_sigma(problem, residuals, &all, floor);
     let largest = residuals.iter().take(places).map(Vector3::norm).fold(0.0, f64::max);
-    if largest <= SUSPECT_AT * sigma {
+    if largest <= suspect_at(places) * sigma {
         return all;
     }
     let (start, sigma) = graduated_search(solve, least_squares, floor, iterations);
@@ -143,7 +140,8 @@ fn decide(residuals: &[Vector3<f64>], places: usize, all: &[f64], sigma: f64) ->
     trust
 }
 
-/// A starting value of the parameters: zero.
-pub(crate) fn start(columns: usize) -> DVector<f64> {
-    DVector::zeros(columns)
+/// A largest residual beyond this many robust standard deviations starts the robust search: more than what Gaussian noise of
+/// so many points shows in about one set of a hundred (chi distribution, 3 degrees of freedom).
+fn suspect_at(places: usize) -> f64 {
+    (4.4 + 0.5 * (places as f64 / 50.0).log10()).clamp(4.0, REJECT_AT)
 }

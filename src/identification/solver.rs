@@ -13,8 +13,8 @@ use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
 use super::{IdentificationError, Iteration, Prior, TerminationReason, Weighting};
 
-/// A step below this many expected deviations ends the iteration.
-const STEP_TOLERANCE: f64 = 1e-8;
+/// What is left to go, in expected deviations, that ends the iteration.
+const STEP_TOLERANCE: f64 = 1e-7;
 /// An expected relative decrease of the cost below this ends the iteration.
 const COST_TOLERANCE: f64 = 1e-13;
 /// First damping after a step that made things worse, relative to the diagonal.
@@ -185,11 +185,15 @@ impl Solve<'_, '_> {
         iterations: &mut Vec<Iteration>,
     ) -> (Linearised, TerminationReason) {
         let mut at = self.linearise(start);
+        let mut last_step = 0.0;
         for _ in 0..limit {
             match self.step(&at) {
                 Ok((next, record)) => {
                     at = next;
-                    let converged = record.step <= STEP_TOLERANCE || record.negligible;
+                    // Steps shrink by about the same factor each time: what is left is the next one of the series.
+                    let left = record.step * (record.step / last_step).min(1.0);
+                    let converged = record.damping == 0.0 && left <= STEP_TOLERANCE || record.negligible;
+                    last_step = record.step;
                     iterations.push(record);
                     if converged {
                         return (at, TerminationReason::Converged);
