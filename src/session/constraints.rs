@@ -79,7 +79,9 @@ fn read(
     if table.records.is_empty() && problems.is_empty() {
         problems.push(Defect::NoRows.of_table());
     }
-    let header = Header::new(record, &mut problems);
+    let Some(header) = Header::new(record, &mut problems) else {
+        return Err(TableErrors::new(file, problems, vec![sockets, lengths]));
+    };
     let is_sockets = header.text("socket").is_some() || header.text("position").is_some();
     let is_lengths = header.has_prefix("from_q") || header.has_prefix("to_q") || header.has_prefix("length");
     let has_points = ["x", "y", "z"].iter().any(|name| header.has_quantity(name));
@@ -90,9 +92,7 @@ fn read(
     } else if is_sockets && !has_points {
         (Constraints::SharedPoints(shared_points::read(input, &mut problems)), vec![sockets])
     } else {
-        if !problems.iter().any(|problem| matches!(problem.defect, Defect::NoHeader { .. })) {
-            problems.push(Defect::NotConstraints { has_points }.at(line));
-        }
+        problems.push(Defect::NotConstraints { has_points }.at(line));
         return Err(TableErrors::new(file, problems, vec![sockets, lengths]));
     };
     if problems.is_empty() { Ok(constraints) } else { Err(TableErrors::new(file, problems, expected)) }

@@ -204,12 +204,7 @@ fn split_named(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem
         problems.push(Defect::NoRows.of_table());
         return None;
     };
-    let before = problems.len();
-    let mut header = Header::new(record, problems);
-    if problems.iter().skip(before).any(|problem| matches!(problem.defect, Defect::NoHeader { .. })) {
-        // Without names there is nothing to look for; complaints about each of them would only hide the reason.
-        return None;
-    }
+    let mut header = Header::new(record, problems)?;
     let places = Places {
         pose: header.text("pose"),
         target: header.text("target"),

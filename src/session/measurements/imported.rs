@@ -82,6 +82,12 @@ fn split(
     let width = columns.len();
     let table = table::split(text, shape, problems);
     let mut records = table.records;
+    let separator = if matches!(shape, Shape::Tabs { .. }) { "separated by tabs" } else { "separated by commas" };
+    for problem in &mut *problems {
+        if let Defect::CellCount { found, expected, .. } = problem.defect {
+            problem.defect = Defect::LayoutCells { found, expected, separator, columns: columns.join(" ") };
+        }
+    }
     let is_number = |cell: &String| cell.replace(',', ".").parse::<f64>().is_ok();
     if let Some(header) = table.header.filter(|header| header.cells.iter().filter(|cell| is_number(cell)).count() > 3) {
         if header.line > 1 && header.cells.len() == width {

@@ -69,12 +69,13 @@ pub(in crate::session) struct Header {
 }
 
 impl Header {
-    /// Names of a record. Reports a line of numbers and names that stand twice; a column without name becomes
-    /// `column5`, counted from 1.
-    pub(in crate::session) fn new(record: Record, problems: &mut Vec<TableProblem>) -> Self {
+    /// Names of a record. Reports names that stand twice; a column without name becomes `column5`, counted from 1.
+    /// `None`, reported, for a line of numbers: to look for names in it would only hide the reason.
+    pub(in crate::session) fn new(record: Record, problems: &mut Vec<TableProblem>) -> Option<Self> {
         let Record { line, cells } = record;
         if cells.iter().all(|cell| cell.replace(',', ".").parse::<f64>().is_ok()) {
             problems.push(Defect::NoHeader { cells: cells.len() }.at(line));
+            return None;
         }
         let named = |(index, cell): (usize, String)| {
             if cell.is_empty() { format!("column{}", index + 1) } else { cell }
@@ -87,7 +88,7 @@ impl Header {
                 problems.push(Defect::DuplicateColumn { first: first + 1, second: index + 1 }.at_cell(line, shown));
             }
         }
-        Self { line, names, lower, without_unit: Vec::new(), unit_example: None, missing: Vec::new() }
+        Some(Self { line, names, lower, without_unit: Vec::new(), unit_example: None, missing: Vec::new() })
     }
 
     /// Place of the text column `name`.

@@ -63,10 +63,10 @@ pub enum Defect {
     },
     /// Not one column per joint of the robot.
     #[error(
-        "the robot has {joints} {} but the table has {}; it needs {}",
+        "the robot has {joints} {}, but the table has {}; it needs {}, and the profile must be that of the measured robot",
         if *joints == 1 { "joint" } else { "joints" },
         joint_columns(prefix, found),
-        if *joints == 1 { format!("{prefix}q1") } else { format!("{prefix}q1 to {prefix}q{joints}") }
+        if *joints == 1 { format!("{prefix}q1") } else { format!("{prefix}q1 … {prefix}q{joints}") }
     )]
     JointColumns {
         /// `from_`, `to_` or nothing.
@@ -241,6 +241,18 @@ pub enum Defect {
         "the layout takes this line for column names, but it holds numbers; put a line of names above it if it is a reading"
     )]
     NumbersIgnored,
+    /// A row with too few or too many cells for an imported layout.
+    #[error("the row has {found} {} instead of {expected}; the layout is {separator}: {columns}", if *found == 1 { "cell" } else { "cells" })]
+    LayoutCells {
+        /// Cells of the row.
+        found: usize,
+        /// Cells of a row in the layout.
+        expected: usize,
+        /// How cells are separated, in words.
+        separator: &'static str,
+        /// Meaning of the cells, in order.
+        columns: String,
+    },
     /// A layout for another robot.
     #[error(
         "a table of RoboDK has six turning joints, and this robot has {joints} {}; write a table with named columns instead",
