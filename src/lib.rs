@@ -3,4 +3,5 @@
 pub mod geometry;
 pub mod identification;
 pub mod kinematics;
+pub mod session;
 pub mod units;

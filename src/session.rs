@@ -1,0 +1,16 @@
+//! The pure data of a session: measured tables and the choice of rows from them.
+//!
+//! Text comes in, types go out. Inside, lengths are metres and angles radians; a *configuration* is the pendant joint
+//! vector. Points are in the tracker frame, which is never registered to the robot base.
+//!
+//! This module reads no file and no clock, and never estimates anything. All defects of a table are reported together
+//! ([`TableErrors`]), each with its place and what to do about it.
+
+#![warn(missing_docs)]
+
+pub mod constraints;
+pub mod filter;
+pub mod measurements;
+mod table;
+
+pub use table::{Defect, TableErrors, TableProblem};

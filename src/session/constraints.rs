@@ -1,0 +1,115 @@
+//! Tables of direct distances: no tracker, no coordinates.
+//!
+//! Two kinds, told apart by their column names:
+//!
+//! ```text
+//! position,socket,q1_rad,…,qn_rad                       rows of one position and socket share one point
+//! from_q1_deg,…,from_qn_deg,to_q1_deg,…,to_qn_deg,length_mm,sigma_mm
+//! ```
+//!
+//! Inside, configurations are pendant joint vectors [rad, sliding joints m] and lengths metres. Other columns are kept as
+//! text for filters. The distance between the sockets of a plate is not in the table: the caller knows the plate.
+
+mod lengths;
+mod shared_points;
+
+pub use lengths::{LengthRow, Lengths};
+pub use shared_points::{ConfigurationRow, SharedPointGroup, SharedPoints};
+
+use super::measurements::joint_names;
+use super::table::{self, Defect, Header, Numbers, Record, Shape, TableErrors, TableProblem, decode};
+use crate::kinematics::JointType;
+
+/// The rows of a table of direct distances.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Constraints {
+    /// Configurations in which the target sat in the same place.
+    SharedPoints(SharedPoints),
+    /// Measured lengths between the target points of two configurations.
+    Lengths(Lengths),
+}
+
+/// Reads a table of direct distances for a robot with the given joints. `file` is its name in messages.
+///
+/// # Errors
+/// All defects of the table together.
+pub fn read_constraints(text: &str, file: &str, joints: &[JointType]) -> Result<Constraints, TableErrors> {
+    read(text, file, joints, Vec::new())
+}
+
+/// As [`read_constraints`], from the bytes of a file: UTF-8, with or without byte order mark.
+///
+/// # Errors
+/// All defects of the table together, lines that are not UTF-8 among them.
+pub fn read_constraints_bytes(bytes: &[u8], file: &str, joints: &[JointType]) -> Result<Constraints, TableErrors> {
+    let mut problems = Vec::new();
+    let text = decode(bytes, &mut problems);
+    if text.is_empty() && !problems.is_empty() {
+        return Err(TableErrors::new(file, problems, Vec::new()));
+    }
+    read(&text, file, joints, problems)
+}
+
+/// The lines of column names for this robot: socket table, table of lengths.
+pub fn headers(joints: &[JointType]) -> [String; 2] {
+    let names = |prefix| joint_names(prefix, joints).join(",");
+    [format!("position,socket,{}", names("")), format!("{},{},length_mm", names("from_"), names("to_"))]
+}
+
+/// What both kinds of table are read from.
+struct Input<'a> {
+    header: Header,
+    records: Vec<Record>,
+    decimal_comma: bool,
+    joints: &'a [JointType],
+}
+
+fn read(
+    text: &str,
+    file: &str,
+    joints: &[JointType],
+    mut problems: Vec<TableProblem>,
+) -> Result<Constraints, TableErrors> {
+    let [sockets, lengths] = headers(joints);
+    let table = table::split(text, Shape::Named, &mut problems);
+    let Some(record) = table.header else {
+        problems.push(Defect::NoRows.of_table());
+        return Err(TableErrors::new(file, problems, vec![sockets, lengths]));
+    };
+    if table.records.is_empty() && problems.is_empty() {
+        problems.push(Defect::NoRows.of_table());
+    }
+    let Some(header) = Header::new(record, &mut problems) else {
+        return Err(TableErrors::new(file, problems, vec![sockets, lengths]));
+    };
+    let is_sockets = header.text("socket").is_some() || header.text("position").is_some();
+    let is_lengths = header.has_prefix("from_q") || header.has_prefix("to_q") || header.has_prefix("length");
+    let has_points = ["x", "y", "z"].iter().any(|name| header.has_quantity(name));
+    let line = header.line;
+    let input = Input { header, records: table.records, decimal_comma: table.decimal_comma, joints };
+    let (constraints, expected) = if is_lengths {
+        (Constraints::Lengths(lengths::read(input, &mut problems)), vec![lengths])
+    } else if is_sockets && !has_points {
+        (Constraints::SharedPoints(shared_points::read(input, &mut problems)), vec![sockets])
+    } else {
+        problems.push(Defect::NotConstraints { has_points }.at(line));
+        return Err(TableErrors::new(file, problems, vec![sockets, lengths]));
+    };
+    if problems.is_empty() { Ok(constraints) } else { Err(TableErrors::new(file, problems, expected)) }
+}
+
+/// All joint values of a row; `None` with problems when one is missing.
+fn configuration(
+    record: &Record,
+    columns: &[table::NumberColumn],
+    numbers: &mut Numbers<'_>,
+    problems: &mut Vec<TableProblem>,
+) -> Option<Vec<f64>> {
+    let values: Vec<f64> = columns.iter().filter_map(|&column| numbers.required(record, column, problems)).collect();
+    (values.len() == columns.len()).then_some(values)
+}
+
+/// Bits of joint values, the same for both zeros: equal for equal rows.
+fn digits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| (value + 0.0).to_bits()).collect()
+}

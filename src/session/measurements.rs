@@ -1,0 +1,254 @@
+//! Measurement tables: configurations with the tracker points read at them.
+//!
+//! Inside, a configuration is the pendant joint vector [rad, or m for a sliding joint] and a point is in the tracker
+//! frame [m]. The table's own layout names its columns with units:
+//!
+//! ```text
+//! pose,target,q1_deg,…,qn_deg,x_mm,y_mm,z_mm,sigma_mm,temperature_degc,note
+//! ```
+//!
+//! - Joints: `deg` or `rad`, sliding joints `mm`, `m`, `um` or `in`; coordinates and `sigma`: `mm`, `m`, `um` or `in`.
+//! - `pose` may be missing: then the rows are numbered from 0, and filters see that number as column `pose`.
+//! - `target`, `sigma` and `temperature` may be missing, and their cells empty.
+//! - Any other column is kept as text for filters.
+//!
+//! Nothing is dropped: copies of rows are kept and listed in [`Measurements::duplicates`].
+
+mod consistency;
+mod imported;
+mod layout;
+mod writer;
+
+use std::mem;
+
+use nalgebra::Point3;
+
+pub use layout::{Layout, UnknownLayout};
+pub use writer::write;
+
+use super::table::{
+    self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,
+};
+use crate::kinematics::JointType;
+
+/// The rows of a measurement table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measurements {
+    /// One per row of the file, in its order, copies included.
+    pub rows: Vec<Row>,
+    /// Names of the columns, parallel to [`Row::fields`].
+    pub columns: Vec<String>,
+    /// The layout that was read.
+    pub layout: Layout,
+    /// Places in `rows` of those that repeat an earlier row in target, configuration and point, ascending. They are
+    /// copies made in a spreadsheet, not readings: identification should leave them out.
+    pub duplicates: Vec<usize>,
+    /// What is odd about the table but does not forbid its use, in the order of its lines.
+    pub warnings: Vec<TableProblem>,
+}
+
+/// One reading: where the robot stood and where the tracker saw the target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// 1-based line in the file.
+    pub line: usize,
+    /// Name of the pose; readings of one pose and target repeat each other.
+    pub pose: String,
+    /// Name of the SMR, where a table distinguishes several.
+    pub target: Option<String>,
+    /// Pendant joint values [rad], sliding joints [m].
+    pub configuration: Vec<f64>,
+    /// Centre of the SMR in the tracker frame [m].
+    pub point: Point3<f64>,
+    /// Standard deviation of the point, per coordinate [m].
+    pub sigma: Option<f64>,
+    /// Temperature [°C].
+    pub temperature: Option<f64>,
+    /// Text of all cells as in the file, parallel to [`Measurements::columns`], for filters.
+    pub fields: Vec<String>,
+}
+
+impl Measurements {
+    /// The rows without the copies listed in [`Measurements::duplicates`].
+    pub fn distinct_rows(&self) -> impl Iterator<Item = &Row> {
+        let is_copy = |index: &usize| self.duplicates.binary_search(index).is_ok();
+        self.rows.iter().enumerate().filter(move |(index, _)| !is_copy(index)).map(|(_, row)| row)
+    }
+}
+
+/// Reads a table with named columns for a robot with the given joints. `file` is its name in messages.
+///
+/// # Errors
+/// All defects of the table together.
+pub fn read(text: &str, file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
+    read_as(Layout::Named, text, file, joints)
+}
+
+/// As [`read`], from the bytes of a file: UTF-8, with or without byte order mark.
+///
+/// # Errors
+/// All defects of the table together, lines that are not UTF-8 among them.
+pub fn read_bytes(bytes: &[u8], file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
+    read_bytes_as(Layout::Named, bytes, file, joints)
+}
+
+/// As [`read`], in a layout chosen by the user.
+///
+/// # Errors
+/// All defects of the table together.
+pub fn read_as(layout: Layout, text: &str, file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
+    read_with(layout, text, file, joints, Vec::new())
+}
+
+/// As [`read_bytes`], in a layout chosen by the user.
+///
+/// # Errors
+/// All defects of the table together, lines that are not UTF-8 among them.
+pub fn read_bytes_as(
+    layout: Layout,
+    bytes: &[u8],
+    file: &str,
+    joints: &[JointType],
+) -> Result<Measurements, TableErrors> {
+    let mut problems = Vec::new();
+    let text = decode(bytes, &mut problems);
+    if text.is_empty() && !problems.is_empty() {
+        return Err(TableErrors::new(file, problems, Vec::new()));
+    }
+    read_with(layout, &text, file, joints, problems)
+}
+
+/// The line of column names that a table for this robot can have: `pose,target,q1_deg,…,x_mm,y_mm,z_mm`.
+pub fn header(joints: &[JointType]) -> String {
+    let mut names = vec!["pose".to_owned(), "target".to_owned()];
+    names.extend(joint_names("", joints));
+    names.extend(["x_mm", "y_mm", "z_mm"].map(str::to_owned));
+    names.join(",")
+}
+
+/// `q1_deg` … `qn_deg` after `prefix`, sliding joints in mm.
+pub(super) fn joint_names(prefix: &str, joints: &[JointType]) -> Vec<String> {
+    let name = |(index, joint): (usize, &JointType)| {
+        format!("{prefix}q{}_{}", index + 1, Measure::of_joint(*joint).usual_unit())
+    };
+    joints.iter().enumerate().map(name).collect()
+}
+
+/// Where the parts of a row stand.
+#[derive(Debug, Default)]
+struct Places {
+    pose: Option<usize>,
+    target: Option<usize>,
+    joints: Vec<NumberColumn>,
+    point: Vec<NumberColumn>,
+    sigma: Option<NumberColumn>,
+    temperature: Option<NumberColumn>,
+}
+
+/// A table before its cells are read: names, places and rows of text.
+struct Split {
+    columns: Vec<String>,
+    places: Places,
+    records: Vec<Record>,
+    decimal_comma: bool,
+}
+
+fn read_with(
+    layout: Layout,
+    text: &str,
+    file: &str,
+    joints: &[JointType],
+    mut problems: Vec<TableProblem>,
+) -> Result<Measurements, TableErrors> {
+    let mut warnings = Vec::new();
+    let split = match layout {
+        Layout::Named => split_named(text, joints, &mut problems),
+        Layout::RoboDk => imported::split_robodk(text, joints, &mut problems, &mut warnings),
+        Layout::Delmia => Some(imported::split_delmia(text, joints, &mut problems, &mut warnings)),
+    };
+    let headers = if layout == Layout::Named { vec![header(joints)] } else { Vec::new() };
+    let Some(Split { mut columns, places, records, decimal_comma }) = split else {
+        return Err(TableErrors::new(file, problems, headers));
+    };
+    if records.is_empty() && problems.is_empty() {
+        problems.push(Defect::NoRows.of_table());
+    }
+    let mut numbers = Numbers::new(&columns, decimal_comma);
+    let numbered = places.pose.is_none();
+    let mut rows = Vec::with_capacity(records.len());
+    for (index, record) in records.into_iter().enumerate() {
+        rows.extend(row(index, record, &places, &mut numbers, &mut problems));
+    }
+    if layout == Layout::RoboDk {
+        imported::name_targets(&mut rows);
+    }
+    if numbered {
+        columns.insert(0, "pose".to_owned());
+        for row in &mut rows {
+            row.fields.insert(0, row.pose.clone());
+        }
+    }
+    let duplicates = consistency::check(&rows, joints, &mut problems, &mut warnings);
+    if problems.is_empty() {
+        warnings.sort_by_key(|warning| warning.line);
+        Ok(Measurements { rows, columns, layout, duplicates, warnings })
+    } else {
+        Err(TableErrors::new(file, problems, headers))
+    }
+}
+
+/// Finds the columns of the table's own layout.
+fn split_named(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> Option<Split> {
+    let table = table::split(text, Shape::Named, problems);
+    let Some(record) = table.header else {
+        problems.push(Defect::NoRows.of_table());
+        return None;
+    };
+    let mut header = Header::new(record, problems)?;
+    let places = Places {
+        pose: header.text("pose"),
+        target: header.text("target"),
+        joints: header.joints("", joints, problems),
+        point: ["x", "y", "z"]
+            .into_iter()
+            .filter_map(|name| header.required(name, Measure::Length, problems))
+            .collect(),
+        sigma: header.number("sigma", Measure::Length, problems),
+        temperature: header.number("temperature", Measure::Temperature, problems),
+    };
+    let columns = header.finish(problems);
+    Some(Split { columns, places, records: table.records, decimal_comma: table.decimal_comma })
+}
+
+/// Reads one row. All its cells are checked, also after the first defect.
+fn row(
+    index: usize,
+    mut record: Record,
+    places: &Places,
+    numbers: &mut Numbers<'_>,
+    problems: &mut Vec<TableProblem>,
+) -> Option<Row> {
+    let before = problems.len();
+    let text = |place: Option<usize>| place.and_then(|place| record.cells.get(place)).map(String::as_str);
+    let pose = text(places.pose).map_or_else(|| index.to_string(), str::to_owned);
+    if pose.is_empty() {
+        problems.push(Defect::Empty.at_cell(record.line, "pose"));
+    }
+    let target = text(places.target).filter(|text| !text.is_empty()).map(str::to_owned);
+    let configuration: Vec<f64> =
+        places.joints.iter().filter_map(|&column| numbers.required(&record, column, problems)).collect();
+    let point: Vec<f64> =
+        places.point.iter().filter_map(|&column| numbers.required(&record, column, problems)).collect();
+    let sigma = places.sigma.and_then(|column| numbers.deviation(&record, column, problems));
+    let temperature = places.temperature.and_then(|column| numbers.optional(&record, column, problems));
+    let point = match point[..] {
+        [x, y, z] => Point3::new(x, y, z),
+        _ => return None,
+    };
+    if point.coords.iter().all(|coordinate| coordinate.abs() <= 0.0) {
+        problems.push(Defect::ZeroPoint.at(record.line));
+    }
+    let complete = problems.len() == before && configuration.len() == places.joints.len();
+    let fields = mem::take(&mut record.cells);
+    complete.then_some(Row { line: record.line, pose, target, configuration, point, sigma, temperature, fields })
+}

@@ -1,0 +1,243 @@
+//! Separated-value tables as text cells with true line numbers; shared by every table a session reads.
+//!
+//! Comma, semicolon or tab is detected from the line of column names. A byte order mark, CRLF, blank lines, rows of
+//! nothing but separators (spreadsheets leave them at the end) and lines that begin with `#` are passed over. Cells lose
+//! surrounding blanks; control characters in them are replaced, so that no cell can disturb a terminal.
+//!
+//! What a column means is not known here.
+
+mod columns;
+mod encoding;
+mod number;
+mod problem;
+
+use std::mem;
+
+pub(super) use columns::{Header, Measure, NumberColumn};
+pub(super) use encoding::decode;
+pub(super) use number::Numbers;
+pub(super) use problem::printable;
+pub use problem::{Defect, TableErrors, TableProblem};
+
+/// One line of a table, split into cells.
+#[derive(Debug)]
+pub(super) struct Record {
+    /// 1-based line in the file.
+    pub(super) line: usize,
+    /// Trimmed, printable text of the cells.
+    pub(super) cells: Vec<String>,
+}
+
+/// The lines of a table, the line of column names apart.
+#[derive(Debug)]
+pub(super) struct Table {
+    /// The first line that is neither blank nor a comment.
+    pub(super) header: Option<Record>,
+    /// The lines after it, each with as many cells as `width` unless reported in the problems.
+    pub(super) records: Vec<Record>,
+    /// Whether `1,5` can be a number: the comma does not separate cells.
+    pub(super) decimal_comma: bool,
+}
+
+/// How the cells of a table are separated and counted.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Shape {
+    /// The first line names the columns, decides the separator and the number of cells.
+    Named,
+    /// The first line is whatever it is; the second decides the separator and every row has `cells` cells.
+    Fixed {
+        /// Cells of a row.
+        cells: usize,
+    },
+    /// As `Fixed`, with tabs and nothing else between the cells.
+    Tabs {
+        /// Cells of a row.
+        cells: usize,
+    },
+}
+
+/// Splits `text` into records. Rows with a wrong number of cells or an open quotation mark go to `problems` instead.
+pub(super) fn split(text: &str, shape: Shape, problems: &mut Vec<TableProblem>) -> Table {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let separator = match shape {
+        Shape::Named => separator(content_lines(text).next()),
+        Shape::Fixed { .. } => separator(content_lines(text).nth(1)),
+        Shape::Tabs { .. } => b'\t',
+    };
+    let mut table = Table { header: None, records: Vec::new(), decimal_comma: separator != b',' };
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .from_reader(text.as_bytes());
+    let mut raw = csv::StringRecord::new();
+    let mut lines = LineCounter { text: text.as_bytes(), offset: 0, line: 1 };
+    let mut width = match shape {
+        Shape::Named => None,
+        Shape::Fixed { cells } | Shape::Tabs { cells } => Some(cells),
+    };
+    loop {
+        let from = usize::try_from(reader.position().byte()).unwrap_or(usize::MAX);
+        match reader.read_record(&mut raw) {
+            Ok(true) => {}
+            Ok(false) => break,
+            Err(reason) => {
+                problems.push(Defect::Unreadable { reason: reason.to_string() }.at(lines.line));
+                break;
+            }
+        }
+        let line = lines.record_at(from);
+        if lines.is_indented_comment() || raw.iter().all(|cell| cell.trim().is_empty()) {
+            continue;
+        }
+        if raw.iter().any(|cell| cell.contains(['\n', '\r'])) {
+            let end = usize::try_from(reader.position().byte()).unwrap_or(usize::MAX);
+            let last_line = lines.line_before(end);
+            problems.push(Defect::OpenQuote { last_line }.at(line));
+            continue;
+        }
+        let mut cells: Vec<String> = raw.iter().map(|cell| printable(cell.trim())).collect();
+        let Some(expected) = width.filter(|_| table.header.is_some()) else {
+            while cells.last().is_some_and(String::is_empty) {
+                cells.pop();
+            }
+            width = width.or(Some(cells.len()));
+            table.header = Some(Record { line, cells });
+            continue;
+        };
+        // Separators that a spreadsheet adds at the end of a line.
+        while cells.len() > expected && cells.last().is_some_and(String::is_empty) {
+            cells.pop();
+        }
+        if cells.len() == expected {
+            table.records.push(Record { line, cells: mem::take(&mut cells) });
+        } else {
+            let comma = separator == b',';
+            problems.push(Defect::CellCount { found: cells.len(), expected, comma }.at(line));
+        }
+    }
+    table
+}
+
+/// Lines that are neither blank nor comments.
+fn content_lines(text: &str) -> impl Iterator<Item = &str> {
+    text.split(['\n', '\r']).filter(|line| {
+        let start = line.trim_start();
+        !start.is_empty() && !start.starts_with('#')
+    })
+}
+
+/// The separator that a line has most of; the comma for a line without any.
+fn separator(line: Option<&str>) -> u8 {
+    let line = line.unwrap_or_default();
+    let count = |wanted: u8| line.bytes().filter(|&byte| byte == wanted).count();
+    // The last of equal counts wins, so the preferred one stands last.
+    [b',', b';', b'\t'].into_iter().filter(|&byte| count(byte) > 0).max_by_key(|&byte| count(byte)).unwrap_or(b',')
+}
+
+/// Follows the line numbers of records: the ones of the `csv` crate count neither blank lines nor CRLF as wanted here.
+struct LineCounter<'a> {
+    text: &'a [u8],
+    offset: usize,
+    line: usize,
+}
+
+impl LineCounter<'_> {
+    /// Line of the record for which the reader stood at byte `from`, passing over what the reader passes over.
+    fn record_at(&mut self, from: usize) -> usize {
+        while self.offset < from.min(self.text.len()) {
+            self.step();
+        }
+        while let Some(&byte) = self.text.get(self.offset) {
+            match byte {
+                b'\n' | b'\r' => self.step(),
+                b'#' => {
+                    while self.text.get(self.offset).is_some_and(|&byte| byte != b'\n') {
+                        self.step();
+                    }
+                }
+                _ => break,
+            }
+        }
+        self.line
+    }
+
+    /// Last line with text before byte `end`, from the current record on.
+    fn line_before(&self, end: usize) -> usize {
+        let mut ahead = LineCounter { text: self.text, offset: self.offset, line: self.line };
+        let mut last = self.line;
+        while ahead.offset < end.min(self.text.len()) {
+            if ahead.text.get(ahead.offset).is_some_and(|byte| !byte.is_ascii_whitespace()) {
+                last = ahead.line;
+            }
+            ahead.step();
+        }
+        last
+    }
+
+    /// Whether the current record is a comment with blanks before its `#`.
+    fn is_indented_comment(&self) -> bool {
+        let rest = self.text.get(self.offset..).unwrap_or_default();
+        rest.iter().find(|&&byte| byte != b' ') == Some(&b'#')
+    }
+
+    fn step(&mut self) {
+        let next = self.text.get(self.offset + 1);
+        match self.text.get(self.offset) {
+            Some(b'\n') => self.line += 1,
+            Some(b'\r') if next != Some(&b'\n') => self.line += 1,
+            _ => {}
+        }
+        self.offset += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(text: &str) -> (Vec<usize>, Vec<String>) {
+        let mut problems = Vec::new();
+        let table = split(text, Shape::Named, &mut problems);
+        let header = table.header.iter().map(|record| record.line);
+        (
+            header.chain(table.records.iter().map(|record| record.line)).collect(),
+            problems.iter().map(ToString::to_string).collect(),
+        )
+    }
+
+    #[test]
+    fn line_numbers_survive_comments_blank_lines_and_line_endings() {
+        for ending in ["\n", "\r\n", "\r"] {
+            let text =
+                ["\u{feff}# from the cell", "", "a,b", "1,2", "", "# x, y", "  # indented", "3,4", ",", "5,6", ""]
+                    .join(ending);
+            let expected = if ending == "\r" {
+                // A comment ends at a line feed; a file of lone carriage returns is one comment.
+                vec![]
+            } else {
+                vec![3, 4, 8, 10]
+            };
+            assert_eq!(lines(&text), (expected, vec![]), "{ending:?}");
+        }
+        assert_eq!(lines("a,b\r1,2\r\r3,4"), (vec![1, 2, 4], vec![]));
+    }
+
+    #[test]
+    fn an_open_quotation_mark_is_reported_with_the_lines_it_swallows() {
+        let (read, problems) = lines("a,b\n1,2\n\"x,2\n3,4\n5,6\n");
+        assert_eq!(read, [1, 2]);
+        assert_eq!(problems.len(), 1);
+        assert!(problems[0].starts_with("line 3: a quotation mark"), "{problems:?}");
+        assert!(problems[0].contains("line 5"), "{problems:?}");
+    }
+
+    #[test]
+    fn quoted_cells_keep_separators_and_lose_control_characters() {
+        let mut problems = Vec::new();
+        let table = split("a;b\n\"x;1\";\u{1b}[31m\n", Shape::Named, &mut problems);
+        assert!(problems.is_empty() && table.decimal_comma);
+        assert_eq!(table.records[0].cells, ["x;1", "\u{fffd}[31m"]);
+    }
+}

@@ -1,0 +1,438 @@
+//! What can be wrong with a table, where, and what to do about it.
+
+use std::fmt;
+
+use thiserror::Error;
+
+/// Problems shown in a message; the others are counted.
+const SHOWN_PROBLEMS: usize = 20;
+
+/// Characters of a cell or name shown in a message.
+const SHOWN_CHARACTERS: usize = 60;
+
+/// A defect of a table. The text says what is wrong and what to do; the place is in [`TableProblem`].
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum Defect {
+    /// Text in UTF-16, as spreadsheets write "Unicode text".
+    #[error("the file is UTF-16 text; save it as 'CSV UTF-8'")]
+    Utf16,
+    /// A byte that is not UTF-8.
+    #[error("byte 0x{byte:02X} is not UTF-8 text; save the file as 'CSV UTF-8'")]
+    NotUtf8 {
+        /// First offending byte of the line.
+        byte: u8,
+    },
+    /// The splitter gave up.
+    #[error("the line cannot be split into cells: {reason}")]
+    Unreadable {
+        /// Why.
+        reason: String,
+    },
+    /// A cell in quotation marks that goes on over the end of its line.
+    #[error(
+        "a quotation mark opens a cell that goes on to line {last_line}, so none of these lines can be read; \
+         close it on its own line"
+    )]
+    OpenQuote {
+        /// Last line of the cell.
+        last_line: usize,
+    },
+    /// The first line holds numbers, not names.
+    #[error(
+        "this line has numbers where the column names should be; write the names with their units above it{}",
+        if *cells == 12 { ", or read a table of RoboDK with the layout 'robodk'" } else { "" }
+    )]
+    NoHeader {
+        /// Cells of the line.
+        cells: usize,
+    },
+    /// Two columns with the same name.
+    #[error("columns {first} and {second} have this name; rename or remove one")]
+    DuplicateColumn {
+        /// 1-based place of the first.
+        first: usize,
+        /// 1-based place of the second.
+        second: usize,
+    },
+    /// Two columns give the same quantity in two units.
+    #[error("the table gives this already as column '{other}'; rename or remove one")]
+    SameQuantity {
+        /// Name of the earlier column.
+        other: String,
+    },
+    /// Not one column per joint of the robot.
+    #[error(
+        "the robot has {joints} {}, but the table has {}; it needs {}, and the profile must be that of the measured robot",
+        if *joints == 1 { "joint" } else { "joints" },
+        joint_columns(prefix, found),
+        if *joints == 1 { format!("{prefix}q1") } else { format!("{prefix}q1 … {prefix}q{joints}") }
+    )]
+    JointColumns {
+        /// `from_`, `to_` or nothing.
+        prefix: String,
+        /// Joints of the robot.
+        joints: usize,
+        /// Names of the joint columns of the table.
+        found: Vec<String>,
+    },
+    /// Columns that the table needs.
+    #[error("{} missing; add {}", named(columns, "is", "are"), if columns.len() == 1 { "it" } else { "them" })]
+    MissingColumns {
+        /// Their names in the usual units.
+        columns: Vec<String>,
+    },
+    /// Columns whose name does not end with a unit.
+    #[error(
+        "{} no unit, and trupose does not guess it; end the name with it, as in '{}'",
+        named(columns, "has", "have"),
+        excerpt(example)
+    )]
+    MissingUnits {
+        /// Their names.
+        columns: Vec<String>,
+        /// The first of them with its usual unit.
+        example: String,
+    },
+    /// A name that ends with something that is not a unit of its quantity.
+    #[error(
+        "'{unit}' is not a unit for this column; write {}, or another name if it is something else",
+        any_of(allowed)
+    )]
+    UnknownUnit {
+        /// What the name ends with.
+        unit: String,
+        /// Units of the quantity.
+        allowed: Vec<&'static str>,
+    },
+    /// Neither of the two tables of direct distances.
+    #[error(
+        "the columns are neither those of a socket table (position, socket, joints) nor those of a table of lengths \
+         (from_ joints, to_ joints, length){}",
+        if *has_points { "; a table with x, y and z is read as measurements" } else { "" }
+    )]
+    NotConstraints {
+        /// The table has tracker coordinates.
+        has_points: bool,
+    },
+    /// Nothing to read.
+    #[error("the table has no rows; it needs column names and below them one row per reading")]
+    NoRows,
+    /// A row with too few or too many cells.
+    #[error(
+        "the row has {found} {} instead of {expected}; {}",
+        if *found == 1 { "cell" } else { "cells" },
+        if *comma && found > expected {
+            "decimal commas need ';' or a tab between the columns"
+        } else {
+            "check the separators, and that the line is complete"
+        }
+    )]
+    CellCount {
+        /// Cells of the row.
+        found: usize,
+        /// Cells that a row of the table has.
+        expected: usize,
+        /// The cells are separated by commas.
+        comma: bool,
+    },
+    /// A cell that needs a value.
+    #[error("the cell is empty; write its value, or leave the row out with a '#' before it")]
+    Empty,
+    /// Text where a number is needed.
+    #[error("'{}' is not a number; write one such as '-12.5'", excerpt(text))]
+    NotANumber {
+        /// Text of the cell.
+        text: String,
+    },
+    /// NaN, an infinity, or a number too large.
+    #[error("'{}' is not a finite number; write its value, or leave the row out with a '#' before it", excerpt(text))]
+    NotFinite {
+        /// Text of the cell.
+        text: String,
+    },
+    /// Decimal comma and decimal point in one file.
+    #[error(
+        "'{}' and line {other_line} do not agree on the decimal sign, so '1,234' could be a thousand; \
+         use the same sign in the whole file and no thousands separators",
+        excerpt(text)
+    )]
+    MixedDecimals {
+        /// Text of the cell.
+        text: String,
+        /// First line with the other sign.
+        other_line: usize,
+    },
+    /// A standard deviation that is zero or negative.
+    #[error(
+        "'{}' is not a standard deviation; write a positive number, or leave the cell empty if it is unknown",
+        excerpt(text)
+    )]
+    NotPositive {
+        /// Text of the cell.
+        text: String,
+    },
+    /// A negative length.
+    #[error("'{}' is not a length; write the measured distance, which is never negative", excerpt(text))]
+    NegativeLength {
+        /// Text of the cell.
+        text: String,
+    },
+    /// The tracker's own origin.
+    #[error(
+        "the point is 0, 0, 0: the tracker had no target; measure again, or leave the row out with a '#' before it"
+    )]
+    ZeroPoint,
+    /// One pose number, two configurations.
+    #[error(
+        "pose '{}'{} stands on line {first_line} with another configuration: joint {joint} was {first} {unit} there and is \
+         {here} {unit} here; correct the joint values, or give one of the two another pose",
+        excerpt(pose),
+        of_target(target.as_deref())
+    )]
+    OtherConfiguration {
+        /// Text of the pose.
+        pose: String,
+        /// Text of the target.
+        target: Option<String>,
+        /// Line of the first row of this pose and target.
+        first_line: usize,
+        /// 1-based joint that differs most.
+        joint: usize,
+        /// Its value on the first line, at the edge.
+        first: f64,
+        /// Its value on this line, at the edge.
+        here: f64,
+        /// `deg` or `mm`.
+        unit: &'static str,
+    },
+    /// Warning: a row that stands twice.
+    #[error("the row repeats line {first_line}, joint values and point alike; it is left out as a copy")]
+    Repeats {
+        /// Line of the first of the two.
+        first_line: usize,
+    },
+    /// Warning: a configuration that stands twice for the same point.
+    #[error("the joint values are those of line {first_line}; a second row with them tells nothing new")]
+    RepeatsConfiguration {
+        /// Line of the first of the two.
+        first_line: usize,
+    },
+    /// Warning: a length that stands twice.
+    #[error("the row repeats line {first_line}, joint values and length alike; remove it if it is a copy")]
+    RepeatsLength {
+        /// Line of the first of the two.
+        first_line: usize,
+    },
+    /// Warning: a point that was measured before, to the last digit, with the robot or the target elsewhere.
+    #[error(
+        "the point is that of line {first_line} to the last digit, but {} another; the instrument may have \
+         repeated an old reading: measure one of the two again",
+        if *other_target { "the target is" } else { "the configuration is" }
+    )]
+    StalePoint {
+        /// Line of the first of the two.
+        first_line: usize,
+        /// The target differs, not the configuration.
+        other_target: bool,
+    },
+    /// Warning: the line of names of an imported layout holds numbers.
+    #[error(
+        "the layout takes this line for column names, but it holds numbers; put a line of names above it if it is a reading"
+    )]
+    NumbersIgnored,
+    /// A row with too few or too many cells for an imported layout.
+    #[error("the row has {found} {} instead of {expected}; the layout is {separator}: {columns}", if *found == 1 { "cell" } else { "cells" })]
+    LayoutCells {
+        /// Cells of the row.
+        found: usize,
+        /// Cells of a row in the layout.
+        expected: usize,
+        /// How cells are separated, in words.
+        separator: &'static str,
+        /// Meaning of the cells, in order.
+        columns: String,
+    },
+    /// A layout for another robot.
+    #[error(
+        "a table of RoboDK has six turning joints, and this robot has {joints} {}; write a table with named columns instead",
+        if *joints == 6 { "joints that do not all turn" } else if *joints == 1 { "joint" } else { "joints" }
+    )]
+    LayoutJoints {
+        /// Joints of the robot.
+        joints: usize,
+    },
+    /// A length between a configuration and itself.
+    #[error("both ends are the same configuration, but the length is '{}'; correct the joint values", excerpt(text))]
+    SameEnds {
+        /// Text of the length.
+        text: String,
+    },
+    /// Warning: a socket that was reached once only.
+    #[error(
+        "this is the only row of position '{}', socket '{}', so it constrains nothing; seat the ball there again in \
+         another configuration",
+        excerpt(position),
+        excerpt(socket)
+    )]
+    LoneRow {
+        /// Place of the plate.
+        position: String,
+        /// Socket of the plate.
+        socket: String,
+    },
+}
+
+impl Defect {
+    /// A defect of the whole table.
+    pub(in crate::session) fn of_table(self) -> TableProblem {
+        TableProblem { line: None, column: None, defect: self }
+    }
+
+    /// A defect of a line, 1-based.
+    pub(in crate::session) fn at(self, line: usize) -> TableProblem {
+        TableProblem { line: Some(line), column: None, defect: self }
+    }
+
+    /// A defect of a cell.
+    pub(in crate::session) fn at_cell(self, line: usize, column: &str) -> TableProblem {
+        TableProblem { line: Some(line), column: Some(column.to_owned()), defect: self }
+    }
+
+    /// Whether the line of column names is at fault, so that it helps to show how it should read.
+    const fn is_of_header(&self) -> bool {
+        matches!(
+            self,
+            Self::NoHeader { .. }
+                | Self::DuplicateColumn { .. }
+                | Self::SameQuantity { .. }
+                | Self::JointColumns { .. }
+                | Self::MissingColumns { .. }
+                | Self::MissingUnits { .. }
+                | Self::UnknownUnit { .. }
+                | Self::NotConstraints { .. }
+                | Self::NoRows
+        )
+    }
+}
+
+/// A defect or warning with its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableProblem {
+    /// 1-based line in the file; `None` when the whole file is meant.
+    pub line: Option<usize>,
+    /// Name of the column as written in the file.
+    pub column: Option<String>,
+    /// What is wrong and what to do.
+    pub defect: Defect,
+}
+
+impl fmt::Display for TableProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.line, self.column.as_deref()) {
+            (Some(line), Some(column)) => write!(f, "line {line}, column '{}': ", excerpt(column))?,
+            (Some(line), None) => write!(f, "line {line}: ")?,
+            (None, Some(column)) => write!(f, "column '{}': ", excerpt(column))?,
+            (None, None) => {}
+        }
+        self.defect.fmt(f)
+    }
+}
+
+/// Everything that is wrong with one table, in the order of its lines. Never empty.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableErrors {
+    /// Name of the file, as given by the caller.
+    pub file: String,
+    /// The defects; more than are shown in the text.
+    pub problems: Vec<TableProblem>,
+    /// How the line of column names should read for this robot; one entry per kind of table.
+    pub headers: Vec<String>,
+}
+
+impl TableErrors {
+    /// The problems of `file` in the order of its lines.
+    pub(in crate::session) fn new(file: &str, mut problems: Vec<TableProblem>, headers: Vec<String>) -> Self {
+        problems.sort_by_key(|problem| problem.line);
+        Self { file: printable(file), problems, headers }
+    }
+}
+
+impl fmt::Display for TableErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.problems.len();
+        write!(f, "'{}' has {count} {}", self.file, if count == 1 { "problem" } else { "problems" })?;
+        for problem in self.problems.iter().take(SHOWN_PROBLEMS) {
+            write!(f, "\n  {problem}")?;
+        }
+        if count > SHOWN_PROBLEMS {
+            write!(f, "\n  and {} more", count - SHOWN_PROBLEMS)?;
+        }
+        if self.problems.iter().any(|problem| problem.defect.is_of_header()) {
+            for (index, header) in self.headers.iter().enumerate() {
+                let lead = if index == 0 { "hint: for this robot the column names read" } else { "  or" };
+                write!(f, "\n{lead} '{header}'")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for TableErrors {}
+
+/// `text` with replacement characters for control characters and for the invisible ones that reorder a line.
+pub(in crate::session) fn printable(text: &str) -> String {
+    let is_harmful = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+    };
+    text.chars().map(|c| if is_harmful(c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
+}
+
+/// The beginning of a text, for a message.
+fn excerpt(text: &str) -> String {
+    let mut shown: String = text.chars().take(SHOWN_CHARACTERS).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
+    }
+    printable(&shown)
+}
+
+/// `a, b and c`.
+fn list(names: &[String]) -> String {
+    let shown: Vec<String> = names.iter().map(|name| excerpt(name)).collect();
+    match shown.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => shown.concat(),
+    }
+}
+
+/// `column a is`, `columns a and b are`.
+fn named(columns: &[String], one: &str, several: &str) -> String {
+    if columns.len() == 1 {
+        format!("column {} {one}", list(columns))
+    } else {
+        format!("columns {} {several}", list(columns))
+    }
+}
+
+fn joint_columns(prefix: &str, found: &[String]) -> String {
+    match found.len() {
+        0 => format!("no joint columns ({prefix}q1 …)"),
+        1 => format!("one joint column ({})", list(found)),
+        count => format!("{count} joint columns ({})", list(found)),
+    }
+}
+
+/// `'mm', 'm' or 'in'`.
+fn any_of(allowed: &[&str]) -> String {
+    let quoted: Vec<String> = allowed.iter().map(|unit| format!("'{unit}'")).collect();
+    match quoted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => quoted.concat(),
+    }
+}
+
+fn of_target(target: Option<&str>) -> String {
+    target.map_or_else(String::new, |target| format!(" (target '{}')", excerpt(target)))
+}
