@@ -4,7 +4,9 @@
 mod support;
 
 use divan::{Bencher, black_box};
-use support::{PaperCase, paper_chain, paper_deviations, paper_parameters, paper_target, random_configurations, seeded};
+use support::{
+    PaperCase, paper_chain, paper_deviations, paper_parameters, paper_target, random_configurations, seeded,
+};
 use trupose::identification::{Identification, Observability, Settings, SigmaSource, Weighting, identify};
 use trupose::kinematics::{ForwardKinematics, IdentificationJacobian};
 use trupose::units::MICROMETRE;

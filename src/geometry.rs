@@ -2,7 +2,9 @@
 //!
 //! Points in metres. `to_from_from` maps coordinates of the first set into the frame of the second.
 
-use nalgebra::{Isometry3, Matrix3, Matrix4, Point3, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix4, Point3, Quaternion, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
+};
 
 /// The rigid motion that brings one point set onto another with the least weighted square error.
 #[derive(Clone, Copy, Debug, PartialEq)]

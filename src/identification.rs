@@ -3,7 +3,7 @@
 //! Method: "A distance error based industrial robot kinematic calibration method", Industrial Robot 41/5 (2014) 439–446. Only
 //! distances enter, so the instrument is never registered to the robot base. What the paper leaves open is settled as follows:
 //!
-//! - **Scaling.** Every parameter is measured in units of its expected deviation ([`FreeParameter::expected`]).
+//! - **Scaling.** Every parameter is measured in units of its expected deviation ([`crate::kinematics::FreeParameter::expected`]).
 //! - **Identifiability.** The rank comes from a clear gap in the singular values; blind directions are named ([`Observability`]).
 //! - **Prior.** A zero-mean prior with the expected deviations ([`Prior::Expected`]), or the minimum-norm solution of the paper.
 //! - **Weighting.** M points give M(M−1)/2 distances but only 3M − 6 independent values. Weighted with their true covariance the
@@ -31,7 +31,7 @@ use thiserror::Error;
 
 pub use linearise::ArmModel;
 pub use observability::{BlindGroup, Observability};
-pub use problem::{FreeParameter, Length, LengthEnd, Observations, PointSample, Problem, SharedPoint, TargetAt};
+pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint, TargetAt};
 
 use crate::geometry::{principal_spread, register};
 use crate::kinematics::ParameterId;
@@ -284,13 +284,17 @@ pub enum IdentificationError {
         value: f64,
     },
     /// Nothing that a distance could be made of.
-    #[error("there is nothing to identify from: at least three measured points, a shared point seen twice, or a length are needed")]
+    #[error(
+        "there is nothing to identify from: at least three measured points, a shared point seen twice, or a length are needed"
+    )]
     NoData,
     /// No parameter is free.
     #[error("no parameter is free to be identified")]
     NoParameters,
     /// The minimum-norm solution needs a rank, and there is no clear gap.
-    #[error("the rank is not clear (largest gap in the singular values {gap:.1}); without a prior the solution would be a guess")]
+    #[error(
+        "the rank is not clear (largest gap in the singular values {gap:.1}); without a prior the solution would be a guess"
+    )]
     RankUnclear {
         /// The largest ratio of neighbouring singular values that could have been the gap.
         gap: f64,
@@ -352,8 +356,7 @@ pub fn identify(
     if settings.estimator == Estimator::Robust {
         let floor = fit.weights.sigma.min(settings.sigma.map_or(f64::INFINITY, |(sigma, _)| sigma)).max(SMALLEST_SIGMA);
         let floor = if settings.sigma.is_some() { floor } else { SMALLEST_SIGMA };
-        let solve =
-            Solve { problem, weighting: settings.weighting, basis: &basis, weights: &fit.weights };
+        let solve = Solve { problem, weighting: settings.weighting, basis: &basis, weights: &fit.weights };
         let trust = robust::find_outliers(&solve, &at.0, floor, settings.iterations, &mut fit.iterations);
         if trust != fit.weights.trust {
             fit.weights.trust = trust;
@@ -402,7 +405,8 @@ impl Fit<'_, '_> {
             let estimated = self.settings.sigma.is_none().then(|| residual_sigma(&solve, &at)).flatten();
             let Some(sigma) = estimated.map(|sigma| sigma.max(SMALLEST_SIGMA)) else { return (at, termination) };
             // Without a prior σ only scales the cost: the solution is the same.
-            let settled = (sigma / self.weights.sigma - 1.0).abs() < SIGMA_TOLERANCE || self.settings.prior == Prior::None;
+            let settled =
+                (sigma / self.weights.sigma - 1.0).abs() < SIGMA_TOLERANCE || self.settings.prior == Prior::None;
             self.weights.sigma = sigma;
             if settled || stop {
                 return (solve_with(self, at.z), termination);
@@ -414,7 +418,8 @@ impl Fit<'_, '_> {
 
 /// Linearises once more with the final weights.
 fn solve_with(fit: &Fit<'_, '_>, z: DVector<f64>) -> Linearised {
-    Solve { problem: fit.problem, weighting: fit.settings.weighting, basis: fit.basis, weights: &fit.weights }.linearise(z)
+    Solve { problem: fit.problem, weighting: fit.settings.weighting, basis: fit.basis, weights: &fit.weights }
+        .linearise(z)
 }
 
 /// σ of a coordinate from the residuals [m]: square sum over independent values less the parameters that the data (not the

@@ -18,7 +18,7 @@ use thiserror::Error;
 pub use chain::{Convention, Joint, JointType, KinematicChain, Link};
 pub use forward::ForwardKinematics;
 pub use jacobian::{ConfigurationJacobian, IdentificationJacobian};
-pub use parameters::{Axis, LinkParameter, ParameterId};
+pub use parameters::{Axis, FreeParameter, LinkParameter, ParameterId};
 
 /// Misuse of a chain: a geometry that cannot be built.
 #[derive(Clone, Debug, Error, PartialEq)]

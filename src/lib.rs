@@ -3,5 +3,6 @@
 pub mod geometry;
 pub mod identification;
 pub mod kinematics;
+pub mod profile;
 pub mod session;
 pub mod units;

@@ -2,7 +2,7 @@
 
 mod support;
 
-use support::{PaperCase, normal, paper_deviations, random_configurations, measure, seeded};
+use support::{PaperCase, measure, normal, paper_deviations, random_configurations, seeded};
 use trupose::identification::verification::ModelErrors;
 use trupose::identification::{
     ArmModel, Estimator, Identification, Prior, Settings, SigmaSource, TerminationReason, Weighting, identify,
@@ -35,8 +35,13 @@ fn table_two_comes_back_entry_by_entry() {
         let (found, truth) = (quantity.to_edge(estimate.deviation), quantity.to_edge(*truth));
         println!("{} {found:.5} {truth:.5}", estimate.id);
     }
-    for g in &found.observability.groups { println!("{}", g.description); }
-    println!("{:?} {:?} gap {:e}", found.observability.condition_number, found.observability.condition_number_raw, found.observability.gap);
+    for g in &found.observability.groups {
+        println!("{}", g.description);
+    }
+    println!(
+        "{:?} {:?} gap {:e}",
+        found.observability.condition_number, found.observability.condition_number_raw, found.observability.gap
+    );
 }
 
 #[test]
@@ -46,7 +51,8 @@ fn one_step_and_iterated() {
         let case = PaperCase::simulated(&paper_deviations(), 56, 10.0 * MICROMETRE, &mut rng);
         let one = run(&case, &paper_settings(1));
         let all = run(&case, &paper_settings(100));
-        let def = run(&case, &Settings { sigma: Some((10.0 * MICROMETRE, SigmaSource::Instrument)), ..Settings::default() });
+        let def =
+            run(&case, &Settings { sigma: Some((10.0 * MICROMETRE, SigmaSource::Instrument)), ..Settings::default() });
         let est = run(&case, &Settings::default());
         let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
         let fresh = measure(&truth, &random_configurations(500, &mut rng), 0.0, &mut rng);
@@ -55,7 +61,20 @@ fn one_step_and_iterated() {
             let v = ModelErrors::new(&f.model, &f.base_from_station, &fresh).unwrap();
             (to_mm(e.distance.unwrap().mean), to_mm(v.position.rms))
         };
-        println!("raw {:.0} k {:.1} one {:.4?} it {:.4?} ({}) def {:.4?} ({}) est {:.4?} ({}) sigma {:.2e} {}", all.observability.condition_number_raw.unwrap(), all.observability.condition_number.unwrap(), dist(&one), dist(&all), all.iterations.len(), dist(&def), def.iterations.len(), dist(&est), est.iterations.len(), est.sigma.used, est.rejected.len());
+        println!(
+            "raw {:.0} k {:.1} one {:.4?} it {:.4?} ({}) def {:.4?} ({}) est {:.4?} ({}) sigma {:.2e} {}",
+            all.observability.condition_number_raw.unwrap(),
+            all.observability.condition_number.unwrap(),
+            dist(&one),
+            dist(&all),
+            all.iterations.len(),
+            dist(&def),
+            def.iterations.len(),
+            dist(&est),
+            est.iterations.len(),
+            est.sigma.used,
+            est.rejected.len()
+        );
         normal(&mut rng);
     }
 }

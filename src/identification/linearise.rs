@@ -141,9 +141,8 @@ pub(crate) fn point_residuals(problem: &Problem<'_>, points: &[Point3<f64>], wei
     let mut centroids = vec![Point3::origin(); stations];
     for station in 0..stations {
         let members = samples.iter().enumerate().filter(|(_, sample)| sample.station == station);
-        let pairs = members
-            .clone()
-            .map(|(index, sample)| (weights.of_place(problem, index), points[index], sample.point));
+        let pairs =
+            members.clone().map(|(index, sample)| (weights.of_place(problem, index), points[index], sample.point));
         let Some(registration) = register(pairs) else { continue };
         centroids[station] = registration.centroid_from;
         let base_from = registration.to_from_from.inverse();

@@ -132,7 +132,11 @@ fn rank_by_gap(values: &[f64]) -> (Option<usize>, f64) {
 }
 
 /// Gram matrix of the unweighted pair rows of (at most [`SCORED_POINTS`]) points, and how many were used.
-fn scored_pair_gram(problem: &Problem<'_>, evaluation: &Evaluation, weights: &Weights) -> (Option<DMatrix<f64>>, usize) {
+fn scored_pair_gram(
+    problem: &Problem<'_>,
+    evaluation: &Evaluation,
+    weights: &Weights,
+) -> (Option<DMatrix<f64>>, usize) {
     let n = evaluation.n;
     let samples = &problem.observations.points;
     let trusted: Vec<usize> = (0..samples.len()).filter(|&index| weights.trust[index] > 0.0).collect();
@@ -250,7 +254,8 @@ fn one_direction(parameters: &[ParameterId], names: &[String], listed: &str, fac
             return format!("{listed}: only their difference");
         }
     }
-    let largest = factors.iter().fold(0.0_f64, |largest, value| if value.abs() > largest.abs() { *value } else { largest });
+    let largest =
+        factors.iter().fold(0.0_f64, |largest, value| if value.abs() > largest.abs() { *value } else { largest });
     let terms: Vec<String> = factors
         .iter()
         .zip(names)

@@ -3,16 +3,7 @@
 use nalgebra::Point3;
 
 use super::IdentificationError;
-use crate::kinematics::{KinematicChain, ParameterId};
-
-/// A parameter to identify, with the deviation one expects of it: the scale of the problem and the width of the prior.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FreeParameter {
-    /// Which parameter.
-    pub id: ParameterId,
-    /// Expected deviation from nominal, one standard deviation [m] or [rad]; positive.
-    pub expected: f64,
-}
+use crate::kinematics::{FreeParameter, KinematicChain, ParameterId};
 
 /// A configuration and the target that was observed there.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +84,11 @@ impl Observations {
             LengthEnd::Target(at) => Some(at),
             LengthEnd::SharedPoint(_) => None,
         });
-        self.points.iter().map(|sample| &sample.at).chain(self.shared.iter().flat_map(|shared| &shared.at)).chain(lengths)
+        self.points
+            .iter()
+            .map(|sample| &sample.at)
+            .chain(self.shared.iter().flat_map(|shared| &shared.at))
+            .chain(lengths)
     }
 }
 

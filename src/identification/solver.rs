@@ -6,8 +6,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::linearise::{ArmModel, Evaluation, NormalEquations, PointResiduals, Weights, point_residuals, project};
 use super::linearise::length_rows;
+use super::linearise::{ArmModel, Evaluation, NormalEquations, PointResiduals, Weights, point_residuals, project};
 use super::observability::{Observability, raw_unit};
 use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
@@ -32,7 +32,11 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    pub(crate) fn new(problem: &Problem<'_>, prior: Prior, observability: &Observability) -> Result<Self, IdentificationError> {
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        prior: Prior,
+        observability: &Observability,
+    ) -> Result<Self, IdentificationError> {
         let n = problem.parameters.len();
         match prior {
             Prior::Expected => {
@@ -52,9 +56,7 @@ impl Basis {
                 let visible = SymmetricEigen::new(DMatrix::identity(n, n) - &blind * blind.transpose());
                 let columns: Vec<DVector<f64>> = (0..n)
                     .filter(|&index| visible.eigenvalues[index] > 0.5)
-                    .map(|index| {
-                        DVector::from_fn(n, |i, _| visible.eigenvectors[(i, index)] * unit(i))
-                    })
+                    .map(|index| DVector::from_fn(n, |i, _| visible.eigenvectors[(i, index)] * unit(i)))
                     .collect();
                 let transform = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
                 Ok(Self { transform, prior_weight: 0.0 })

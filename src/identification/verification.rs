@@ -6,8 +6,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::linearise::{ArmModel, Weights, point_residuals};
-use super::problem::{FreeParameter, Observations, PointSample, Problem};
+use super::problem::{Observations, PointSample, Problem};
 use super::{Estimator, IdentificationError, Prior, Settings, Weighting, identify};
+use crate::kinematics::FreeParameter;
 use crate::units::MILLIMETRE;
 
 /// Above this many points the distances are taken between evenly picked ones: 2000 points have two million pairs.
@@ -119,9 +120,11 @@ pub fn fit_setup(
     samples: &[PointSample],
     trusted: impl Fn(usize) -> bool,
 ) -> Result<FittedSetup, IdentificationError> {
-    let points: Vec<PointSample> = samples.iter().enumerate().filter(|(index, _)| trusted(*index)).map(|(_, s)| s.clone()).collect();
+    let points: Vec<PointSample> =
+        samples.iter().enumerate().filter(|(index, _)| trusted(*index)).map(|(_, s)| s.clone()).collect();
     let observations = Observations { points, ..Observations::default() };
-    let problem = Problem { chain: &model.chain, targets: &model.targets, parameters: free, observations: &observations };
+    let problem =
+        Problem { chain: &model.chain, targets: &model.targets, parameters: free, observations: &observations };
     if free.is_empty() {
         problem.check()?;
         let predicted = model.points_in_base(observations.places());

@@ -124,6 +124,15 @@ impl ParameterId {
     }
 }
 
+/// A parameter to identify, with the deviation one expects of it: the scale of the problem and the width of the prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeParameter {
+    /// Which parameter.
+    pub id: ParameterId,
+    /// Expected deviation from nominal, one standard deviation [m] or [rad]; positive.
+    pub expected: f64,
+}
+
 /// `alpha1`, `d2`, `beta2`, `target1.x`.
 impl fmt::Display for ParameterId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -160,9 +169,8 @@ impl KinematicChain {
         let mut chain = self.clone();
         for (id, deviation) in deviations {
             let ParameterId::Link { joint, parameter } = id else { continue };
-            let link = chain
-                .link_mut(joint)
-                .ok_or_else(|| KinematicsError::UnknownParameter { parameter: id.to_string() })?;
+            let link =
+                chain.link_mut(joint).ok_or_else(|| KinematicsError::UnknownParameter { parameter: id.to_string() })?;
             let constant = match parameter {
                 LinkParameter::Alpha => &mut link.alpha,
                 LinkParameter::A => &mut link.a,
@@ -190,8 +198,7 @@ impl KinematicChain {
                 };
                 // z of the second frame seen from the first: Rot(x,α) Rot(y,β) z, whose third entry is cos α cos β.
                 let cosine = link.alpha.cos() * link.beta.cos();
-                let both_turn =
-                    first.joint_type == JointType::Revolute && second.joint_type == JointType::Revolute;
+                let both_turn = first.joint_type == JointType::Revolute && second.joint_type == JointType::Revolute;
                 both_turn && cosine.abs() > tolerance.cos()
             })
             .collect()

@@ -6,8 +6,10 @@ use nalgebra::{DVector, Isometry3, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use trupose::identification::{ArmModel, FreeParameter, Observations, PointSample, Problem, TargetAt};
-use trupose::kinematics::{Convention, Joint, JointType, KinematicChain, Link, LinkParameter, ParameterId};
+use trupose::identification::{ArmModel, Observations, PointSample, Problem, TargetAt};
+use trupose::kinematics::{
+    Convention, FreeParameter, Joint, JointType, KinematicChain, Link, LinkParameter, ParameterId,
+};
 use trupose::units::{MILLIMETRE, from_deg, from_mm};
 
 /// Table I: (α [deg], a [mm], d [mm], θ [deg]) per joint.
@@ -50,13 +52,7 @@ pub(crate) fn paper_chain() -> KinematicChain {
         .map(|(index, [alpha, a, d, theta])| Joint {
             name: format!("J{}", index + 1),
             joint_type: JointType::Revolute,
-            link: Link {
-                alpha: from_deg(*alpha),
-                a: from_mm(*a),
-                d: from_mm(*d),
-                theta: from_deg(*theta),
-                beta: 0.0,
-            },
+            link: Link { alpha: from_deg(*alpha), a: from_mm(*a), d: from_mm(*d), theta: from_deg(*theta), beta: 0.0 },
             direction: 1.0,
             coupling: Vec::new(),
         })
@@ -103,9 +99,7 @@ pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
 
 /// Uniformly random configurations in the reference ranges [rad].
 pub(crate) fn random_configurations(count: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
-    (0..count)
-        .map(|_| RANGES.iter().map(|(low, high)| from_deg(rng.random_range(*low..*high))).collect())
-        .collect()
+    (0..count).map(|_| RANGES.iter().map(|(low, high)| from_deg(rng.random_range(*low..*high))).collect()).collect()
 }
 
 /// A tracker somewhere in front of the robot.
@@ -114,7 +108,12 @@ pub(crate) fn station_from_base() -> Isometry3<f64> {
 }
 
 /// Measures `truth` at configurations with `noise` [m] per coordinate.
-pub(crate) fn measure(truth: &ArmModel, configurations: &[Vec<f64>], noise: f64, rng: &mut ChaCha8Rng) -> Vec<PointSample> {
+pub(crate) fn measure(
+    truth: &ArmModel,
+    configurations: &[Vec<f64>],
+    noise: f64,
+    rng: &mut ChaCha8Rng,
+) -> Vec<PointSample> {
     configurations
         .iter()
         .map(|configuration| {
