@@ -7,10 +7,10 @@ use crate::kinematics::JointType;
 use crate::session::table::{Defect, TableProblem};
 use crate::units::Quantity;
 
-/// Joint values of one pose may differ by this much, encoder readings at the same pose do [rad]. A swapped row or a
+/// Joint values of one pose may differ by this much, encoder readings at the same pose do (rad). A swapped row or a
 /// mistyped pose differs by far more.
 const SAME_POSE_ANGLE: f64 = 1e-3;
-/// The same for a sliding joint [m].
+/// The same for a sliding joint (m).
 const SAME_POSE_LENGTH: f64 = 1e-3;
 
 /// Reports poses with two configurations in `problems`, copies and stale readings in `warnings`. Returns the places of
