@@ -189,7 +189,7 @@ fn rows() -> impl Strategy<Value = Vec<Row>> {
                 Row {
                     line: index + 2,
                     // Unique, and without blanks at the ends, which reading takes off.
-                    pose: format!("{}{index}", pose.trim_start()),
+                    pose: format!("{}_{index}", pose.trim_start()),
                     target,
                     configuration: vec![q.0, q.1, q.2],
                     point: Point3::new(x, y, z),

@@ -1,7 +1,7 @@
 //! Measurement tables: configurations with the tracker points read at them.
 //!
 //! Inside, a configuration is the pendant joint vector [rad, or m for a sliding joint] and a point is in the tracker
-//! frame [m]. The table's own layout names its columns with units:
+//! frame (m). The table's own layout names its columns with units:
 //!
 //! ```text
 //! pose,target,q1_deg,…,qn_deg,x_mm,y_mm,z_mm,sigma_mm,temperature_degc,note
@@ -56,13 +56,13 @@ pub struct Row {
     pub pose: String,
     /// Name of the SMR, where a table distinguishes several.
     pub target: Option<String>,
-    /// Pendant joint values [rad], sliding joints [m].
+    /// Pendant joint values (rad), sliding joints (m).
     pub configuration: Vec<f64>,
-    /// Centre of the SMR in the tracker frame [m].
+    /// Centre of the SMR in the tracker frame (m).
     pub point: Point3<f64>,
-    /// Standard deviation of the point, per coordinate [m].
+    /// Standard deviation of the point, per coordinate (m).
     pub sigma: Option<f64>,
-    /// Temperature [°C].
+    /// Temperature (°C).
     pub temperature: Option<f64>,
     /// Text of all cells as in the file, parallel to [`Measurements::columns`], for filters.
     pub fields: Vec<String>,

@@ -11,8 +11,6 @@ mod encoding;
 mod number;
 mod problem;
 
-use std::mem;
-
 pub(super) use columns::{Header, Measure, NumberColumn};
 pub(super) use encoding::decode;
 pub(super) use number::Numbers;
@@ -33,7 +31,7 @@ pub(super) struct Record {
 pub(super) struct Table {
     /// The first line that is neither blank nor a comment.
     pub(super) header: Option<Record>,
-    /// The lines after it, each with as many cells as `width` unless reported in the problems.
+    /// The lines after it that have the right number of cells; the others are among the problems.
     pub(super) records: Vec<Record>,
     /// Whether `1,5` can be a number: the comma does not separate cells.
     pub(super) decimal_comma: bool,
@@ -111,7 +109,7 @@ pub(super) fn split(text: &str, shape: Shape, problems: &mut Vec<TableProblem>) 
             cells.pop();
         }
         if cells.len() == expected {
-            table.records.push(Record { line, cells: mem::take(&mut cells) });
+            table.records.push(Record { line, cells });
         } else {
             let comma = separator == b',';
             problems.push(Defect::CellCount { found: cells.len(), expected, comma }.at(line));

@@ -21,13 +21,13 @@ pub struct Lengths {
 pub struct LengthRow {
     /// 1-based line in the file.
     pub line: usize,
-    /// Pendant joint values at one end [rad], sliding joints [m].
+    /// Pendant joint values at one end (rad), sliding joints (m).
     pub from: Vec<f64>,
-    /// Pendant joint values at the other end [rad], sliding joints [m].
+    /// Pendant joint values at the other end (rad), sliding joints (m).
     pub to: Vec<f64>,
-    /// Measured distance between the two target points [m], never negative.
+    /// Measured distance between the two target points (m), never negative.
     pub length: f64,
-    /// Standard deviation of the length [m].
+    /// Standard deviation of the length (m).
     pub sigma: Option<f64>,
     /// Text of all cells as in the file, parallel to [`Lengths::columns`], for filters.
     pub fields: Vec<String>,

@@ -32,7 +32,7 @@ pub struct SharedPointGroup {
 pub struct ConfigurationRow {
     /// 1-based line in the file.
     pub line: usize,
-    /// Pendant joint values [rad], sliding joints [m].
+    /// Pendant joint values (rad), sliding joints (m).
     pub configuration: Vec<f64>,
     /// Text of all cells as in the file, parallel to [`SharedPoints::columns`], for filters.
     pub fields: Vec<String>,

@@ -7,10 +7,10 @@ use crate::kinematics::JointType;
 use crate::session::table::{Defect, TableProblem};
 use crate::units::Quantity;
 
-/// Joint values of one pose may differ by this much, encoder readings at the same pose do [rad]. A swapped row or a
+/// Joint values of one pose may differ by this much, encoder readings at the same pose do (rad). A swapped row or a
 /// mistyped pose differs by far more.
 const SAME_POSE_ANGLE: f64 = 1e-3;
-/// The same for a sliding joint [m].
+/// The same for a sliding joint (m).
 const SAME_POSE_LENGTH: f64 = 1e-3;
 
 /// Reports poses with two configurations in `problems`, copies and stale readings in `warnings`. Returns the places of
@@ -31,21 +31,28 @@ pub(super) fn check(
         problems.extend(other_configuration(first, row, joints));
 
         let point: [u64; 3] = row.point.coords.map(digits).into();
-        let reading: Vec<u64> = point.into_iter().chain(row.configuration.iter().map(|&value| digits(value))).collect();
-        let same_point = points.get(&point).copied();
-        if let Some(first) = readings.get(&(reading.clone(), target)) {
-            duplicates.push(index);
-            warnings.push(Defect::Repeats { first_line: first.line }.at(row.line));
-        } else if let Some(first) = same_point {
-            let other_target = first.target != row.target;
-            if other_target || farthest_joint(first, row, joints).is_some() {
-                warnings.push(Defect::StalePoint { first_line: first.line, other_target }.at(row.line));
-            }
+        let first = *points.entry(point).or_insert(row);
+        if first.line == row.line {
+            continue;
         }
-        points.entry(point).or_insert(row);
-        readings.entry((reading, target)).or_insert(row);
+        // Only rows that share their point are compared as a whole: in a sound table that is none.
+        readings.entry(reading(first)).or_insert(first);
+        let copied = *readings.entry(reading(row)).or_insert(row);
+        if copied.line != row.line {
+            duplicates.push(index);
+            warnings.push(Defect::Repeats { first_line: copied.line }.at(row.line));
+        } else if first.target != row.target || farthest_joint(first, row, joints).is_some() {
+            let other_target = first.target != row.target;
+            warnings.push(Defect::StalePoint { first_line: first.line, other_target }.at(row.line));
+        }
     }
     duplicates
+}
+
+/// What makes two rows copies of each other: point, joint values, target.
+fn reading(row: &Row) -> (Vec<u64>, Option<&str>) {
+    let values = row.point.iter().chain(&row.configuration);
+    (values.map(|&value| digits(value)).collect(), row.target.as_deref())
 }
 
 fn other_configuration(first: &Row, row: &Row, joints: &[JointType]) -> Option<TableProblem> {

@@ -11,11 +11,11 @@ pub enum Layout {
     /// Named columns with units, in any order: trupose's own.
     #[default]
     Named,
-    /// The table of RoboDK's calibration: 12 columns, the first line ignored. Six joints [degree], the measured point
-    /// [mm], the centre of the target in the flange frame (RoboDK's "TCP") [mm].
+    /// The table of RoboDK's calibration: 12 columns, the first line ignored. Six joints (degree), the measured point
+    /// (mm), the centre of the target in the flange frame (RoboDK's "TCP") (mm).
     RoboDk,
     /// A table of DELMIA, tabs between the cells, the first line ignored: name of the pose, one value per joint
-    /// [degree, sliding joints mm], the measured point [mm].
+    /// [degree, sliding joints mm], the measured point (mm).
     ///
     /// DELMIA publishes no fixed layout. This is an assumption, kept narrow: a table with another number of columns is
     /// refused, never guessed at.

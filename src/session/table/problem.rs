@@ -382,6 +382,9 @@ impl std::error::Error for TableErrors {}
 
 /// `text` with replacement characters for control characters and for the invisible ones that reorder a line.
 pub(in crate::session) fn printable(text: &str) -> String {
+    if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
+        return text.to_owned();
+    }
     let is_harmful = |c: char| {
         c.is_control()
             || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
