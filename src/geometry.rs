@@ -13,7 +13,7 @@ pub struct Registration {
     pub to_from_from: Isometry3<f64>,
     /// Weighted mean of the first set.
     pub centroid_from: Point3<f64>,
-    /// Root mean square of what is left [m], weighted.
+    /// Root mean square of what is left (m), weighted.
     pub rms: f64,
 }
 
@@ -61,7 +61,7 @@ fn horn_rotation(cross: &Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(vector[0], vector[1], vector[2], vector[3]))
 }
 
-/// Root mean square spread of points along their principal axes [m], largest first: `(0.5, 0.3, 0.0)` is a flat set.
+/// Root mean square spread of points along their principal axes (m), largest first: `(0.5, 0.3, 0.0)` is a flat set.
 pub fn principal_spread<'a>(points: impl Iterator<Item = &'a Point3<f64>> + Clone) -> [f64; 3] {
     let count = points.clone().count();
     if count == 0 {

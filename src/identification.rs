@@ -93,7 +93,7 @@ pub struct Settings {
     pub estimator: Estimator,
     /// Largest number of solver steps; 1 is the paper's single linear step.
     pub iterations: usize,
-    /// Standard deviation of a coordinate [m] and where it comes from; `None`: estimated from the residuals.
+    /// Standard deviation of a coordinate (m) and where it comes from; `None`: estimated from the residuals.
     pub sigma: Option<(f64, SigmaSource)>,
 }
 
@@ -138,11 +138,11 @@ pub enum TerminationReason {
 /// The measurement σ of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sigma {
-    /// What balanced data and prior [m]; with own σ per reading their root mean square.
+    /// What balanced data and prior (m); with own σ per reading their root mean square.
     pub used: f64,
     /// Where it comes from.
     pub source: SigmaSource,
-    /// What the residuals say [m]: root mean square per coordinate, corrected for the parameters fitted; `None` without
+    /// What the residuals say (m): root mean square per coordinate, corrected for the parameters fitted; `None` without
     /// enough data.
     pub from_residuals: Option<f64>,
 }
@@ -159,13 +159,13 @@ impl Sigma {
 pub struct Estimate {
     /// Which parameter.
     pub id: ParameterId,
-    /// Nominal value [m] or [rad].
+    /// Nominal value (m) or (rad).
     pub nominal: f64,
-    /// Identified − nominal [m] or [rad].
+    /// Identified − nominal (m) or (rad).
     pub deviation: f64,
-    /// Standard deviation of the deviation [m] or [rad].
+    /// Standard deviation of the deviation (m) or (rad).
     pub sigma: f64,
-    /// Expected deviation [m] or [rad].
+    /// Expected deviation (m) or (rad).
     pub expected: f64,
     /// Whether it can be found on its own; if not, a [`BlindGroup`] says what can.
     pub identifiable: bool,
@@ -185,7 +185,7 @@ pub enum RejectionReason {
 pub struct Rejected {
     /// Index of the place, in the order of [`Observations::places`].
     pub place: usize,
-    /// Distance from the prediction of the model fitted without it [m].
+    /// Distance from the prediction of the model fitted without it (m).
     pub residual: f64,
     /// The same in robust standard deviations of the accepted samples.
     pub ratio: f64,
@@ -200,7 +200,7 @@ pub struct Identification {
     pub model: ArmModel,
     /// Every free parameter.
     pub estimates: Vec<Estimate>,
-    /// Covariance of the deviations, n × n ([m] and [rad]).
+    /// Covariance of the deviations, n × n ((m) and (rad)).
     pub covariance: DMatrix<f64>,
     /// What the data can tell.
     pub observability: Observability,
@@ -214,7 +214,7 @@ pub struct Identification {
     pub termination: TerminationReason,
     /// Pose of each instrument station in the base of the identified arm.
     pub base_from_station: Vec<Isometry3<f64>>,
-    /// Measured − predicted in the base [m] for every place, in-sample: for finding outliers, never to be shown as accuracy.
+    /// Measured − predicted in the base (m) for every place, in-sample: for finding outliers, never to be shown as accuracy.
     pub residuals: Vec<Vector3<f64>>,
 }
 
@@ -280,7 +280,7 @@ pub enum IdentificationError {
     Length {
         /// Index of the length.
         length: usize,
-        /// What was given [m].
+        /// What was given (m).
         value: f64,
     },
     /// Nothing that a distance could be made of.
@@ -305,9 +305,9 @@ pub enum IdentificationError {
         to_mm(*mirrored), to_mm(*proper)
     )]
     Mirrored {
-        /// Root mean square residual of the best proper registration [m].
+        /// Root mean square residual of the best proper registration (m).
         proper: f64,
-        /// The same with one axis reversed [m].
+        /// The same with one axis reversed (m).
         mirrored: f64,
     },
     /// The solver ran into numbers that are not finite.
@@ -315,9 +315,9 @@ pub enum IdentificationError {
     Diverged,
 }
 
-/// Smallest σ that is ever assumed [m]: below the resolution of any instrument, above the arithmetic.
+/// Smallest σ that is ever assumed (m): below the resolution of any instrument, above the arithmetic.
 const SMALLEST_SIGMA: f64 = 1e-3 * MICROMETRE;
-/// First guess of σ where it is estimated [m].
+/// First guess of σ where it is estimated (m).
 const FIRST_SIGMA: f64 = 50.0 * MICROMETRE;
 /// Rounds of estimating σ, and the relative change that ends them.
 const SIGMA_ROUNDS: usize = 50;
@@ -422,7 +422,7 @@ fn solve_with(fit: &Fit<'_, '_>, z: DVector<f64>) -> Linearised {
         .linearise(z)
 }
 
-/// σ of a coordinate from the residuals [m]: square sum over independent values less the parameters that the data (not the
+/// σ of a coordinate from the residuals (m): square sum over independent values less the parameters that the data (not the
 /// prior) determined. Lengths that come with their own σ do not count.
 fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<f64> {
     let Solve { problem, weights, basis, .. } = solve;
@@ -517,7 +517,7 @@ fn summarise(solved: Solved<'_, '_>) -> Identification {
     }
 }
 
-/// Nominal value of a parameter of the problem [m] or [rad].
+/// Nominal value of a parameter of the problem (m) or (rad).
 fn nominal_value(problem: &Problem<'_>, id: ParameterId) -> f64 {
     match id {
         ParameterId::Link { .. } => problem.chain.parameter(id).unwrap_or(0.0),

@@ -5,15 +5,15 @@
 
 use std::f64::consts::PI;
 
-/// One millimetre [m].
+/// One millimetre (m).
 pub const MILLIMETRE: f64 = 1e-3;
-/// One micrometre [m].
+/// One micrometre (m).
 pub const MICROMETRE: f64 = 1e-6;
-/// One inch [m], exact (ISO 31-1).
+/// One inch (m), exact (ISO 31-1).
 pub const INCH: f64 = 25.4e-3;
-/// One degree [rad].
+/// One degree (rad).
 pub const DEGREE: f64 = PI / 180.0;
-/// One milliradian [rad].
+/// One milliradian (rad).
 pub const MILLIRADIAN: f64 = 1e-3;
 
 /// Metres of a length in millimetres.

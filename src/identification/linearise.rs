@@ -14,12 +14,12 @@ use crate::kinematics::{ForwardKinematics, IdentificationJacobian, KinematicChai
 pub struct ArmModel {
     /// The arm.
     pub chain: KinematicChain,
-    /// Target coordinates in the flange frame [m].
+    /// Target coordinates in the flange frame (m).
     pub targets: Vec<Point3<f64>>,
 }
 
 impl ArmModel {
-    /// The nominal model of `problem` with the deviations `x` ([m] or [rad]) added.
+    /// The nominal model of `problem` with the deviations `x` ((m) or (rad)) added.
     pub fn with_deviations(problem: &Problem<'_>, x: &DVector<f64>) -> Self {
         let deviations = || problem.parameters.iter().map(|parameter| parameter.id).zip(x.iter().copied());
         // The problem was checked: every parameter exists.
@@ -35,12 +35,12 @@ impl ArmModel {
         Self { chain, targets }
     }
 
-    /// Predicted position in the base of one observed target [m].
+    /// Predicted position in the base of one observed target (m).
     pub fn point_in_base(&self, at: &TargetAt) -> Point3<f64> {
         ForwardKinematics::new(&self.chain).point_in_base(&at.configuration, &self.targets[at.target])
     }
 
-    /// Predicted positions in the base [m], in the order of `places`.
+    /// Predicted positions in the base (m), in the order of `places`.
     pub fn points_in_base<'a>(&self, places: impl Iterator<Item = &'a TargetAt>) -> Vec<Point3<f64>> {
         let arm = ForwardKinematics::new(&self.chain);
         places.map(|at| arm.point_in_base(&at.configuration, &self.targets[at.target])).collect()
@@ -52,7 +52,7 @@ impl ArmModel {
 pub(crate) struct Evaluation {
     /// Number of parameters.
     pub(crate) n: usize,
-    /// Predicted positions in the base [m].
+    /// Predicted positions in the base (m).
     pub(crate) points: Vec<Point3<f64>>,
     /// Jacobians: `3 n` numbers per place.
     pub(crate) rows: Vec<f64>,
@@ -83,7 +83,7 @@ impl Evaluation {
 /// How much each observation counts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Weights {
-    /// Standard deviation of a coordinate [m] where the reading has none.
+    /// Standard deviation of a coordinate (m) where the reading has none.
     pub(crate) sigma: f64,
     /// Factor per place in 0 … 1: below one for a suspicious sample, zero for a rejected one.
     pub(crate) trust: Vec<f64>,
@@ -126,9 +126,9 @@ impl NormalEquations {
 pub(crate) struct PointResiduals {
     /// Pose of each station in the robot base; identity where a station has no point.
     pub(crate) base_from_station: Vec<Isometry3<f64>>,
-    /// Measured − predicted in the base [m], per place that is a point or a seat of a shared point; zero for ends of lengths.
+    /// Measured − predicted in the base (m), per place that is a point or a seat of a shared point; zero for ends of lengths.
     pub(crate) of_places: Vec<Vector3<f64>>,
-    /// Weighted centroid of the predicted points of each station [m].
+    /// Weighted centroid of the predicted points of each station (m).
     centroids: Vec<Point3<f64>>,
 }
 

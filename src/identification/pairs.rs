@@ -7,21 +7,21 @@
 
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
-/// Points closer than this [m] have no usable direction between them.
+/// Points closer than this (m) have no usable direction between them.
 const SAME_POINT: f64 = 1e-6;
 
 /// One point of a pair problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PairPoint<'a> {
-    /// Predicted position in the base [m].
+    /// Predicted position in the base (m).
     pub(crate) predicted: Point3<f64>,
-    /// Measured position in the frame of its station [m].
+    /// Measured position in the frame of its station (m).
     pub(crate) measured: Point3<f64>,
     /// Jacobian, `3 n` numbers.
     pub(crate) rows: &'a [f64],
     /// Factor of this point in the weight of its pairs.
     pub(crate) trust: f64,
-    /// Standard deviation of a coordinate [m].
+    /// Standard deviation of a coordinate (m).
     pub(crate) sigma: f64,
 }
 

@@ -1,1 +1,382 @@
-//! Checks of plausibility.
+//! Do these data describe this robot at all? Looks for the mistakes that turn a calibration into nonsense: wrong unit, wrong
+//! joint sign or zero, swapped rows, joints that never move, too few or flat points.
+//!
+//! The yardstick is the nominal model itself: with frame and target fitted, its residual cannot exceed what the expected
+//! deviations allow by much. Where it does, each mistake is tried in turn and the one that explains the data is named. This
+//! happens before identification, because a solver bends parameters until nonsense looks like a fit.
+
+use nalgebra::Point3;
+
+use super::linearise::{ArmModel, Evaluation, Weights, point_residuals, project};
+use super::problem::{Observations, PointSample, Problem};
+use super::{Estimator, IdentificationError, Observability, Prior, Settings, Weighting, identify};
+use crate::geometry::principal_spread;
+use crate::kinematics::{FreeParameter, JointType, ParameterId};
+use crate::units::{DEGREE, INCH, MILLIMETRE, to_deg, to_mm};
+
+/// Nominal residuals beyond this many expected ones are not explained by a robot with its expected deviations.
+const IMPLAUSIBLE: f64 = 6.0;
+/// Nominal residuals below this (m) are never called implausible: every arm deserves a few millimetres.
+const ALWAYS_PLAUSIBLE: f64 = 5.0 * MILLIMETRE;
+/// A mistake explains the data if it lowers the residual to this fraction.
+const EXPLAINS: f64 = 0.25;
+/// A joint that moves less than this over the whole set does not move (rad).
+const STILL_JOINT: f64 = 5.0 * DEGREE;
+/// The same for a prismatic joint (m).
+const STILL_SLIDE: f64 = 20.0 * MILLIMETRE;
+/// Independent values per independent combination below which the error bars rest on too little.
+const VALUES_PER_COMBINATION: usize = 2;
+/// A condition number of `A·S` beyond this leaves weak combinations to the prior.
+const POOR_CONDITION: f64 = 5e3;
+/// Points flatter than this fraction of their extent are a plane.
+const FLAT: f64 = 0.02;
+
+/// A mistake that explains data the nominal robot cannot.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Mistake {
+    /// Measured coordinates are in another unit; they should have been multiplied by `factor`.
+    CoordinateUnit {
+        /// Measured extent over predicted extent.
+        ratio: f64,
+        /// The likely story.
+        story: &'static str,
+    },
+    /// Joint values were radians read as degrees.
+    RadiansAsDegrees,
+    /// Joint values were degrees read as radians.
+    DegreesAsRadians,
+    /// A joint counts the other way.
+    JointSign {
+        /// Index of the joint.
+        joint: usize,
+    },
+    /// A joint has another zero.
+    JointZero {
+        /// Index of the joint.
+        joint: usize,
+        /// What has to be added to its pendant value (rad).
+        offset: f64,
+    },
+    /// The points of two rows were swapped.
+    SwappedRows {
+        /// Index of the one sample.
+        first: usize,
+        /// Index of the other.
+        second: usize,
+    },
+    /// The measured frame is left-handed.
+    Mirrored,
+}
+
+impl Mistake {
+    /// What it is and what to do, with names instead of indices.
+    pub fn describe(&self, joint_name: impl Fn(usize) -> String, sample_name: impl Fn(usize) -> String) -> String {
+        match self {
+            Self::CoordinateUnit { ratio, story } => {
+                format!("the measured points span {ratio:.4} times what the robot can reach between them: {story}")
+            }
+            Self::RadiansAsDegrees => {
+                "the joint values fit when read as radians: name the columns 'q1_rad', 'q2_rad', …".to_owned()
+            }
+            Self::DegreesAsRadians => {
+                "the joint values fit when read as degrees: name the columns 'q1_deg', 'q2_deg', …".to_owned()
+            }
+            Self::JointSign { joint } => format!(
+                "joint {} counts the other way: the data fit with its sign reversed; check the sign of its column, or 'direction' in the profile",
+                joint_name(*joint)
+            ),
+            Self::JointZero { joint, offset } => format!(
+                "joint {} has another zero: the data fit with {:+.0} deg added to it; check the column, or 'theta_deg' in the profile",
+                joint_name(*joint),
+                to_deg(*offset)
+            ),
+            Self::SwappedRows { first, second } => {
+                format!(
+                    "{} and {} are swapped: each point fits the other's configuration",
+                    sample_name(*first),
+                    sample_name(*second)
+                )
+            }
+            Self::Mirrored => {
+                "the points fit only when mirrored: the instrument's frame is left-handed; reverse one of its axes"
+                    .to_owned()
+            }
+        }
+    }
+}
+
+/// How the measured points compare with the nominal robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plausibility {
+    /// Root mean square distance of the measured points from the nominal prediction, frame and target fitted (m).
+    pub nominal_rms: f64,
+    /// The same as the expected deviations predict it (m).
+    pub expected_rms: f64,
+    /// The mistake that explains a nominal residual which is too large.
+    pub mistake: Option<Mistake>,
+}
+
+impl Plausibility {
+    /// Whether the robot with its expected deviations can have produced the points.
+    pub fn is_plausible(&self) -> bool {
+        self.nominal_rms <= (IMPLAUSIBLE * self.expected_rms).max(ALWAYS_PLAUSIBLE)
+    }
+}
+
+/// Compares the points of `problem` with its nominal model and, where they do not fit, looks for the mistake.
+///
+/// # Errors
+/// Sizes or indices that do not fit.
+pub fn compare_with_nominal(problem: &Problem<'_>) -> Result<Plausibility, IdentificationError> {
+    problem.check()?;
+    let expected_rms = expected_residual(problem);
+    let trial = Trial::new(problem);
+    let points = problem.observations.points.clone();
+    let (nominal_rms, residuals) = trial.residuals(&points);
+    let mut plausibility = Plausibility { nominal_rms, expected_rms, mistake: None };
+    if points.len() >= 4 && !plausibility.is_plausible() {
+        plausibility.mistake = trial.find_mistake(&points, nominal_rms, &residuals);
+    }
+    Ok(plausibility)
+}
+
+/// Root mean square residual (m) that the expected deviations predict once frame and target are fitted.
+fn expected_residual(problem: &Problem<'_>) -> f64 {
+    let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
+    let evaluation = Evaluation::new(problem, &model);
+    let weights = Weights::uniform(problem, 1.0);
+    let residuals = point_residuals(problem, &evaluation.points, &weights);
+    let gram = project(problem, evaluation, &residuals, &weights).normal_equations().gram;
+    let of_links = problem.parameters.iter().enumerate().filter(|(_, p)| matches!(p.id, ParameterId::Link { .. }));
+    let variance: f64 = of_links.map(|(index, p)| gram[(index, index)] * p.expected * p.expected).sum();
+    (variance / problem.observations.points.len().max(1) as f64).sqrt()
+}
+
+/// The nominal arm with frame and free target fitted robustly to altered data.
+struct Trial<'a, 'p> {
+    problem: &'a Problem<'p>,
+    target_parameters: Vec<FreeParameter>,
+}
+
+impl<'a, 'p> Trial<'a, 'p> {
+    fn new(problem: &'a Problem<'p>) -> Self {
+        let is_target = |p: &&FreeParameter| matches!(p.id, ParameterId::Target { .. });
+        Self { problem, target_parameters: problem.parameters.iter().filter(is_target).copied().collect() }
+    }
+
+    /// Root mean square and single residuals (m) of the nominal arm on `points`.
+    fn residuals(&self, points: &[PointSample]) -> (f64, Vec<f64>) {
+        let observations = Observations { points: points.to_vec(), ..Observations::default() };
+        let problem = Problem { parameters: &self.target_parameters, observations: &observations, ..*self.problem };
+        let settings = Settings {
+            weighting: Weighting::Covariance,
+            prior: Prior::Expected,
+            estimator: Estimator::LeastSquares,
+            iterations: 20,
+            sigma: Some((MILLIMETRE, super::SigmaSource::Option)),
+        };
+        let fitted = if self.target_parameters.is_empty() {
+            None
+        } else {
+            identify(&problem, &settings, &mut |_| {}).ok().map(|found| found.residuals)
+        };
+        let vectors = fitted.unwrap_or_else(|| {
+            let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
+            let predicted = model.points_in_base(observations.places());
+            point_residuals(&problem, &predicted, &Weights::uniform(&problem, MILLIMETRE)).of_places
+        });
+        let norms: Vec<f64> = vectors.iter().map(|vector| vector.norm()).collect();
+        let square: f64 = norms.iter().map(|norm| norm * norm).sum();
+        ((square / norms.len().max(1) as f64).sqrt(), norms)
+    }
+
+    fn find_mistake(&self, points: &[PointSample], nominal_rms: f64, residuals: &[f64]) -> Option<Mistake> {
+        if let Some(unit) = self.coordinate_unit(points) {
+            return Some(unit);
+        }
+        let mut best: Option<(f64, Mistake)> = None;
+        let mut consider = |mistake: Mistake, altered: &[PointSample]| {
+            let (rms, _) = self.residuals(altered);
+            if rms < EXPLAINS * nominal_rms && best.as_ref().is_none_or(|(best, _)| rms < *best) {
+                best = Some((rms, mistake));
+            }
+        };
+        for (mistake, altered) in self.joint_mistakes(points) {
+            consider(mistake, &altered);
+        }
+        let mirrored: Vec<PointSample> =
+            alter(points, |sample| sample.point = Point3::new(-sample.point.x, sample.point.y, sample.point.z));
+        consider(Mistake::Mirrored, &mirrored);
+        if let Some((mistake, altered)) = swapped_pair(points, residuals) {
+            consider(mistake, &altered);
+        }
+        best.map(|(_, mistake)| mistake)
+    }
+
+    /// The extent of the measured points against the predicted ones tells the unit without any fit.
+    fn coordinate_unit(&self, points: &[PointSample]) -> Option<Mistake> {
+        const STORIES: [(f64, &str); 5] = [
+            (1e-3, "metres were read as millimetres; name the columns 'x_m', 'y_m', 'z_m'"),
+            (1e3, "millimetres were read as metres; name the columns 'x_mm', 'y_mm', 'z_mm'"),
+            (MILLIMETRE / INCH, "inches were read as millimetres; name the columns 'x_in', 'y_in', 'z_in'"),
+            (INCH / MILLIMETRE, "millimetres were read as inches; name the columns 'x_mm', 'y_mm', 'z_mm'"),
+            (1e-3 / INCH, "metres were read as inches; name the columns 'x_m', 'y_m', 'z_m'"),
+        ];
+        let model = ArmModel { chain: self.problem.chain.clone(), targets: self.problem.targets.to_vec() };
+        let predicted = model.points_in_base(points.iter().map(|sample| &sample.at));
+        let extent = |spread: [f64; 3]| spread.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let measured = extent(principal_spread(points.iter().map(|sample| &sample.point)));
+        let ratio = measured / extent(principal_spread(predicted.iter()));
+        STORIES
+            .iter()
+            .find(|(factor, _)| (0.5..2.0).contains(&(ratio / factor)))
+            .map(|(_, story)| Mistake::CoordinateUnit { ratio, story })
+    }
+
+    fn joint_mistakes(&self, points: &[PointSample]) -> Vec<(Mistake, Vec<PointSample>)> {
+        let joints = self.problem.chain.joints();
+        let turning = |joint: &usize| joints[*joint].joint_type == JointType::Revolute;
+        let scaled = |factor: f64| {
+            alter(points, |sample| {
+                for joint in (0..joints.len()).filter(turning) {
+                    sample.at.configuration[joint] *= factor;
+                }
+            })
+        };
+        let mut mistakes =
+            vec![(Mistake::RadiansAsDegrees, scaled(1.0 / DEGREE)), (Mistake::DegreesAsRadians, scaled(DEGREE))];
+        for joint in 0..joints.len() {
+            let reversed = alter(points, |sample| sample.at.configuration[joint] *= -1.0);
+            mistakes.push((Mistake::JointSign { joint }, reversed));
+        }
+        // The zero of joint 1 only turns the base: distances cannot see it, and need not.
+        for joint in (1..joints.len()).filter(turning) {
+            for offset in [90.0, -90.0, 180.0] {
+                let offset = offset * DEGREE;
+                let shifted = alter(points, |sample| sample.at.configuration[joint] += offset);
+                mistakes.push((Mistake::JointZero { joint, offset }, shifted));
+            }
+        }
+        mistakes
+    }
+}
+
+fn alter(points: &[PointSample], change: impl Fn(&mut PointSample)) -> Vec<PointSample> {
+    let mut altered = points.to_vec();
+    altered.iter_mut().for_each(change);
+    altered
+}
+
+/// The two worst samples, with their points exchanged.
+fn swapped_pair(points: &[PointSample], residuals: &[f64]) -> Option<(Mistake, Vec<PointSample>)> {
+    let mut order: Vec<usize> = (0..points.len().min(residuals.len())).collect();
+    order.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]));
+    let (&first, &second) = (order.first()?, order.get(1)?);
+    let (first, second) = (first.min(second), first.max(second));
+    let mut altered = points.to_vec();
+    (altered[first].point, altered[second].point) = (altered[second].point, altered[first].point);
+    Some((Mistake::SwappedRows { first, second }, altered))
+}
+
+/// Something that makes the result of an identification doubtful although it can be computed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Weakness {
+    /// Fewer independent values than twice the combinations to find.
+    TooFewData {
+        /// Independent values in the observations.
+        values: usize,
+        /// Combinations that are to be found.
+        combinations: usize,
+    },
+    /// A joint that does not move.
+    StillJoint {
+        /// Index of the joint.
+        joint: usize,
+        /// How far it moves over all samples (rad or m).
+        range: f64,
+    },
+    /// The points lie (nearly) in a plane or on a line: distances do not see motion out of it.
+    Flat {
+        /// Spread along the principal axes, root mean square (m).
+        spread: [f64; 3],
+    },
+    /// The condition number leaves some combinations to the prior.
+    PoorCondition {
+        /// Condition number of `A·S`.
+        condition_number: f64,
+    },
+    /// No gap in the singular values decides the rank.
+    RankUnclear {
+        /// The largest ratio of neighbours.
+        gap: f64,
+    },
+}
+
+impl Weakness {
+    /// What it is and what to do.
+    pub fn describe(&self, joint_name: impl Fn(usize) -> String, joint_type: impl Fn(usize) -> JointType) -> String {
+        match self {
+            Self::TooFewData { values, combinations } => format!(
+                "too few data: {values} independent values for {combinations} combinations of parameters; measure at least {} poses, better twice as many",
+                (VALUES_PER_COMBINATION * combinations + 6).div_ceil(3)
+            ),
+            Self::StillJoint { joint, range } => {
+                let quantity = joint_type(*joint).quantity();
+                format!(
+                    "joint {} hardly moves ({:.2} {} over all poses): its errors and those of its neighbours cannot be told apart; add poses that turn it",
+                    joint_name(*joint),
+                    quantity.to_edge(*range),
+                    quantity.unit()
+                )
+            }
+            Self::Flat { spread } => format!(
+                "the points lie nearly in a plane (spread {:.0} x {:.0} x {:.1} mm): spread them in all directions",
+                to_mm(spread[0]),
+                to_mm(spread[1]),
+                to_mm(spread[2])
+            ),
+            Self::PoorCondition { condition_number } => format!(
+                "the poses are poorly conditioned (condition number {condition_number:.0}): some combinations of parameters rest on the prior alone; use a planned pose set"
+            ),
+            Self::RankUnclear { gap } => format!(
+                "the rank is not clear (largest gap in the singular values {gap:.1}): which parameters can be found is not decided by these data"
+            ),
+        }
+    }
+}
+
+/// Looks at how rich the data are.
+pub fn weaknesses(problem: &Problem<'_>, observability: &Observability) -> Vec<Weakness> {
+    let mut found = Vec::new();
+    let values = problem.observations.independent_values();
+    let combinations = observability.rank.unwrap_or(problem.parameters.len());
+    if values < VALUES_PER_COMBINATION * combinations {
+        found.push(Weakness::TooFewData { values, combinations });
+    }
+    for (joint, definition) in problem.chain.joints().iter().enumerate() {
+        let values = || problem.observations.places().map(|place| place.configuration[joint]);
+        let range = values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
+        let still = match definition.joint_type {
+            JointType::Revolute => STILL_JOINT,
+            JointType::Prismatic => STILL_SLIDE,
+        };
+        if range < still {
+            found.push(Weakness::StillJoint { joint, range });
+        }
+    }
+    let points = &problem.observations.points;
+    if !points.is_empty() {
+        let spread = principal_spread(points.iter().map(|sample| &sample.point));
+        if spread[2] < FLAT * spread[0] {
+            found.push(Weakness::Flat { spread });
+        }
+    }
+    match (observability.rank, observability.condition_number) {
+        (None, _) => found.push(Weakness::RankUnclear { gap: observability.gap }),
+        (Some(_), Some(condition_number)) if condition_number > POOR_CONDITION => {
+            found.push(Weakness::PoorCondition { condition_number });
+        }
+        _ => {}
+    }
+    found
+}

@@ -8,7 +8,7 @@ use crate::kinematics::{FreeParameter, KinematicChain, ParameterId};
 /// A configuration and the target that was observed there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetAt {
-    /// Pendant configuration [rad] or [m].
+    /// Pendant configuration (rad) or (m).
     pub configuration: Vec<f64>,
     /// Index of the target.
     pub target: usize,
@@ -21,9 +21,9 @@ pub struct PointSample {
     pub at: TargetAt,
     /// Index of the instrument station: points of one station share an unknown frame.
     pub station: usize,
-    /// Coordinates in the frame of the station [m].
+    /// Coordinates in the frame of the station (m).
     pub point: Point3<f64>,
-    /// Standard deviation of each coordinate [m], where the reading has one.
+    /// Standard deviation of each coordinate (m), where the reading has one.
     pub sigma: Option<f64>,
 }
 
@@ -50,9 +50,9 @@ pub struct Length {
     pub from: LengthEnd,
     /// … to here.
     pub to: LengthEnd,
-    /// Measured length [m].
+    /// Measured length (m).
     pub length: f64,
-    /// Its standard deviation [m], where it is known.
+    /// Its standard deviation (m), where it is known.
     pub sigma: Option<f64>,
 }
 
@@ -97,7 +97,7 @@ impl Observations {
 pub struct Problem<'a> {
     /// Nominal arm.
     pub chain: &'a KinematicChain,
-    /// Nominal target coordinates in the flange frame [m], one per target.
+    /// Nominal target coordinates in the flange frame (m), one per target.
     pub targets: &'a [Point3<f64>],
     /// Parameters to identify, in the order of all vectors and matrices.
     pub parameters: &'a [FreeParameter],

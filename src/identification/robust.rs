@@ -22,7 +22,7 @@ const GRADUATION: f64 = 1.4;
 /// Rounds in which samples may change sides before the decision stands.
 const ROUNDS: usize = 10;
 
-/// Robust standard deviation of a coordinate [m] from the median residual of the trusted places, corrected for the share of the
+/// Robust standard deviation of a coordinate (m) from the median residual of the trusted places, corrected for the share of the
 /// residual that the fit took up.
 pub(crate) fn robust_sigma(problem: &Problem<'_>, residuals: &[Vector3<f64>], trust: &[f64], floor: f64) -> f64 {
     let mut norms: Vec<f64> = residuals
@@ -50,7 +50,7 @@ fn judged_places(problem: &Problem<'_>) -> usize {
 
 /// Finds outliers at a least-squares solution. Returns the trust of every place: 1 or 0.
 ///
-/// `floor` is the smallest standard deviation [m] that residuals are judged by.
+/// `floor` is the smallest standard deviation (m) that residuals are judged by.
 pub(crate) fn find_outliers(
     solve: &Solve<'_, '_>,
     least_squares: &Linearised,

@@ -14,7 +14,7 @@ use crate::units::MILLIMETRE;
 /// Above this many points the distances are taken between evenly picked ones: 2000 points have two million pairs.
 const PAIRED_POINTS: usize = 2000;
 
-/// Statistics of a non-negative error [m].
+/// Statistics of a non-negative error (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorStatistics {
     /// How many values.
@@ -50,13 +50,13 @@ impl ErrorStatistics {
 /// Errors of one model on one set of samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelErrors {
-    /// Measured − predicted per sample, in the robot base [m].
+    /// Measured − predicted per sample, in the robot base (m).
     pub vectors: Vec<Vector3<f64>>,
     /// Norm of the position errors.
     pub position: ErrorStatistics,
-    /// Mean of the absolute error along x, y, z of the base [m] (table IV of the paper).
+    /// Mean of the absolute error along x, y, z of the base (m) (table IV of the paper).
     pub axis_mean: [f64; 3],
-    /// Largest absolute error along x, y, z [m] (table IV).
+    /// Largest absolute error along x, y, z (m) (table IV).
     pub axis_max: [f64; 3],
     /// Distance errors `|l_measured − l_predicted|` over pairs of samples of one station (table III); `None` below two samples.
     pub distance: Option<ErrorStatistics>,

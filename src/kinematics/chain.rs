@@ -17,9 +17,9 @@ pub enum Convention {
 /// Whether a joint turns or slides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointType {
-    /// The joint variable adds to θ [rad].
+    /// The joint variable adds to θ (rad).
     Revolute,
-    /// The joint variable adds to d [m].
+    /// The joint variable adds to d (m).
     Prismatic,
 }
 
@@ -36,15 +36,15 @@ impl JointType {
 /// Constants of one link. Angles in radians, lengths in metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Link {
-    /// Twist about x [rad].
+    /// Twist about x (rad).
     pub alpha: f64,
-    /// Length along x [m].
+    /// Length along x (m).
     pub a: f64,
-    /// Offset along z [m]; for a prismatic joint the value at joint zero.
+    /// Offset along z (m); for a prismatic joint the value at joint zero.
     pub d: f64,
-    /// Angle about z [rad]; for a revolute joint the value at joint zero (joint offset).
+    /// Angle about z (rad); for a revolute joint the value at joint zero (joint offset).
     pub theta: f64,
-    /// Hayati's rotation about y [rad], for an axis (nearly) parallel to its neighbour.
+    /// Hayati's rotation about y (rad), for an axis (nearly) parallel to its neighbour.
     pub beta: f64,
 }
 
@@ -65,7 +65,7 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// Kinematic joint variable `direction · (q_i + Σ_j coupling_j q_j)` at the pendant configuration `q` ([rad] or [m]).
+    /// Kinematic joint variable `direction · (q_i + Σ_j coupling_j q_j)` at the pendant configuration `q` ((rad) or (m)).
     pub fn variable(&self, index: usize, q: &[f64]) -> f64 {
         let coupled: f64 = self.coupling.iter().zip(q).map(|(c, q_j)| c * q_j).sum();
         self.direction * (q[index] + coupled)

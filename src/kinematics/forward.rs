@@ -161,13 +161,13 @@ impl<'a> ForwardKinematics<'a> {
         self.chain
     }
 
-    /// Pose of the flange in the base at the pendant configuration `q` ([rad] or [m], one entry per joint; missing entries
+    /// Pose of the flange in the base at the pendant configuration `q` ((rad) or (m), one entry per joint; missing entries
     /// count as zero joints left out, extra ones are ignored).
     pub fn base_from_flange(&self, q: &[f64]) -> Isometry3<f64> {
         self.flange_frame(q, |_, _| {}).to_isometry()
     }
 
-    /// Position in the base of a point fixed to the flange [m].
+    /// Position in the base of a point fixed to the flange (m).
     pub fn point_in_base(&self, q: &[f64], target_in_flange: &Point3<f64>) -> Point3<f64> {
         let flange = self.flange_frame(q, |_, _| {});
         Point3::from(flange.origin + flange.axes() * target_in_flange.coords)

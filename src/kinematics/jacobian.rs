@@ -31,9 +31,9 @@ impl IdentificationJacobian {
         self.parameters.is_empty()
     }
 
-    /// Position of the target in the base [m] at configuration `q`, and its derivatives.
+    /// Position of the target in the base (m) at configuration `q`, and its derivatives.
     ///
-    /// `rows` takes the 3 × n Jacobian row by row: `n` entries for x, then y, then z ([m] per [m] or [rad]); it must hold
+    /// `rows` takes the 3 × n Jacobian row by row: `n` entries for x, then y, then z ((m) per (m) or (rad)); it must hold
     /// `3 n` numbers. `target` is the index that target coordinates must have to count for this point.
     #[inline]
     pub fn evaluate(
@@ -78,9 +78,9 @@ impl IdentificationJacobian {
 /// Geometric Jacobian by the pendant joints: velocity of a point and angular velocity, in the base.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConfigurationJacobian {
-    /// 6 × dof: rows 0–2 linear [m per rad or m], rows 3–5 angular [rad per rad or m].
+    /// 6 × dof: rows 0–2 linear (m per rad or m), rows 3–5 angular (rad per rad or m).
     pub matrix: Matrix6xX<f64>,
-    /// Position of the target in the base [m].
+    /// Position of the target in the base (m).
     pub point_in_base: Point3<f64>,
 }
 

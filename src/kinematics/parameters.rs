@@ -129,7 +129,7 @@ impl ParameterId {
 pub struct FreeParameter {
     /// Which parameter.
     pub id: ParameterId,
-    /// Expected deviation from nominal, one standard deviation [m] or [rad]; positive.
+    /// Expected deviation from nominal, one standard deviation (m) or (rad); positive.
     pub expected: f64,
 }
 
@@ -144,7 +144,7 @@ impl fmt::Display for ParameterId {
 }
 
 impl KinematicChain {
-    /// Value of a link constant ([m] or [rad]); `None` for a target coordinate or a joint that the arm does not have.
+    /// Value of a link constant ((m) or (rad)); `None` for a target coordinate or a joint that the arm does not have.
     pub fn parameter(&self, id: ParameterId) -> Option<f64> {
         let ParameterId::Link { joint, parameter } = id else { return None };
         let link = self.joints().get(joint)?.link;
@@ -157,7 +157,7 @@ impl KinematicChain {
         })
     }
 
-    /// The same arm with deviations ([m] or [rad]) added to its link constants. Target coordinates are not the chain's and are
+    /// The same arm with deviations ((m) or (rad)) added to its link constants. Target coordinates are not the chain's and are
     /// passed over.
     ///
     /// # Errors
@@ -183,7 +183,7 @@ impl KinematicChain {
         Ok(chain)
     }
 
-    /// Pairs of neighbouring joints whose axes are parallel or antiparallel at the nominal geometry, within `tolerance` [rad]:
+    /// Pairs of neighbouring joints whose axes are parallel or antiparallel at the nominal geometry, within `tolerance` (rad):
     /// index of the first joint of each pair. Between such axes the common normal is undefined and plain DH is singular.
     ///
     /// The angle between axes i and i+1 is fixed: it is α of link i (standard) or of link i+1 (modified), tilted by β.
