@@ -1,0 +1,234 @@
+//! Robot profiles: one RON text describes arm, targets, instrument, acceptance limits and cell; checked values come out.
+//!
+//! [`Profile::parse`] finds all problems of a text in one pass and shows each with line and caret; a [`Profile`] that exists
+//! is consistent. Inside are metre, radian and second; the text carries millimetre and degree in the names of its fields.
+//! Points are in the flange frame (targets), a link frame (bodies) or the robot base (floor, boxes, tracker), as documented.
+//!
+//! This module reads no files: text in, values and messages out.
+
+mod builtin;
+mod cell;
+mod check;
+mod decode;
+mod diagnostic;
+mod expected;
+mod schema;
+mod syntax;
+mod text;
+
+use nalgebra::{Point3, Unit, Vector3};
+
+pub use builtin::{builtin, builtin_names};
+pub use cell::{Capsule, Instrument, KeepOut, Tracker};
+pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
+pub use expected::ExpectedDeviations;
+pub use text::{check_text, list_text, show_text};
+
+use crate::kinematics::{Axis, KinematicChain, LinkParameter, ParameterId};
+
+/// Angle below which neighbouring axes count as parallel [rad]: 1°, far above any assembly error and far below any design angle.
+pub const PARALLEL_TOLERANCE: f64 = crate::units::DEGREE;
+
+/// Uncertainty of a target position that the profile leaves open [m]: 50 mm, the size of a flange adapter.
+pub const FREE_TARGET_UNCERTAINTY: f64 = 50.0 * crate::units::MILLIMETRE;
+
+/// A robot in its cell, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    name: String,
+    title: String,
+    source: String,
+    chain: KinematicChain,
+    joints: Vec<JointRange>,
+    beta_joints: Vec<usize>,
+    fixed_parameters: Vec<ParameterId>,
+    targets: Vec<Target>,
+    expected_deviations: ExpectedDeviations,
+    acceptance: Acceptance,
+    instrument: Option<Instrument>,
+    bodies: Vec<Capsule>,
+    floor: Option<f64>,
+    keep_out: Vec<KeepOut>,
+    tracker: Tracker,
+}
+
+/// What a joint can do, in pendant values: [rad] and [rad/s] for a revolute joint, [m] and [m/s] for a prismatic one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointRange {
+    /// Lowest and highest value; `None` if the profile gives none.
+    pub limits: Option<(f64, f64)>,
+    /// Range for measuring poses, inside `limits`; the same as `limits` if the profile gives none.
+    pub planning_limits: Option<(f64, f64)>,
+    /// Highest speed.
+    pub max_speed: Option<f64>,
+    /// Encoder pulses per degree of the joint (revolute only): joint offsets can be shown in pulses.
+    pub pulses_per_degree: Option<f64>,
+}
+
+/// An SMR on the flange.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// Name in tables.
+    pub name: String,
+    /// Centre of the SMR in the flange frame [m].
+    pub position_in_flange: Point3<f64>,
+    /// Standard deviation expected of each coordinate [m]; zero: taken as exact and not identified.
+    pub uncertainty: f64,
+    /// Direction that the SMR faces, in the flange frame.
+    pub axis_in_flange: Unit<Vector3<f64>>,
+}
+
+impl Target {
+    /// Whether the position is identified together with the arm.
+    pub fn is_free(&self) -> bool {
+        self.uncertainty > 0.0
+    }
+}
+
+/// Limits for the verification of an identified arm [m]; `None`: no limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Acceptance {
+    /// Mean position error.
+    pub position_mean: Option<f64>,
+    /// RMS position error.
+    pub position_rms: Option<f64>,
+    /// Largest position error.
+    pub position_max: Option<f64>,
+    /// Mean distance error.
+    pub distance_mean: Option<f64>,
+    /// RMS distance error.
+    pub distance_rms: Option<f64>,
+    /// Largest distance error.
+    pub distance_max: Option<f64>,
+}
+
+/// Which parameters are identified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Level {
+    /// Level 1: joint offsets (θ of revolute, d of prismatic joints).
+    Offsets,
+    /// Level 2: all link constants, with β where the profile has it.
+    Geometric,
+}
+
+/// A parameter to identify with the size that its deviation is expected to have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeParameter {
+    /// Which one.
+    pub id: ParameterId,
+    /// Standard deviation of the prior [m] or [rad], above zero.
+    pub expected: f64,
+}
+
+impl Profile {
+    /// Reads a profile. `file_name` stands in the messages only.
+    ///
+    /// # Errors
+    /// All problems of the text, warnings among them, if at least one makes the profile unusable; otherwise the warnings
+    /// come with the profile.
+    pub fn parse(text: &str, file_name: &str) -> Result<(Self, Vec<Diagnostic>), ProfileErrors> {
+        schema::parse(text, file_name)
+    }
+
+    /// Short name: lower-case letters, digits, `_` and `-`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Name for people, one line.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Where the numbers come from, one line.
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// The nominal arm.
+    pub const fn chain(&self) -> &KinematicChain {
+        &self.chain
+    }
+
+    /// Limits and speeds, one entry per joint of the chain.
+    pub fn joints(&self) -> &[JointRange] {
+        &self.joints
+    }
+
+    /// Joints whose link has a β to identify, from 0, ascending.
+    pub fn beta_joints(&self) -> &[usize] {
+        &self.beta_joints
+    }
+
+    /// Parameters that are never identified.
+    pub fn fixed_parameters(&self) -> &[ParameterId] {
+        &self.fixed_parameters
+    }
+
+    /// The targets; at least one.
+    pub fn targets(&self) -> &[Target] {
+        &self.targets
+    }
+
+    /// Sizes of the prior.
+    pub const fn expected_deviations(&self) -> &ExpectedDeviations {
+        &self.expected_deviations
+    }
+
+    /// Limits for the verification.
+    pub const fn acceptance(&self) -> &Acceptance {
+        &self.acceptance
+    }
+
+    /// The measuring instrument, if its uncertainty is known.
+    pub const fn instrument(&self) -> Option<&Instrument> {
+        self.instrument.as_ref()
+    }
+
+    /// Capsules around the links.
+    pub fn bodies(&self) -> &[Capsule] {
+        &self.bodies
+    }
+
+    /// Height of the floor: z in the robot base [m].
+    pub const fn floor(&self) -> Option<f64> {
+        self.floor
+    }
+
+    /// Boxes that the arm must not enter.
+    pub fn keep_out(&self) -> &[KeepOut] {
+        &self.keep_out
+    }
+
+    /// Where the tracker stands and what it can see.
+    pub const fn tracker(&self) -> &Tracker {
+        &self.tracker
+    }
+
+    /// The parameters to identify, in the order of equation (19) of the method paper: α, a, d, θ joint by joint, then the
+    /// β's, then the coordinates of targets that are not taken as exact.
+    pub fn free_parameters(&self, level: Level) -> Vec<FreeParameter> {
+        let constants = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
+        let links = (0..self.chain.dof())
+            .flat_map(|joint| constants.map(|parameter| ParameterId::Link { joint, parameter }))
+            .chain(self.beta_joints.iter().map(|&joint| ParameterId::Link { joint, parameter: LinkParameter::Beta }))
+            .filter(|id| match level {
+                Level::Offsets => id.is_joint_offset(&self.chain),
+                Level::Geometric => true,
+            });
+        let targets = self
+            .targets
+            .iter()
+            .enumerate()
+            .filter(|(_, target)| target.is_free())
+            .flat_map(|(target, _)| Axis::ALL.map(|axis| ParameterId::Target { target, axis }));
+        links
+            .chain(targets)
+            .filter(|id| !self.fixed_parameters.contains(id))
+            .map(|id| FreeParameter { id, expected: self.expected_deviations.of(id, &self.chain, &self.targets) })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,196 @@
+//! Schema 1 of profile files: the top level. Names carry units (mm, deg, mrad, um); unknown fields are errors.
+
+mod cell;
+mod joint;
+mod parameters;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use super::decode::{Fields, choice, direction, fields, list, not_negative, number, numbers, point, text};
+use super::diagnostic::{Diagnostic, Findings, ProfileErrors};
+use super::syntax::{self, Ast};
+use super::{FREE_TARGET_UNCERTAINTY, JointRange, Profile, Target, check};
+use crate::kinematics::{Convention, Joint, KinematicChain};
+use crate::units::{from_deg, from_mm};
+use joint::DecodedJoint;
+
+/// The schema that this program writes and reads.
+const SCHEMA: f64 = 1.0;
+
+const FIELDS: &[&str] = &[
+    "schema",
+    "name",
+    "title",
+    "source",
+    "convention",
+    "base",
+    "joints",
+    "flange",
+    "targets",
+    "fixed",
+    "expected_deviations",
+    "acceptance",
+    "instrument",
+    "tracker",
+    "bodies",
+    "floor_mm",
+    "keep_out",
+];
+
+/// See [`Profile::parse`].
+pub(super) fn parse(text: &str, file_name: &str) -> Result<(Profile, Vec<Diagnostic>), ProfileErrors> {
+    let mut findings = Findings::new(text, file_name);
+    let profile = syntax::parse(text, &mut findings).and_then(|tree| profile(&tree, &mut findings));
+    let failed = findings.has_errors();
+    let diagnostics = findings.into_diagnostics();
+    match profile {
+        Some(profile) if !failed => Ok((profile, diagnostics)),
+        _ => Err(ProfileErrors { diagnostics }),
+    }
+}
+
+fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
+    let top = fields(tree, "the profile", FIELDS, findings)?;
+    schema_number(&top, findings);
+    let name = top.require("name", "\"my-robot\"", findings).and_then(|ast| short_name(ast, findings));
+    let title = top.require("title", "\"Maker and type\"", findings).and_then(|ast| text(ast, findings));
+    let source = top.require("source", "\"where the numbers come from\"", findings).and_then(|ast| text(ast, findings));
+    let convention = top.require("convention", "Standard", findings).and_then(|ast| {
+        let choices = [("Standard", Convention::Standard), ("Modified", Convention::Modified)];
+        choice(ast, &choices, findings)
+    });
+    let base = top.get_or("base", Isometry3::identity(), |ast| pose(ast, "'base'", findings));
+    let flange = top.get_or("flange", Isometry3::identity(), |ast| pose(ast, "'flange'", findings));
+    let joints = top
+        .require("joints", "[(name: \"J1\", type: Revolute, ...), ...]", findings)
+        .and_then(|ast| joint::joints(ast, findings));
+    let targets = targets(&top, findings);
+    let acceptance = cell::acceptance(&top, findings);
+    let instrument = cell::instrument(&top, findings);
+    let tracker = cell::tracker(&top, findings);
+    let floor = top.get("floor_mm").and_then(|ast| number(ast, findings)).map(from_mm);
+    let keep_out = cell::keep_out(&top, findings);
+    let known = joints.as_ref().map(|joints| joints.shapes.as_slice());
+    let bodies = cell::bodies(&top, known.map(<[_]>::len), findings);
+    let names = known.map(|joints| parameters::Names::new(joints, targets.as_deref().unwrap_or_default()));
+    let fixed_parameters = parameters::fixed(&top, names.as_ref(), findings);
+    let expected_deviations = parameters::expected_deviations(&top, names.as_ref(), findings);
+
+    // From here on everything is needed; what is missing was reported above.
+    let decoded = joints?;
+    let joints = decoded.complete?;
+    let spans: Vec<_> = joints.iter().map(|joint| joint.span).collect();
+    let (chain_joints, joint_ranges, has_beta) = unzipped(joints);
+    let chain = match KinematicChain::new(convention?, base?, chain_joints, flange?) {
+        Ok(chain) => chain,
+        Err(error) => {
+            findings.error(top.start(), error.to_string(), None);
+            return None;
+        }
+    };
+    let beta_joints = (0..chain.dof()).filter(|&joint| has_beta.get(joint).copied().unwrap_or(false)).collect();
+    let profile = Profile {
+        name: name?,
+        title: title?,
+        source: source?,
+        chain,
+        joints: joint_ranges,
+        beta_joints,
+        fixed_parameters: fixed_parameters?,
+        targets: targets?,
+        expected_deviations: expected_deviations?,
+        acceptance: acceptance?,
+        instrument,
+        bodies: bodies?,
+        floor,
+        keep_out: keep_out?,
+        tracker: tracker?,
+    };
+    check::check(&profile, &spans, findings);
+    Some(profile)
+}
+
+fn unzipped(joints: Vec<DecodedJoint>) -> (Vec<Joint>, Vec<JointRange>, Vec<bool>) {
+    let mut chain_joints = Vec::with_capacity(joints.len());
+    let mut ranges = Vec::with_capacity(joints.len());
+    let mut has_beta = Vec::with_capacity(joints.len());
+    for DecodedJoint { joint, range, has_beta: beta, span: _ } in joints {
+        chain_joints.push(joint);
+        ranges.push(range);
+        has_beta.push(beta);
+    }
+    (chain_joints, ranges, has_beta)
+}
+
+fn schema_number(top: &Fields<'_>, findings: &mut Findings<'_>) {
+    let Some(ast) = top.require("schema", "1", findings) else { return };
+    let Some(schema) = number(ast, findings) else { return };
+    if schema.to_bits() != SCHEMA.to_bits() {
+        let hint = format!("this program reads schema {SCHEMA}");
+        findings.error(ast.span, format!("schema {schema} is not known"), hint);
+    }
+}
+
+/// A name that can be typed on a command line and used in a file name.
+fn short_name(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
+    let name = text(ast, findings)?;
+    if name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '_' | '-')) {
+        return Some(name);
+    }
+    let hint = "use lower-case letters, digits, '_' and '-'".to_owned();
+    findings.error(ast.span, format!("'{}' cannot be the name of a profile", syntax::shortened(&name)), hint);
+    None
+}
+
+/// `(xyz_mm: (…), rpy_deg: (…))`: fixed-axis roll, pitch, yaw as in URDF.
+fn pose(ast: &Ast, what: &str, findings: &mut Findings<'_>) -> Option<Isometry3<f64>> {
+    let inside = fields(ast, what, &["xyz_mm", "rpy_deg"], findings)?;
+    let origin = inside.get_or("xyz_mm", Point3::origin(), |ast| point(ast, findings));
+    let angles = inside.get_or("rpy_deg", [0.0; 3], |ast| numbers(ast, findings));
+    let [roll, pitch, yaw] = angles?.map(from_deg);
+    let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    Some(Isometry3::from_parts(Translation3::from(origin?), rotation))
+}
+
+fn targets(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Vec<Target>> {
+    let items = match top.get("targets") {
+        Some(ast) => list(ast, "targets", findings)?,
+        None => &[],
+    };
+    if items.is_empty() {
+        let place = top.get("targets").map_or_else(|| top.start(), |ast| ast.span);
+        findings.warning(
+            place,
+            "no target is given: one SMR is assumed within 50 mm of the flange origin",
+            "add 'targets: [(name: \"smr\", position_mm: (0.0, 0.0, 50.0))]' with the position as mounted".to_owned(),
+        );
+        return Some(vec![Target {
+            name: "smr".to_owned(),
+            position_in_flange: Point3::origin(),
+            uncertainty: FREE_TARGET_UNCERTAINTY,
+            axis_in_flange: Vector3::z_axis(),
+        }]);
+    }
+    let mut targets: Vec<Option<Target>> = Vec::new();
+    for item in items {
+        let target = target(item, findings);
+        if let Some(target) = &target
+            && targets.iter().flatten().any(|earlier| earlier.name == target.name)
+        {
+            let hint = "give each target its own name".to_owned();
+            findings.error(item.span, format!("two targets are called '{}'", target.name), hint);
+        }
+        targets.push(target);
+    }
+    targets.into_iter().collect()
+}
+
+fn target(ast: &Ast, findings: &mut Findings<'_>) -> Option<Target> {
+    let inside = fields(ast, "a target", &["name", "position_mm", "uncertainty_mm", "axis_in_flange"], findings)?;
+    let name = inside.require("name", "\"smr\"", findings).and_then(|ast| text(ast, findings));
+    let position = inside.require("position_mm", "(0.0, 0.0, 50.0)", findings).and_then(|ast| point(ast, findings));
+    let uncertainty =
+        inside.get_or("uncertainty_mm", FREE_TARGET_UNCERTAINTY, |ast| not_negative(ast, findings).map(from_mm));
+    let axis = inside.get_or("axis_in_flange", Vector3::z_axis(), |ast| direction(ast, findings));
+    Some(Target { name: name?, position_in_flange: position?, uncertainty: uncertainty?, axis_in_flange: axis? })
+}

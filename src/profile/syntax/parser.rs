@@ -1,0 +1,203 @@
+//! Words to tree. A missing comma or colon is reported and passed over; any other syntax error ends the reading, because
+//! what follows would only be noise.
+
+use super::super::diagnostic::{Findings, Span};
+use super::lexer::{Token, TokenKind, tokens};
+use super::{Ast, Field, Node};
+
+/// Deepest nesting: far above any profile, far below the end of the stack.
+const DEEPEST: usize = 32;
+
+/// Reads a whole text; `None` after a syntax error that cannot be passed over.
+pub(super) fn parse(text: &str, findings: &mut Findings<'_>) -> Option<Ast> {
+    let mut parser = Parser { tokens: tokens(text, findings), at: 0, depth: 0, findings };
+    parser.skip_extensions()?;
+    let value = parser.value()?;
+    let rest = parser.peek().clone();
+    if rest.kind != TokenKind::End {
+        let hint = "a profile is one pair of brackets: ( schema: 1, ... )".to_owned();
+        parser.findings.error(rest.span, format!("{} after the end of the profile", rest.kind.describe()), hint);
+        return None;
+    }
+    Some(value)
+}
+
+struct Parser<'f, 'a> {
+    tokens: Vec<Token>,
+    at: usize,
+    depth: usize,
+    findings: &'f mut Findings<'a>,
+}
+
+/// What stands at the end of the word list; also what a broken list would answer.
+const END: Token = Token { kind: TokenKind::End, span: Span::new(0, 0) };
+
+impl Parser<'_, '_> {
+    fn peek(&self) -> &Token {
+        self.tokens.get(self.at).or_else(|| self.tokens.last()).unwrap_or(&END)
+    }
+
+    fn peek_second(&self) -> &TokenKind {
+        self.tokens.get(self.at + 1).map_or(&TokenKind::End, |token| &token.kind)
+    }
+
+    fn next(&mut self) -> Token {
+        let token = self.peek().clone();
+        self.at += 1;
+        token
+    }
+
+    fn is_mark(&self, mark: char) -> bool {
+        self.peek().kind == TokenKind::Mark(mark)
+    }
+
+    fn take(&mut self, mark: char) -> bool {
+        let found = self.is_mark(mark);
+        if found {
+            self.at += 1;
+        }
+        found
+    }
+
+    fn fail<T>(&mut self, expected: &str) -> Option<T> {
+        let token = self.peek().clone();
+        self.findings.error(token.span, format!("expected {expected}, found {}", token.kind.describe()), None);
+        None
+    }
+
+    /// `#![enable(implicit_some)]` and the like change nothing here.
+    fn skip_extensions(&mut self) -> Option<()> {
+        while self.take('#') {
+            if !(self.take('!') && self.take('[')) {
+                return self.fail("'#![enable(...)]'");
+            }
+            while !self.take(']') {
+                if self.next().kind == TokenKind::End {
+                    return self.fail("']'");
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn value(&mut self) -> Option<Ast> {
+        if self.depth >= DEEPEST {
+            return self.fail(&format!("at most {DEEPEST} levels of brackets"));
+        }
+        self.depth += 1;
+        let value = self.value_inside();
+        self.depth -= 1;
+        value
+    }
+
+    fn value_inside(&mut self) -> Option<Ast> {
+        let Token { kind, span } = self.peek().clone();
+        let start = span.start;
+        let node = match kind {
+            TokenKind::Text(text) => {
+                self.at += 1;
+                Node::Text(text)
+            }
+            TokenKind::Number(number) => {
+                self.at += 1;
+                Node::Number(number)
+            }
+            TokenKind::Name(name) => {
+                self.at += 1;
+                if self.is_mark('(') {
+                    let inside = self.round()?;
+                    match inside {
+                        Node::Tuple(mut items) if name == "Some" && items.len() == 1 => return items.pop(),
+                        inside => inside,
+                    }
+                } else {
+                    match name.as_str() {
+                        "true" => Node::Flag(true),
+                        "false" => Node::Flag(false),
+                        "None" => Node::Absent,
+                        "inf" => Node::Number(f64::INFINITY),
+                        "NaN" => Node::Number(f64::NAN),
+                        _ => Node::Name(name),
+                    }
+                }
+            }
+            TokenKind::Mark('(') => self.round()?,
+            TokenKind::Mark('[') => {
+                self.at += 1;
+                Node::List(self.items(']')?)
+            }
+            TokenKind::Mark('{') => {
+                self.at += 1;
+                self.map()?
+            }
+            TokenKind::Mark(_) | TokenKind::End => return self.fail("a value"),
+        };
+        let end = self.at.checked_sub(1).and_then(|last| self.tokens.get(last)).map_or(start, |token| token.span.end);
+        Some(Ast { span: Span::new(start, end), node })
+    }
+
+    /// `( … )`: a struct if a name and a colon come first.
+    fn round(&mut self) -> Option<Node> {
+        self.take('(');
+        let is_struct = matches!(self.peek().kind, TokenKind::Name(_)) && *self.peek_second() == TokenKind::Mark(':');
+        if !is_struct {
+            return Some(Node::Tuple(self.items(')')?));
+        }
+        let mut fields = Vec::new();
+        while !self.take(')') {
+            let Token { kind: TokenKind::Name(name), span: name_span } = self.peek().clone() else {
+                return self.fail("the name of a field or ')'");
+            };
+            self.at += 1;
+            self.colon()?;
+            let value = self.value()?;
+            fields.push(Field { name, name_span, value });
+            self.comma(')')?;
+        }
+        Some(Node::Struct(fields))
+    }
+
+    fn items(&mut self, close: char) -> Option<Vec<Ast>> {
+        let mut items = Vec::new();
+        while !self.take(close) {
+            items.push(self.value()?);
+            self.comma(close)?;
+        }
+        Some(items)
+    }
+
+    fn map(&mut self) -> Option<Node> {
+        let mut entries = Vec::new();
+        while !self.take('}') {
+            let key = self.value()?;
+            self.colon()?;
+            entries.push((key, self.value()?));
+            self.comma('}')?;
+        }
+        Some(Node::Map(entries))
+    }
+
+    fn colon(&mut self) -> Option<()> {
+        if self.take(':') {
+            return Some(());
+        }
+        self.fail::<()>("':'");
+        // A value where the colon should stand: only the colon is missing.
+        self.begins_value().then_some(())
+    }
+
+    fn comma(&mut self, close: char) -> Option<()> {
+        if self.take(',') || self.is_mark(close) {
+            return Some(());
+        }
+        self.fail::<()>(&format!("',' or '{close}'"));
+        self.begins_value().then_some(())
+    }
+
+    fn begins_value(&self) -> bool {
+        match self.peek().kind {
+            TokenKind::Name(_) | TokenKind::Text(_) | TokenKind::Number(_) | TokenKind::Mark('(' | '[' | '{') => true,
+            TokenKind::Mark(_) | TokenKind::End => false,
+        }
+    }
+}

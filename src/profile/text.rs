@@ -1,0 +1,240 @@
+//! Profiles as text for people, at most 80 columns wide: what `profile list`, `profile show` and `profile check` print.
+//!
+//! Degrees and millimetres, as in the file. Every text ends with a line break.
+
+use super::diagnostic::{joined, wrapped};
+use super::{Diagnostic, JointRange, Level, PARALLEL_TOLERANCE, Profile, ProfileErrors};
+use crate::kinematics::{Convention, Joint, JointType};
+use crate::units::{Quantity, to_deg, to_mm};
+
+/// Widest line [characters].
+const WIDTH: usize = 80;
+
+/// A table of profiles: name, number of joints, title.
+pub fn list_text<'p>(profiles: impl IntoIterator<Item = &'p Profile>) -> String {
+    let profiles: Vec<&Profile> = profiles.into_iter().collect();
+    let width = profiles.iter().map(|profile| profile.name().chars().count()).max().unwrap_or(0).max(4);
+    let mut lines = vec![format!("{:width$}  joints  robot", "name")];
+    for profile in profiles {
+        let line = format!("{:width$}  {:>6}  {}", profile.name(), profile.chain().dof(), profile.title());
+        lines.push(clipped(&line));
+    }
+    finished(&lines)
+}
+
+/// Everything that identification and planning take from a profile.
+pub fn show_text(profile: &Profile) -> String {
+    let mut lines = wrapped(&format!("{}: {}", profile.name(), profile.title()), WIDTH);
+    lines.extend(wrapped(&format!("source: {}", profile.source()), WIDTH));
+    lines.push(String::new());
+    lines.extend(geometry_lines(profile));
+    lines.push(String::new());
+    lines.extend(range_lines(profile));
+    lines.push(String::new());
+    lines.extend(target_lines(profile));
+    lines.push(String::new());
+    lines.extend(parameter_lines(profile));
+    lines.push(String::new());
+    lines.extend(cell_lines(profile));
+    finished(&lines)
+}
+
+/// The outcome of reading a profile: its problems, then one line that counts them.
+pub fn check_text(file_name: &str, outcome: &Result<(Profile, Vec<Diagnostic>), ProfileErrors>) -> String {
+    let (diagnostics, errors, verdict) = match outcome {
+        Ok((profile, warnings)) => (warnings, 0, format!("profile '{}' can be used", profile.name())),
+        Err(errors) => (&errors.diagnostics, errors.error_count(), "the profile cannot be used".to_owned()),
+    };
+    let mut text = joined(diagnostics);
+    if !diagnostics.is_empty() {
+        text.push_str("\n\n");
+    }
+    let file = super::diagnostic::printable(file_name);
+    let (errors, warnings) = (counted(errors, "error"), counted(diagnostics.len() - errors, "warning"));
+    format!("{text}{file}: {verdict}: {errors}, {warnings}\n")
+}
+
+fn geometry_lines(profile: &Profile) -> Vec<String> {
+    let chain = profile.chain();
+    let (convention, product) = match chain.convention() {
+        Convention::Standard => ("standard", "Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta)"),
+        Convention::Modified => ("modified (Craig)", "Rot(x,alpha) Trans(x,a) Rot(y,beta) Rot(z,theta) Trans(z,d)"),
+    };
+    let mut lines = vec![format!("nominal geometry, {convention} convention:"), format!("  {product}")];
+    lines.push(format!(
+        "{:<8}{:<10}{:>10}{:>11}{:>11}{:>11}{:>10}",
+        "joint", "type", "alpha deg", "a mm", "d mm", "theta deg", "beta deg"
+    ));
+    for (index, joint) in chain.joints().iter().enumerate() {
+        let link = joint.link;
+        let beta = if profile.beta_joints().contains(&index) { fixed(to_deg(link.beta), 3) } else { "-".to_owned() };
+        lines.push(clipped(&format!(
+            "{:<8}{:<10}{:>10}{:>11}{:>11}{:>11}{beta:>10}",
+            joint.name,
+            type_name(joint.joint_type),
+            fixed(to_deg(link.alpha), 3),
+            fixed(to_mm(link.a), 3),
+            fixed(to_mm(link.d), 3),
+            fixed(to_deg(link.theta), 3),
+        )));
+    }
+    for joint in chain.joints() {
+        let coupled: String = joint
+            .coupling
+            .iter()
+            .zip(chain.joints())
+            .filter(|(coefficient, _)| **coefficient != 0.0)
+            .map(|(coefficient, other)| {
+                let sign = if *coefficient < 0.0 { "-" } else { "+" };
+                format!(" {sign} {} x {}", coefficient.abs(), other.name)
+            })
+            .collect::<Vec<_>>()
+            .concat();
+        let sense = if joint.direction < 0.0 { "-" } else { "" };
+        if !coupled.is_empty() {
+            lines.push(clipped(&format!("{0} in the chain = {sense}({0}{coupled}) of the pendant", joint.name)));
+        } else if joint.direction < 0.0 {
+            lines.push(clipped(&format!("{0} in the chain = -{0} of the pendant", joint.name)));
+        }
+    }
+    let parallel: Vec<String> = chain
+        .parallel_axes(PARALLEL_TOLERANCE)
+        .into_iter()
+        .filter_map(|first| {
+            Some(format!("{} and {}", chain.joints().get(first)?.name, chain.joints().get(first + 1)?.name))
+        })
+        .collect();
+    let parallel = if parallel.is_empty() { "none".to_owned() } else { parallel.join(", ") };
+    lines.extend(wrapped(&format!("parallel neighbouring axes: {parallel}"), WIDTH));
+    lines
+}
+
+fn range_lines(profile: &Profile) -> Vec<String> {
+    let mut lines =
+        vec![format!("{:<8}{:<5}{:>24}{:>24}{:>14}", "joint", "unit", "limits", "for planning", "speed /s")];
+    for (joint, range) in profile.chain().joints().iter().zip(profile.joints()) {
+        lines.push(clipped(&range_line(joint, range)));
+    }
+    lines
+}
+
+fn range_line(joint: &Joint, range: &JointRange) -> String {
+    let quantity = joint.joint_type.quantity();
+    let speed = range.max_speed.map_or_else(|| "-".to_owned(), |speed| fixed(quantity.to_edge(speed), 1));
+    let limits = interval(range.limits, quantity);
+    let planning = interval(range.planning_limits, quantity);
+    format!("{:<8}{:<5}{limits:>24}{planning:>24}{speed:>14}", joint.name, quantity.unit())
+}
+
+fn target_lines(profile: &Profile) -> Vec<String> {
+    let mut lines = vec![format!("{:<12}{:>11}{:>11}{:>11}  {}", "target", "x mm", "y mm", "z mm", "in the flange")];
+    for target in profile.targets() {
+        let state = if target.is_free() {
+            format!("free, within {} mm", fixed(to_mm(target.uncertainty), 1))
+        } else {
+            "taken as exact".to_owned()
+        };
+        let [x, y, z] = [0, 1, 2].map(|axis| fixed(to_mm(target.position_in_flange[axis]), 3));
+        lines.push(clipped(&format!("{:<12}{x:>11}{y:>11}{z:>11}  {state}", target.name)));
+    }
+    lines
+}
+
+fn parameter_lines(profile: &Profile) -> Vec<String> {
+    let count = |level| profile.free_parameters(level).len();
+    let fixed_names: Vec<String> = profile.fixed_parameters().iter().map(ToString::to_string).collect();
+    let mut lines = vec![format!(
+        "free parameters: {} geometric, {} offsets only (target coordinates included)",
+        count(Level::Geometric),
+        count(Level::Offsets)
+    )];
+    if !fixed_names.is_empty() {
+        lines.extend(wrapped(&format!("fixed: {}", fixed_names.join(", ")), WIDTH));
+    }
+    let acceptance = profile.acceptance();
+    let limits: Vec<String> = [
+        ("position mean", acceptance.position_mean),
+        ("position RMS", acceptance.position_rms),
+        ("position max", acceptance.position_max),
+        ("distance mean", acceptance.distance_mean),
+        ("distance RMS", acceptance.distance_rms),
+        ("distance max", acceptance.distance_max),
+    ]
+    .into_iter()
+    .filter_map(|(name, limit)| limit.map(|limit| format!("{name} {} mm", fixed(to_mm(limit), 3))))
+    .collect();
+    let limits = if limits.is_empty() { "none".to_owned() } else { limits.join(", ") };
+    lines.extend(wrapped(&format!("acceptance limits: {limits}"), WIDTH));
+    lines
+}
+
+fn cell_lines(profile: &Profile) -> Vec<String> {
+    let instrument = profile.instrument().map_or_else(
+        || "not given; its uncertainty is estimated from the residuals".to_owned(),
+        |instrument| format!("{}, sigma {}", instrument.name, instrument.sigma_text()),
+    );
+    let tracker = profile.tracker();
+    let [x, y, z] = [0, 1, 2].map(|axis| fixed(to_mm(tracker.position_in_base[axis]), 0));
+    let mut lines = wrapped(&format!("instrument: {instrument}"), WIDTH);
+    lines.extend(wrapped(
+        &format!(
+            "tracker near ({x}, {y}, {z}) mm in the base, sees up to {} deg off the SMR axis, {} to {} mm away",
+            fixed(to_deg(tracker.acceptance_angle), 0),
+            fixed(to_mm(tracker.range.0), 0),
+            fixed(to_mm(tracker.range.1), 0),
+        ),
+        WIDTH,
+    ));
+    let floor =
+        profile.floor().map_or_else(|| "no floor".to_owned(), |z| format!("floor at {} mm", fixed(to_mm(z), 0)));
+    lines.push(format!(
+        "collision shapes: {}, {floor}, keep-out boxes: {}",
+        counted(profile.bodies().len(), "body").replace("bodys", "bodies"),
+        profile.keep_out().len()
+    ));
+    lines
+}
+
+const fn type_name(joint_type: JointType) -> &'static str {
+    match joint_type {
+        JointType::Revolute => "revolute",
+        JointType::Prismatic => "prismatic",
+    }
+}
+
+fn interval(limits: Option<(f64, f64)>, quantity: Quantity) -> String {
+    limits.map_or_else(
+        || "-".to_owned(),
+        |(low, high)| format!("{} .. {}", fixed(quantity.to_edge(low), 1), fixed(quantity.to_edge(high), 1)),
+    )
+}
+
+/// A number with this many decimals; never `-0.000`.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
+        _ => text,
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
+}
+
+/// A line of at most [`WIDTH`] characters; a cut is marked.
+fn clipped(line: &str) -> String {
+    let line = line.trim_end();
+    if line.chars().count() <= WIDTH {
+        return line.to_owned();
+    }
+    let mut start: String = line.chars().take(WIDTH - 3).collect();
+    start.push_str("...");
+    start
+}
+
+fn finished(lines: &[String]) -> String {
+    let mut text = lines.join("\n");
+    text.push('\n');
+    text
+}
