@@ -9,7 +9,7 @@ use thiserror::Error;
 /// Widest message line [characters].
 const WIDTH: usize = 80;
 /// Characters of a source line that are shown.
-const EXCERPT: usize = 68;
+const EXCERPT: usize = 64;
 /// Problems of one file that are shown.
 const MOST: usize = 100;
 
