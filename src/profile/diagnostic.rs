@@ -60,7 +60,7 @@ impl fmt::Display for Diagnostic {
         write!(f, "{place}: {}: {}", self.severity.name(), self.message)?;
         let number = self.line.to_string();
         let margin = " ".repeat(number.len());
-        write!(f, "\n  {number} | {}", self.excerpt)?;
+        write!(f, "\n  {number} |{}{}", if self.excerpt.is_empty() { "" } else { " " }, self.excerpt)?;
         write!(f, "\n  {margin} | {}{}", " ".repeat(self.indent), "^".repeat(self.carets))?;
         if let Some(hint) = &self.hint {
             let lines = wrapped(hint, WIDTH - 8);
@@ -128,6 +128,11 @@ impl<'a> Findings<'a> {
 
     pub(super) fn has_errors(&self) -> bool {
         self.found.iter().any(|(_, diagnostic)| diagnostic.severity == Severity::Error)
+    }
+
+    /// Line of a place, from 1.
+    pub(super) fn line_of(&self, span: Span) -> usize {
+        self.text.get(..span.start).unwrap_or_default().matches('\n').count() + 1
     }
 
     /// The problems in the order of the file.

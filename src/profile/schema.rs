@@ -1,4 +1,22 @@
 //! Schema 1 of profile files: the top level. Names carry units (mm, deg, mrad, um); unknown fields are errors.
+//!
+//! Needed: `schema`, `name`, `title`, `source`, `convention`, `joints` with `name`, `type`, `alpha_deg`, `a_mm`, `d_mm`,
+//! `theta_deg`. All else may be left out:
+//!
+//! | field | left out |
+//! |---|---|
+//! | `base`, `flange`: `(xyz_mm, rpy_deg)` | identity; roll, pitch, yaw about fixed axes as in URDF |
+//! | joint `beta_deg` | the link has no β, and none is identified |
+//! | joint `direction`, `coupling` | +1, none |
+//! | joint `planning_limits_…` | the joint limits |
+//! | `targets` | one target 'smr' at the flange origin, free (with a warning) |
+//! | target `uncertainty_mm`, `axis_in_flange` | 50 mm; +z of the flange |
+//! | `fixed`, `keep_out`, `bodies` | none |
+//! | `expected_deviations` | 1 mm, α β 2 mrad, joint offset 10 mrad, prismatic offset 1 mm |
+//! | `acceptance` | no limit |
+//! | `instrument` | unknown; σ is estimated from the residuals |
+//! | `tracker` | at (3000, 0, 1000) mm, 30°, 500 to 20000 mm |
+//! | `floor_mm` | no floor |
 
 mod cell;
 mod joint;

@@ -31,6 +31,7 @@ pub(super) struct DecodedJoint {
     pub(super) joint: Joint,
     pub(super) range: JointRange,
     pub(super) has_beta: bool,
+    /// Its name: the place for what concerns the whole joint.
     pub(super) span: Span,
 }
 
@@ -72,7 +73,8 @@ pub(super) fn joints(ast: &Ast, findings: &mut Findings<'_>) -> Option<DecodedJo
         let joint = joint(inside, index, joint_type, &names, findings);
         match (joint, &mut complete) {
             (Some((joint, range)), Some(complete)) => {
-                complete.push(DecodedJoint { joint, range, has_beta, span: inside.span });
+                let span = inside.get("name").map_or_else(|| inside.start(), |name| name.span);
+                complete.push(DecodedJoint { joint, range, has_beta, span });
             }
             _ => complete = None,
         }
@@ -176,11 +178,13 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
         JointType::Revolute => ("revolute", "deg", "mm"),
         JointType::Prismatic => ("prismatic", "mm", "deg"),
     };
+    let mut good = true;
     for (field, suffix) in [("limits_", ""), ("planning_limits_", ""), ("max_speed_", "_s")] {
         let wrong = format!("{field}{other}{suffix}");
         if let Some(ast) = inside.get(&wrong) {
             let hint = format!("use '{field}{unit}{suffix}'");
             findings.error(ast.span, format!("a {kind} joint has no '{wrong}'"), hint);
+            good = false;
         }
     }
     let pulses = inside.get("pulses_per_degree");
@@ -193,7 +197,14 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
     let max_speed = inside.get_or(&format!("max_speed_{unit}_s"), None, |ast| {
         positive(ast, findings).map(|speed| Some(quantity.from_edge(speed)))
     });
-    let pulses_per_degree = inside.get_or("pulses_per_degree", None, |ast| number(ast, findings).map(Some));
+    let pulses_per_degree = inside.get_or("pulses_per_degree", None, |ast| {
+        let value = number(ast, findings)?;
+        if value == 0.0 {
+            let hint = "pulses per degree are above 0, or below 0 for an encoder that counts down".to_owned();
+            findings.error(ast.span, "0 pulses per degree are not allowed", hint);
+        }
+        Some(Some(value))
+    });
     if let (Some(Some((low, high))), Some(Some((plan_low, plan_high))), Some(ast)) =
         (limits, planning, inside.get(&planning_field))
         && (plan_low < low || plan_high > high)
@@ -206,7 +217,7 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
         );
     }
     let limits = limits?;
-    Some(JointRange {
+    good.then_some(JointRange {
         limits,
         planning_limits: planning?.or(limits),
         max_speed: max_speed?,
