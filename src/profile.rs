@@ -26,10 +26,10 @@ pub use text::{check_text, list_text, show_text};
 
 use crate::kinematics::{Axis, KinematicChain, LinkParameter, ParameterId};
 
-/// Angle below which neighbouring axes count as parallel [rad]: 1°, far above any assembly error and far below any design angle.
+/// Angle below which neighbouring axes count as parallel (rad): 1°, far above any assembly error and far below any design angle.
 pub const PARALLEL_TOLERANCE: f64 = crate::units::DEGREE;
 
-/// Uncertainty of a target position that the profile leaves open [m]: 50 mm, the size of a flange adapter.
+/// Uncertainty of a target position that the profile leaves open (m): 50 mm, the size of a flange adapter.
 pub const FREE_TARGET_UNCERTAINTY: f64 = 50.0 * crate::units::MILLIMETRE;
 
 /// A robot in its cell, checked.
@@ -52,7 +52,7 @@ pub struct Profile {
     tracker: Tracker,
 }
 
-/// What a joint can do, in pendant values: [rad] and [rad/s] for a revolute joint, [m] and [m/s] for a prismatic one.
+/// What a joint can do, in pendant values: (rad) and (rad/s) for a revolute joint, (m) and (m/s) for a prismatic one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointRange {
     /// Lowest and highest value; `None` if the profile gives none.
@@ -70,9 +70,9 @@ pub struct JointRange {
 pub struct Target {
     /// Name in tables.
     pub name: String,
-    /// Centre of the SMR in the flange frame [m].
+    /// Centre of the SMR in the flange frame (m).
     pub position_in_flange: Point3<f64>,
-    /// Standard deviation expected of each coordinate [m]; zero: taken as exact and not identified.
+    /// Standard deviation expected of each coordinate (m); zero: taken as exact and not identified.
     pub uncertainty: f64,
     /// Direction that the SMR faces, in the flange frame.
     pub axis_in_flange: Unit<Vector3<f64>>,
@@ -85,7 +85,7 @@ impl Target {
     }
 }
 
-/// Limits for the verification of an identified arm [m]; `None`: no limit.
+/// Limits for the verification of an identified arm (m); `None`: no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Acceptance {
     /// Mean position error.
@@ -116,7 +116,7 @@ pub enum Level {
 pub struct FreeParameter {
     /// Which one.
     pub id: ParameterId,
-    /// Standard deviation of the prior [m] or [rad], above zero.
+    /// Standard deviation of the prior (m) or (rad), above zero.
     pub expected: f64,
 }
 
@@ -190,7 +190,7 @@ impl Profile {
         &self.bodies
     }
 
-    /// Height of the floor: z in the robot base [m].
+    /// Height of the floor: z in the robot base (m).
     pub const fn floor(&self) -> Option<f64> {
         self.floor
     }

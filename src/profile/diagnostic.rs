@@ -6,7 +6,7 @@ use std::fmt;
 
 use thiserror::Error;
 
-/// Widest message line [characters].
+/// Widest message line (characters).
 const WIDTH: usize = 80;
 /// Characters of a source line that are shown.
 const EXCERPT: usize = 64;
