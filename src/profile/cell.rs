@@ -9,14 +9,14 @@ use crate::units::{DEGREE, MICROMETRE};
 pub struct Instrument {
     /// Maker and type.
     pub name: String,
-    /// Constant part of the standard deviation per coordinate [m].
+    /// Constant part of the standard deviation per coordinate (m).
     pub sigma: f64,
-    /// Part that grows with the distance [m per m].
+    /// Part that grows with the distance (m per m).
     pub sigma_per_metre: f64,
 }
 
 impl Instrument {
-    /// Standard deviation [m] at a distance from the instrument [m]; both parts are added, as makers state them
+    /// Standard deviation (m) at a distance from the instrument (m); both parts are added, as makers state them
     /// (`15 µm + 6 µm/m`).
     pub const fn sigma_at(&self, distance: f64) -> f64 {
         self.sigma + self.sigma_per_metre * distance
@@ -33,11 +33,11 @@ impl Instrument {
 pub struct Capsule {
     /// Link frame: 0 is the fixed base, i the frame after joint i (entry i of `ForwardKinematics::base_from_links`).
     pub link: usize,
-    /// One end of the line in that frame [m].
+    /// One end of the line in that frame (m).
     pub from: Point3<f64>,
-    /// The other end [m]; the same point makes a sphere.
+    /// The other end (m); the same point makes a sphere.
     pub to: Point3<f64>,
-    /// Distance from line to surface [m].
+    /// Distance from line to surface (m).
     pub radius: f64,
 }
 
@@ -46,20 +46,20 @@ pub struct Capsule {
 pub struct KeepOut {
     /// Name in messages.
     pub name: String,
-    /// Corner with the smallest coordinates, in the base [m].
+    /// Corner with the smallest coordinates, in the base (m).
     pub min: Point3<f64>,
-    /// Corner with the largest coordinates, in the base [m].
+    /// Corner with the largest coordinates, in the base (m).
     pub max: Point3<f64>,
 }
 
 /// Place of the tracker and what it can see.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracker {
-    /// Roughly where it stands, in the robot base [m]: for planning only, never for identification.
+    /// Roughly where it stands, in the robot base (m): for planning only, never for identification.
     pub position_in_base: Point3<f64>,
-    /// Largest angle between beam and SMR axis [rad].
+    /// Largest angle between beam and SMR axis (rad).
     pub acceptance_angle: f64,
-    /// Nearest and farthest target [m].
+    /// Nearest and farthest target (m).
     pub range: (f64, f64),
 }
 

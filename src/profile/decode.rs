@@ -21,6 +21,14 @@ impl<'t> Fields<'t> {
         (!matches!(value.node, Node::Absent)).then_some(value)
     }
 
+    /// Decoded value of a field, or `default` if it is absent; `None` if it is there and bad.
+    pub(super) fn get_or<T>(&self, name: &str, default: T, decode: impl FnOnce(&'t Ast) -> Option<T>) -> Option<T> {
+        match self.get(name) {
+            Some(ast) => decode(ast),
+            None => Some(default),
+        }
+    }
+
     /// Value of a field that must be there.
     pub(super) fn require(&self, name: &str, example: &str, findings: &mut Findings<'_>) -> Option<&'t Ast> {
         let value = self.get(name);

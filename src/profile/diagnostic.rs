@@ -6,10 +6,12 @@ use std::fmt;
 
 use thiserror::Error;
 
-/// Widest message line [characters].
+/// Widest message line (characters).
 const WIDTH: usize = 80;
 /// Characters of a source line that are shown.
-const EXCERPT: usize = 68;
+const EXCERPT: usize = 64;
+/// Problems of one file that are shown.
+const MOST: usize = 100;
 
 /// How bad a problem is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,7 +60,7 @@ impl fmt::Display for Diagnostic {
         write!(f, "{place}: {}: {}", self.severity.name(), self.message)?;
         let number = self.line.to_string();
         let margin = " ".repeat(number.len());
-        write!(f, "\n  {number} | {}", self.excerpt)?;
+        write!(f, "\n  {number} |{}{}", if self.excerpt.is_empty() { "" } else { " " }, self.excerpt)?;
         write!(f, "\n  {margin} | {}{}", " ".repeat(self.indent), "^".repeat(self.carets))?;
         if let Some(hint) = &self.hint {
             let lines = wrapped(hint, WIDTH - 8);
@@ -117,15 +119,20 @@ impl<'a> Findings<'a> {
     }
 
     pub(super) fn error(&mut self, span: Span, message: impl Into<String>, hint: impl Into<Option<String>>) {
-        self.add(Severity::Error, span, message.into(), hint.into());
+        self.add(Severity::Error, span, &message.into(), hint.into().as_deref());
     }
 
     pub(super) fn warning(&mut self, span: Span, message: impl Into<String>, hint: impl Into<Option<String>>) {
-        self.add(Severity::Warning, span, message.into(), hint.into());
+        self.add(Severity::Warning, span, &message.into(), hint.into().as_deref());
     }
 
     pub(super) fn has_errors(&self) -> bool {
         self.found.iter().any(|(_, diagnostic)| diagnostic.severity == Severity::Error)
+    }
+
+    /// Line of a place, from 1.
+    pub(super) fn line_of(&self, span: Span) -> usize {
+        self.text.get(..span.start).unwrap_or_default().matches('\n').count() + 1
     }
 
     /// The problems in the order of the file.
@@ -134,7 +141,13 @@ impl<'a> Findings<'a> {
         self.found.into_iter().map(|(_, diagnostic)| diagnostic).collect()
     }
 
-    fn add(&mut self, severity: Severity, span: Span, message: String, hint: Option<String>) {
+    /// Notes a problem. After [`MOST`] of them only one more says so: the file is no profile, and the rest helps nobody.
+    fn add(&mut self, severity: Severity, span: Span, message: &str, hint: Option<&str>) {
+        let (severity, message, hint) = match self.found.len() {
+            0..MOST => (severity, message, hint),
+            MOST => (Severity::Error, "too many problems: the rest is not shown", None),
+            _ => return,
+        };
         let start = span.start.min(self.text.len());
         let before = self.text.get(..start).unwrap_or_default();
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
@@ -149,8 +162,8 @@ impl<'a> Findings<'a> {
             file: self.file.clone(),
             line: before.matches('\n').count() + 1,
             column: indent + 1,
-            message: printable(&message),
-            hint: hint.map(|hint| printable(&hint)),
+            message: printable(message),
+            hint: hint.map(printable),
             excerpt,
             indent: indent_shown,
             carets: carets_shown,

@@ -6,16 +6,16 @@ use super::Target;
 use crate::kinematics::{JointType, KinematicChain, LinkParameter, ParameterId};
 use crate::units::{MILLIMETRE, MILLIRADIAN};
 
-/// Standard deviations of the zero-mean prior [m] and [rad], each above zero.
+/// Standard deviations of the zero-mean prior (m) and (rad), each above zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpectedDeviations {
-    /// Lengths a and d [m].
+    /// Lengths a and d (m).
     pub length: f64,
-    /// Angles α and β, and θ of prismatic joints [rad].
+    /// Angles α and β, and θ of prismatic joints (rad).
     pub angle: f64,
-    /// Joint offsets θ of revolute joints [rad].
+    /// Joint offsets θ of revolute joints (rad).
     pub joint_offset: f64,
-    /// Joint offsets d of prismatic joints [m].
+    /// Joint offsets d of prismatic joints (m).
     pub prismatic_offset: f64,
     /// Parameters with an own value; of targets too.
     pub overrides: BTreeMap<ParameterId, f64>,
@@ -35,7 +35,7 @@ impl Default for ExpectedDeviations {
 }
 
 impl ExpectedDeviations {
-    /// The expected deviation of a parameter [m] or [rad]. A target coordinate has the uncertainty of its target.
+    /// The expected deviation of a parameter (m) or (rad). A target coordinate has the uncertainty of its target.
     pub fn of(&self, id: ParameterId, chain: &KinematicChain, targets: &[Target]) -> f64 {
         if let Some(own) = self.overrides.get(&id) {
             return *own;

@@ -1,4 +1,22 @@
 //! Schema 1 of profile files: the top level. Names carry units (mm, deg, mrad, um); unknown fields are errors.
+//!
+//! Needed: `schema`, `name`, `title`, `source`, `convention`, `joints` with `name`, `type`, `alpha_deg`, `a_mm`, `d_mm`,
+//! `theta_deg`. All else may be left out:
+//!
+//! | field | left out |
+//! |---|---|
+//! | `base`, `flange`: `(xyz_mm, rpy_deg)` | identity; roll, pitch, yaw about fixed axes as in URDF |
+//! | joint `beta_deg` | the link has no β, and none is identified |
+//! | joint `direction`, `coupling` | +1, none |
+//! | joint `planning_limits_…` | the joint limits |
+//! | `targets` | one target 'smr' at the flange origin, free (with a warning) |
+//! | target `uncertainty_mm`, `axis_in_flange` | 50 mm; +z of the flange |
+//! | `fixed`, `keep_out`, `bodies` | none |
+//! | `expected_deviations` | 1 mm, α β 2 mrad, joint offset 10 mrad, prismatic offset 1 mm |
+//! | `acceptance` | no limit |
+//! | `instrument` | unknown; σ is estimated from the residuals |
+//! | `tracker` | at (3000, 0, 1000) mm, 30°, 500 to 20000 mm |
+//! | `floor_mm` | no floor |
 
 mod cell;
 mod joint;
@@ -6,7 +24,7 @@ mod parameters;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::decode::{Fields, choice, fields, list, not_negative, number, numbers, point, text};
+use super::decode::{Fields, choice, direction, fields, list, not_negative, number, numbers, point, text};
 use super::diagnostic::{Diagnostic, Findings, ProfileErrors};
 use super::syntax::{self, Ast};
 use super::{FREE_TARGET_UNCERTAINTY, JointRange, Profile, Target, check};
@@ -59,8 +77,8 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
         let choices = [("Standard", Convention::Standard), ("Modified", Convention::Modified)];
         choice(ast, &choices, findings)
     });
-    let base = top.get("base").map_or(Some(Isometry3::identity()), |ast| pose(ast, "'base'", findings));
-    let flange = top.get("flange").map_or(Some(Isometry3::identity()), |ast| pose(ast, "'flange'", findings));
+    let base = top.get_or("base", Isometry3::identity(), |ast| pose(ast, "'base'", findings));
+    let flange = top.get_or("flange", Isometry3::identity(), |ast| pose(ast, "'flange'", findings));
     let joints = top
         .require("joints", "[(name: \"J1\", type: Revolute, ...), ...]", findings)
         .and_then(|ast| joint::joints(ast, findings));
@@ -145,8 +163,8 @@ fn short_name(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
 /// `(xyz_mm: (…), rpy_deg: (…))`: fixed-axis roll, pitch, yaw as in URDF.
 fn pose(ast: &Ast, what: &str, findings: &mut Findings<'_>) -> Option<Isometry3<f64>> {
     let inside = fields(ast, what, &["xyz_mm", "rpy_deg"], findings)?;
-    let origin = inside.get("xyz_mm").map_or(Some(Point3::origin()), |ast| point(ast, findings));
-    let angles = inside.get("rpy_deg").map_or(Some([0.0; 3]), |ast| numbers(ast, findings));
+    let origin = inside.get_or("xyz_mm", Point3::origin(), |ast| point(ast, findings));
+    let angles = inside.get_or("rpy_deg", [0.0; 3], |ast| numbers(ast, findings));
     let [roll, pitch, yaw] = angles?.map(from_deg);
     let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
     Some(Isometry3::from_parts(Translation3::from(origin?), rotation))
@@ -158,7 +176,7 @@ fn targets(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Vec<Target>>
         None => &[],
     };
     if items.is_empty() {
-        let place = top.get("targets").map_or(top.start(), |ast| ast.span);
+        let place = top.get("targets").map_or_else(|| top.start(), |ast| ast.span);
         findings.warning(
             place,
             "no target is given: one SMR is assumed within 50 mm of the flange origin",
@@ -189,10 +207,8 @@ fn target(ast: &Ast, findings: &mut Findings<'_>) -> Option<Target> {
     let inside = fields(ast, "a target", &["name", "position_mm", "uncertainty_mm", "axis_in_flange"], findings)?;
     let name = inside.require("name", "\"smr\"", findings).and_then(|ast| text(ast, findings));
     let position = inside.require("position_mm", "(0.0, 0.0, 50.0)", findings).and_then(|ast| point(ast, findings));
-    let uncertainty = inside
-        .get("uncertainty_mm")
-        .map_or(Some(FREE_TARGET_UNCERTAINTY), |ast| not_negative(ast, findings).map(from_mm));
-    let axis =
-        inside.get("axis_in_flange").map_or(Some(Vector3::z_axis()), |ast| super::decode::direction(ast, findings));
+    let uncertainty =
+        inside.get_or("uncertainty_mm", FREE_TARGET_UNCERTAINTY, |ast| not_negative(ast, findings).map(from_mm));
+    let axis = inside.get_or("axis_in_flange", Vector3::z_axis(), |ast| direction(ast, findings));
     Some(Target { name: name?, position_in_flange: position?, uncertainty: uncertainty?, axis_in_flange: axis? })
 }

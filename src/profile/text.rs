@@ -7,7 +7,7 @@ use super::{Diagnostic, JointRange, Level, PARALLEL_TOLERANCE, Profile, ProfileE
 use crate::kinematics::{Convention, Joint, JointType};
 use crate::units::{Quantity, to_deg, to_mm};
 
-/// Widest line [characters].
+/// Widest line (characters).
 const WIDTH: usize = 80;
 
 /// A table of profiles: name, number of joints, title.
@@ -50,31 +50,28 @@ pub fn check_text(file_name: &str, outcome: &Result<(Profile, Vec<Diagnostic>), 
         text.push_str("\n\n");
     }
     let file = super::diagnostic::printable(file_name);
-    text.push_str(&format!("{file}: {verdict}: "));
-    text.push_str(&counted(errors, "error"));
-    text.push_str(", ");
-    text.push_str(&counted(diagnostics.len() - errors, "warning"));
-    text.push('\n');
-    text
+    let (errors, warnings) = (counted(errors, "error"), counted(diagnostics.len() - errors, "warning"));
+    format!("{text}{file}: {verdict}: {errors}, {warnings}\n")
 }
 
 fn geometry_lines(profile: &Profile) -> Vec<String> {
     let chain = profile.chain();
+    let column = name_column(profile);
     let (convention, product) = match chain.convention() {
         Convention::Standard => ("standard", "Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta)"),
         Convention::Modified => ("modified (Craig)", "Rot(x,alpha) Trans(x,a) Rot(y,beta) Rot(z,theta) Trans(z,d)"),
     };
     let mut lines = vec![format!("nominal geometry, {convention} convention:"), format!("  {product}")];
     lines.push(format!(
-        "{:<8}{:<10}{:>10}{:>11}{:>11}{:>11}{:>10}",
+        "{:<column$}{:<10}{:>10}{:>11}{:>11}{:>11}{:>10}",
         "joint", "type", "alpha deg", "a mm", "d mm", "theta deg", "beta deg"
     ));
     for (index, joint) in chain.joints().iter().enumerate() {
         let link = joint.link;
         let beta = if profile.beta_joints().contains(&index) { fixed(to_deg(link.beta), 3) } else { "-".to_owned() };
         lines.push(clipped(&format!(
-            "{:<8}{:<10}{:>10}{:>11}{:>11}{:>11}{beta:>10}",
-            joint.name,
+            "{:<column$}{:<10}{:>10}{:>11}{:>11}{:>11}{beta:>10}",
+            name_in(joint, column),
             type_name(joint.joint_type),
             fixed(to_deg(link.alpha), 3),
             fixed(to_mm(link.a), 3),
@@ -114,20 +111,21 @@ fn geometry_lines(profile: &Profile) -> Vec<String> {
 }
 
 fn range_lines(profile: &Profile) -> Vec<String> {
+    let column = name_column(profile);
     let mut lines =
-        vec![format!("{:<8}{:<5}{:>24}{:>24}{:>14}", "joint", "unit", "limits", "for planning", "speed /s")];
+        vec![format!("{:<column$}{:<5}{:>22}{:>22}{:>14}", "joint", "unit", "limits", "for planning", "speed /s")];
     for (joint, range) in profile.chain().joints().iter().zip(profile.joints()) {
-        lines.push(clipped(&range_line(joint, range)));
+        lines.push(clipped(&range_line(joint, range, column)));
     }
     lines
 }
 
-fn range_line(joint: &Joint, range: &JointRange) -> String {
+fn range_line(joint: &Joint, range: &JointRange, column: usize) -> String {
     let quantity = joint.joint_type.quantity();
     let speed = range.max_speed.map_or_else(|| "-".to_owned(), |speed| fixed(quantity.to_edge(speed), 1));
     let limits = interval(range.limits, quantity);
     let planning = interval(range.planning_limits, quantity);
-    format!("{:<8}{:<5}{limits:>24}{planning:>24}{speed:>14}", joint.name, quantity.unit())
+    format!("{:<column$}{:<5}{limits:>22}{planning:>22}{speed:>14}", name_in(joint, column), quantity.unit())
 }
 
 fn target_lines(profile: &Profile) -> Vec<String> {
@@ -197,6 +195,17 @@ fn cell_lines(profile: &Profile) -> Vec<String> {
         profile.keep_out().len()
     ));
     lines
+}
+
+/// Width of the column of joint names: as wide as the longest one, as far as the table stays within [`WIDTH`].
+fn name_column(profile: &Profile) -> usize {
+    let longest = profile.chain().joints().iter().map(|joint| joint.name.chars().count()).max().unwrap_or(0);
+    (longest + 1).clamp(8, 16)
+}
+
+/// A joint name that leaves one blank in its column.
+fn name_in(joint: &Joint, column: usize) -> String {
+    joint.name.chars().take(column - 1).collect()
 }
 
 const fn type_name(joint_type: JointType) -> &'static str {

@@ -2,11 +2,11 @@
 
 use nalgebra::Point3;
 
-use super::super::decode::{Fields, fields, list, not_negative, number, numbers, point, positive, text};
+use super::super::decode::{Fields, fields, list, not_negative, number, numbers, point, positive, range, text};
 use super::super::diagnostic::Findings;
 use super::super::syntax::Ast;
 use super::super::{Acceptance, Capsule, Instrument, KeepOut, Tracker};
-use crate::units::{MICROMETRE, from_deg, from_mm};
+use crate::units::{MICROMETRE, Quantity, from_deg, from_mm};
 
 pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Acceptance> {
     const FIELDS: [&str; 6] = [
@@ -20,7 +20,7 @@ pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
     let Some(ast) = top.get("acceptance") else { return Some(Acceptance::default()) };
     let inside = fields(ast, "'acceptance'", &FIELDS, findings)?;
     let limits =
-        FIELDS.map(|name| super::joint::good(inside.get(name).map(|ast| positive(ast, findings).map(from_mm))));
+        FIELDS.map(|name| inside.get_or(name, None, |ast| positive(ast, findings).map(|limit| Some(from_mm(limit)))));
     let [position_mean, position_rms, position_max, distance_mean, distance_rms, distance_max] = limits;
     Some(Acceptance {
         position_mean: position_mean?,
@@ -38,7 +38,7 @@ pub(super) fn instrument(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
     let inside = fields(ast, "'instrument'", &["name", "sigma_um", "sigma_um_per_m"], findings)?;
     let name = inside.require("name", "\"maker and type\"", findings).and_then(|ast| text(ast, findings));
     let sigma = inside.require("sigma_um", "10.0", findings).and_then(|ast| positive(ast, findings));
-    let per_metre = inside.get("sigma_um_per_m").map_or(Some(0.0), |ast| not_negative(ast, findings));
+    let per_metre = inside.get_or("sigma_um_per_m", 0.0, |ast| not_negative(ast, findings));
     Some(Instrument { name: name?, sigma: sigma? * MICROMETRE, sigma_per_metre: per_metre? * MICROMETRE })
 }
 
@@ -46,31 +46,22 @@ pub(super) fn tracker(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<T
     let default = Tracker::default();
     let Some(ast) = top.get("tracker") else { return Some(default) };
     let inside = fields(ast, "'tracker'", &["position_mm", "acceptance_angle_deg", "range_mm"], findings)?;
-    let position = inside.get("position_mm").map_or(Some(default.position_in_base), |ast| point(ast, findings));
-    let angle = match inside.get("acceptance_angle_deg") {
-        None => Some(default.acceptance_angle),
-        Some(ast) => positive(ast, findings).and_then(|angle| {
-            if angle > 180.0 {
-                findings.error(
-                    ast.span,
-                    format!("{angle} deg is not an acceptance angle"),
-                    "allowed: 0 to 180".to_owned(),
-                );
-                return None;
-            }
-            Some(from_deg(angle))
-        }),
-    };
-    let range = match inside.get("range_mm") {
-        None => Some(default.range),
-        Some(ast) => super::super::decode::range(ast, crate::units::Quantity::Length, findings).and_then(|range| {
-            if range.0 < 0.0 {
-                findings.error(ast.span, "a range cannot begin below zero", "write (nearest, farthest)".to_owned());
-                return None;
-            }
-            Some(range)
-        }),
-    };
+    let position = inside.get_or("position_mm", default.position_in_base, |ast| point(ast, findings));
+    let angle = inside.get_or("acceptance_angle_deg", default.acceptance_angle, |ast| {
+        let angle = positive(ast, findings)?;
+        if angle > 180.0 {
+            let message = format!("{angle} deg is not an acceptance angle");
+            findings.error(ast.span, message, "allowed: above 0, up to 180".to_owned());
+        }
+        Some(from_deg(angle))
+    });
+    let range = inside.get_or("range_mm", default.range, |ast| {
+        let range = range(ast, Quantity::Length, findings)?;
+        if range.0 < 0.0 {
+            findings.error(ast.span, "a range cannot begin below zero", "write (nearest, farthest)".to_owned());
+        }
+        Some(range)
+    });
     Some(Tracker { position_in_base: position?, acceptance_angle: angle?, range: range? })
 }
 

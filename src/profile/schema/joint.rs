@@ -31,6 +31,7 @@ pub(super) struct DecodedJoint {
     pub(super) joint: Joint,
     pub(super) range: JointRange,
     pub(super) has_beta: bool,
+    /// Its name: the place for what concerns the whole joint.
     pub(super) span: Span,
 }
 
@@ -72,7 +73,8 @@ pub(super) fn joints(ast: &Ast, findings: &mut Findings<'_>) -> Option<DecodedJo
         let joint = joint(inside, index, joint_type, &names, findings);
         match (joint, &mut complete) {
             (Some((joint, range)), Some(complete)) => {
-                complete.push(DecodedJoint { joint, range, has_beta, span: inside.span });
+                let span = inside.get("name").map_or_else(|| inside.start(), |name| name.span);
+                complete.push(DecodedJoint { joint, range, has_beta, span });
             }
             _ => complete = None,
         }
@@ -116,14 +118,8 @@ fn joint(
     let d = constant("d_mm", Quantity::Length, true);
     let theta = constant("theta_deg", Quantity::Angle, true);
     let beta = constant("beta_deg", Quantity::Angle, false);
-    let direction = match inside.get("direction") {
-        Some(ast) => direction(ast, findings),
-        None => Some(1.0),
-    };
-    let coupling = match inside.get("coupling") {
-        Some(ast) => coupling(ast, index, names, findings),
-        None => Some(Vec::new()),
-    };
+    let direction = inside.get_or("direction", 1.0, |ast| direction(ast, findings));
+    let coupling = inside.get_or("coupling", Vec::new(), |ast| coupling(ast, index, names, findings));
     let range = joint_type.and_then(|joint_type| joint_range(inside, joint_type, findings));
     let joint = Joint {
         name: names.get(index)?.clone()?,
@@ -182,25 +178,35 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
         JointType::Revolute => ("revolute", "deg", "mm"),
         JointType::Prismatic => ("prismatic", "mm", "deg"),
     };
+    let mut good = true;
     for (field, suffix) in [("limits_", ""), ("planning_limits_", ""), ("max_speed_", "_s")] {
         let wrong = format!("{field}{other}{suffix}");
         if let Some(ast) = inside.get(&wrong) {
             let hint = format!("use '{field}{unit}{suffix}'");
             findings.error(ast.span, format!("a {kind} joint has no '{wrong}'"), hint);
+            good = false;
         }
     }
     let pulses = inside.get("pulses_per_degree");
     if let (JointType::Prismatic, Some(ast)) = (joint_type, pulses) {
         findings.error(ast.span, "a prismatic joint has no 'pulses_per_degree'", "remove it".to_owned());
     }
-    let limits_ast = inside.get(&format!("limits_{unit}"));
-    let planning_ast = inside.get(&format!("planning_limits_{unit}"));
-    let speed_ast = inside.get(&format!("max_speed_{unit}_s"));
-    let limits = limits_ast.map(|ast| range(ast, quantity, findings));
-    let planning = planning_ast.map(|ast| range(ast, quantity, findings));
-    let max_speed = speed_ast.map(|ast| positive(ast, findings).map(|speed| quantity.from_edge(speed)));
-    let pulses_per_degree = pulses.map(|ast| number(ast, findings));
-    if let (Some(Some((low, high))), Some(Some((plan_low, plan_high))), Some(ast)) = (limits, planning, planning_ast)
+    let planning_field = format!("planning_limits_{unit}");
+    let limits = inside.get_or(&format!("limits_{unit}"), None, |ast| range(ast, quantity, findings).map(Some));
+    let planning = inside.get_or(&planning_field, None, |ast| range(ast, quantity, findings).map(Some));
+    let max_speed = inside.get_or(&format!("max_speed_{unit}_s"), None, |ast| {
+        positive(ast, findings).map(|speed| Some(quantity.from_edge(speed)))
+    });
+    let pulses_per_degree = inside.get_or("pulses_per_degree", None, |ast| {
+        let value = number(ast, findings)?;
+        if value == 0.0 {
+            let hint = "pulses per degree are above 0, or below 0 for an encoder that counts down".to_owned();
+            findings.error(ast.span, "0 pulses per degree are not allowed", hint);
+        }
+        Some(Some(value))
+    });
+    if let (Some(Some((low, high))), Some(Some((plan_low, plan_high))), Some(ast)) =
+        (limits, planning, inside.get(&planning_field))
         && (plan_low < low || plan_high > high)
     {
         let [low, high] = [low, high].map(|limit| tidy(quantity.to_edge(limit)));
@@ -210,23 +216,13 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
             "planning limits can only narrow the joint limits".to_owned(),
         );
     }
-    // A field that is there must be good; one that is not there is `None`.
-    let limits = good(limits)?;
-    Some(JointRange {
+    let limits = limits?;
+    good.then_some(JointRange {
         limits,
-        planning_limits: good(planning)?.or(limits),
-        max_speed: good(max_speed)?,
-        pulses_per_degree: good(pulses_per_degree)?,
+        planning_limits: planning?.or(limits),
+        max_speed: max_speed?,
+        pulses_per_degree: pulses_per_degree?,
     })
-}
-
-/// Absent stays absent, good stays good, bad becomes `None` outside.
-pub(super) fn good<T>(decoded: Option<Option<T>>) -> Option<Option<T>> {
-    match decoded {
-        None => Some(None),
-        Some(None) => None,
-        Some(value) => Some(value),
-    }
 }
 
 /// A limit as written: without the last bits of the conversion.

@@ -7,6 +7,8 @@ use super::super::diagnostic::{Findings, Span};
 pub(super) struct Token {
     pub(super) kind: TokenKind,
     pub(super) span: Span,
+    /// A text without an end: what follows on its line is lost.
+    pub(super) is_torn: bool,
 }
 
 /// Kind of a word.
@@ -39,7 +41,7 @@ impl TokenKind {
 
 /// Cuts a text into words; problems go to `findings`. The last word is always [`TokenKind::End`].
 pub(super) fn tokens(text: &str, findings: &mut Findings<'_>) -> Vec<Token> {
-    let mut lexer = Lexer { text, at: 0 };
+    let mut lexer = Lexer { text, at: 0, is_torn: false };
     let mut tokens = Vec::new();
     loop {
         let token = lexer.next_token(findings);
@@ -54,6 +56,7 @@ pub(super) fn tokens(text: &str, findings: &mut Findings<'_>) -> Vec<Token> {
 struct Lexer<'a> {
     text: &'a str,
     at: usize,
+    is_torn: bool,
 }
 
 impl Lexer<'_> {
@@ -86,7 +89,7 @@ impl Lexer<'_> {
             self.skip_blank(findings);
             let start = self.at;
             let Some(first) = self.peek() else {
-                return Token { kind: TokenKind::End, span: Span::new(start, start) };
+                return Token { kind: TokenKind::End, span: Span::new(start, start), is_torn: false };
             };
             let kind = match first {
                 '(' | ')' | '[' | ']' | '{' | '}' | ':' | ',' | '#' | '!' => {
@@ -107,7 +110,8 @@ impl Lexer<'_> {
                 }
             };
             if let Some(kind) = kind {
-                return Token { kind, span: Span::new(start, self.at) };
+                let is_torn = std::mem::take(&mut self.is_torn);
+                return Token { kind, span: Span::new(start, self.at), is_torn };
             }
         }
     }
@@ -172,11 +176,13 @@ impl Lexer<'_> {
         let start = self.at;
         self.bump();
         let mut text = String::new();
-        loop {
+        // Texts of profiles stay on one line, so that a forgotten quote does not swallow the rest of the file.
+        while let Some(next) = self.peek().filter(|c| *c != '\n') {
             let escape_start = self.at;
-            match self.bump() {
-                Some('"') => return TokenKind::Text(text),
-                Some('\\') => match self.escape() {
+            self.bump();
+            match next {
+                '"' => return TokenKind::Text(text),
+                '\\' => match self.escape() {
                     Some(character) => text.push(character),
                     None => findings.error(
                         Span::new(escape_start, self.at),
@@ -184,14 +190,13 @@ impl Lexer<'_> {
                         r#"allowed: \" \\ \n \t \r \0 \xHH \u{H...}"#.to_owned(),
                     ),
                 },
-                Some(character) => text.push(character),
-                None => {
-                    let hint = "close it with '\"'".to_owned();
-                    findings.error(Span::new(start, start + 1), "this text has no end", hint);
-                    return TokenKind::Text(text);
-                }
+                character => text.push(character),
             }
         }
+        self.is_torn = true;
+        let hint = "close it with '\"' on the same line".to_owned();
+        findings.error(Span::new(start, self.at), "this text has no end", hint);
+        TokenKind::Text(text)
     }
 
     /// The character after a backslash; `None` if there is no such escape.

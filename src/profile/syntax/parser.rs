@@ -30,11 +30,11 @@ struct Parser<'f, 'a> {
 }
 
 /// What stands at the end of the word list; also what a broken list would answer.
-const END: Token = Token { kind: TokenKind::End, span: Span::new(0, 0) };
+const END: Token = Token { kind: TokenKind::End, span: Span::new(0, 0), is_torn: false };
 
 impl Parser<'_, '_> {
     fn peek(&self) -> &Token {
-        self.tokens.get(self.at).or(self.tokens.last()).unwrap_or(&END)
+        self.tokens.get(self.at).or_else(|| self.tokens.last()).unwrap_or(&END)
     }
 
     fn peek_second(&self) -> &TokenKind {
@@ -60,9 +60,17 @@ impl Parser<'_, '_> {
     }
 
     fn fail<T>(&mut self, expected: &str) -> Option<T> {
+        self.fail_with_hint(expected, None)
+    }
+
+    fn fail_with_hint<T>(&mut self, expected: &str, hint: Option<String>) -> Option<T> {
         let token = self.peek().clone();
-        self.findings.error(token.span, format!("expected {expected}, found {}", token.kind.describe()), None);
+        self.findings.error(token.span, format!("expected {expected}, found {}", token.kind.describe()), hint);
         None
+    }
+
+    fn previous(&self) -> Option<&Token> {
+        self.at.checked_sub(1).and_then(|previous| self.tokens.get(previous))
     }
 
     /// `#![enable(implicit_some)]` and the like change nothing here.
@@ -91,7 +99,7 @@ impl Parser<'_, '_> {
     }
 
     fn value_inside(&mut self) -> Option<Ast> {
-        let Token { kind, span } = self.peek().clone();
+        let Token { kind, span, .. } = self.peek().clone();
         let start = span.start;
         let node = match kind {
             TokenKind::Text(text) => {
@@ -124,73 +132,82 @@ impl Parser<'_, '_> {
             TokenKind::Mark('(') => self.round()?,
             TokenKind::Mark('[') => {
                 self.at += 1;
-                Node::List(self.items(']')?)
+                Node::List(self.items(']', span)?)
             }
             TokenKind::Mark('{') => {
                 self.at += 1;
-                self.map()?
+                self.map(span)?
             }
             TokenKind::Mark(_) | TokenKind::End => return self.fail("a value"),
         };
-        let end = self.at.checked_sub(1).and_then(|last| self.tokens.get(last)).map_or(start, |token| token.span.end);
+        let end = self.previous().map_or(start, |token| token.span.end);
         Some(Ast { span: Span::new(start, end), node })
     }
 
     /// `( … )`: a struct if a name and a colon come first.
     fn round(&mut self) -> Option<Node> {
+        let open = self.peek().span;
         self.take('(');
-        let is_struct = matches!(self.peek().kind, TokenKind::Name(_)) && *self.peek_second() == TokenKind::Mark(':');
+        // A name with a value behind it is a field whose colon is missing.
+        let is_struct = matches!(self.peek().kind, TokenKind::Name(_))
+            && !matches!(self.peek_second(), TokenKind::Mark(',' | ')' | '(') | TokenKind::End);
         if !is_struct {
-            return Some(Node::Tuple(self.items(')')?));
+            return Some(Node::Tuple(self.items(')', open)?));
         }
         let mut fields = Vec::new();
         while !self.take(')') {
-            let Token { kind: TokenKind::Name(name), span: name_span } = self.peek().clone() else {
+            let Token { kind: TokenKind::Name(name), span: name_span, .. } = self.peek().clone() else {
                 return self.fail("the name of a field or ')'");
             };
             self.at += 1;
-            self.colon()?;
+            self.colon(None)?;
             let value = self.value()?;
             fields.push(Field { name, name_span, value });
-            self.comma(')')?;
+            self.comma(')', open)?;
         }
         Some(Node::Struct(fields))
     }
 
-    fn items(&mut self, close: char) -> Option<Vec<Ast>> {
+    fn items(&mut self, close: char, open: Span) -> Option<Vec<Ast>> {
         let mut items = Vec::new();
         while !self.take(close) {
             items.push(self.value()?);
-            self.comma(close)?;
+            self.comma(close, open)?;
         }
         Some(items)
     }
 
-    fn map(&mut self) -> Option<Node> {
+    fn map(&mut self, open: Span) -> Option<Node> {
         let mut entries = Vec::new();
         while !self.take('}') {
             let key = self.value()?;
-            self.colon()?;
+            self.colon(Some("entries of '{ }' are \"name\": value; a list is written '[ ]'"))?;
             entries.push((key, self.value()?));
-            self.comma('}')?;
+            self.comma('}', open)?;
         }
         Some(Node::Map(entries))
     }
 
-    fn colon(&mut self) -> Option<()> {
+    fn colon(&mut self, hint: Option<&str>) -> Option<()> {
         if self.take(':') {
             return Some(());
         }
-        self.fail::<()>("':'");
+        self.fail_with_hint::<()>("':'", hint.map(str::to_owned));
         // A value where the colon should stand: only the colon is missing.
         self.begins_value().then_some(())
     }
 
-    fn comma(&mut self, close: char) -> Option<()> {
+    /// The comma after an entry, unless the bracket that began at `open` ends here.
+    fn comma(&mut self, close: char, open: Span) -> Option<()> {
         if self.take(',') || self.is_mark(close) {
             return Some(());
         }
-        self.fail::<()>(&format!("',' or '{close}'"));
+        // The comma may have been lost with the end of a text; that has been said.
+        if !self.previous().is_some_and(|token| token.is_torn) {
+            let line = self.findings.line_of(open);
+            let hint = (!self.begins_value()).then(|| format!("the bracket of line {line} is still open here"));
+            self.fail_with_hint::<()>(&format!("',' or '{close}'"), hint);
+        }
         self.begins_value().then_some(())
     }
 

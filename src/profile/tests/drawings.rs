@@ -34,7 +34,7 @@ struct Drawing {
 }
 
 impl Drawing {
-    /// `turns`: how much each axis turns against its predecessor [rad] or slides [m].
+    /// `turns`: how much each axis turns against its predecessor (rad) or slides (m).
     fn base_from_flange(&self, turns: &[f64]) -> Isometry3<f64> {
         let [x, z] = [self.flange_x, self.flange_z].map(Vector3::from);
         let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
