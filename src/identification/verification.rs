@@ -3,12 +3,12 @@
 //! Errors are measured − predicted. Position errors need the registration of the instrument, which comes from the identification
 //! set (or, for another set-up, is fitted anew and said so); distance errors need none.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 
 use super::linearise::{ArmModel, Weights, point_residuals};
-use super::problem::{Observations, PointSample, Problem};
+use super::problem::{LengthEnd, Observations, PointSample, Problem};
 use super::{Estimator, IdentificationError, Prior, Settings, Weighting, identify};
-use crate::kinematics::FreeParameter;
+use crate::kinematics::{FreeParameter, Joint, JointType};
 use crate::units::MILLIMETRE;
 
 /// Above this many points the distances are taken between evenly picked ones: 2000 points have two million pairs.
@@ -98,6 +98,170 @@ fn distance_errors(samples: &[PointSample], predicted: &[Point3<f64>]) -> Option
     ErrorStatistics::new(errors)
 }
 
+/// Distance of every seat from the mean of its shared point (m), and the errors of lengths between shared points (m).
+#[derive(Clone, Debug, PartialEq)]
+pub struct DirectErrors {
+    /// Predicted position of each seat less the mean of its shared point, in the base (m).
+    pub seats: Vec<Vector3<f64>>,
+    /// Statistics of the distances of the seats from their mean; `None` without a shared point that was seen twice.
+    pub seat: Option<ErrorStatistics>,
+    /// Measured − predicted lengths (m).
+    pub lengths: Vec<f64>,
+    /// Their statistics; `None` without lengths.
+    pub length: Option<ErrorStatistics>,
+}
+
+impl DirectErrors {
+    /// Errors of `model` on shared points and lengths.
+    pub fn new(model: &ArmModel, observations: &Observations) -> Self {
+        let mut means = Vec::with_capacity(observations.shared.len());
+        let mut seats = Vec::new();
+        for shared in &observations.shared {
+            let points = model.points_in_base(shared.at.iter());
+            let sum = points.iter().fold(Vector3::zeros(), |sum, point| sum + point.coords);
+            let mean = Point3::from(sum / points.len().max(1) as f64);
+            means.push(mean);
+            if points.len() > 1 {
+                seats.extend(points.iter().map(|point| point - mean));
+            }
+        }
+        let end = |end: &LengthEnd| match end {
+            LengthEnd::Target(at) => Some(model.point_in_base(at)),
+            LengthEnd::SharedPoint(index) => means.get(*index).copied(),
+        };
+        let lengths: Vec<f64> = observations
+            .lengths
+            .iter()
+            .filter_map(|length| Some(length.length - (end(&length.to)? - end(&length.from)?).norm()))
+            .collect();
+        Self {
+            seat: ErrorStatistics::new(seats.iter().map(Vector3::norm).collect()),
+            length: ErrorStatistics::new(lengths.clone()),
+            seats,
+            lengths,
+        }
+    }
+}
+
+/// How much of the remaining error follows one joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointResidual {
+    /// Index of the joint.
+    pub joint: usize,
+    /// Share of the square error explained by `a + b cos q + c sin q` (revolute) or `a + b q + c q²` (prismatic) per
+    /// component, less what chance explains; 0 … 1.
+    pub explained: f64,
+    /// Mean error over ranges of the joint: from, to (rad or m), count, mean norm (m).
+    pub bins: Vec<(f64, f64, usize, f64)>,
+}
+
+/// Looks for a joint that the errors follow: gear harmonics, gravity, a wrong coupling. `vectors` are error vectors (m) at
+/// `configurations`.
+pub fn residual_against_joints(
+    joints: &[Joint],
+    configurations: &[&[f64]],
+    vectors: &[Vector3<f64>],
+) -> Vec<JointResidual> {
+    const BINS: usize = 5;
+    joints
+        .iter()
+        .enumerate()
+        .map(|(index, joint)| {
+            let values: Vec<f64> = configurations.iter().map(|configuration| configuration[index]).collect();
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let width = (high - low) / BINS as f64;
+            let bins = if width > 0.0 {
+                (0..BINS)
+                    .map(|bin| {
+                        let (from, to) = (low + bin as f64 * width, low + (bin + 1) as f64 * width);
+                        let inside = |value: f64| value >= from && (value < to || bin + 1 == BINS);
+                        let members: Vec<f64> = values
+                            .iter()
+                            .zip(vectors)
+                            .filter(|(value, _)| inside(**value))
+                            .map(|(_, vector)| vector.norm())
+                            .collect();
+                        let mean = members.iter().sum::<f64>() / members.len().max(1) as f64;
+                        (from, to, members.len(), mean)
+                    })
+                    .collect()
+            } else {
+                Vec::new()
+            };
+            JointResidual { joint: index, explained: explained_share(joint.joint_type, &values, vectors), bins }
+        })
+        .collect()
+}
+
+fn explained_share(joint_type: JointType, values: &[f64], vectors: &[Vector3<f64>]) -> f64 {
+    let count = values.len();
+    if count < 8 {
+        return 0.0;
+    }
+    let centre = values.iter().sum::<f64>() / count as f64;
+    let regressors = DMatrix::from_fn(count, 3, |row, column| match (joint_type, column) {
+        (_, 0) => 1.0,
+        (JointType::Revolute, 1) => values[row].cos(),
+        (JointType::Revolute, _) => values[row].sin(),
+        (JointType::Prismatic, 1) => values[row] - centre,
+        (JointType::Prismatic, _) => (values[row] - centre).powi(2),
+    });
+    let errors = DMatrix::from_fn(count, 3, |row, column| vectors[row][column]);
+    let means = errors.row_mean();
+    let total: f64 = errors.row_iter().map(|row| (row - &means).norm_squared()).sum();
+    let svd = regressors.clone().svd(true, true);
+    let Ok(coefficients) = svd.solve(&errors, 1e-9) else { return 0.0 };
+    let left = (&errors - regressors * coefficients).norm_squared();
+    if total <= 0.0 {
+        return 0.0;
+    }
+    let adjusted = 1.0 - (left / (count - 3) as f64) / (total / (count - 1) as f64);
+    adjusted.clamp(0.0, 1.0)
+}
+
+/// A part of a joint's range that one of the two sets covers and the other does not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoverageGap {
+    /// Index of the joint.
+    pub joint: usize,
+    /// Range of the identification set (rad or m).
+    pub identification: (f64, f64),
+    /// Range of the verification set (rad or m).
+    pub verification: (f64, f64),
+    /// Whether it is the verification set that reaches further; otherwise it covers less than half.
+    pub extrapolates: bool,
+}
+
+/// Compares the ranges of both sets joint by joint. A verification outside the identification range by more than a tenth of it
+/// tests extrapolation; one that covers less than half of it leaves the rest untested.
+pub fn coverage_gaps(joints: &[Joint], identification: &[&[f64]], verification: &[&[f64]]) -> Vec<CoverageGap> {
+    let range = |set: &[&[f64]], joint: usize| {
+        set.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), configuration| {
+            (low.min(configuration[joint]), high.max(configuration[joint]))
+        })
+    };
+    if identification.is_empty() || verification.is_empty() {
+        return Vec::new();
+    }
+    (0..joints.len())
+        .filter_map(|joint| {
+            let (known, tested) = (range(identification, joint), range(verification, joint));
+            let width = known.1 - known.0;
+            // A tenth of the range, and never less than what a still joint wobbles.
+            let margin = (0.1 * width).max(0.02);
+            let extrapolates = tested.0 < known.0 - margin || tested.1 > known.1 + margin;
+            let narrow = (tested.1.min(known.1) - tested.0.max(known.0)) < 0.5 * width - margin;
+            (extrapolates || narrow).then_some(CoverageGap {
+                joint,
+                identification: known,
+                verification: tested,
+                extrapolates,
+            })
+        })
+        .collect()
+}
+
 /// A model with the set-up (instrument frame, and target where it is free) fitted to some samples.
 #[derive(Clone, Debug)]
 pub struct FittedSetup {
@@ -107,26 +271,20 @@ pub struct FittedSetup {
     pub base_from_station: Vec<Isometry3<f64>>,
 }
 
-/// Fits the instrument frame, and the target coordinates among `free`, of a given arm to samples. The arm is not changed.
+/// Fits the instrument frame, and the target coordinates among `free`, of a given arm to observations. The arm is not changed.
 ///
-/// `trusted` says which samples count. This is how a nominal model is compared fairly: it gets the same frame and target fit
-/// as the identified one.
+/// This is how a nominal model is compared fairly: it gets the same frame and target fit as the identified one.
 ///
 /// # Errors
 /// Sizes or indices that do not fit, or a mirrored frame.
 pub fn fit_setup(
     model: &ArmModel,
     free: &[FreeParameter],
-    samples: &[PointSample],
-    trusted: impl Fn(usize) -> bool,
+    observations: &Observations,
 ) -> Result<FittedSetup, IdentificationError> {
-    let points: Vec<PointSample> =
-        samples.iter().enumerate().filter(|(index, _)| trusted(*index)).map(|(_, s)| s.clone()).collect();
-    let observations = Observations { points, ..Observations::default() };
-    let problem =
-        Problem { chain: &model.chain, targets: &model.targets, parameters: free, observations: &observations };
+    let problem = Problem { chain: &model.chain, targets: &model.targets, parameters: free, observations };
+    problem.check()?;
     if free.is_empty() {
-        problem.check()?;
         let predicted = model.points_in_base(observations.places());
         let weights = Weights::uniform(&problem, MILLIMETRE);
         let residuals = point_residuals(&problem, &predicted, &weights);

@@ -1,0 +1,96 @@
+//! Files on disk: reading with errors that name the file, and replacing results atomically.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// A file that could not be read or written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// Reading failed.
+    #[error("cannot read '{}'", path.display())]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Writing failed; what stood there before is untouched.
+    #[error("cannot write '{}' (what was there before is unchanged)", path.display())]
+    Write {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+/// It cannot be read.
+pub fn read(path: &Path) -> Result<Vec<u8>, StoreError> {
+    fs::read(path).map_err(|source| StoreError::Read { path: path.to_owned(), source })
+}
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// It cannot be made.
+pub fn create_folder(path: &Path) -> Result<(), StoreError> {
+    fs::create_dir_all(path).map_err(|source| StoreError::Write { path: path.to_owned(), source })
+}
+
+/// Replaces a file as a whole: the new text is written beside it, forced to disk, and renamed over it.
+///
+/// # Errors
+/// Any step failed; the old file is then still there.
+pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
+    let written = || -> io::Result<()> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut file = tempfile::Builder::new().prefix(".trupose-").tempfile_in(folder)?;
+        file.write_all(text.as_bytes())?;
+        file.as_file().sync_all()?;
+        set_readable(file.as_file())?;
+        file.persist(path).map_err(|failed| failed.error)?;
+        // The rename itself must survive a power cut.
+        File::open(folder)?.sync_all()
+    };
+    written().map_err(|source| StoreError::Write { path: path.to_owned(), source })
+}
+
+/// Temporary files are private; results are for everybody who may read the folder.
+#[cfg(unix)]
+fn set_readable(file: &File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    file.set_permissions(fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn set_readable(_file: &File) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn replacing_keeps_either_the_old_or_the_new_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result.ron");
+        replace(&path, "one").unwrap();
+        replace(&path, "two").unwrap();
+        assert_eq!(read(&path).unwrap(), b"two");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let error = replace(Path::new("/nowhere/at/all.ron"), "text").unwrap_err();
+        assert_eq!(error.to_string(), "cannot write '/nowhere/at/all.ron' (what was there before is unchanged)");
+    }
+}
