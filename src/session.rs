@@ -8,9 +8,11 @@
 
 #![warn(missing_docs)]
 
+pub mod calibration;
 pub mod constraints;
 pub mod filter;
 pub mod measurements;
+pub mod summary;
 mod table;
 
 pub use table::{Defect, TableErrors, TableProblem};

@@ -27,7 +27,8 @@ const BLIND_SHARE: f64 = 1e-6;
 /// What the observations can tell at the nominal model.
 #[derive(Clone, Debug)]
 pub struct Observability {
-    /// Singular values of the scaled rows, largest first.
+    /// Singular values of the scaled rows, largest first: how far (m, root sum of squares) one expected deviation along each
+    /// direction moves the points.
     pub singular_values: Vec<f64>,
     /// Number of independent combinations of parameters that the data determine; `None` where no gap decides it.
     pub rank: Option<usize>,
@@ -61,7 +62,7 @@ impl Observability {
     pub fn new(problem: &Problem<'_>) -> Self {
         let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
         let evaluation = Evaluation::new(problem, &model);
-        Self::of_evaluation(problem, evaluation, &Weights::uniform(problem, MILLIMETRE))
+        Self::of_evaluation(problem, evaluation, &Weights::uniform(problem, 1.0))
     }
 
     pub(crate) fn of_evaluation(problem: &Problem<'_>, evaluation: Evaluation, weights: &Weights) -> Self {

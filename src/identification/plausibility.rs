@@ -26,8 +26,9 @@ const STILL_JOINT: f64 = 5.0 * DEGREE;
 const STILL_SLIDE: f64 = 20.0 * MILLIMETRE;
 /// Independent values per independent combination below which the error bars rest on too little.
 const VALUES_PER_COMBINATION: usize = 2;
-/// A condition number of `A·S` beyond this leaves weak combinations to the prior.
-const POOR_CONDITION: f64 = 5e3;
+/// A combination whose deviation the data show with less than this many standard deviations per expected deviation rests on the
+/// prior more than on the data.
+const WEAK_SIGNAL: f64 = 1.0;
 /// Points flatter than this fraction of their extent are a plane.
 const FLAT: f64 = 0.02;
 
@@ -300,10 +301,12 @@ pub enum Weakness {
         /// Spread along the principal axes, root mean square (m).
         spread: [f64; 3],
     },
-    /// The condition number leaves some combinations to the prior.
-    PoorCondition {
-        /// Condition number of `A·S`.
-        condition_number: f64,
+    /// Combinations that could be found in principle, but of which these data say less than the expected deviations do.
+    WeakCombinations {
+        /// How many.
+        weak: usize,
+        /// Of how many.
+        combinations: usize,
     },
     /// No gap in the singular values decides the rank.
     RankUnclear {
@@ -335,8 +338,8 @@ impl Weakness {
                 to_mm(spread[1]),
                 to_mm(spread[2])
             ),
-            Self::PoorCondition { condition_number } => format!(
-                "the poses are poorly conditioned (condition number {condition_number:.0}): some combinations of parameters rest on the prior alone; use a planned pose set"
+            Self::WeakCombinations { weak, combinations } => format!(
+                "poor excitation: {weak} of {combinations} combinations of parameters rest on the expected deviations more than on the data; spread the poses over the joint ranges, or use a planned pose set"
             ),
             Self::RankUnclear { gap } => format!(
                 "the rank is not clear (largest gap in the singular values {gap:.1}): which parameters can be found is not decided by these data"
@@ -345,8 +348,8 @@ impl Weakness {
     }
 }
 
-/// Looks at how rich the data are.
-pub fn weaknesses(problem: &Problem<'_>, observability: &Observability) -> Vec<Weakness> {
+/// Looks at how rich the data are; `sigma` is the standard deviation of a measured coordinate (m).
+pub fn weaknesses(problem: &Problem<'_>, observability: &Observability, sigma: f64) -> Vec<Weakness> {
     let mut found = Vec::new();
     let values = problem.observations.independent_values();
     let combinations = observability.rank.unwrap_or(problem.parameters.len());
@@ -371,12 +374,15 @@ pub fn weaknesses(problem: &Problem<'_>, observability: &Observability) -> Vec<W
             found.push(Weakness::Flat { spread });
         }
     }
-    match (observability.rank, observability.condition_number) {
-        (None, _) => found.push(Weakness::RankUnclear { gap: observability.gap }),
-        (Some(_), Some(condition_number)) if condition_number > POOR_CONDITION => {
-            found.push(Weakness::PoorCondition { condition_number });
+    match observability.rank {
+        None => found.push(Weakness::RankUnclear { gap: observability.gap }),
+        Some(rank) => {
+            let signals = observability.singular_values.iter().take(rank);
+            let weak = signals.filter(|&&value| value < WEAK_SIGNAL * sigma).count();
+            if weak > 0 {
+                found.push(Weakness::WeakCombinations { weak, combinations: rank });
+            }
         }
-        _ => {}
     }
     found
 }

@@ -134,6 +134,18 @@ impl DirectErrors {
             .iter()
             .filter_map(|length| Some(length.length - (end(&length.to)? - end(&length.from)?).norm()))
             .collect();
+        Self::of_values(seats, lengths)
+    }
+
+    /// The errors of both, as one set.
+    #[must_use]
+    pub fn pooled_with(&self, other: &Self) -> Self {
+        let seats = self.seats.iter().chain(&other.seats).copied().collect();
+        let lengths = self.lengths.iter().chain(&other.lengths).copied().collect();
+        Self::of_values(seats, lengths)
+    }
+
+    fn of_values(seats: Vec<Vector3<f64>>, lengths: Vec<f64>) -> Self {
         Self {
             seat: ErrorStatistics::new(seats.iter().map(Vector3::norm).collect()),
             length: ErrorStatistics::new(lengths.clone()),

@@ -1,0 +1,153 @@
+//! Reading the files that commands name.
+
+use std::path::Path;
+
+use sha2::{Digest as _, Sha256};
+
+use crate::error::{ExitStatus, Failure};
+use crate::identification::{PointSample, TargetAt};
+use crate::kinematics::JointType;
+use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
+use crate::session::filter::Filter;
+use crate::session::measurements::{Layout, Measurements, Row, read_bytes_as};
+use crate::session::summary::InputFile;
+use crate::store;
+
+/// A profile with the text it came from.
+#[derive(Clone, Debug)]
+pub(super) struct LoadedProfile {
+    pub(super) profile: Profile,
+    pub(super) text: String,
+    pub(super) warnings: Vec<Diagnostic>,
+}
+
+/// SHA-256 in hexadecimal.
+pub(super) fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
+}
+
+/// The text of a file.
+pub(super) fn text(path: &Path) -> Result<String, Failure> {
+    let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let place = error.utf8_error().valid_up_to();
+        Failure::new(ExitStatus::Usage, format!("'{}' is not UTF-8 text (byte {place})", path.display()))
+            .hint("save it as UTF-8")
+    })
+}
+
+/// A profile by the name of a shipped one, or by its path.
+pub(super) fn profile(name_or_path: &str) -> Result<LoadedProfile, Failure> {
+    let path = Path::new(name_or_path);
+    let (text, file) = match builtin(name_or_path) {
+        Some(text) => (text.to_owned(), format!("profiles/{name_or_path}.ron")),
+        None if path.is_file() => (text(path)?, name_or_path.to_owned()),
+        None => {
+            let names: Vec<&str> = builtin_names().collect();
+            return Err(Failure::new(ExitStatus::Usage, format!("there is no profile or file '{name_or_path}'"))
+                .hint(format!("shipped profiles: {}", names.join(", "))));
+        }
+    };
+    parse_profile(text, &file)
+}
+
+/// A profile from its text.
+pub(super) fn parse_profile(text: String, file: &str) -> Result<LoadedProfile, Failure> {
+    match Profile::parse(&text, file) {
+        Ok((profile, warnings)) => Ok(LoadedProfile { profile, text, warnings }),
+        Err(errors) => {
+            let count = errors.error_count();
+            let noun = if count == 1 { "error" } else { "errors" };
+            Err(Failure::new(ExitStatus::Usage, format!("profile '{file}' has {count} {noun}\n\n{errors}\n")))
+        }
+    }
+}
+
+/// A measurement table with the bytes it came from.
+#[derive(Clone, Debug)]
+pub(super) struct LoadedTable {
+    pub(super) table: Measurements,
+    pub(super) input: InputFile,
+}
+
+/// A measurement table for the robot of a profile.
+pub(super) fn measurements(path: &Path, layout: Layout, profile: &Profile, role: &str) -> Result<LoadedTable, Failure> {
+    let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    let file = path.display().to_string();
+    let table = read_bytes_as(layout, &bytes, &file, &joint_types(profile))
+        .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
+    Ok(LoadedTable { table, input: input_file(role, file, &bytes) })
+}
+
+/// The record of an input file.
+pub(super) fn input_file(role: &str, file: String, bytes: &[u8]) -> InputFile {
+    InputFile { role: role.to_owned(), file, sha256: sha256(bytes) }
+}
+
+/// The joint types of a profile's arm.
+pub(super) fn joint_types(profile: &Profile) -> Vec<JointType> {
+    profile.chain().joints().iter().map(|joint| joint.joint_type).collect()
+}
+
+/// A filter and whether it fits the columns of a table.
+pub(super) fn filter(text: Option<&str>, columns: &[String]) -> Result<Option<Filter>, Failure> {
+    let Some(text) = text else { return Ok(None) };
+    let usage = |error: &dyn std::error::Error| {
+        Failure::from_error(ExitStatus::Usage, error)
+            .hint("a condition reads like \"pose % 17 == 0\" or \"position != 'left'\"")
+    };
+    let filter = Filter::parse(text).map_err(|error| usage(&error))?;
+    filter.check(columns).map_err(|error| usage(&error))?;
+    Ok(Some(filter))
+}
+
+/// Splits the rows of a table (copies left out) by a filter: those that match, and the rest.
+pub(super) fn split<'a>(
+    table: &'a Measurements,
+    filter: Option<&Filter>,
+) -> Result<(Vec<&'a Row>, Vec<&'a Row>), Failure> {
+    let mut matching = Vec::new();
+    let mut rest = Vec::new();
+    for row in table.distinct_rows() {
+        let matches = match filter {
+            None => true,
+            Some(filter) => filter
+                .matches(&table.columns, &row.fields, row.line)
+                .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?,
+        };
+        if matches { matching.push(row) } else { rest.push(row) }
+    }
+    Ok((matching, rest))
+}
+
+/// Samples for the maths from the rows of a table.
+pub(super) fn samples(rows: &[&Row], profile: &Profile) -> Result<Vec<PointSample>, Failure> {
+    rows.iter()
+        .map(|row| {
+            let target = match &row.target {
+                None => 0,
+                Some(name) => target_index(profile, name).ok_or_else(|| {
+                    let known: Vec<&str> = profile.targets().iter().map(|target| target.name.as_str()).collect();
+                    Failure::new(ExitStatus::Usage, format!("line {}: the profile has no target '{name}'", row.line))
+                        .hint(format!("targets of '{}': {}", profile.name(), known.join(", ")))
+                })?,
+            };
+            Ok(PointSample {
+                at: TargetAt { configuration: row.configuration.clone(), target },
+                station: 0,
+                point: row.point,
+                sigma: row.sigma,
+            })
+        })
+        .collect()
+}
+
+fn target_index(profile: &Profile, name: &str) -> Option<usize> {
+    profile.targets().iter().position(|target| target.name == name)
+}
+
+/// The time, in UTC to the second.
+pub(super) fn now() -> String {
+    let now = jiff::Timestamp::now();
+    now.round(jiff::Unit::Second).unwrap_or(now).to_string()
+}

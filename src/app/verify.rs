@@ -1,0 +1,172 @@
+//! `trupose verify`: a calibration on other data.
+
+use std::io::Write;
+
+use nalgebra::{Isometry3, Point3};
+
+use super::assess::{point_verification, verdict};
+use super::estimate::{identification_failure, provenance, warning};
+use super::identify::exit_status;
+use super::{Console, load, to_json};
+use crate::cli::{RefitArg, VerifyArgs};
+use crate::error::{ExitStatus, Failure};
+use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
+use crate::identification::{ArmModel, Observations, PointSample};
+use crate::kinematics::{FreeParameter, ParameterId};
+use crate::profile::{Level, Profile};
+use crate::report;
+use crate::session::calibration::Calibration;
+use crate::session::summary::{SCHEMA, VerificationReport};
+use crate::units::{MILLIMETRE, from_mm};
+
+/// How freely a target that was mounted anew is fitted (m).
+const NEW_MOUNTING: f64 = 50.0 * MILLIMETRE;
+
+pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let file = args.calibration.display().to_string();
+    let text = load::text(&args.calibration)?;
+    let calibration = Calibration::parse(&text).map_err(|error| {
+        Failure::new(ExitStatus::Usage, format!("'{file}' is not a usable calibration: {error}"))
+            .hint("a calibration is written by 'trupose identify --out DIR'")
+    })?;
+    let loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
+    let profile = &loaded.profile;
+    let measured = load::measurements(&args.measurements, args.layout, profile, "verification")?;
+    let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;
+    let (rows, _) = load::split(&measured.table, filter.as_ref())?;
+    let samples = load::samples(&rows, profile)?;
+    if samples.is_empty() {
+        return Err(Failure::new(ExitStatus::Usage, "no row is left for the verification").hint("check '--use'"));
+    }
+
+    let models = Models::new(&calibration, profile, &file)?;
+    let (nominal, identified) = models.set_up(args.refit, profile, &samples, &file)?;
+    let errors = |setup: &FittedSetup| {
+        ModelErrors::new(&setup.model, &setup.base_from_station, &samples)
+            .ok_or_else(|| Failure::new(ExitStatus::Numerical, "the frame of the instrument could not be fitted"))
+    };
+    let (nominal_errors, identified_errors) = (errors(&nominal)?, errors(&identified)?);
+    let mut warnings: Vec<_> =
+        measured.table.warnings.iter().map(|problem| warning("table", problem.to_string(), false)).collect();
+    let (refit, basis, fitted) = match args.refit {
+        RefitArg::None => ("none", "same set-up as the identification", 0),
+        RefitArg::Frame => ("frame", "another set-up: the place of the tracker was fitted to these very points", 6),
+        RefitArg::FrameAndTarget => {
+            ("frame+target", "another set-up: the place of the tracker and the SMR were fitted to these very points", 9)
+        }
+    };
+    if fitted > 0 && 3 * samples.len() < 4 * fitted {
+        let message = format!(
+            "{fitted} numbers of the set-up were fitted to only {} points: the position errors are too small to be believed",
+            samples.len()
+        );
+        warnings.push(warning("few_data", message, true));
+    }
+    let verification = point_verification(
+        profile.chain().joints(),
+        &samples,
+        &nominal_errors,
+        &identified_errors,
+        format!("'{}', {basis}", measured.input.file),
+        refit,
+    );
+    let inputs = vec![load::input_file("calibration", file, text.as_bytes()), measured.input];
+    let report = VerificationReport {
+        schema: SCHEMA,
+        provenance: provenance(profile, &calibration.profile, inputs),
+        verdict: verdict(profile.acceptance(), Some(&verification), &warnings),
+        warnings,
+        verification,
+    };
+    let text = if args.json { to_json(&report)? } else { report::verification_text(&report) };
+    console.print(&text)?;
+    Ok(exit_status(&report.verdict.status))
+}
+
+/// Nominal and identified arm of a calibration with the set-up of its identification.
+struct Models {
+    nominal: ArmModel,
+    identified: ArmModel,
+    nominal_station: Option<Isometry3<f64>>,
+    station: Option<Isometry3<f64>>,
+}
+
+impl Models {
+    fn new(calibration: &Calibration, profile: &Profile, file: &str) -> Result<Self, Failure> {
+        let known: Vec<ParameterId> = profile.free_parameters(Level::Geometric).iter().map(|p| p.id).collect();
+        let mut deviations = Vec::new();
+        let mut targets: Vec<Point3<f64>> = profile.targets().iter().map(|target| target.position_in_flange).collect();
+        for parameter in &calibration.parameters {
+            let id = known.iter().copied().find(|id| id.to_string() == parameter.name).ok_or_else(|| {
+                Failure::new(
+                    ExitStatus::Usage,
+                    format!("'{file}': its profile has no free parameter '{}'", parameter.name),
+                )
+            })?;
+            let deviation = id.quantity().from_edge(parameter.deviation);
+            deviations.push((id, deviation));
+            if let ParameterId::Target { target, axis } = id
+                && let Some(point) = targets.get_mut(target)
+            {
+                point[axis.index()] += deviation;
+            }
+        }
+        let chain = profile
+            .chain()
+            .with_deviations(deviations)
+            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        let nominal_targets = calibration
+            .nominal_targets_mm
+            .iter()
+            .map(|&(x, y, z)| Point3::new(from_mm(x), from_mm(y), from_mm(z)))
+            .collect::<Vec<_>>();
+        if nominal_targets.len() != targets.len() {
+            return Err(Failure::new(ExitStatus::Usage, format!("'{file}': the targets do not match its profile")));
+        }
+        Ok(Self {
+            nominal: ArmModel { chain: profile.chain().clone(), targets: nominal_targets },
+            identified: ArmModel { chain, targets },
+            nominal_station: calibration.nominal_base_from_station.as_ref().map(Into::into),
+            station: calibration.base_from_station.as_ref().map(Into::into),
+        })
+    }
+
+    /// Both models with the set-up in which `samples` were measured.
+    fn set_up(
+        self,
+        refit: RefitArg,
+        profile: &Profile,
+        samples: &[PointSample],
+        file: &str,
+    ) -> Result<(FittedSetup, FittedSetup), Failure> {
+        let free = match refit {
+            RefitArg::None => {
+                let known = |model, station: Option<Isometry3<f64>>| {
+                    let base_from_station = vec![station.ok_or_else(|| {
+                        Failure::new(ExitStatus::Usage, format!("'{file}' knows no place of a tracker"))
+                            .hint("use '--refit frame' or '--refit frame+target'")
+                    })?];
+                    Ok(FittedSetup { model, base_from_station })
+                };
+                return Ok((known(self.nominal, self.nominal_station)?, known(self.identified, self.station)?));
+            }
+            RefitArg::Frame => Vec::new(),
+            RefitArg::FrameAndTarget => remounted_targets(profile, samples),
+        };
+        let observations = Observations { points: samples.to_vec(), ..Observations::default() };
+        let fit =
+            |model: &ArmModel| fit_setup(model, &free, &observations).map_err(|error| identification_failure(&error));
+        Ok((fit(&self.nominal)?, fit(&self.identified)?))
+    }
+}
+
+/// The coordinates of all targets that the samples show, free.
+fn remounted_targets(profile: &Profile, samples: &[PointSample]) -> Vec<FreeParameter> {
+    (0..profile.targets().len())
+        .filter(|target| samples.iter().any(|sample| sample.at.target == *target))
+        .flat_map(|target| {
+            crate::kinematics::Axis::ALL
+                .map(|axis| FreeParameter { id: ParameterId::Target { target, axis }, expected: NEW_MOUNTING })
+        })
+        .collect()
+}

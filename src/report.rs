@@ -1,0 +1,8 @@
+//! Results as text for people: at most 80 columns, every number with its unit and as many digits as it deserves.
+//!
+//! Knows the plain summaries of `session` and nothing of how they were made.
+
+mod tables;
+mod text;
+
+pub use text::{identification_text, verification_text};

@@ -1,0 +1,284 @@
+//! The reports of `identify`, `constraints` and `verify` on a terminal.
+
+use super::tables::{decimals_for, fixed, paragraph};
+use crate::session::summary::{
+    IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict,
+    VerificationReport, VerificationSummary, Warning,
+};
+
+/// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
+const WEAK: f64 = 0.5;
+/// A joint is only named if it explains this share of what is left.
+const WORTH_NAMING: f64 = 0.1;
+
+/// Report of an identification.
+pub fn identification_text(summary: &IdentificationSummary) -> String {
+    let mut text = title("Identification", &summary.provenance);
+    text.push_str(&warnings(&summary.warnings));
+    text.push_str(&verdict(&summary.verdict));
+    if let Some(verification) = &summary.verification {
+        text.push_str(&verification_tables(verification));
+    }
+    text.push_str(&fit_lines(summary));
+    text.push_str(&parameter_table(&summary.parameters));
+    text.push_str(&blind_lines(summary));
+    text.push_str(&rejected_lines(summary));
+    if let Some(verification) = &summary.verification {
+        text.push_str(&joint_lines(&verification.residual_by_joint));
+    }
+    for file in &summary.written {
+        push_line(&mut text, &format!("written: {file}"));
+    }
+    text
+}
+
+/// Report of a verification.
+pub fn verification_text(report: &VerificationReport) -> String {
+    let mut text = title("Verification", &report.provenance);
+    text.push_str(&warnings(&report.warnings));
+    text.push_str(&verdict(&report.verdict));
+    text.push_str(&verification_tables(&report.verification));
+    text.push_str(&joint_lines(&report.verification.residual_by_joint));
+    text
+}
+
+fn push_line(text: &mut String, line: &str) {
+    text.push_str(line);
+    text.push('\n');
+}
+
+fn title(what: &str, provenance: &Provenance) -> String {
+    let mut text = paragraph("", &format!("{what} of {} ({})", provenance.robot, provenance.profile));
+    for input in &provenance.inputs {
+        push_line(&mut text, &format!("  {}: {}", input.role, input.file));
+    }
+    push_line(&mut text, &format!("  {}, {}", provenance.program, provenance.created));
+    text.push('\n');
+    text
+}
+
+fn warnings(warnings: &[Warning]) -> String {
+    let mut text = String::new();
+    for warning in warnings {
+        let mark = if warning.blocks_acceptance { "WARNING " } else { "note    " };
+        text.push_str(&paragraph(mark, &format!("{} [{}]", warning.message, warning.code)));
+    }
+    if !warnings.is_empty() {
+        text.push('\n');
+    }
+    text
+}
+
+fn verdict(verdict: &Verdict) -> String {
+    let name = match verdict.status.as_str() {
+        "accepted" => "ACCEPTED",
+        "not_accepted" => "NOT ACCEPTED",
+        _ => "NOT EVALUATED",
+    };
+    let mut text = paragraph("", &format!("Verdict: {name}: {}", verdict.reasons.join("; ")));
+    for check in &verdict.checks {
+        let sign = if check.met { "<=" } else { "> " };
+        let result = if check.met { "met" } else { "NOT MET" };
+        push_line(
+            &mut text,
+            &format!(
+                "  {:<16}{:>9} mm  {sign} {:>7} mm  {result}",
+                check.quantity.replace('_', " "),
+                fixed(check.value_mm, 4),
+                fixed(check.limit_mm, 3)
+            ),
+        );
+    }
+    text.push('\n');
+    text
+}
+
+/// Nominal and identified side by side: tables III and IV of the method paper, with root mean square and 95 %.
+fn verification_tables(verification: &VerificationSummary) -> String {
+    let VerificationSummary { samples, basis, nominal, identified, .. } = verification;
+    let mut text =
+        paragraph("", &format!("Accuracy on {samples} samples that the identification did not see: {basis}"));
+    push_line(&mut text, &format!("  {:<34}{:>12}{:>14}", "mm", "nominal", "identified"));
+    let pairs: [(&str, fn(&ModelSummary) -> Option<StatisticsSummary>); 3] = [
+        ("position error", |model| model.position_mm),
+        ("distance error", |model| model.distance_mm),
+        ("off the shared point", |model| model.seat_mm),
+    ];
+    for (name, pick) in pairs {
+        if let (Some(nominal), Some(identified)) = (pick(nominal), pick(identified)) {
+            text.push_str(&statistics_rows(name, &nominal, &identified));
+        }
+    }
+    if let (Some(nominal), Some(identified)) = (&nominal.axis_mm, &identified.axis_mm) {
+        for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
+            row(
+                &mut text,
+                &format!("along {name}, mean of absolute values"),
+                nominal.mean[axis],
+                identified.mean[axis],
+            );
+            row(&mut text, &format!("along {name}, largest"), nominal.max[axis], identified.max[axis]);
+        }
+    }
+    text.push('\n');
+    text
+}
+
+fn statistics_rows(name: &str, nominal: &StatisticsSummary, identified: &StatisticsSummary) -> String {
+    let mut text = String::new();
+    row(&mut text, &format!("{name}, mean of {}", identified.count), nominal.mean, identified.mean);
+    row(&mut text, "  rms", nominal.rms, identified.rms);
+    row(&mut text, "  95 %", nominal.p95, identified.p95);
+    row(&mut text, "  max", nominal.max, identified.max);
+    text
+}
+
+fn row(text: &mut String, name: &str, nominal: f64, identified: f64) {
+    push_line(text, &format!("  {name:<34}{:>12}{:>14}", fixed(nominal, 4), fixed(identified, 4)));
+}
+
+fn fit_lines(summary: &IdentificationSummary) -> String {
+    let sigma = &summary.sigma;
+    let source = match sigma.source.as_str() {
+        "readings" => "given with the readings",
+        "option" => "given on the command line",
+        "instrument" => "of the profile's instrument",
+        _ => "estimated from the residuals",
+    };
+    let mut text = paragraph(
+        "",
+        &format!(
+            "Identified from {} samples, {} parameters ({}), {} weighting, prior {}, {} estimator",
+            summary.samples,
+            summary.parameter_count,
+            summary.settings.level,
+            summary.settings.weighting,
+            summary.settings.prior,
+            summary.settings.estimator
+        ),
+    );
+    let residual = match sigma.from_residuals_mm {
+        Some(residual) if sigma.source != "residuals" => format!("; the residuals say {} mm", fixed(residual, 4)),
+        _ => String::new(),
+    };
+    push_line(&mut text, &format!("  sigma {} mm, {source}{residual}", fixed(sigma.used_mm, 4)));
+    let rank = summary.rank.map_or_else(
+        || "rank not clear".to_owned(),
+        |rank| format!("rank {rank} of {} (gap {:.0e})", summary.parameter_count, summary.singular_value_gap),
+    );
+    push_line(&mut text, &format!("  {rank}"));
+    if let (Some(scaled), Some(raw)) = (summary.condition_number, summary.condition_number_mm_rad) {
+        let line =
+            format!("  condition number {} in expected deviations, {} in mm and rad", fixed(scaled, 1), fixed(raw, 0));
+        push_line(&mut text, &line);
+    }
+    push_line(
+        &mut text,
+        &format!("  {} after {} solver steps", summary.termination.replace('_', " "), summary.iterations.len()),
+    );
+    text.push('\n');
+    text
+}
+
+fn parameter_table(parameters: &[ParameterSummary]) -> String {
+    let mut text = String::new();
+    push_line(
+        &mut text,
+        &format!(
+            "{:<12}{:>4}{:>13}{:>13}{:>13}{:>11}  {}",
+            "parameter", "unit", "nominal", "deviation", "identified", "sigma", "found"
+        ),
+    );
+    for parameter in parameters {
+        let decimals = decimals_for(parameter.sigma);
+        let found = if !parameter.identifiable {
+            "only combined"
+        } else if parameter.sigma > WEAK * parameter.expected {
+            "weakly"
+        } else {
+            "yes"
+        };
+        push_line(
+            &mut text,
+            &format!(
+                "{:<12}{:>4}{:>13}{:>13}{:>13}{:>11}  {found}",
+                parameter.name,
+                parameter.unit,
+                fixed(parameter.nominal, 4),
+                fixed(parameter.deviation, decimals),
+                fixed(parameter.nominal + parameter.deviation, decimals),
+                fixed(parameter.sigma, decimals)
+            ),
+        );
+    }
+    text.push('\n');
+    text
+}
+
+fn blind_lines(summary: &IdentificationSummary) -> String {
+    let mut text = String::new();
+    if !summary.blind_groups.is_empty() {
+        push_line(&mut text, "What these data cannot tell:");
+        for group in &summary.blind_groups {
+            text.push_str(&paragraph("  - ", &group.description));
+        }
+        text.push('\n');
+    }
+    if !summary.correlations.is_empty() {
+        push_line(&mut text, "Strongly correlated:");
+        for pair in &summary.correlations {
+            let [first, second] = &pair.parameters;
+            push_line(&mut text, &format!("  - {first} and {second}: {:+.2}", pair.correlation));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn rejected_lines(summary: &IdentificationSummary) -> String {
+    if summary.settings.estimator != "robust" {
+        return String::new();
+    }
+    if summary.rejected.is_empty() {
+        return "Rejected samples: none\n\n".to_owned();
+    }
+    let mut text = format!("Rejected samples, {} of {}:\n", summary.rejected.len(), summary.samples);
+    for rejected in &summary.rejected {
+        let line = format!(
+            "pose {} (line {}): {} mm off, {}",
+            rejected.pose,
+            rejected.line,
+            fixed(rejected.residual_mm, 3),
+            rejected.reason
+        );
+        text.push_str(&paragraph("  - ", &line));
+    }
+    text.push('\n');
+    text
+}
+
+/// Mean error over each joint's range, so that a pattern is seen, and the joints that the errors follow.
+fn joint_lines(joints: &[JointSummary]) -> String {
+    let mut text = String::new();
+    if joints.iter().all(|joint| joint.bins.is_empty()) {
+        return text;
+    }
+    push_line(&mut text, "Mean error of the identified model over fifths of each joint's range (mm):");
+    for joint in joints {
+        let (Some(first), Some(last)) = (joint.bins.first(), joint.bins.last()) else { continue };
+        let range = format!("{:>5.0} ..{:>5.0} {}", first.from, last.to, joint.unit);
+        let bins: String = joint
+            .bins
+            .iter()
+            .map(|bin| if bin.count == 0 { format!("{:>8}", "-") } else { format!("{:>8}", fixed(bin.mean_mm, 3)) })
+            .collect();
+        let share = if joint.explained >= WORTH_NAMING {
+            format!("  follows it: {:.0} %", 100.0 * joint.explained)
+        } else {
+            String::new()
+        };
+        push_line(&mut text, &format!("  {:<6}{range:<18}{bins}{share}", joint.joint));
+    }
+    text.push('\n');
+    text
+}

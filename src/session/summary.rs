@@ -1,0 +1,310 @@
+//! The numbers of an identification or verification as they leave the program: plain data in mm and degree, the same for the
+//! text, the JSON object and later reports.
+//!
+//! Field names are part of the interface of scripts: units are in the names, nothing is renamed or removed within a schema
+//! version.
+
+use serde::{Deserialize, Serialize};
+
+/// Version of the layout of these objects.
+pub const SCHEMA: u32 = 1;
+
+/// Where numbers come from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Program and version.
+    pub program: String,
+    /// When, RFC 3339 in UTC.
+    pub created: String,
+    /// Name of the profile.
+    pub profile: String,
+    /// Title of the robot.
+    pub robot: String,
+    /// SHA-256 of the profile's text.
+    pub profile_sha256: String,
+    /// Files that were read.
+    pub inputs: Vec<InputFile>,
+}
+
+/// An input file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// What it was used for: `identification`, `verification` or `calibration`.
+    pub role: String,
+    /// Its path as given.
+    pub file: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+}
+
+/// How the identification was asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IdentificationSettings {
+    /// `offsets` or `geometric`.
+    pub level: String,
+    /// `covariance` or `uniform`.
+    pub weighting: String,
+    /// `expected` or `none`.
+    pub prior: String,
+    /// `robust` or `least-squares`.
+    pub estimator: String,
+    /// Largest number of solver steps.
+    pub iterations: usize,
+    /// Condition that picked the identification rows.
+    pub filter: Option<String>,
+}
+
+/// Measurement σ.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SigmaSummary {
+    /// What balanced data and prior, per coordinate.
+    pub used_mm: f64,
+    /// `readings`, `option`, `instrument` or `residuals`.
+    pub source: String,
+    /// What the residuals say.
+    pub from_residuals_mm: Option<f64>,
+}
+
+/// One identified parameter. Numbers are in `unit`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParameterSummary {
+    /// Name, such as `a2` or `target1.x`.
+    pub name: String,
+    /// `mm` or `deg`.
+    pub unit: String,
+    /// Nominal value.
+    pub nominal: f64,
+    /// Identified − nominal.
+    pub deviation: f64,
+    /// Standard deviation of the deviation.
+    pub sigma: f64,
+    /// Deviation expected before measuring, one standard deviation.
+    pub expected: f64,
+    /// Whether it can be found on its own.
+    pub identifiable: bool,
+}
+
+/// Two parameters that the data tie together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CorrelationSummary {
+    /// Names of the two.
+    pub parameters: [String; 2],
+    /// Correlation, −1 … 1.
+    pub correlation: f64,
+}
+
+/// Parameters of which only combinations can be found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BlindGroupSummary {
+    /// Their names.
+    pub parameters: Vec<String>,
+    /// Number of directions that the data do not see.
+    pub blind: usize,
+    /// In words.
+    pub description: String,
+}
+
+/// A sample that was left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RejectedSummary {
+    /// Name of the pose.
+    pub pose: String,
+    /// Line of the file.
+    pub line: usize,
+    /// Distance from the prediction of the model fitted without it.
+    pub residual_mm: f64,
+    /// The same in robust standard deviations of the accepted samples.
+    pub ratio: f64,
+    /// Why.
+    pub reason: String,
+}
+
+/// Something the reader must know before the numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Warning {
+    /// Stable short name of the kind, such as `few_data` or `ran_away`.
+    pub code: String,
+    /// What it is and what to do.
+    pub message: String,
+    /// Whether it rules out the verdict "accepted".
+    pub blocks_acceptance: bool,
+}
+
+/// Statistics of a non-negative error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StatisticsSummary {
+    /// How many values.
+    pub count: usize,
+    /// Mean.
+    pub mean: f64,
+    /// Root mean square.
+    pub rms: f64,
+    /// 95 % of the values are at most this.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// Per-axis absolute errors in the robot base, as table IV of the method paper.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisSummary {
+    /// Mean of the absolute error along x, y, z.
+    pub mean: [f64; 3],
+    /// Largest absolute error along x, y, z.
+    pub max: [f64; 3],
+}
+
+/// Errors of one model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ModelSummary {
+    /// Norm of the position error after registration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_mm: Option<StatisticsSummary>,
+    /// The same per axis of the base.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis_mm: Option<AxisSummary>,
+    /// Distance error over pairs of samples, or of measured lengths.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_mm: Option<StatisticsSummary>,
+    /// Distance of the target from the mean of its shared point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seat_mm: Option<StatisticsSummary>,
+}
+
+/// Mean error over a part of a joint's range.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointBin {
+    /// Lower end, in `unit` of the joint.
+    pub from: f64,
+    /// Upper end.
+    pub to: f64,
+    /// Samples in it.
+    pub count: usize,
+    /// Mean error.
+    pub mean_mm: f64,
+}
+
+/// Error of the identified model against one joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointSummary {
+    /// Name of the joint.
+    pub joint: String,
+    /// `deg` or `mm`.
+    pub unit: String,
+    /// Share of the square error that follows this joint, 0 … 1.
+    pub explained: f64,
+    /// Over its range.
+    pub bins: Vec<JointBin>,
+}
+
+/// Accuracy on samples that the identification did not see.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VerificationSummary {
+    /// Number of verification samples.
+    pub samples: usize,
+    /// Where they come from, and what was fitted to them.
+    pub basis: String,
+    /// What was fitted to the verification samples themselves: `none`, `frame` or `frame+target`.
+    pub refit: String,
+    /// The nominal model with its own registration.
+    pub nominal: ModelSummary,
+    /// The identified model.
+    pub identified: ModelSummary,
+    /// Error of the identified model against each joint.
+    pub residual_by_joint: Vec<JointSummary>,
+}
+
+/// One comparison with an acceptance limit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LimitCheck {
+    /// What is limited, such as `position_rms`.
+    pub quantity: String,
+    /// What was found.
+    pub value_mm: f64,
+    /// What is allowed.
+    pub limit_mm: f64,
+    /// Whether it is met.
+    pub met: bool,
+}
+
+/// The verdict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// `accepted`, `not_accepted` or `not_evaluated`.
+    pub status: String,
+    /// Why, in words.
+    pub reasons: Vec<String>,
+    /// Every limit of the profile.
+    pub checks: Vec<LimitCheck>,
+}
+
+/// One step of the solver.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IterationSummary {
+    /// Weighted square sum of residuals plus the prior's share, dimensionless.
+    pub cost: f64,
+    /// Largest change of a parameter, in expected deviations.
+    pub step: f64,
+}
+
+/// Everything about an identification.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IdentificationSummary {
+    /// Version of this layout.
+    pub schema: u32,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+    /// How it was asked for.
+    pub settings: IdentificationSettings,
+    /// What must be known before the numbers are used.
+    pub warnings: Vec<Warning>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Accuracy on samples that the identification did not see.
+    pub verification: Option<VerificationSummary>,
+    /// Number of identification samples, rejected ones included.
+    pub samples: usize,
+    /// Free parameters.
+    pub parameter_count: usize,
+    /// Independent combinations that the data determine.
+    pub rank: Option<usize>,
+    /// Ratio of the singular values at the rank.
+    pub singular_value_gap: f64,
+    /// Of `A·S` on the identifiable subspace: parameters in units of their expected deviation.
+    pub condition_number: Option<f64>,
+    /// Of A with parameters in mm and rad.
+    pub condition_number_mm_rad: Option<f64>,
+    /// Number of points whose pairs entered the condition numbers.
+    pub condition_number_points: usize,
+    /// Measurement σ.
+    pub sigma: SigmaSummary,
+    /// Every free parameter.
+    pub parameters: Vec<ParameterSummary>,
+    /// What only combinations of parameters can say.
+    pub blind_groups: Vec<BlindGroupSummary>,
+    /// Pairs of identifiable parameters correlated beyond ±0.9.
+    pub correlations: Vec<CorrelationSummary>,
+    /// Samples left out.
+    pub rejected: Vec<RejectedSummary>,
+    /// `converged`, `iteration_limit` or `no_improvement`.
+    pub termination: String,
+    /// Steps of the solver.
+    pub iterations: Vec<IterationSummary>,
+    /// Files written.
+    pub written: Vec<String>,
+}
+
+/// The verification of a calibration on other data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VerificationReport {
+    /// Version of this layout.
+    pub schema: u32,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+    /// What must be known before the numbers are used.
+    pub warnings: Vec<Warning>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The errors.
+    pub verification: VerificationSummary,
+}
