@@ -195,11 +195,13 @@ pub(crate) struct ProjectedRows {
     pub(crate) residuals: Vec<f64>,
 }
 
-/// The position problem with the rigid motion of every station, and every shared point, projected out. This is exactly the
-/// distance problem weighted with the covariance of the pairs (design: distances lose nothing but the frame).
+/// The position problem with the rigid motion of every station, every shared point, and the turn of the base under shared
+/// points projected out. For measured points this is exactly the distance problem weighted with the covariance of the pairs
+/// (distances lose nothing but the frame).
 ///
-/// Per station the six columns of a rigid motion at the centroid are orthogonal to each other up to the 3 × 3 inertia, so the
-/// projection needs no decomposition: `B − mean(B) − (I⁻¹ Σ w r×B) × r`.
+/// About the centroid the columns of a shift and of a turn are orthogonal, so the projection needs no decomposition:
+/// `B − mean(B)`, then `− (I⁻¹ Σ w r×B) × r` with the inertia I. Shared points do not see a turn of the base either; their
+/// rows would show one of the size of the residuals, `ω × (p − mean)`, which means nothing.
 pub(crate) fn project(
     problem: &Problem<'_>,
     mut evaluation: Evaluation,
@@ -209,14 +211,21 @@ pub(crate) fn project(
     let n = evaluation.n;
     let lengths = length_rows(problem, &evaluation, weights);
     let samples = &problem.observations.points;
-    for station in 0..residuals.base_from_station.len() {
+    for (station, centroid) in residuals.centroids.iter().enumerate() {
         let members: Vec<usize> = (0..samples.len()).filter(|&index| samples[index].station == station).collect();
-        remove_rigid_motion(problem, &mut evaluation, &members, residuals.centroids[station], weights);
+        let arms: Vec<Vector3<f64>> = members.iter().map(|&index| evaluation.points[index] - centroid).collect();
+        remove_mean(problem, &mut evaluation, &members, weights);
+        remove_turn(problem, &mut evaluation, &members, &arms, weights);
     }
+    let mut seats = Vec::new();
     for range in shared_ranges(problem) {
-        remove_mean(problem, &mut evaluation, range, weights);
+        let members: Vec<usize> = range.collect();
+        remove_mean(problem, &mut evaluation, &members, weights);
+        seats.extend(members);
     }
-    let independent = samples.len() + problem.observations.shared.iter().map(|shared| shared.at.len()).sum::<usize>();
+    let arms: Vec<Vector3<f64>> = seats.iter().map(|&index| -residuals.of_places[index]).collect();
+    remove_turn(problem, &mut evaluation, &seats, &arms, weights);
+    let independent = samples.len() + seats.len();
     let Evaluation { mut rows, .. } = evaluation;
     rows.truncate(3 * n * independent);
     let mut values = Vec::with_capacity(3 * independent + lengths.residuals.len());
@@ -232,65 +241,54 @@ pub(crate) fn project(
     ProjectedRows { n, rows, residuals: values }
 }
 
-fn remove_rigid_motion(
+/// Takes the weighted mean of the Jacobians from each: a shift of all members.
+fn remove_mean(problem: &Problem<'_>, evaluation: &mut Evaluation, members: &[usize], weights: &Weights) {
+    let n = evaluation.n;
+    let mean = mean_rows(problem, evaluation, members.iter().copied(), weights);
+    for &index in members {
+        for (value, mean) in evaluation.rows[3 * n * index..3 * n * (index + 1)].iter_mut().zip(&mean) {
+            *value -= mean;
+        }
+    }
+}
+
+/// Takes from the Jacobians what a common turn of all members about the origin of `arms` (m) explains.
+fn remove_turn(
     problem: &Problem<'_>,
     evaluation: &mut Evaluation,
     members: &[usize],
-    centroid: Point3<f64>,
+    arms: &[Vector3<f64>],
     weights: &Weights,
 ) {
     let n = evaluation.n;
-    let mut total = 0.0;
     let mut inertia = Matrix3::zeros();
-    let mut mean = vec![0.0; 3 * n];
     let mut turn = vec![0.0; 3 * n];
-    for &index in members {
+    for (&index, r) in members.iter().zip(arms) {
         let weight = weights.of_place(problem, index);
-        let r = evaluation.points[index] - centroid;
-        total += weight;
         inertia += (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * weight;
         let (bx, by, bz) = split_rows(evaluation.place(index), n);
         for c in 0..n {
-            mean[c] += weight * bx[c];
-            mean[n + c] += weight * by[c];
-            mean[2 * n + c] += weight * bz[c];
             turn[c] += weight * (r.y * bz[c] - r.z * by[c]);
             turn[n + c] += weight * (r.z * bx[c] - r.x * bz[c]);
             turn[2 * n + c] += weight * (r.x * by[c] - r.y * bx[c]);
         }
-    }
-    if total <= 0.0 {
-        return;
     }
     let inverse = pseudo_inverse(&inertia);
     for c in 0..n {
         let omega = inverse * Vector3::new(turn[c], turn[n + c], turn[2 * n + c]);
         for (axis, value) in omega.iter().enumerate() {
             turn[axis * n + c] = *value;
-            mean[axis * n + c] /= total;
         }
     }
-    let (mx, my, mz) = split_rows(&mean, n);
     let (tx, ty, tz) = split_rows(&turn, n);
-    for &index in members {
-        let r = evaluation.points[index] - centroid;
+    for (&index, r) in members.iter().zip(arms) {
         let rows = &mut evaluation.rows[3 * n * index..3 * n * (index + 1)];
         let (bx, rest) = rows.split_at_mut(n);
         let (by, bz) = rest.split_at_mut(n);
         for c in 0..n {
-            bx[c] -= mx[c] + ty[c] * r.z - tz[c] * r.y;
-            by[c] -= my[c] + tz[c] * r.x - tx[c] * r.z;
-            bz[c] -= mz[c] + tx[c] * r.y - ty[c] * r.x;
-        }
-    }
-}
-
-fn remove_mean(problem: &Problem<'_>, evaluation: &mut Evaluation, range: std::ops::Range<usize>, weights: &Weights) {
-    let n = evaluation.n;
-    let mean = mean_rows(problem, evaluation, range.clone(), weights);
-    for index in range {
-        for (value, mean) in evaluation.rows[3 * n * index..3 * n * (index + 1)].iter_mut().zip(&mean) {
-            *value -= mean;
+            bx[c] -= ty[c] * r.z - tz[c] * r.y;
+            by[c] -= tz[c] * r.x - tx[c] * r.z;
+            bz[c] -= tx[c] * r.y - ty[c] * r.x;
         }
     }
 }
@@ -298,12 +296,12 @@ fn remove_mean(problem: &Problem<'_>, evaluation: &mut Evaluation, range: std::o
 fn mean_rows(
     problem: &Problem<'_>,
     evaluation: &Evaluation,
-    range: std::ops::Range<usize>,
+    members: impl Iterator<Item = usize>,
     weights: &Weights,
 ) -> Vec<f64> {
     let mut mean = vec![0.0; 3 * evaluation.n];
     let mut total = 0.0;
-    for index in range {
+    for index in members {
         let weight = weights.of_place(problem, index);
         total += weight;
         for (sum, value) in mean.iter_mut().zip(evaluation.place(index)) {
