@@ -225,12 +225,18 @@ fn describe_group(problem: &Problem<'_>, projector: &DMatrix<f64>, scale: &[f64]
             .map(|(&index, value)| problem.parameters[index].id.quantity().to_edge(value * scale[index]))
             .collect();
         one_direction(&parameters, &names, &listed, &factors)
+    } else if members.len() == blind + 1 {
+        // One combination is seen: the direction that is orthogonal to all blind ones, per edge unit of each parameter.
+        let direction = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+        let weights: Vec<f64> = members
+            .iter()
+            .zip(direction.iter())
+            .map(|(&index, value)| problem.parameters[index].id.quantity().from_edge(value / scale[index]))
+            .collect();
+        one_combination(&names, &listed, &weights)
     } else {
-        format!(
-            "{listed}: only {} independent combinations of these {} can be found",
-            members.len() - blind.min(members.len()),
-            members.len()
-        )
+        let left = members.len() - blind.min(members.len());
+        format!("{listed}: only {left} independent combinations of these {} can be found", members.len())
     };
     BlindGroup { parameters, blind, description }
 }
@@ -255,8 +261,7 @@ fn one_direction(parameters: &[ParameterId], names: &[String], listed: &str, fac
             return format!("{listed}: only their difference");
         }
     }
-    let largest =
-        factors.iter().fold(0.0_f64, |largest, value| if value.abs() > largest.abs() { *value } else { largest });
+    let largest = signed_largest(factors);
     let terms: Vec<String> = factors
         .iter()
         .zip(names)
@@ -266,11 +271,54 @@ fn one_direction(parameters: &[ParameterId], names: &[String], listed: &str, fac
     format!("{listed}: cannot be told apart along the change {}", terms.join(", "))
 }
 
+fn one_combination(names: &[String], listed: &str, weights: &[f64]) -> String {
+    let largest = signed_largest(weights);
+    if weights.iter().all(|weight| (weight / largest - 1.0).abs() < 1e-6) {
+        return format!("{listed}: only their sum");
+    }
+    let terms: Vec<String> =
+        weights.iter().zip(names).map(|(weight, name)| format!("{:+.3} {name}", weight / largest)).collect();
+    format!("{listed}: only the combination {}", terms.join(" "))
+}
+
+/// The value of largest size, with its sign.
+fn signed_largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0_f64, |largest, value| if value.abs() > largest.abs() { *value } else { largest })
+}
+
 /// `a`, `a and b`, `a, b and c`.
 fn join_names(names: &[String]) -> String {
     match names {
         [] => String::new(),
         [only] => only.clone(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rank_stands_at_a_clear_gap() {
+        assert_eq!(rank_by_gap(&[3.0, 1.0, 1e-3, 1e-12, 0.0]), (Some(3), 1e-3 / 1e-12));
+        let (rank, gap) = rank_by_gap(&[1.0, 0.5, 0.2]);
+        assert_eq!(rank, Some(3), "gap {gap}");
+        assert_eq!(rank_by_gap(&[0.0, 0.0]).0, Some(0));
+    }
+
+    #[test]
+    fn values_that_fade_out_evenly_have_no_rank() {
+        let fading: Vec<f64> = (0..14).map(|index| 10_f64.powi(-index)).collect();
+        let (rank, gap) = rank_by_gap(&fading);
+        assert_eq!(rank, None);
+        assert!((gap - 10.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn names_are_joined_as_in_a_sentence() {
+        let names = ["a1", "d2", "d3"].map(str::to_owned);
+        let joined = [join_names(&names[..1]), join_names(&names[..2]), join_names(&names)];
+        assert_eq!(joined, ["a1", "a1 and d2", "a1, d2 and d3"]);
     }
 }

@@ -8,8 +8,10 @@ use crate::session::summary::{
 
 /// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
 const WEAK: f64 = 0.5;
-/// A joint is only named if it explains this share of what is left.
+/// A joint is only named if it explains this share of what is left …
 const WORTH_NAMING: f64 = 0.1;
+/// … and this over the number of samples: about four standard deviations of what chance explains.
+const CHANCE: f64 = 4.0;
 
 /// Report of an identification.
 pub fn identification_text(summary: &IdentificationSummary) -> String {
@@ -185,7 +187,7 @@ fn parameter_table(parameters: &[ParameterSummary]) -> String {
     push_line(
         &mut text,
         &format!(
-            "{:<12}{:>4}{:>13}{:>13}{:>13}{:>11}  {}",
+            "{:<11}{:>4}{:>12}{:>12}{:>12}{:>10}  {}",
             "parameter", "unit", "nominal", "deviation", "identified", "sigma", "found"
         ),
     );
@@ -201,7 +203,7 @@ fn parameter_table(parameters: &[ParameterSummary]) -> String {
         push_line(
             &mut text,
             &format!(
-                "{:<12}{:>4}{:>13}{:>13}{:>13}{:>11}  {found}",
+                "{:<11}{:>4}{:>12}{:>12}{:>12}{:>10}  {found}",
                 parameter.name,
                 parameter.unit,
                 fixed(parameter.nominal, 4),
@@ -263,7 +265,8 @@ fn joint_lines(joints: &[JointSummary]) -> String {
     if joints.iter().all(|joint| joint.bins.is_empty()) {
         return text;
     }
-    push_line(&mut text, "Mean error of the identified model over fifths of each joint's range (mm):");
+    push_line(&mut text, "Mean error of the identified model over fifths of each joint's range (mm), and");
+    push_line(&mut text, "how much of the square error follows the joint:");
     for joint in joints {
         let (Some(first), Some(last)) = (joint.bins.first(), joint.bins.last()) else { continue };
         let range = format!("{:>5.0} ..{:>5.0} {}", first.from, last.to, joint.unit);
@@ -272,12 +275,13 @@ fn joint_lines(joints: &[JointSummary]) -> String {
             .iter()
             .map(|bin| if bin.count == 0 { format!("{:>8}", "-") } else { format!("{:>8}", fixed(bin.mean_mm, 3)) })
             .collect();
-        let share = if joint.explained >= WORTH_NAMING {
-            format!("  follows it: {:.0} %", 100.0 * joint.explained)
+        let count: usize = joint.bins.iter().map(|bin| bin.count).sum();
+        let share = if joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64) {
+            format!("{:.0} %", 100.0 * joint.explained)
         } else {
-            String::new()
+            "-".to_owned()
         };
-        push_line(&mut text, &format!("  {:<6}{range:<18}{bins}{share}", joint.joint));
+        push_line(&mut text, &format!("  {:<6}{range:<18}{bins}{share:>7}", joint.joint));
     }
     text.push('\n');
     text

@@ -1,0 +1,136 @@
+//! The layers: who may know whom, what the pure parts must not touch, and that every module says what it is for.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Modules with the crate modules that they may use, lowest layer first.
+const LAYERS: &[(&str, &[&str])] = &[
+    ("units", &[]),
+    ("geometry", &["units"]),
+    ("kinematics", &["units", "geometry"]),
+    ("identification", &["units", "geometry", "kinematics"]),
+    ("profile", &["units", "geometry", "kinematics"]),
+    ("session", &["units", "geometry", "kinematics", "profile"]),
+    ("store", &["units", "geometry", "profile", "session"]),
+    ("report", &["units", "geometry", "profile", "session"]),
+    ("error", &[]),
+    ("cli", &["units", "session"]),
+    (
+        "app",
+        &["cli", "error", "geometry", "identification", "kinematics", "profile", "report", "session", "store", "units"],
+    ),
+];
+
+/// Modules that read no file, no clock, no environment and print nothing.
+const PURE: &[&str] = &["units", "geometry", "kinematics", "identification", "profile", "session"];
+
+/// What a pure module must not name.
+const IMPURE: &[&str] =
+    &["std::fs", "std::time", "std::env", "std::net", "std::thread", "std::io", "println!", "print!", "dbg!", "rand::"];
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// All source files with their top module and text; `main.rs` and `lib.rs` belong to none.
+fn modules() -> Vec<(PathBuf, String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut paths = Vec::new();
+    sources(&root, &mut paths);
+    paths
+        .into_iter()
+        .map(|path| {
+            let inside = path.strip_prefix(&root).unwrap().with_extension("");
+            let top = inside.components().next().unwrap().as_os_str().to_str().unwrap().to_owned();
+            let text = fs::read_to_string(&path).unwrap();
+            (path, top, text)
+        })
+        .filter(|(_, top, _)| top != "main" && top != "lib")
+        .collect()
+}
+
+/// The part of a file that ships: unit tests may know more.
+fn shipped(text: &str) -> &str {
+    text.split("#[cfg(test)]\nmod tests {").next().unwrap_or(text)
+}
+
+fn is_test_file(path: &Path) -> bool {
+    path.components().any(|part| part.as_os_str() == "tests") || path.ends_with("tests.rs")
+}
+
+/// Names that follow `crate::` in a text, comments aside.
+fn used_modules(text: &str) -> Vec<String> {
+    let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+    code.flat_map(|line| {
+        line.match_indices("crate::").map(|(at, mark)| {
+            line[at + mark.len()..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>()
+        })
+    })
+    // `use crate::{a, b}` would hide its names: it has no name here and is refused below.
+    .collect()
+}
+
+#[test]
+fn every_module_keeps_to_its_layer() {
+    let mut wrong = Vec::new();
+    for (path, top, text) in modules() {
+        if is_test_file(&path) {
+            continue;
+        }
+        let Some((_, allowed)) = LAYERS.iter().find(|(name, _)| *name == top) else {
+            wrong.push(format!("{}: module '{top}' has no place in the layers", path.display()));
+            continue;
+        };
+        for used in used_modules(shipped(&text)) {
+            if used != top && !allowed.contains(&used.as_str()) {
+                wrong.push(format!("{}: '{top}' must not know '{used}'", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn pure_modules_touch_nothing_outside() {
+    let mut wrong = Vec::new();
+    for (path, top, text) in modules() {
+        if !PURE.contains(&top.as_str()) || is_test_file(&path) {
+            continue;
+        }
+        for (number, line) in shipped(&text).lines().enumerate() {
+            for name in IMPURE {
+                if line.contains(name) && !line.trim_start().starts_with("//") {
+                    wrong.push(format!("{}:{}: {name}", path.display(), number + 1));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_module_says_what_it_is_for() {
+    let silent: Vec<String> = modules()
+        .iter()
+        .filter(|(path, _, text)| !is_test_file(path) && !text.starts_with("//!"))
+        .map(|(path, _, _)| path.display().to_string())
+        .collect();
+    assert!(silent.is_empty(), "no module doc: {silent:?}");
+}
+
+#[test]
+fn files_stay_small() {
+    let mut sizes: Vec<(usize, String)> =
+        modules().iter().map(|(path, _, text)| (text.lines().count(), path.display().to_string())).collect();
+    sizes.sort();
+    let (largest, name) = sizes.last().unwrap();
+    assert!(*largest <= 700, "{name} has {largest} lines: split it");
+}
