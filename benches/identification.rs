@@ -1,5 +1,7 @@
 //! Speed of kinematics and identification on one core.
 
+#![expect(clippy::unwrap_used, reason = "a failure of a test or benchmark is a panic")]
+
 #[path = "../tests/support/mod.rs"]
 mod support;
 
@@ -48,7 +50,7 @@ fn observability(bencher: Bencher<'_, '_>, poses: usize) {
 }
 
 /// Whole identification with the default settings and the σ of the instrument.
-#[divan::bench(args = [56, 1000, 12_000, 100_000])]
+#[divan::bench(args = [56, 1000, 12_000, 100_000], sample_count = 10)]
 fn identify_covariance(bencher: Bencher<'_, '_>, poses: usize) {
     let case = case(poses);
     bencher.bench_local(|| run(&case, &instrument(Weighting::Covariance)));
@@ -62,14 +64,14 @@ fn identify_estimated_sigma(bencher: Bencher<'_, '_>, poses: usize) {
 }
 
 /// Whole identification, all pairs alike.
-#[divan::bench(args = [56, 200])]
+#[divan::bench(args = [56, 200], sample_count = 20)]
 fn identify_uniform(bencher: Bencher<'_, '_>, poses: usize) {
     let case = case(poses);
     bencher.bench_local(|| run(&case, &instrument(Weighting::Uniform)));
 }
 
 /// One step over all 499,500 pairs of 1000 points (two linearisations).
-#[divan::bench]
+#[divan::bench(sample_count = 10)]
 fn uniform_1000_one_step(bencher: Bencher<'_, '_>) {
     let case = case(1000);
     let settings = Settings { iterations: 1, ..instrument(Weighting::Uniform) };

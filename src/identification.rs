@@ -352,15 +352,21 @@ pub fn identify(
         iterations: Vec::new(),
         progress,
     };
-    let mut at = fit.solve(DVector::zeros(basis.transform.ncols()));
+    let zero = DVector::zeros(basis.transform.ncols());
     if settings.estimator == Estimator::Robust {
-        let floor = fit.weights.sigma.min(settings.sigma.map_or(f64::INFINITY, |(sigma, _)| sigma)).max(SMALLEST_SIGMA);
-        let floor = if settings.sigma.is_some() { floor } else { SMALLEST_SIGMA };
+        let predicted = nominal.points_in_base(problem.observations.places());
+        fit.weights.trust = robust::gross_trust(problem, &predicted);
+    }
+    let mut at = fit.solve(zero.clone());
+    if settings.estimator == Estimator::Robust {
+        let floor = settings.sigma.map_or(SMALLEST_SIGMA, |(sigma, _)| sigma);
         let solve = Solve { problem, weighting: settings.weighting, basis: &basis, weights: &fit.weights };
-        let trust = robust::find_outliers(&solve, &at.0, floor, settings.iterations, &mut fit.iterations);
+        let trust = robust::find_outliers(&solve, &at.0, floor);
         if trust != fit.weights.trust {
+            // From the start: the steps on record are those that lead to the result.
             fit.weights.trust = trust;
-            at = fit.solve(at.0.z.clone());
+            fit.iterations.clear();
+            at = fit.solve(zero);
         }
     }
     let (at, termination) = at;

@@ -1,4 +1,20 @@
-//! trupose: guided kinematic calibration of industrial robot arms from measured distances.
+//! trupose makes an industrial arm accurate: it identifies the kinematic errors of a robot from distances between points measured
+//! with a laser tracker, verifies them on points it never saw, and delivers a corrected model with honest error bars.
+//!
+//! Words, one per thing: *nominal* is the maker's, *identified* is ours, *deviation* = identified − nominal; a *configuration* is
+//! a joint vector as the pendant shows it; a *target* is an SMR on the flange; a *sample* is a configuration with its reading;
+//! *residual* = measured − predicted. Transforms are named so that they cancel: `base_from_flange`, `point_in_base`.
+//! Inside are metre, radian and `f64`; millimetre and degree live at the edge, with the unit in every field name.
+//!
+//! Layers, lowest first; a module knows only those before it (`tests/architecture.rs` checks it):
+//!
+//! - [`units`], [`geometry`], [`kinematics`], [`identification`]: the maths. No I/O, no clock, no threads, no random numbers.
+//! - [`profile`], [`session`]: pure data. Text in, checked types out.
+//! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
+//! - [`cli`], [`app`], [`error`]: what was typed, what is done about it, and how it ends.
+//!
+//! Reference: "A distance error based industrial robot kinematic calibration method", Industrial Robot 41/5 (2014) 439–446,
+//! called *the method paper* throughout.
 
 pub mod app;
 pub mod cli;

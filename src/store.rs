@@ -50,7 +50,7 @@ pub fn create_folder(path: &Path) -> Result<(), StoreError> {
 /// Any step failed; the old file is then still there.
 pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
     let written = || -> io::Result<()> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
         let mut file = tempfile::Builder::new().prefix(".trupose-").tempfile_in(folder)?;
         file.write_all(text.as_bytes())?;
         file.as_file().sync_all()?;

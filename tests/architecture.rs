@@ -1,5 +1,7 @@
 //! The layers: who may know whom, what the pure parts must not touch, and that every module says what it is for.
 
+#![expect(clippy::unwrap_used, clippy::string_slice, reason = "a failure of a test or benchmark is a panic")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

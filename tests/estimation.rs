@@ -1,9 +1,11 @@
 //! Estimates against truth that is known: error bars by Monte Carlo, outliers, mirrored frames, other kinds of data.
 
+#![expect(clippy::unwrap_used, reason = "a failure of a test or benchmark is a panic")]
+
 mod support;
 
 use nalgebra::{DMatrix, DVector, Point3};
-use rand::RngExt;
+use rand::RngExt as _;
 use support::{PaperCase, measure, normal, paper_deviations, paper_parameters, random_configurations, seeded};
 use trupose::identification::verification::{DirectErrors, ModelErrors};
 use trupose::identification::{

@@ -2,6 +2,8 @@
 //!
 //! To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test example`.
 
+#![expect(clippy::disallowed_methods, reason = "a failure of a test is a panic; test files need no atomic writes")]
+
 mod support;
 
 use std::path::{Path, PathBuf};

@@ -1,6 +1,13 @@
 //! Measured data of real robots, end to end through the program. The data are not part of this project: sources are named in the
 //! README. They are looked for in the folder `TRUPOSE_MEASURED_DATA`, or in `../shared/data` beside the project.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a failure of a test is a panic; a skipped test says so"
+)]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

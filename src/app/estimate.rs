@@ -249,7 +249,8 @@ impl SampleName {
 
 /// The rejected samples with their names.
 fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary> {
-    let name = |place: usize| names.get(place).cloned().unwrap_or(SampleName { pose: place.to_string(), line: 0 });
+    let name =
+        |place: usize| names.get(place).cloned().unwrap_or_else(|| SampleName { pose: place.to_string(), line: 0 });
     found
         .rejected
         .iter()

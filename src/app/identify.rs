@@ -8,7 +8,7 @@ use super::estimate::{self, Finished, SampleName, nominal_targets, warning};
 use super::{Console, load, to_json};
 use crate::cli::{IdentifyArgs, WeightingArg};
 use crate::error::{ExitStatus, Failure};
-use crate::identification::plausibility::{Mistake, Plausibility, compare_with_nominal};
+use crate::identification::plausibility::{Plausibility, compare_with_nominal};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{ArmModel, Identification, Observations, PointSample, Problem, Weighting};
 use crate::profile::Profile;
@@ -56,7 +56,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     }
     warnings.extend(limit_warnings(profile, &rows));
     warnings.extend(limit_warnings(profile, &verification_rows));
-    warnings.extend(check_plausibility(&problem, &names)?);
+    warnings.extend(check_plausibility(&problem)?);
 
     let distance = observations.points.iter().map(|sample| sample.point.coords.norm()).sum::<f64>()
         / observations.points.len().max(1) as f64;
@@ -154,33 +154,29 @@ fn limit_warnings(profile: &Profile, rows: &[&Row]) -> Option<Warning> {
 }
 
 /// Refuses data that a known mistake explains better than this robot does.
-fn check_plausibility(problem: &Problem<'_>, names: &[SampleName]) -> Result<Vec<Warning>, Failure> {
+fn check_plausibility(problem: &Problem<'_>) -> Result<Vec<Warning>, Failure> {
     let plausibility = compare_with_nominal(problem).map_err(|error| estimate::identification_failure(&error))?;
     if plausibility.is_plausible() {
         return Ok(Vec::new());
     }
-    let Plausibility { nominal_rms, expected_rms, mistake } = &plausibility;
+    let Plausibility { nominal, expected, mistake } = &plausibility;
     let joints = problem.chain.joints();
-    let sample_name = |index: usize| names.get(index).map_or_else(|| index.to_string(), SampleName::text);
     let gap = format!(
-        "the measured points are {:.1} mm (rms) off the nominal robot, {:.1} mm can be expected",
-        to_mm(*nominal_rms),
-        to_mm(*expected_rms)
+        "the measured points are typically {:.1} mm off the nominal robot, {:.1} mm can be expected",
+        to_mm(*nominal),
+        to_mm(*expected)
     );
     match mistake {
-        // Two rows are no reason to refuse the rest: they are rejected and named.
-        Some(mistake @ Mistake::SwappedRows { .. }) => {
-            let text = mistake.describe(|joint| joints[joint].name.clone(), sample_name);
-            Ok(vec![warning("swapped_rows", format!("{gap}; {text}"), false)])
-        }
         Some(mistake) => {
-            let text = mistake.describe(|joint| joints[joint].name.clone(), sample_name);
+            let text = mistake.describe(|joint| joints[joint].name.clone());
             Err(Failure::new(ExitStatus::Usage, format!("{gap}: {text}")))
         }
         None => Ok(vec![warning(
             "implausible",
-            format!("{gap}, and no single mistake explains it (several swapped rows, outliers, or another robot?)"),
-            false,
+            format!(
+                "{gap}, and no single mistake explains it (rows in another order, another robot, two joints wrong?)"
+            ),
+            true,
         )]),
     }
 }

@@ -309,7 +309,9 @@ fn mean_rows(
         }
     }
     if total > 0.0 {
-        mean.iter_mut().for_each(|value| *value /= total);
+        for value in &mut mean {
+            *value /= total;
+        }
     }
     mean
 }

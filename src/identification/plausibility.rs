@@ -1,5 +1,5 @@
 //! Do these data describe this robot at all? Looks for the mistakes that turn a calibration into nonsense: wrong unit, wrong
-//! joint sign or zero, swapped rows, joints that never move, too few or flat points.
+//! joint sign or zero, joints that never move, too few or flat points.
 //!
 //! The yardstick is the nominal model itself: with frame and target fitted, its residual cannot exceed what the expected
 //! deviations allow by much. Where it does, each mistake is tried in turn and the one that explains the data is named. This
@@ -9,7 +9,8 @@ use nalgebra::Point3;
 
 use super::linearise::{ArmModel, Evaluation, Weights, point_residuals, project};
 use super::problem::{Observations, PointSample, Problem};
-use super::{Estimator, IdentificationError, Observability, Prior, Settings, Weighting, identify};
+use super::robust::gross_trust;
+use super::{Estimator, IdentificationError, Observability, Settings, SigmaSource, identify};
 use crate::geometry::principal_spread;
 use crate::kinematics::{FreeParameter, JointType, ParameterId};
 use crate::units::{DEGREE, INCH, MILLIMETRE, to_deg, to_mm};
@@ -20,6 +21,8 @@ const IMPLAUSIBLE: f64 = 6.0;
 const ALWAYS_PLAUSIBLE: f64 = 5.0 * MILLIMETRE;
 /// A mistake explains the data if it lowers the residual to this fraction.
 const EXPLAINS: f64 = 0.25;
+/// A mistake explains the data only if what is left is below this fraction of their extent.
+const FITS: f64 = 0.1;
 /// A joint that moves less than this over the whole set does not move (rad).
 const STILL_JOINT: f64 = 5.0 * DEGREE;
 /// The same for a prismatic joint (m).
@@ -58,20 +61,13 @@ pub enum Mistake {
         /// What has to be added to its pendant value (rad).
         offset: f64,
     },
-    /// The points of two rows were swapped.
-    SwappedRows {
-        /// Index of the one sample.
-        first: usize,
-        /// Index of the other.
-        second: usize,
-    },
     /// The measured frame is left-handed.
     Mirrored,
 }
 
 impl Mistake {
     /// What it is and what to do, with names instead of indices.
-    pub fn describe(&self, joint_name: impl Fn(usize) -> String, sample_name: impl Fn(usize) -> String) -> String {
+    pub fn describe(&self, joint_name: impl Fn(usize) -> String) -> String {
         match self {
             Self::CoordinateUnit { ratio, story } => {
                 format!("the measured points span {ratio:.4} times what the robot can reach between them: {story}")
@@ -91,13 +87,6 @@ impl Mistake {
                 joint_name(*joint),
                 to_deg(*offset)
             ),
-            Self::SwappedRows { first, second } => {
-                format!(
-                    "{} and {} are swapped: each point fits the other's configuration",
-                    sample_name(*first),
-                    sample_name(*second)
-                )
-            }
             Self::Mirrored => {
                 "the points fit only when mirrored: the instrument's frame is left-handed; reverse one of its axes"
                     .to_owned()
@@ -109,10 +98,11 @@ impl Mistake {
 /// How the measured points compare with the nominal robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plausibility {
-    /// Root mean square distance of the measured points from the nominal prediction, frame and target fitted (m).
-    pub nominal_rms: f64,
-    /// The same as the expected deviations predict it (m).
-    pub expected_rms: f64,
+    /// Typical (median) distance of the measured points from the nominal prediction, frame and target fitted robustly (m): a few
+    /// wrong rows do not change it.
+    pub nominal: f64,
+    /// Root mean square distance that the expected deviations predict (m).
+    pub expected: f64,
     /// The mistake that explains a nominal residual which is too large.
     pub mistake: Option<Mistake>,
 }
@@ -120,7 +110,7 @@ pub struct Plausibility {
 impl Plausibility {
     /// Whether the robot with its expected deviations can have produced the points.
     pub fn is_plausible(&self) -> bool {
-        self.nominal_rms <= (IMPLAUSIBLE * self.expected_rms).max(ALWAYS_PLAUSIBLE)
+        self.nominal <= (IMPLAUSIBLE * self.expected).max(ALWAYS_PLAUSIBLE)
     }
 }
 
@@ -130,13 +120,13 @@ impl Plausibility {
 /// Sizes or indices that do not fit.
 pub fn compare_with_nominal(problem: &Problem<'_>) -> Result<Plausibility, IdentificationError> {
     problem.check()?;
-    let expected_rms = expected_residual(problem);
+    let expected = expected_residual(problem);
     let trial = Trial::new(problem);
-    let points = problem.observations.points.clone();
-    let (nominal_rms, residuals) = trial.residuals(&points);
-    let mut plausibility = Plausibility { nominal_rms, expected_rms, mistake: None };
+    let points = &problem.observations.points;
+    let fit = trial.fit(points);
+    let mut plausibility = Plausibility { nominal: fit.typical, expected, mistake: None };
     if points.len() >= 4 && !plausibility.is_plausible() {
-        plausibility.mistake = trial.find_mistake(&points, nominal_rms, &residuals);
+        plausibility.mistake = trial.find_mistake(points, fit.relative());
     }
     Ok(plausibility)
 }
@@ -165,57 +155,49 @@ impl<'a, 'p> Trial<'a, 'p> {
         Self { problem, target_parameters: problem.parameters.iter().filter(is_target).copied().collect() }
     }
 
-    /// Root mean square and single residuals (m) of the nominal arm on `points`.
-    fn residuals(&self, points: &[PointSample]) -> (f64, Vec<f64>) {
+    /// The nominal arm on `points`.
+    fn fit(&self, points: &[PointSample]) -> TrialFit {
         let observations = Observations { points: points.to_vec(), ..Observations::default() };
         let problem = Problem { parameters: &self.target_parameters, observations: &observations, ..*self.problem };
-        let settings = Settings {
-            weighting: Weighting::Covariance,
-            prior: Prior::Expected,
-            estimator: Estimator::LeastSquares,
-            iterations: 20,
-            sigma: Some((MILLIMETRE, super::SigmaSource::Option)),
-        };
-        let fitted = if self.target_parameters.is_empty() {
-            None
-        } else {
-            identify(&problem, &settings, &mut |_| {}).ok().map(|found| found.residuals)
-        };
-        let vectors = fitted.unwrap_or_else(|| {
-            let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
-            let predicted = model.points_in_base(observations.places());
-            point_residuals(&problem, &predicted, &Weights::uniform(&problem, MILLIMETRE)).of_places
-        });
-        let norms: Vec<f64> = vectors.iter().map(|vector| vector.norm()).collect();
-        let square: f64 = norms.iter().map(|norm| norm * norm).sum();
-        ((square / norms.len().max(1) as f64).sqrt(), norms)
-    }
-
-    fn find_mistake(&self, points: &[PointSample], nominal_rms: f64, residuals: &[f64]) -> Option<Mistake> {
-        if let Some(unit) = self.coordinate_unit(points) {
-            return Some(unit);
-        }
-        let mut best: Option<(f64, Mistake)> = None;
-        let mut consider = |mistake: Mistake, altered: &[PointSample]| {
-            let (rms, _) = self.residuals(altered);
-            if rms < EXPLAINS * nominal_rms && best.as_ref().is_none_or(|(best, _)| rms < *best) {
-                best = Some((rms, mistake));
+        let mut model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
+        let mut predicted = model.points_in_base(observations.places());
+        if !self.target_parameters.is_empty() {
+            let settings = Settings {
+                iterations: 20,
+                sigma: Some((MILLIMETRE, SigmaSource::Option)),
+                estimator: Estimator::LeastSquares,
+                ..Settings::default()
+            };
+            if let Ok(found) = identify(&problem, &settings, &mut |_| {}) {
+                model = found.model;
+                predicted = model.points_in_base(observations.places());
             }
-        };
-        for (mistake, altered) in self.joint_mistakes(points) {
-            consider(mistake, &altered);
         }
-        let mirrored: Vec<PointSample> =
-            alter(points, |sample| sample.point = Point3::new(-sample.point.x, sample.point.y, sample.point.z));
-        consider(Mistake::Mirrored, &mirrored);
-        if let Some((mistake, altered)) = swapped_pair(points, residuals) {
-            consider(mistake, &altered);
-        }
-        best.map(|(_, mistake)| mistake)
+        let trust = gross_trust(&problem, &predicted);
+        let weights = Weights { trust, ..Weights::uniform(&problem, MILLIMETRE) };
+        let mut norms: Vec<f64> =
+            point_residuals(&problem, &predicted, &weights).of_places.iter().map(nalgebra::Matrix::norm).collect();
+        norms.sort_by(f64::total_cmp);
+        let typical = norms.get(norms.len() / 2).copied().unwrap_or(0.0);
+        TrialFit { typical, extent: extent(&predicted) }
     }
 
-    /// The extent of the measured points against the predicted ones tells the unit without any fit.
-    fn coordinate_unit(&self, points: &[PointSample]) -> Option<Mistake> {
+    fn find_mistake(&self, points: &[PointSample], as_given: f64) -> Option<Mistake> {
+        let mut trials = self.coordinate_mistakes(points);
+        trials.extend(self.joint_mistakes(points));
+        let mirrored =
+            alter(points, |sample| sample.point = Point3::new(-sample.point.x, sample.point.y, sample.point.z));
+        trials.push((Mistake::Mirrored, mirrored));
+        trials
+            .into_iter()
+            .map(|(mistake, altered)| (self.fit(&altered).relative(), mistake))
+            .filter(|(relative, _)| *relative < EXPLAINS * as_given && *relative < FITS)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, mistake)| mistake)
+    }
+
+    /// The extent of the measured points against the predicted ones suggests a unit; the fit decides.
+    fn coordinate_mistakes(&self, points: &[PointSample]) -> Vec<(Mistake, Vec<PointSample>)> {
         const STORIES: [(f64, &str); 5] = [
             (1e-3, "metres were read as millimetres; name the columns 'x_m', 'y_m', 'z_m'"),
             (1e3, "millimetres were read as metres; name the columns 'x_mm', 'y_mm', 'z_mm'"),
@@ -225,13 +207,16 @@ impl<'a, 'p> Trial<'a, 'p> {
         ];
         let model = ArmModel { chain: self.problem.chain.clone(), targets: self.problem.targets.to_vec() };
         let predicted = model.points_in_base(points.iter().map(|sample| &sample.at));
-        let extent = |spread: [f64; 3]| spread.iter().map(|value| value * value).sum::<f64>().sqrt();
-        let measured = extent(principal_spread(points.iter().map(|sample| &sample.point)));
-        let ratio = measured / extent(principal_spread(predicted.iter()));
+        let measured: Vec<Point3<f64>> = points.iter().map(|sample| sample.point).collect();
+        let ratio = extent(&measured) / extent(&predicted);
         STORIES
             .iter()
-            .find(|(factor, _)| (0.5..2.0).contains(&(ratio / factor)))
-            .map(|(_, story)| Mistake::CoordinateUnit { ratio, story })
+            .filter(|(factor, _)| (0.5..2.0).contains(&(ratio / factor)))
+            .map(|(factor, story)| {
+                let scaled = alter(points, |sample| sample.point.coords /= *factor);
+                (Mistake::CoordinateUnit { ratio, story }, scaled)
+            })
+            .collect()
     }
 
     fn joint_mistakes(&self, points: &[PointSample]) -> Vec<(Mistake, Vec<PointSample>)> {
@@ -262,21 +247,30 @@ impl<'a, 'p> Trial<'a, 'p> {
     }
 }
 
+/// How well the nominal arm fits altered data.
+struct TrialFit {
+    /// Median residual (m).
+    typical: f64,
+    /// Root mean square extent of the predicted points (m).
+    extent: f64,
+}
+
+impl TrialFit {
+    /// Residual relative to the extent: comparable between data of different size.
+    fn relative(&self) -> f64 {
+        self.typical / self.extent.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Root mean square distance from the centroid (m).
+fn extent(points: &[Point3<f64>]) -> f64 {
+    principal_spread(points.iter()).iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
 fn alter(points: &[PointSample], change: impl Fn(&mut PointSample)) -> Vec<PointSample> {
     let mut altered = points.to_vec();
     altered.iter_mut().for_each(change);
     altered
-}
-
-/// The two worst samples, with their points exchanged.
-fn swapped_pair(points: &[PointSample], residuals: &[f64]) -> Option<(Mistake, Vec<PointSample>)> {
-    let mut order: Vec<usize> = (0..points.len().min(residuals.len())).collect();
-    order.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]));
-    let (&first, &second) = (order.first()?, order.get(1)?);
-    let (first, second) = (first.min(second), first.max(second));
-    let mut altered = points.to_vec();
-    (altered[first].point, altered[second].point) = (altered[second].point, altered[first].point);
-    Some((Mistake::SwappedRows { first, second }, altered))
 }
 
 /// Something that makes the result of an identification doubtful although it can be computed.

@@ -36,7 +36,9 @@ impl ErrorStatistics {
             return None;
         }
         let count = values.len();
-        values.iter_mut().for_each(|value| *value = value.abs());
+        for value in &mut values {
+            *value = value.abs();
+        }
         let mean = values.iter().sum::<f64>() / count as f64;
         let rms = (values.iter().map(|value| value * value).sum::<f64>() / count as f64).sqrt();
         let max = values.iter().copied().fold(0.0, f64::max);

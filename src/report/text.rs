@@ -95,13 +95,16 @@ fn verdict(verdict: &Verdict) -> String {
     text
 }
 
+/// Picks one kind of error of a model.
+type Pick = fn(&ModelSummary) -> Option<StatisticsSummary>;
+
 /// Nominal and identified side by side: tables III and IV of the method paper, with root mean square and 95 %.
 fn verification_tables(verification: &VerificationSummary) -> String {
     let VerificationSummary { samples, basis, nominal, identified, .. } = verification;
     let mut text =
         paragraph("", &format!("Accuracy on {samples} samples that the identification did not see: {basis}"));
     push_line(&mut text, &format!("  {:<34}{:>12}{:>14}", "mm", "nominal", "identified"));
-    let pairs: [(&str, fn(&ModelSummary) -> Option<StatisticsSummary>); 3] = [
+    let pairs: [(&str, Pick); 3] = [
         ("position error", |model| model.position_mm),
         ("distance error", |model| model.distance_mm),
         ("off the shared point", |model| model.seat_mm),
@@ -273,7 +276,13 @@ fn joint_lines(joints: &[JointSummary]) -> String {
         let bins: String = joint
             .bins
             .iter()
-            .map(|bin| if bin.count == 0 { format!("{:>8}", "-") } else { format!("{:>8}", fixed(bin.mean_mm, 3)) })
+            .map(|bin| {
+                if bin.count == 0 {
+                    format!("{:>8}", "-")
+                } else {
+                    format!("{:>8}", fixed(bin.mean_mm, if bin.mean_mm < 100.0 { 3 } else { 1 }))
+                }
+            })
             .collect();
         let count: usize = joint.bins.iter().map(|bin| bin.count).sum();
         let share = if joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64) {

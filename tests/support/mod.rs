@@ -1,11 +1,15 @@
 //! Simulated robots and data that several test programs share.
-#![allow(dead_code, reason = "every test program uses a part of it")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "every test program uses a part of it; a failure of a test is a panic"
+)]
 #![allow(clippy::allow_attributes, reason = "whether code is dead differs from one test program to the next")]
 
 use nalgebra::{DVector, Isometry3, Point3, Vector3};
-use rand::{RngExt, SeedableRng};
+use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution as _, StandardNormal};
 use trupose::identification::{ArmModel, Observations, PointSample, Problem, TargetAt};
 use trupose::kinematics::{
     Convention, FreeParameter, Joint, JointType, KinematicChain, Link, LinkParameter, ParameterId,

@@ -1,0 +1,420 @@
+//! The program as its users run it: exit codes, messages about bad data, files written and read back.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a failure of a test is a panic; test files need no atomic writes"
+)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn trupose(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_trupose"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn example(file: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/soochow-example").join(file);
+    fs::read_to_string(path).unwrap()
+}
+
+/// The example's header and rows, cell by cell.
+fn cells() -> (Vec<String>, Vec<Vec<String>>) {
+    let text = example("measurements.csv");
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let split = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+    let header = split(lines.next().unwrap());
+    (header, lines.map(split).collect())
+}
+
+/// A table changed by `change`, written to a temporary folder.
+struct Table {
+    folder: tempfile::TempDir,
+}
+
+impl Table {
+    fn changed(change: impl FnOnce(&mut Vec<String>, &mut Vec<Vec<String>>)) -> Self {
+        let (mut header, mut rows) = cells();
+        change(&mut header, &mut rows);
+        let lines: Vec<String> = std::iter::once(&header).chain(&rows).map(|cells| cells.join(",")).collect();
+        Self::text(&lines.join("\n"))
+    }
+
+    fn text(text: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("table.csv"), text).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("table.csv")
+    }
+
+    /// Identifies from it: exit code, stdout, stderr without the folder's name.
+    fn identify(&self, more: &[&str]) -> (i32, String, String) {
+        let path = self.path();
+        let mut arguments = vec!["identify", "--profile", "soochow", "--measurements", path.to_str().unwrap()];
+        arguments.extend(["--verify", "sessions/soochow-example/verification.csv"]);
+        arguments.extend(more);
+        let output = trupose(&arguments);
+        let clean = |bytes: Vec<u8>| {
+            String::from_utf8(bytes).unwrap().replace(&format!("{}/", self.folder.path().display()), "")
+        };
+        (output.status.code().unwrap(), clean(output.stdout), clean(output.stderr))
+    }
+
+    fn json(&self, more: &[&str]) -> (i32, Value) {
+        let (code, out, err) = self.identify(&[more, &["--json"]].concat());
+        (code, serde_json::from_str(&out).unwrap_or_else(|_| panic!("no JSON; stderr: {err}")))
+    }
+}
+
+/// Multiplies the numbers of some columns.
+fn scale(rows: &mut [Vec<String>], columns: std::ops::Range<usize>, factor: f64) {
+    for row in rows {
+        for cell in &mut row[columns.clone()] {
+            *cell = (cell.parse::<f64>().unwrap() * factor).to_string();
+        }
+    }
+}
+
+fn codes(report: &Value) -> Vec<String> {
+    let warnings = report["warnings"].as_array().unwrap();
+    warnings.iter().map(|warning| warning["code"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn mistakes_in_a_whole_table_are_named_and_refused() {
+    let rename = |header: &mut Vec<String>, from: &str, to: &str| {
+        for name in header {
+            *name = name.replace(from, to);
+        }
+    };
+    let cases: [(Table, &str); 8] = [
+        (Table::changed(|header, _| rename(header, "_deg", "_rad")), "fit when read as degrees"),
+        (Table::changed(|_, rows| scale(rows, 1..7, std::f64::consts::PI / 180.0)), "fit when read as radians"),
+        (Table::changed(|_, rows| scale(rows, 7..10, 1e-3)), "metres were read as millimetres"),
+        (Table::changed(|_, rows| scale(rows, 7..10, 1.0 / 25.4)), "inches were read as millimetres"),
+        (Table::changed(|header, _| rename(header, "_mm", "_m")), "millimetres were read as metres"),
+        (Table::changed(|_, rows| scale(rows, 4..5, -1.0)), "joint J4 counts the other way"),
+        (
+            Table::changed(|_, rows| {
+                for row in rows {
+                    row[3] = (row[3].parse::<f64>().unwrap() + 90.0).to_string();
+                }
+            }),
+            "joint J3 has another zero: the data fit with -90 deg added",
+        ),
+        (Table::changed(|_, rows| scale(rows, 8..9, -1.0)), "left-handed"),
+    ];
+    for (table, cause) in cases {
+        let (code, out, err) = table.identify(&[]);
+        assert_eq!((code, out.as_str()), (2, ""), "{cause}: {err}");
+        assert!(err.starts_with("error: ") && err.contains(cause), "{cause}: {err}");
+    }
+}
+
+#[test]
+fn single_wrong_rows_are_named_and_left_out() {
+    let bumped = Table::changed(|_, rows| rows[5][7] = (rows[5][7].parse::<f64>().unwrap() + 2.0).to_string());
+    let mistyped = Table::changed(|_, rows| rows[5][2] = "80".to_owned());
+    for table in [bumped, mistyped] {
+        let (code, report) = table.json(&[]);
+        let rejected = report["rejected"].as_array().unwrap();
+        assert_eq!((code, rejected.len()), (0, 1), "{rejected:?}");
+        // Line 1 is the header.
+        assert_eq!((&rejected[0]["pose"], &rejected[0]["line"]), (&"5".into(), &7.into()));
+    }
+    let swapped = Table::changed(|_, rows| {
+        let (first, second) = (rows[16][7..].to_vec(), rows[17][7..].to_vec());
+        rows[16].splice(7.., second);
+        rows[17].splice(7.., first);
+    });
+    let (code, report) = swapped.json(&[]);
+    assert_eq!(code, 0);
+    let reasons: Vec<&str> =
+        report["rejected"].as_array().unwrap().iter().map(|r| r["reason"].as_str().unwrap()).collect();
+    assert_eq!(reasons, ["looks swapped with pose 17 (line 19)", "looks swapped with pose 16 (line 18)"]);
+}
+
+#[test]
+fn poor_data_are_never_accepted() {
+    let few = Table::changed(|_, rows| rows.truncate(8));
+    let two_joints = Table::changed(|_, rows| {
+        // Poses along joints 1 and 2 of the true robot would be needed to fit; here the point is that nothing else moves.
+        let first = rows[0].clone();
+        for row in rows {
+            row[3..7].clone_from_slice(&first[3..7]);
+        }
+    });
+    let (code, report) = few.json(&[]);
+    assert_eq!((code, report["verdict"]["status"].as_str()), (1, Some("not_accepted")));
+    assert_eq!(codes(&report)[0], "poor_data");
+    let (code, out, err) = two_joints.identify(&[]);
+    assert!(code != 0, "{out}{err}");
+    let shifted = Table::changed(|_, rows| {
+        let first = rows[0][7..].to_vec();
+        for index in 1..rows.len() {
+            let next = rows[index][7..].to_vec();
+            rows[index - 1].splice(7.., next);
+        }
+        rows.last_mut().unwrap().splice(7.., first);
+    });
+    let (code, report) = shifted.json(&[]);
+    assert_eq!((code, report["verdict"]["status"].as_str()), (1, Some("not_accepted")));
+    assert!(codes(&report).contains(&"implausible".to_owned()));
+}
+
+#[test]
+fn only_two_moving_joints_are_called_out() {
+    // Simulated on the nominal robot, so that nothing but the excitation is wrong.
+    use trupose::identification::{ArmModel, TargetAt};
+    use trupose::kinematics::JointType;
+    use trupose::session::measurements::{Row, write};
+    let (profile, _) = trupose::profile::Profile::parse(trupose::profile::builtin("soochow").unwrap(), "").unwrap();
+    let model = ArmModel { chain: profile.chain().clone(), targets: vec![profile.targets()[0].position_in_flange] };
+    let rows: Vec<Row> = (0..40)
+        .map(|index| {
+            let turn = f64::from(index);
+            let configuration = vec![(0.9 * turn).sin(), 0.8 * (1.7 * turn).cos(), 0.1, 0.2, 0.5, 0.3];
+            let point = model.point_in_base(&TargetAt { configuration: configuration.clone(), target: 0 });
+            Row {
+                line: 0,
+                pose: index.to_string(),
+                target: None,
+                configuration,
+                point,
+                sigma: None,
+                temperature: None,
+                fields: Vec::new(),
+            }
+        })
+        .collect();
+    let (code, report) = Table::text(&write(&rows, &[JointType::Revolute; 6])).json(&[]);
+    assert_eq!((code, report["verdict"]["status"].as_str()), (1, Some("not_accepted")));
+    let messages: Vec<&str> =
+        report["warnings"].as_array().unwrap().iter().map(|warning| warning["message"].as_str().unwrap()).collect();
+    for joint in ["J3", "J4", "J5", "J6"] {
+        let wanted = format!("joint {joint} hardly moves");
+        assert!(messages.iter().any(|message| message.starts_with(&wanted)), "{wanted}: {messages:?}");
+    }
+}
+
+#[test]
+fn the_verdict_needs_samples_that_were_not_used() {
+    let measurements = "sessions/soochow-example/measurements.csv";
+    let unverified = trupose(&["identify", "--profile", "soochow", "--measurements", measurements, "--json"]);
+    let report: Value = serde_json::from_slice(&unverified.stdout).unwrap();
+    assert_eq!((unverified.status.code(), report["verdict"]["status"].as_str()), (Some(0), Some("not_evaluated")));
+    assert!(report["verification"].is_null());
+    let itself =
+        ["identify", "--profile", "soochow", "--measurements", measurements, "--verify", measurements, "--json"];
+    let output = trupose(&itself);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), codes(&report)[0].as_str()), (Some(1), "not_independent"));
+}
+
+#[test]
+fn a_calibration_is_read_back_to_the_same_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new/results");
+    let output = trupose(&[
+        "identify",
+        "--profile",
+        "soochow",
+        "--measurements",
+        "sessions/soochow-example/measurements.csv",
+        "--verify",
+        "sessions/soochow-example/verification.csv",
+        "--out",
+        out.to_str().unwrap(),
+        "--json",
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let identified: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let saved: Value = serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+    assert_eq!(saved, identified);
+    let calibration = out.join("calibration.ron");
+    let output = trupose(&[
+        "verify",
+        "--calibration",
+        calibration.to_str().unwrap(),
+        "--measurements",
+        "sessions/soochow-example/verification.csv",
+        "--json",
+    ]);
+    let verified: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (model, error) in [("nominal", "position_mm"), ("identified", "position_mm"), ("identified", "distance_mm")] {
+        for statistic in ["mean", "rms", "p95", "max"] {
+            let pick = |report: &Value| report["verification"][model][error][statistic].as_f64().unwrap();
+            assert!((pick(&verified) - pick(&identified)).abs() < 1e-9, "{model} {error} {statistic}");
+        }
+    }
+    // A calibration that was tampered with is refused with its place.
+    let text = fs::read_to_string(&calibration).unwrap();
+    fs::write(&calibration, text.replacen("deviation: ", "deviatoin: ", 1)).unwrap();
+    let output = trupose(&[
+        "verify",
+        "--calibration",
+        calibration.to_str().unwrap(),
+        "--measurements",
+        "sessions/soochow-example/verification.csv",
+    ]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(message.contains("is not a usable calibration: line ") && message.contains("`deviation`"), "{message}");
+}
+
+#[test]
+fn another_set_up_is_fitted_and_said_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let arguments = [
+        "identify",
+        "--profile",
+        "soochow",
+        "--measurements",
+        "sessions/soochow-example/measurements.csv",
+        "--out",
+        out,
+    ];
+    assert_eq!(trupose(&arguments).status.code(), Some(0));
+    // The tracker moved by a metre and turned by a quarter: only '--refit frame' makes sense of it.
+    let moved: Vec<String> = example("verification.csv")
+        .lines()
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            match cells.get(9).and_then(|cell| cell.parse::<f64>().ok()) {
+                Some(z) => {
+                    let number = |index: usize| cells[index].parse::<f64>().unwrap();
+                    format!("{},{},{},{}", cells[..7].join(","), 1000.0 - number(8), number(7), z)
+                }
+                None => line.to_owned(),
+            }
+        })
+        .collect();
+    let table = Table::text(&moved.join("\n"));
+    let calibration = folder.path().join("calibration.ron");
+    let verify = |refit: &str| {
+        let output = trupose(&[
+            "verify",
+            "--calibration",
+            calibration.to_str().unwrap(),
+            "--measurements",
+            table.path().to_str().unwrap(),
+            "--refit",
+            refit,
+            "--json",
+        ]);
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (output.status.code().unwrap(), report)
+    };
+    let (code, report) = verify("none");
+    assert_eq!(code, 1);
+    assert!(report["verification"]["identified"]["position_mm"]["rms"].as_f64().unwrap() > 100.0);
+    let (code, report) = verify("frame");
+    assert_eq!((code, report["verification"]["refit"].as_str()), (0, Some("frame")));
+    assert!(report["verification"]["basis"].as_str().unwrap().contains("fitted to these very points"));
+    assert!(report["verification"]["identified"]["position_mm"]["rms"].as_f64().unwrap() < 0.03);
+}
+
+#[test]
+fn the_papers_single_step_can_be_reproduced() {
+    let output = trupose(&[
+        "identify",
+        "--profile",
+        "soochow",
+        "--measurements",
+        "sessions/soochow-example/measurements.csv",
+        "--weighting",
+        "uniform",
+        "--prior",
+        "none",
+        "--estimator",
+        "least-squares",
+        "--iterations",
+        "1",
+        "--json",
+    ]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((report["iterations"].as_array().unwrap().len(), &report["rank"]), (1, &21.into()));
+    let raw = report["condition_number_mm_rad"].as_f64().unwrap();
+    assert!((11_000.0..16_000.0).contains(&raw), "{raw}");
+}
+
+#[test]
+fn wrong_command_lines_end_with_2() {
+    let cases: [&[&str]; 6] = [
+        &["identify"],
+        &["identify", "--profile", "nobody", "--measurements", "x.csv"],
+        &["identify", "--profile", "soochow", "--measurements", "not-there.csv"],
+        &[
+            "identify",
+            "--profile",
+            "soochow",
+            "--measurements",
+            "sessions/soochow-example/measurements.csv",
+            "--use",
+            "pose %",
+        ],
+        &[
+            "identify",
+            "--profile",
+            "soochow",
+            "--measurements",
+            "sessions/soochow-example/measurements.csv",
+            "--sigma-mm",
+            "-1",
+        ],
+        &["identify", "--profile", "ur5", "--measurements", "Cargo.toml"],
+    ];
+    for arguments in cases {
+        let output = trupose(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "{arguments:?}");
+    }
+    let output = trupose(&["identify", "--profile", "nobody", "--measurements", "x.csv"]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("no profile or file 'nobody'") && message.contains("soochow"), "{message}");
+}
+
+#[test]
+fn results_that_cannot_be_written_end_with_5() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a-file");
+    fs::write(&file, "not a folder").unwrap();
+    let output = trupose(&[
+        "identify",
+        "--profile",
+        "soochow",
+        "--measurements",
+        "sessions/soochow-example/measurements.csv",
+        "--out",
+        file.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(5));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("cannot write"));
+    assert_eq!(fs::read_to_string(&file).unwrap(), "not a folder");
+}
+
+#[test]
+fn profiles_are_listed_shown_and_checked() {
+    let list = String::from_utf8(trupose(&["profile", "list"]).stdout).unwrap();
+    for name in trupose::profile::builtin_names() {
+        assert!(list.contains(name), "{name}");
+        let shown = trupose(&["profile", "show", name]);
+        assert_eq!(shown.status.code(), Some(0), "{name}");
+        let file = format!("profiles/{name}.ron");
+        assert_eq!(trupose(&["profile", "check", &file]).status.code(), Some(0), "{name}");
+    }
+    let output = trupose(&["profile", "check", "Cargo.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+}
