@@ -5,5 +5,6 @@ pub mod identification;
 pub mod kinematics;
 pub mod planning;
 pub mod profile;
+pub mod program;
 pub mod session;
 pub mod units;
