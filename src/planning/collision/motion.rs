@@ -113,3 +113,99 @@ impl ArmShape<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Point3, Unit, Vector3};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kinematics::Link;
+    use crate::planning::{Body, BoxInBase, Cell, KeepOutBox, MountedTarget, TrackerStand};
+
+    const JOINTS: usize = 5;
+    const LIMITS: (f64, f64) = (-2.0, 2.0);
+
+    fn point() -> impl Strategy<Value = Point3<f64>> {
+        prop::array::uniform3(-0.5..0.5_f64).prop_map(Point3::from)
+    }
+
+    /// Any arm: both conventions, a sliding joint, a coupling, β.
+    fn chain() -> impl Strategy<Value = KinematicChain> {
+        let link = (-3.0..3.0_f64, -0.8..0.8_f64, -0.8..0.8_f64, -3.0..3.0_f64, -0.2..0.2_f64)
+            .prop_map(|(alpha, a, d, theta, beta)| Link { alpha, a, d, theta, beta });
+        let links = prop::collection::vec(link, JOINTS);
+        (links, 0..JOINTS, 0..JOINTS, -1.0..1.0_f64, any::<bool>()).prop_map(
+            |(links, slides, coupled, by, is_standard)| {
+                let joint = |(index, link): (usize, Link)| Joint {
+                    name: format!("J{}", index + 1),
+                    joint_type: if index == slides { JointType::Prismatic } else { JointType::Revolute },
+                    link,
+                    direction: if index % 2 == 0 { 1.0 } else { -1.0 },
+                    coupling: if index == coupled && index > 0 { vec![by, 0.0, 0.0, 0.0, 0.0] } else { Vec::new() },
+                };
+                let convention = if is_standard { Convention::Standard } else { Convention::Modified };
+                let joints = links.into_iter().enumerate().map(joint).collect();
+                let flange = Isometry3::new(Vector3::new(0.1, 0.0, 0.2), Vector3::new(0.3, 0.2, 0.1));
+                KinematicChain::new(convention, Isometry3::identity(), joints, flange).unwrap()
+            },
+        )
+    }
+
+    fn cell(ends: &[(Point3<f64>, Point3<f64>)]) -> Cell {
+        let body = |(link, (from, to)): (usize, &(Point3<f64>, Point3<f64>))| Body {
+            link,
+            from: *from,
+            to: *to,
+            radius: 0.01,
+        };
+        Cell {
+            limits: vec![LIMITS; JOINTS],
+            bodies: ends.iter().enumerate().map(body).collect(),
+            floor: Some(-9.0),
+            keep_out: vec![KeepOutBox {
+                name: "box".to_owned(),
+                space: BoxInBase { min: Point3::new(4.0, -1.0, -1.0), max: Point3::new(5.0, 1.0, 1.0) },
+            }],
+            tracker: Some(TrackerStand {
+                position_in_base: Point3::new(0.0, 7.0, 0.0),
+                acceptance_angle: 1.0,
+                range: (0.1, 20.0),
+            }),
+            target: MountedTarget {
+                position_in_flange: Point3::new(0.0, 0.1, 0.1),
+                axis_in_flange: Unit::new_unchecked(Vector3::z()),
+            },
+            region: None,
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn no_gap_changes_by_more_than_its_bound(
+            chain in chain(),
+            ends in prop::collection::vec((point(), point()), JOINTS + 1),
+            from in prop::collection::vec(LIMITS.0..LIMITS.1, JOINTS),
+            way in prop::collection::vec(-1.0..1.0_f64, JOINTS),
+            length in prop_oneof![Just(1.0), Just(1e-2), Just(1e-4)],
+        ) {
+            let shape = ArmShape::new(&chain, &cell(&ends), 0.0).unwrap();
+            let to: Vec<f64> =
+                from.iter().zip(&way).map(|(q, way)| (q + way * length).clamp(LIMITS.0, LIMITS.1)).collect();
+            let change: Vec<f64> = chain
+                .joints()
+                .iter()
+                .enumerate()
+                .map(|(index, joint)| joint.variable(index, &to) - joint.variable(index, &from))
+                .collect();
+            let [before, after] = [&from, &to].map(|q| shape.lines(q));
+            for &contact in &shape.contacts {
+                let moved = (shape.contact_gap(contact, &after) - shape.contact_gap(contact, &before)).abs();
+                let bound = shape.reach.bound(contact, &shape.solids, &change);
+                prop_assert!(moved <= bound + 1e-12, "{contact:?}: {moved} > {bound}");
+            }
+        }
+    }
+}
