@@ -8,8 +8,8 @@
 //!
 //! Layers, lowest first; a module knows only those before it (`tests/architecture.rs` checks it):
 //!
-//! - [`units`], [`geometry`], [`kinematics`], [`identification`]: the maths. No I/O, no clock, no threads, no random numbers.
-//! - [`profile`], [`session`]: pure data. Text in, checked types out.
+//! - [`units`], [`geometry`], [`kinematics`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
+//! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
 //! - [`cli`], [`app`], [`error`]: what was typed, what is done about it, and how it ends.
 //!
@@ -22,7 +22,9 @@ pub mod error;
 pub mod geometry;
 pub mod identification;
 pub mod kinematics;
+pub mod planning;
 pub mod profile;
+pub mod program;
 pub mod report;
 pub mod session;
 pub mod store;

@@ -1,4 +1,4 @@
-//! The pure data of a session: measured tables and the choice of rows from them.
+//! The pure data of a session: plans, measured tables and the choice of rows from them.
 //!
 //! Text comes in, types go out. Inside, lengths are metres and angles radians; a *configuration* is the pendant joint
 //! vector. Points are in the tracker frame, which is never registered to the robot base.
@@ -12,6 +12,7 @@ pub mod calibration;
 pub mod constraints;
 pub mod filter;
 pub mod measurements;
+pub mod plan;
 pub mod summary;
 mod table;
 

@@ -11,8 +11,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("geometry", &["units"]),
     ("kinematics", &["units", "geometry"]),
     ("identification", &["units", "geometry", "kinematics"]),
+    ("planning", &["units", "geometry", "kinematics", "identification"]),
     ("profile", &["units", "geometry", "kinematics"]),
     ("session", &["units", "geometry", "kinematics", "profile"]),
+    ("program", &["units", "kinematics", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "profile", "session"]),
     ("error", &[]),
@@ -24,7 +26,7 @@ const LAYERS: &[(&str, &[&str])] = &[
 ];
 
 /// Modules that read no file, no clock, no environment and print nothing.
-const PURE: &[&str] = &["units", "geometry", "kinematics", "identification", "profile", "session"];
+const PURE: &[&str] = &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "program"];
 
 /// What a pure module must not name.
 const IMPURE: &[&str] =

@@ -23,8 +23,10 @@ use std::mem;
 
 use nalgebra::Point3;
 
+pub(super) use consistency::farthest_joint;
 pub use layout::{Layout, UnknownLayout};
 pub use writer::write;
+pub(super) use writer::{decimal, joint_cells, quoted};
 
 use super::table::{
     self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,

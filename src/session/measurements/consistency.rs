@@ -41,7 +41,9 @@ pub(super) fn check(
         if copied.line != row.line {
             duplicates.push(index);
             warnings.push(Defect::Repeats { first_line: copied.line }.at(row.line));
-        } else if first.target != row.target || farthest_joint(first, row, joints).is_some() {
+        } else if first.target != row.target
+            || farthest_joint(&first.configuration, &row.configuration, joints).is_some()
+        {
             let other_target = first.target != row.target;
             warnings.push(Defect::StalePoint { first_line: first.line, other_target }.at(row.line));
         }
@@ -56,7 +58,7 @@ fn reading(row: &Row) -> (Vec<u64>, Option<&str>) {
 }
 
 fn other_configuration(first: &Row, row: &Row, joints: &[JointType]) -> Option<TableProblem> {
-    let (joint, quantity, before, here) = farthest_joint(first, row, joints)?;
+    let (joint, quantity, before, here) = farthest_joint(&first.configuration, &row.configuration, joints)?;
     let defect = Defect::OtherConfiguration {
         pose: row.pose.clone(),
         target: row.target.clone(),
@@ -70,8 +72,12 @@ fn other_configuration(first: &Row, row: &Row, joints: &[JointType]) -> Option<T
 }
 
 /// The joint that differs most, in units of what is tolerated, if any differs by more: place, quantity, both values.
-fn farthest_joint(first: &Row, row: &Row, joints: &[JointType]) -> Option<(usize, Quantity, f64, f64)> {
-    let pairs = first.configuration.iter().zip(&row.configuration).zip(joints).enumerate();
+pub(in crate::session) fn farthest_joint(
+    first: &[f64],
+    here: &[f64],
+    joints: &[JointType],
+) -> Option<(usize, Quantity, f64, f64)> {
+    let pairs = first.iter().zip(here).zip(joints).enumerate();
     let excess = pairs.map(|(index, ((&before, &here), joint))| {
         let tolerance = match joint.quantity() {
             Quantity::Angle => SAME_POSE_ANGLE,

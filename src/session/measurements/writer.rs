@@ -32,14 +32,7 @@ pub fn write(rows: &[Row], joints: &[JointType]) -> String {
         if has_target {
             cells.push(row.target.as_deref().map_or_else(String::new, quoted));
         }
-        cells.extend(row.configuration.iter().zip(joints).map(|(&value, joint)| {
-            let quantity = joint.quantity();
-            let decimals = match quantity {
-                Quantity::Angle => ANGLE_DECIMALS,
-                Quantity::Length => LENGTH_DECIMALS,
-            };
-            decimal(quantity.to_edge(value), decimals)
-        }));
+        cells.extend(joint_cells(&row.configuration, joints));
         cells.extend(row.point.iter().map(|&coordinate| decimal(to_mm(coordinate), LENGTH_DECIMALS)));
         if has_sigma {
             cells.push(row.sigma.map_or_else(String::new, |sigma| decimal(to_mm(sigma), LENGTH_DECIMALS)));
@@ -53,15 +46,27 @@ pub fn write(rows: &[Row], joints: &[JointType]) -> String {
     text
 }
 
+/// Joint values in degrees, sliding joints in mm.
+pub(in crate::session) fn joint_cells(configuration: &[f64], joints: &[JointType]) -> impl Iterator<Item = String> {
+    configuration.iter().zip(joints).map(|(&value, joint)| {
+        let quantity = joint.quantity();
+        let decimals = match quantity {
+            Quantity::Angle => ANGLE_DECIMALS,
+            Quantity::Length => LENGTH_DECIMALS,
+        };
+        decimal(quantity.to_edge(value), decimals)
+    })
+}
+
 /// A fixed number of decimals, without the sign of a rounded zero.
-fn decimal(value: f64, decimals: usize) -> String {
+pub(in crate::session) fn decimal(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
     if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
 /// A cell in quotation marks where the text could be taken for something else.
-fn quoted(text: &str) -> String {
+pub(in crate::session) fn quoted(text: &str) -> String {
     let text = printable(text);
     if text.starts_with('#') || text.contains([',', ';', '"']) {
         format!("\"{}\"", text.replace('"', "\"\""))

@@ -262,6 +262,17 @@ pub enum Defect {
         /// Joints of the robot.
         joints: usize,
     },
+    /// A kind of pose that plans do not have.
+    #[error("'{}' is not a kind of pose; write {}", excerpt(text), any_of(allowed))]
+    UnknownKind {
+        /// Text of the cell.
+        text: String,
+        /// The kinds there are.
+        allowed: Vec<&'static str>,
+    },
+    /// A plan of nothing but home and via poses.
+    #[error("no pose of the plan is measured; it needs rows of kind 'identification' or 'verification'")]
+    NothingToMeasure,
     /// A length between a configuration and itself.
     #[error("both ends are the same configuration, but the length is '{}'; correct the joint values", excerpt(text))]
     SameEnds {

@@ -1,0 +1,369 @@
+//! Robot programs for a plan: text in the controller's own language.
+//!
+//! Every program moves joint by joint (never along a line in space), slowly, to an exact stop, waits at the poses that are
+//! measured, and passes through the others. The head of every program says what to do first: run it in manual mode up to
+//! the first pose, and which joint convention it uses. Nothing here sends a program anywhere or starts one.
+//!
+//! **Joint convention.** A configuration is the pendant joint vector, so controllers get it as it is, FANUC's J3 with its
+//! coupling to J2 too. The exception is ROS: the joints of a URDF turn one link against the one before, so a coupled joint
+//! gets its own value plus the coupled ones (FANUC: J3 + J2), in the sense of the pendant. INFORM counts motor pulses, which no
+//! document at hand explains for coupled axes: such an arm is refused there.
+//!
+//! **Digits.** Values are written with the digits that the controller keeps; the plan's own grid
+//! ([`on_grid`](crate::planning::candidates::on_grid)) fits all of them but pulses. [`Program::largest_rounding`] says how far
+//! the text is from the plan.
+//!
+//! **Line ends.** CR LF where the maker's own tools write it (ABB, KUKA, FANUC, Yaskawa, Stäubli), LF for URScript and YAML.
+//! All text is ASCII: what else is in names is replaced.
+
+mod error;
+mod fanuc;
+mod inform;
+mod krl;
+mod names;
+mod rapid;
+mod ros;
+mod urscript;
+mod val3;
+
+use std::fmt;
+use std::str::FromStr;
+
+use jiff::civil::DateTime;
+
+pub use error::ProgramError;
+pub use names::MAX_NAME;
+
+use crate::kinematics::{JointType, KinematicChain};
+use crate::session::plan::{PlannedPose, PoseKind};
+
+/// A controller's language.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Dialect {
+    /// ABB RAPID module.
+    Rapid,
+    /// KUKA KRL source.
+    Krl,
+    /// FANUC TP program as ASCII (`.LS`).
+    Fanuc,
+    /// Universal Robots script.
+    Urscript,
+    /// Stäubli VAL3 program and data.
+    Val3,
+    /// Yaskawa INFORM job.
+    Inform,
+    /// ROS 2 `trajectory_msgs/JointTrajectory` as YAML.
+    Ros,
+}
+
+impl Dialect {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Rapid, Self::Krl, Self::Fanuc, Self::Urscript, Self::Val3, Self::Inform, Self::Ros];
+
+    /// Name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rapid => "rapid",
+            Self::Krl => "krl",
+            Self::Fanuc => "fanuc",
+            Self::Urscript => "urscript",
+            Self::Val3 => "val3",
+            Self::Inform => "inform",
+            Self::Ros => "ros",
+        }
+    }
+}
+
+impl Dialect {
+    /// Name in messages.
+    const fn title(self) -> &'static str {
+        match self {
+            Self::Rapid => "RAPID",
+            Self::Krl => "KRL",
+            Self::Fanuc => "FANUC TP",
+            Self::Urscript => "URScript",
+            Self::Val3 => "VAL3",
+            Self::Inform => "INFORM",
+            Self::Ros => "ROS",
+        }
+    }
+
+    /// How to load or start the program, where that is not plain.
+    const fn advice(self) -> Option<&'static str> {
+        match self {
+            Self::Rapid => Some("To start: program pointer to this routine. It has its own name, not 'main'."),
+            Self::Krl => Some("With external axes: add E1 to E6 to every PTP."),
+            Self::Urscript => Some("In PolyScope: load it in a Script node, then call the function."),
+            Self::Val3 => Some("Add the .dtx and the .pgx to an application."),
+            Self::Ros => {
+                Some("The arm must stand at the first point before this is sent. Put the joint names of the URDF here.")
+            }
+            Self::Fanuc | Self::Inform => None,
+        }
+    }
+}
+
+impl fmt::Display for Dialect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Dialect {
+    type Err = ProgramError;
+
+    fn from_str(text: &str) -> Result<Self, ProgramError> {
+        let known = Self::ALL.into_iter().find(|dialect| dialect.name().eq_ignore_ascii_case(text));
+        known.ok_or_else(|| ProgramError::UnknownDialect { text: text.to_owned() })
+    }
+}
+
+/// The arm that the program is for.
+#[derive(Clone, Copy, Debug)]
+pub struct Robot<'a> {
+    /// Name of the profile, for the head of the program.
+    pub profile: &'a str,
+    /// Joints: types, names and couplings.
+    pub chain: &'a KinematicChain,
+    /// Highest speed of each joint (rad/s, sliding joints m/s); only ROS and URScript use it.
+    pub max_speeds: &'a [Option<f64>],
+    /// Encoder pulses per degree of each joint; only INFORM needs it.
+    pub pulses_per_degree: &'a [Option<f64>],
+}
+
+/// How the program waits while a pose is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pause {
+    /// So long (s).
+    Dwell(f64),
+    /// Until the operator says to go on.
+    Acknowledge,
+}
+
+/// How the program is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Name of the program, shortened and cleaned as the dialect needs it.
+    pub name: String,
+    /// Waiting at the poses that are measured.
+    pub pause: Pause,
+    /// Part of the full speed, above 0 and at most [`MAX_SPEED`].
+    pub speed: f64,
+    /// When the plan was made into a program, for heads that have a date.
+    pub created: DateTime,
+}
+
+/// Part of full speed unless asked otherwise.
+pub const DEFAULT_SPEED: f64 = 0.1;
+
+/// Wait at a pose unless asked otherwise (s): the arm stops swinging in 2 s, a reading takes 1 s.
+pub const DEFAULT_DWELL: f64 = 3.0;
+
+/// Fastest that a measuring program may be, in parts of full speed.
+pub const MAX_SPEED: f64 = 0.5;
+
+/// A text with the name of its file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProgramFile {
+    /// Name with extension, without folder.
+    pub file_name: String,
+    /// The text, with the line ends of the controller.
+    pub text: String,
+}
+
+/// A program, in as many files as the controller wants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    /// The files.
+    pub files: Vec<ProgramFile>,
+    /// Largest difference of a joint value in the text and in the plan (rad, sliding joints m).
+    pub largest_rounding: f64,
+}
+
+/// Writes the program of a plan.
+///
+/// # Errors
+/// An arm that the dialect is not made for, a number that is missing or makes no sense, an empty plan, a wait for the operator
+/// where there is none.
+pub fn write(
+    dialect: Dialect,
+    robot: &Robot<'_>,
+    poses: &[PlannedPose],
+    options: &Options,
+) -> Result<Program, ProgramError> {
+    let dof = robot.chain.dof();
+    if poses.is_empty() {
+        return Err(ProgramError::EmptyPlan);
+    }
+    if let Some(pose) = poses.iter().find(|pose| pose.configuration.len() != dof) {
+        let joints = pose.configuration.len();
+        return Err(ProgramError::PoseJoints { pose: names::ascii(&pose.pose), joints, robot_joints: dof });
+    }
+    if let Some(pose) = poses.iter().find(|pose| !pose.configuration.iter().all(|value| value.is_finite())) {
+        return Err(ProgramError::NotFinite { pose: names::ascii(&pose.pose) });
+    }
+    if !(options.speed > 0.0 && options.speed <= MAX_SPEED) {
+        return Err(ProgramError::Speed { speed: options.speed });
+    }
+    if let Pause::Dwell(dwell) = options.pause
+        && !(dwell > 0.0 && dwell <= MAX_DWELL)
+    {
+        return Err(ProgramError::Dwell { dwell });
+    }
+    let mut job = Job { dialect, robot, poses, options, largest_rounding: 0.0 };
+    let files = match dialect {
+        Dialect::Rapid => rapid::write(&mut job),
+        Dialect::Krl => krl::write(&mut job),
+        Dialect::Fanuc => fanuc::write(&mut job),
+        Dialect::Urscript => urscript::write(&mut job),
+        Dialect::Val3 => val3::write(&mut job),
+        Dialect::Inform => inform::write(&mut job),
+        Dialect::Ros => ros::write(&mut job),
+    }?;
+    Ok(Program { files, largest_rounding: job.largest_rounding })
+}
+
+/// Longest wait at a pose (s): beyond it a mistake in the unit is likelier.
+const MAX_DWELL: f64 = 600.0;
+
+/// What a writer works on.
+struct Job<'a> {
+    dialect: Dialect,
+    robot: &'a Robot<'a>,
+    poses: &'a [PlannedPose],
+    options: &'a Options,
+    largest_rounding: f64,
+}
+
+impl Job<'_> {
+    /// Refuses an arm that does not have one of these numbers of joints, or has sliding ones where none can be.
+    fn require_joints(
+        &self,
+        allowed: std::ops::RangeInclusive<usize>,
+        is_sliding_allowed: bool,
+    ) -> Result<(), ProgramError> {
+        let dialect = self.dialect;
+        let joints = self.robot.chain.dof();
+        if !allowed.contains(&joints) {
+            return Err(ProgramError::JointCount { dialect, joints, least: *allowed.start(), most: *allowed.end() });
+        }
+        let mut types = self.robot.chain.joints().iter();
+        match types.find(|joint| joint.joint_type == JointType::Prismatic) {
+            Some(joint) if !is_sliding_allowed => {
+                Err(ProgramError::SlidingJoint { dialect, joint: names::ascii(&joint.name) })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Joint values at the edge (degree, sliding joints mm) with `decimals`.
+    fn edge_values(&mut self, pose: &PlannedPose, decimals: usize) -> Vec<String> {
+        let joints = self.robot.chain.joints().iter().zip(&pose.configuration);
+        let values: Vec<_> = joints.map(|(joint, &q)| (joint.joint_type.quantity(), q)).collect();
+        values
+            .into_iter()
+            .map(|(quantity, q)| {
+                let text = decimal(quantity.to_edge(q), decimals);
+                self.note_rounding(quantity.from_edge(text.parse().unwrap_or(f64::NAN)), q);
+                text
+            })
+            .collect()
+    }
+
+    /// Values of the inside (rad, m) with `decimals`.
+    fn inside_values(&mut self, values: &[f64], decimals: usize) -> Vec<String> {
+        let write = |&value: &f64| {
+            let text = decimal(value, decimals);
+            self.note_rounding(text.parse().unwrap_or(f64::NAN), value);
+            text
+        };
+        values.iter().map(write).collect()
+    }
+
+    fn note_rounding(&mut self, written: f64, planned: f64) {
+        self.largest_rounding = self.largest_rounding.max((written - planned).abs());
+    }
+
+    /// What every program says at its beginning, in lines of at most `width` characters.
+    fn head(&self, width: usize) -> Vec<String> {
+        let measured = self.poses.iter().filter(|pose| pose.kind.is_measured()).count();
+        let mut lines = vec![
+            format!("Calibration poses by trupose {}", env!("CARGO_PKG_VERSION")),
+            format!("Profile: {}", names::ascii(self.robot.profile)),
+            format!("{} stops, {measured} of them measured", self.poses.len()),
+            "SAFETY: run it in manual mode at reduced speed up to the first pose, hand on the enabling switch. Cables, \
+             fixtures and people are unknown to the planner. Check that this is the robot of the profile above."
+                .to_owned(),
+            self.convention().to_owned(),
+            "Moves are joint moves: the active tool does not matter for the path.".to_owned(),
+            match self.options.pause {
+                Pause::Dwell(dwell) => format!("Each measured pose is held for {} s.", decimal(dwell, 1)),
+                Pause::Acknowledge => "Each measured pose is held until the operator goes on.".to_owned(),
+            },
+        ];
+        lines.extend(self.dialect.advice().map(str::to_owned));
+        lines.iter().flat_map(|line| names::wrapped(line, width)).collect()
+    }
+
+    fn convention(&self) -> &'static str {
+        let is_coupled = self.robot.chain.joints().iter().any(|joint| joint.coupling.iter().any(|c| *c != 0.0));
+        match (self.dialect, is_coupled) {
+            (Dialect::Ros, true) => {
+                "Joint values are those of a URDF, each link against the one before: coupled joints are NOT as on the \
+                 pendant. Radians."
+            }
+            (Dialect::Ros | Dialect::Urscript, _) => "Joint values as on the pendant, but in radians.",
+            (Dialect::Inform, _) => "Joint values are encoder pulses; see the plan for degrees.",
+            (Dialect::Fanuc, true) => {
+                "Joint values as on the pendant, in degrees: J3 is the slope of the forearm, coupled to J2."
+            }
+            (_, true) => "Joint values as on the pendant, in degrees, couplings included.",
+            (_, false) => "Joint values as on the pendant, in degrees.",
+        }
+    }
+
+    /// `pose 12, verification`.
+    fn label(pose: &PlannedPose) -> String {
+        match pose.kind {
+            PoseKind::Home | PoseKind::Via => pose.kind.name().to_owned(),
+            kind => {
+                let name: String = names::ascii(&pose.pose).chars().take(MAX_NAME).collect();
+                format!("pose {name}, {kind}")
+            }
+        }
+    }
+
+    /// A file named after the program.
+    fn file(name: &str, extension: &str, lines: &[String], line_end: &str) -> ProgramFile {
+        let mut text = lines.join(line_end);
+        text.push_str(line_end);
+        ProgramFile { file_name: format!("{name}.{extension}"), text }
+    }
+
+    /// Time to wait (s) with two decimals, if the program waits for itself.
+    fn dwell(&self) -> Option<String> {
+        match self.options.pause {
+            Pause::Dwell(dwell) => Some(decimal(dwell, 2)),
+            Pause::Acknowledge => None,
+        }
+    }
+
+    /// Part of full speed in percent, a whole number from 1.
+    fn percent(&self) -> String {
+        decimal((self.options.speed * 100.0).round().max(1.0), 0)
+    }
+}
+
+/// Fixed decimals without the sign of a rounded zero.
+fn decimal(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+/// Characters of a comment line where the controller has no limit.
+const HEAD_WIDTH: usize = 72;
+
+const CRLF: &str = "\r\n";
+const LF: &str = "\n";

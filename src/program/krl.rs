@@ -1,0 +1,34 @@
+//! KUKA KRL (`.src`): axis positions with `PTP`, without approximation (no `C_PTP`), so every point is an exact stop.
+//!
+//! `WAIT SEC` and `HALT` stop the advance run. Cells with external axes must add `E1` to `E6`: an axis that is not in the
+//! aggregate stays where it is. Arms with seven axes have another controller, which is programmed in Java.
+
+use super::names::{MAX_NAME, identifier};
+use super::{CRLF, HEAD_WIDTH, Job, ProgramError, ProgramFile};
+
+const DECIMALS: usize = 5;
+
+pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+    job.require_joints(6..=6, false)?;
+    let name = identifier(&job.options.name, MAX_NAME);
+    let mut lines = vec![format!("DEF {name}()")];
+    lines.extend(job.head(HEAD_WIDTH).iter().map(|line| format!("  ; {line}")));
+    lines.push("  BAS(#INITMOV,0)".to_owned());
+    lines.push(format!("  BAS(#VEL_PTP,{})", job.percent()));
+    lines.push("  BAS(#ACC_PTP,20)".to_owned());
+    for pose in job.poses {
+        let label = Job::label(pose);
+        let values = job.edge_values(pose, DECIMALS);
+        let axes: Vec<String> = values.iter().zip(1..).map(|(value, axis)| format!("A{axis} {value}")).collect();
+        lines.push(format!("  ; {label}"));
+        lines.push(format!("  PTP {{{}}}", axes.join(",")));
+        if pose.kind.is_measured() {
+            match job.dwell() {
+                Some(dwell) => lines.push(format!("  WAIT SEC {dwell}")),
+                None => lines.extend(["  ; measure, then press start".to_owned(), "  HALT".to_owned()]),
+            }
+        }
+    }
+    lines.push("END".to_owned());
+    Ok(vec![Job::file(&name, "src", &lines, CRLF)])
+}

@@ -1,0 +1,40 @@
+//! ABB RAPID (`.mod`): joint targets with `MoveAbsJ`, `fine` points.
+//!
+//! RAPID has no speed in percent for one move: full speed is taken as 2500 mm/s and 500 deg/s at the tool, the values
+//! of `vmax`'s usual ceiling and of the predefined speeds, so that 10 % are 250 mm/s.
+
+use super::names::{MAX_NAME, identifier};
+use super::{CRLF, HEAD_WIDTH, Job, ProgramError, ProgramFile, decimal};
+
+/// Digits after the point: RAPID's numbers have 23 bits.
+const DECIMALS: usize = 5;
+
+pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+    job.require_joints(6..=6, false)?;
+    let name = identifier(&job.options.name, MAX_NAME);
+    let mut lines = vec![format!("MODULE {name}")];
+    lines.extend(job.head(HEAD_WIDTH).iter().map(|line| format!("  ! {line}")));
+    let speed = job.options.speed;
+    let (tool, turn) = (decimal(2500.0 * speed, 0), decimal(500.0 * speed, 0));
+    lines.push(format!("  LOCAL CONST speeddata vMeasure:=[{tool},{turn},{tool},{turn}];"));
+    lines.push("  LOCAL VAR num nAnswer;".to_owned());
+    lines.push(format!("  PROC {name}_main()"));
+    for pose in job.poses {
+        let label = Job::label(pose);
+        let joints = job.edge_values(pose, DECIMALS).join(",");
+        lines.push(format!("    ! {label}"));
+        lines.push(format!("    MoveAbsJ [[{joints}],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs,vMeasure,fine,tool0;"));
+        if pose.kind.is_measured() {
+            lines.push("    WaitRob \\ZeroSpeed;".to_owned());
+            lines.push(match job.dwell() {
+                Some(dwell) => format!("    WaitTime {dwell};"),
+                None => format!(
+                    "    TPReadFK nAnswer,\"{label}: measure, then OK\",stEmpty,stEmpty,stEmpty,stEmpty,\"OK\";"
+                ),
+            });
+        }
+    }
+    lines.push("  ENDPROC".to_owned());
+    lines.push("ENDMODULE".to_owned());
+    Ok(vec![Job::file(&name, "mod", &lines, CRLF)])
+}
