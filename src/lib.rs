@@ -3,6 +3,8 @@
 pub mod geometry;
 pub mod identification;
 pub mod kinematics;
+pub mod planning;
 pub mod profile;
+pub mod runtime;
 pub mod session;
 pub mod units;
