@@ -143,12 +143,11 @@ impl Design {
         order.sort_by(|&a, &b| variances[b].total_cmp(&variances[a]));
         for &candidate in order.iter().take(RETURNING) {
             let share = RETURNING_SHARE / RETURNING as f64;
-            match self.members.iter().position(|&member| member == candidate) {
-                Some(index) => self.shares[index] += share,
-                None => {
-                    self.members.push(candidate);
-                    self.shares.push(share);
-                }
+            if let Some(index) = self.members.iter().position(|&member| member == candidate) {
+                self.shares[index] += share;
+            } else {
+                self.members.push(candidate);
+                self.shares.push(share);
             }
         }
         self.normalise();

@@ -4,8 +4,8 @@
 //! that the result does not depend on who runs them or in which order. The balanced objective takes two stages: the first
 //! finds how well a set can predict, the second lowers the condition number without giving much of that away.
 
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::descent::Descent;
@@ -58,7 +58,8 @@ pub struct SearchSettings {
     pub seed: u64,
     /// Number of independent starts; the best result counts.
     pub starts: usize,
-    /// Sweeps over all poses per start and stage: the work of an uninterrupted search.
+    /// Sweeps over all poses per start and stage: the work of an uninterrupted search. Prediction and D alone get three times
+    /// as many, which take no longer.
     pub sweeps: usize,
     /// Candidates that a place looks at in one visit; a larger pool is gone through in turn.
     pub window: usize,
@@ -75,6 +76,16 @@ impl Default for SearchSettings {
             starts: 4,
             sweeps: 8,
             window: 1500,
+        }
+    }
+}
+
+impl SearchSettings {
+    /// Sweeps per start of a stage.
+    pub const fn sweeps_of(&self, stage: Stage) -> usize {
+        match (stage, self.objective) {
+            (Stage::Objective { .. }, Objective::Prediction | Objective::D) => 3 * self.sweeps,
+            _ => self.sweeps,
         }
     }
 }
@@ -113,7 +124,7 @@ pub struct Progress {
     pub start: usize,
     /// Which stage.
     pub stage: Stage,
-    /// Sweeps done, of [`SearchSettings::sweeps`].
+    /// Sweeps done, of [`SearchSettings::sweeps_of`].
     pub sweep: usize,
     /// Condition number of the best set of this start.
     pub condition_number: f64,

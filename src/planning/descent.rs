@@ -4,8 +4,8 @@
 //! 1990): the condition number has many poor local minima. Where no exchange is left, a few poses are replaced at random.
 
 use nalgebra::DMatrix;
-use rand::RngExt;
-use rand::seq::SliceRandom;
+use rand::RngExt as _;
+use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::choice::{Chosen, Objective, Progress, SearchSettings, Stage};
@@ -121,7 +121,7 @@ impl<'a> Descent<'a> {
             objective,
             limit,
             stage,
-            sweeps: settings.sweeps,
+            sweeps: settings.sweeps_of(stage),
             window: settings.window.max(1),
             fixed: settings.required.len(),
             rng,
@@ -250,8 +250,7 @@ impl<'a> Descent<'a> {
         window: &[usize],
         bar: f64,
     ) -> Option<Exchange> {
-        let hopeful: Vec<usize> =
-            window.iter().copied().filter(|&candidate| vacancy.may_reach(candidate, bar)).collect();
+        let hopeful = vacancy.shortlist(window, bar);
         let mut allowed = Vec::new();
         with_each(self.information, others, &hopeful, |candidate, merit| {
             if merit.predicted_error() <= self.limit {

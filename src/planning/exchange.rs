@@ -131,3 +131,29 @@ pub(super) fn add_pose(information: &Information, matrix: &mut DMatrix<f64>, can
     let columns = DMatrixView::from_slice(information.rows(candidate), width, 3);
     matrix.gemm(sign, &columns, &columns.transpose(), 1.0);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::information::tests::pool;
+    use super::*;
+
+    #[test]
+    fn updates_equal_the_merit_from_scratch() {
+        let information = pool(300);
+        let set: Vec<usize> = (0..30).collect();
+        let mut others = information.sum(&set);
+        add_pose(&information, &mut others, 7, -1.0);
+        let prediction = Prediction::new(&information, others).unwrap();
+        let candidates: Vec<usize> = (30..300).chain([7]).collect();
+        let mut seen = 0;
+        prediction.with_each(&information, &candidates, |candidate, merit| {
+            let mut set = set.clone();
+            set[7] = candidate;
+            let scratch = Merit::new(&information, information.sum(&set));
+            assert!((merit.variance / scratch.variance - 1.0).abs() < 1e-9, "{merit:?} {scratch:?}");
+            assert!((merit.log_det - scratch.log_det).abs() < 1e-9, "{merit:?} {scratch:?}");
+            seen += 1;
+        });
+        assert_eq!(seen, candidates.len());
+    }
+}

@@ -23,6 +23,9 @@ pub(super) const FRAME: usize = 6;
 /// Fewer fresh poses than this do not stand for the workspace (and three are needed to check them).
 const FEWEST_FRESH: usize = 3;
 
+/// A singular value of the pool (less the rigid motion) below this share of its Jacobians' norm is a rounding error.
+const ROUNDING: f64 = 1e-11;
+
 /// A pool of candidates with everything that choosing and scoring need.
 #[derive(Clone, Debug)]
 pub struct Information {
@@ -66,6 +69,11 @@ impl Information {
         let basis = DMatrix::from_diagonal(&scale) * visible;
         let reduction = Reduction { model, parameters, basis: &basis };
         let (points, jacobians) = reduction.jacobians(candidates);
+        // The rank is relative to the largest singular value: where that one is a rounding error, nothing was seen at all.
+        let seen = observability.singular_values.first().map_or(0.0, |value| value * MILLIMETRE);
+        if seen < ROUNDING * jacobians.norm() {
+            return Err(PlanningError::NothingIdentifiable { parameters: parameters.len() });
+        }
         let middle = points.iter().fold(nalgebra::Vector3::zeros(), |sum, point| sum + point.coords)
             / points.len().max(1) as f64;
         let rows = with_frame(&points, &jacobians, rank, &middle.into());
@@ -120,11 +128,6 @@ impl Information {
     pub(super) fn rows(&self, candidate: usize) -> &[f64] {
         let size = 3 * self.width();
         &self.rows[size * candidate..size * (candidate + 1)]
-    }
-
-    /// The rows of G of all candidates as columns of an m × 3N matrix.
-    pub(super) fn columns(&self) -> DMatrixView<'_, f64> {
-        DMatrixView::from_slice(&self.rows, self.width(), 3 * self.len())
     }
 
     /// `S V`, n × rank.
@@ -228,4 +231,59 @@ fn with_frame(points: &[Point3<f64>], jacobians: &DMatrix<f64>, rank: usize, mid
         }
     }
     rows
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::{JointBox, random};
+    use super::*;
+    use crate::kinematics::{LinkParameter, ParameterId};
+    use crate::profile::{Level, Profile, builtin};
+
+    fn soochow() -> (ArmModel, Vec<FreeParameter>, JointBox) {
+        let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "").unwrap();
+        let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
+        let model = ArmModel { chain: profile.chain().clone(), targets };
+        (model, profile.free_parameters(Level::Geometric), JointBox::of_profile(&profile).unwrap())
+    }
+
+    fn places(joint_box: &JointBox, count: usize, seed: u64) -> Vec<TargetAt> {
+        random(joint_box, seed).take(count).map(|configuration| TargetAt { configuration, target: 0 }).collect()
+    }
+
+    /// A pool of random candidates of the paper's robot.
+    pub(in super::super) fn pool(candidates: usize) -> Information {
+        let (model, parameters, joint_box) = soochow();
+        Information::new(&model, &parameters, &places(&joint_box, candidates, 1), &places(&joint_box, 300, 2)).unwrap()
+    }
+
+    #[test]
+    fn blind_directions_move_points_only_as_a_rigid_body_would() {
+        let information = pool(50);
+        let width = information.width();
+        assert_eq!(width, information.rank() + 6);
+        assert_eq!(information.parameters().len() - information.rank(), information.observability().blind.ncols());
+        // Parameters and frame together are fully determined.
+        let eigenvalues = information.sum(&(0..50).collect::<Vec<_>>()).symmetric_eigenvalues();
+        assert!(eigenvalues.min() > 1e-10 * eigenvalues.max());
+    }
+
+    #[test]
+    fn unusable_pools_are_refused() {
+        let (model, parameters, joint_box) = soochow();
+        let some = places(&joint_box, 60, 1);
+        let new = |parameters: &[FreeParameter], candidates: &[TargetAt], fresh: &[TargetAt]| {
+            Information::new(&model, parameters, candidates, fresh).unwrap_err()
+        };
+        assert_eq!(new(&[], &some, &some), PlanningError::NoParameters);
+        assert_eq!(new(&parameters, &some, &some[..2]), PlanningError::FreshPoses { given: 2, needed: 3 });
+        assert!(matches!(new(&parameters, &[], &some), PlanningError::Candidates(_)));
+        let base = ParameterId::Link { joint: 0, parameter: LinkParameter::Theta };
+        let blind = [FreeParameter { id: base, expected: 1e-3 }];
+        assert_eq!(new(&blind, &some, &some), PlanningError::NothingIdentifiable { parameters: 1 });
+        let mut short = some.clone();
+        short[5].configuration.pop();
+        assert!(matches!(new(&parameters, &short, &some), PlanningError::Candidates(_)));
+        assert!(matches!(new(&parameters, &some, &short), PlanningError::Candidates(_)));
+    }
 }

@@ -1,6 +1,6 @@
 //! Configurations inside a box of joint limits: evenly spread or plainly random, both fixed by a seed.
 
-use rand::{RngExt, SeedableRng};
+use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::PlanningError;

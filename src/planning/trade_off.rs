@@ -1,6 +1,6 @@
 //! What more poses would bring: the predicted error against the number of poses.
 
-use rand::SeedableRng;
+use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::PlanningError;

@@ -1,6 +1,6 @@
 //! What random sets of the same size reach: the yardstick beside every plan.
 
-use rand::SeedableRng;
+use rand::SeedableRng as _;
 use rand::seq::index::sample;
 use rand_chacha::ChaCha8Rng;
 
