@@ -30,7 +30,9 @@ use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 use thiserror::Error;
 
 pub use linearise::ArmModel;
+pub(crate) use observability::raw_unit;
 pub use observability::{BlindGroup, Observability};
+pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint, TargetAt};
 
 use crate::geometry::{principal_spread, register};

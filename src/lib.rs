@@ -26,6 +26,7 @@ pub mod planning;
 pub mod profile;
 pub mod program;
 pub mod report;
+pub mod runtime;
 pub mod session;
 pub mod store;
 pub mod units;

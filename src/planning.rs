@@ -1,14 +1,86 @@
-//! Pose planning: which configurations are worth measuring, which of them can be measured, and in which order.
+//! Planning of measuring poses: which configurations to measure so that the identified arm predicts well everywhere, which of them
+//! can be measured at all in the [`Cell`] ([`candidates`]), and in which order ([`order`]).
 //!
-//! Metres and radians; points in the robot base unless a name says otherwise; a configuration is the pendant joint vector.
-//! Nothing here reads a file or a clock, draws unseeded random numbers or knows robot profiles: the cell comes in as the
-//! plain [`Cell`].
+//! From a pool of candidate configurations ([`Information`]) a set is chosen by exchange ([`Search`]) and judged ([`Score`]):
+//!
+//! - **Condition number** of the identification matrix `A·S` (actual pair rows `u_jk · (B_k − B_j)` of the set, every parameter
+//!   in units of its expected deviation, on the subspace that distances can identify, prior not counted).
+//! - **Predicted error**: RMS position error of the identified arm at fresh poses, registration included, per unit of
+//!   measurement σ: `sqrt(trace(M⁻¹ W))`, M the information of the set and W the mean of `GᵀG` over fresh poses, both on the
+//!   identifiable subspace together with the six parameters of the frame.
+//!
+//! The condition number alone is a bad master: sets that minimise it predict worse than random ones, because they give up the
+//! strong directions. The default objective ([`Objective::Balanced`]) therefore minimises it only among sets whose predicted
+//! error is near the best found. A bound from approximate design ([`DesignBound`]) says how much a better set could still gain.
+//!
+//! Lengths in metres, angles in radians, configurations in pendant values. Nothing here reads a file or a clock or starts a
+//! thread; randomness comes only from a passed seed, time limits only as a callback. [`crate::runtime::search`] runs the
+//! starts of a search in parallel.
+//!
+//! Literature: Sun & Hollerbach, "Observability index selection for robot calibration", ICRA 2008 (O1–O5); Fedorov, "Theory of
+//! optimal experiments", 1972 (exchange); Kiefer & Wolfowitz, "The equivalence of two extremum problems", 1960 (bound);
+//! Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018 (samples).
 
+#![warn(missing_docs)]
+
+mod bound;
 pub mod candidates;
 mod cell;
+mod choice;
 pub mod collision;
+mod descent;
+mod error;
+mod exchange;
+mod information;
 pub mod order;
+mod pair_exchange;
+mod pairs;
+mod sampling;
+mod score;
+mod trade_off;
 pub mod verification_set;
 pub mod visibility;
+mod yardstick;
 
+pub use bound::DesignBound;
 pub use cell::{Body, BoxInBase, Cell, CellError, KeepOutBox, MountedTarget, TrackerStand};
+pub use choice::{Chosen, Objective, Progress, Search, SearchSettings, Stage};
+pub use error::PlanningError;
+pub use information::Information;
+pub use sampling::{JointBox, low_discrepancy, random};
+pub use score::{ObservabilityIndices, ParameterPrecision, Score};
+pub use trade_off::{TradeOff, trade_off};
+pub use yardstick::{Spread, Yardstick};
+
+/// Checks that a set can be scored: known candidates, none twice, enough of them.
+fn check_set(information: &Information, set: &[usize]) -> Result<(), PlanningError> {
+    check_members(information, set)?;
+    check_count(information, set.len())
+}
+
+/// Checks that a set holds known candidates, none twice.
+fn check_members(information: &Information, set: &[usize]) -> Result<(), PlanningError> {
+    let mut sorted = set.to_vec();
+    sorted.sort_unstable();
+    if let Some(&pose) = sorted.iter().find(|&&pose| pose >= information.len()) {
+        return Err(PlanningError::UnknownCandidate { pose, candidates: information.len() });
+    }
+    if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(PlanningError::RepeatedPose { pose: pair[0] });
+    }
+    Ok(())
+}
+
+/// Checks that `poses` poses can determine what the pool can.
+fn check_count(information: &Information, poses: usize) -> Result<(), PlanningError> {
+    let needed = information.fewest_poses();
+    if poses >= needed {
+        return Ok(());
+    }
+    Err(PlanningError::TooFewPoses {
+        poses,
+        parameters: information.parameters().len(),
+        rank: information.rank(),
+        needed,
+    })
+}

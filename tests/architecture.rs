@@ -15,6 +15,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("profile", &["units", "geometry", "kinematics"]),
     ("session", &["units", "geometry", "kinematics", "profile"]),
     ("program", &["units", "kinematics", "session"]),
+    ("runtime", &["planning"]),
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "profile", "session"]),
     ("error", &[]),

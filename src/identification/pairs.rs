@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
 /// Points closer than this (m) have no usable direction between them.
-const SAME_POINT: f64 = 1e-6;
+pub(crate) const SAME_POINT: f64 = 1e-6;
 
 /// One point of a pair problem.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,289 @@
+//! What each candidate configuration tells: its predicted point and the Jacobian that its measurement would have, on the
+//! directions that distances can identify.
+//!
+//! Parameters are taken in units of their expected deviation (`z = S⁻¹ x`) and reduced to an orthonormal basis V of the
+//! identifiable directions (from a clear gap in the singular values of the whole pool). The information of a pose about
+//! parameters and instrument frame together is `GᵀG` with
+//!
+//! `G = [ B S V | 1 mm · I | 1 mm · (r ↦ ω × r) ]`, 3 × m, m = rank + 6,
+//!
+//! r the point less the middle of the pool, so that one unit of a frame parameter is 1 mm or 1 mrad. Only their ratio to each
+//! other depends on those units, never a predicted error or a condition number.
+
+use nalgebra::{DMatrix, DMatrixView, DVector, Point3};
+
+use super::PlanningError;
+use crate::identification::{ArmModel, Observability, Observations, PointSample, Problem, TargetAt};
+use crate::kinematics::{ForwardKinematics, FreeParameter, IdentificationJacobian};
+use crate::units::MILLIMETRE;
+
+/// Parameters of the instrument frame: three translations, three rotations.
+pub(super) const FRAME: usize = 6;
+
+/// Fewer fresh poses than this do not stand for the workspace (and three are needed to check them).
+const FEWEST_FRESH: usize = 3;
+
+/// A singular value of the pool (less the rigid motion) below this share of its Jacobians' norm is a rounding error.
+const ROUNDING: f64 = 1e-11;
+
+/// A pool of candidates with everything that choosing and scoring need.
+#[derive(Clone, Debug)]
+pub struct Information {
+    parameters: Vec<FreeParameter>,
+    observability: Observability,
+    /// `S V`: from reduced to real parameters, n × rank ([m] or [rad]).
+    basis: DMatrix<f64>,
+    points: Vec<Point3<f64>>,
+    /// G of every candidate, row by row: x, y, z of m numbers each [m].
+    rows: Vec<f64>,
+    /// W: mean of `GᵀG` over the fresh poses, m × m [m²].
+    fresh: DMatrix<f64>,
+}
+
+impl Information {
+    /// Of `candidates` for identifying `parameters` of `model`, judged by the error at `fresh` poses.
+    ///
+    /// # Errors
+    /// Sizes that do not fit, no free parameter, no fresh pose, or a pool from which the rank is not clear.
+    pub fn new(
+        model: &ArmModel,
+        parameters: &[FreeParameter],
+        candidates: &[TargetAt],
+        fresh: &[TargetAt],
+    ) -> Result<Self, PlanningError> {
+        if parameters.is_empty() {
+            return Err(PlanningError::NoParameters);
+        }
+        if fresh.len() < FEWEST_FRESH {
+            return Err(PlanningError::FreshPoses { given: fresh.len(), needed: FEWEST_FRESH });
+        }
+        check(model, parameters, fresh)?;
+        check(model, parameters, candidates)?;
+        let observability = observe(model, parameters, candidates);
+        let rank = observability.rank.ok_or(PlanningError::RankUnclear { gap: observability.gap })?;
+        if rank == 0 {
+            return Err(PlanningError::NothingIdentifiable { parameters: parameters.len() });
+        }
+        let scale = DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.expected));
+        let visible = complement(&observability.blind, rank);
+        let basis = DMatrix::from_diagonal(&scale) * visible;
+        let reduction = Reduction { model, parameters, basis: &basis };
+        let (points, jacobians) = reduction.jacobians(candidates);
+        // The rank is relative to the largest singular value: where that one is a rounding error, nothing was seen at all.
+        let seen = observability.singular_values.first().map_or(0.0, |value| value * MILLIMETRE);
+        if seen < ROUNDING * jacobians.norm() {
+            return Err(PlanningError::NothingIdentifiable { parameters: parameters.len() });
+        }
+        let middle = points.iter().fold(nalgebra::Vector3::zeros(), |sum, point| sum + point.coords)
+            / points.len().max(1) as f64;
+        let rows = with_frame(&points, &jacobians, rank, &middle.into());
+        let (fresh_points, fresh_jacobians) = reduction.jacobians(fresh);
+        let fresh_rows = with_frame(&fresh_points, &fresh_jacobians, rank, &middle.into());
+        let columns = DMatrixView::from_slice(&fresh_rows, rank + FRAME, 3 * fresh.len());
+        let fresh = columns * columns.transpose() / fresh.len() as f64;
+        Ok(Self { parameters: parameters.to_vec(), observability, basis, points, rows, fresh })
+    }
+
+    /// Number of candidates.
+    pub const fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is no candidate.
+    pub const fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// The parameters to identify, in order.
+    pub fn parameters(&self) -> &[FreeParameter] {
+        &self.parameters
+    }
+
+    /// What all candidates together could tell: rank, blind directions in words.
+    pub const fn observability(&self) -> &Observability {
+        &self.observability
+    }
+
+    /// Number of combinations of parameters that distances can find.
+    pub fn rank(&self) -> usize {
+        self.basis.ncols()
+    }
+
+    /// Fewest poses that can determine them: `3 M ≥ rank + 6`.
+    pub fn fewest_poses(&self) -> usize {
+        (self.rank() + FRAME).div_ceil(3)
+    }
+
+    /// Predicted position of a candidate in the base [m].
+    pub fn point(&self, candidate: usize) -> &Point3<f64> {
+        &self.points[candidate]
+    }
+
+    /// Numbers per row of G.
+    pub(super) fn width(&self) -> usize {
+        self.rank() + FRAME
+    }
+
+    /// G of a candidate: three rows of [`Self::width`] numbers, the reduced parameters first.
+    pub(super) fn rows(&self, candidate: usize) -> &[f64] {
+        let size = 3 * self.width();
+        &self.rows[size * candidate..size * (candidate + 1)]
+    }
+
+    /// `S V`, n × rank.
+    pub(super) const fn basis(&self) -> &DMatrix<f64> {
+        &self.basis
+    }
+
+    /// W, m × m [m²].
+    pub(super) const fn fresh(&self) -> &DMatrix<f64> {
+        &self.fresh
+    }
+
+    /// Sum of `GᵀG` over a set, m × m [m²].
+    pub(super) fn sum(&self, set: &[usize]) -> DMatrix<f64> {
+        let width = self.width();
+        let mut stacked = DMatrix::zeros(width, 3 * set.len());
+        for (target, &candidate) in stacked.as_mut_slice().chunks_mut(3 * width).zip(set) {
+            target.copy_from_slice(self.rows(candidate));
+        }
+        &stacked * stacked.transpose()
+    }
+}
+
+/// Checks that `places` fit the model.
+fn check(model: &ArmModel, parameters: &[FreeParameter], places: &[TargetAt]) -> Result<(), PlanningError> {
+    let observations = observed_at(places, std::iter::repeat(Point3::origin()));
+    problem(model, parameters, &observations).check().map_err(PlanningError::Candidates)
+}
+
+/// What measuring at all of `places` could tell.
+fn observe(model: &ArmModel, parameters: &[FreeParameter], places: &[TargetAt]) -> Observability {
+    let observations = observed_at(places, model.points_in_base(places.iter()).into_iter());
+    Observability::new(&problem(model, parameters, &observations))
+}
+
+fn problem<'a>(model: &'a ArmModel, parameters: &'a [FreeParameter], observations: &'a Observations) -> Problem<'a> {
+    Problem { chain: &model.chain, targets: &model.targets, parameters, observations }
+}
+
+/// Places as if measured at `points`.
+fn observed_at(places: &[TargetAt], points: impl Iterator<Item = Point3<f64>>) -> Observations {
+    let sample = |(at, point): (&TargetAt, _)| PointSample { at: at.clone(), station: 0, point, sigma: None };
+    Observations { points: places.iter().zip(points).map(sample).collect(), ..Observations::default() }
+}
+
+/// Orthonormal basis of everything orthogonal to the columns of `blind`, n × rank.
+fn complement(blind: &DMatrix<f64>, rank: usize) -> DMatrix<f64> {
+    let n = blind.nrows();
+    if blind.ncols() == 0 {
+        return DMatrix::identity(n, n);
+    }
+    let eigen = (DMatrix::identity(n, n) - blind * blind.transpose()).symmetric_eigen();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let columns: Vec<_> = order[..rank].iter().map(|&index| eigen.eigenvectors.column(index)).collect();
+    DMatrix::from_columns(&columns)
+}
+
+/// How Jacobians are reduced to the identifiable directions.
+struct Reduction<'a> {
+    model: &'a ArmModel,
+    parameters: &'a [FreeParameter],
+    basis: &'a DMatrix<f64>,
+}
+
+impl Reduction<'_> {
+    /// Predicted points [m] and `B S V` of `places`: the rows x, y, z of each as columns of a rank × 3N matrix.
+    fn jacobians(&self, places: &[TargetAt]) -> (Vec<Point3<f64>>, DMatrix<f64>) {
+        let n = self.parameters.len();
+        let arm = ForwardKinematics::new(&self.model.chain);
+        let ids: Vec<_> = self.parameters.iter().map(|parameter| parameter.id).collect();
+        let mut jacobian = IdentificationJacobian::new(&ids);
+        let mut rows = DMatrix::zeros(n, 3 * places.len());
+        let points = places
+            .iter()
+            .zip(rows.as_mut_slice().chunks_mut(3 * n))
+            .map(|(at, rows)| {
+                jacobian.evaluate(&arm, &at.configuration, at.target, &self.model.targets[at.target], rows)
+            })
+            .collect();
+        (points, self.basis.tr_mul(&rows))
+    }
+}
+
+/// Appends the six columns of the frame to the reduced Jacobians.
+fn with_frame(points: &[Point3<f64>], jacobians: &DMatrix<f64>, rank: usize, middle: &Point3<f64>) -> Vec<f64> {
+    let width = rank + FRAME;
+    let mut rows = vec![0.0; 3 * width * points.len()];
+    for (index, point) in points.iter().enumerate() {
+        let r = point - middle;
+        // Rows of ω ↦ ω × r.
+        let turn = [[0.0, r.z, -r.y], [-r.z, 0.0, r.x], [r.y, -r.x, 0.0]];
+        for axis in 0..3 {
+            let start = width * (3 * index + axis);
+            let row = &mut rows[start..start + width];
+            row[..rank].copy_from_slice(jacobians.column(3 * index + axis).as_slice());
+            row[rank + axis] = MILLIMETRE;
+            for (value, turn) in row[rank + 3..].iter_mut().zip(turn[axis]) {
+                *value = MILLIMETRE * turn;
+            }
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::{JointBox, random};
+    use super::*;
+    use crate::kinematics::{LinkParameter, ParameterId};
+    use crate::profile::{Level, Profile, builtin};
+
+    fn soochow() -> (ArmModel, Vec<FreeParameter>, JointBox) {
+        let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "").unwrap();
+        let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
+        let model = ArmModel { chain: profile.chain().clone(), targets };
+        (model, profile.free_parameters(Level::Geometric), JointBox::of_profile(&profile).unwrap())
+    }
+
+    fn places(joint_box: &JointBox, count: usize, seed: u64) -> Vec<TargetAt> {
+        random(joint_box, seed).take(count).map(|configuration| TargetAt { configuration, target: 0 }).collect()
+    }
+
+    /// A pool of random candidates of the paper's robot.
+    pub(in super::super) fn pool(candidates: usize) -> Information {
+        let (model, parameters, joint_box) = soochow();
+        Information::new(&model, &parameters, &places(&joint_box, candidates, 1), &places(&joint_box, 300, 2)).unwrap()
+    }
+
+    #[test]
+    fn blind_directions_move_points_only_as_a_rigid_body_would() {
+        let information = pool(50);
+        let width = information.width();
+        assert_eq!(width, information.rank() + 6);
+        assert_eq!(information.parameters().len() - information.rank(), information.observability().blind.ncols());
+        // Parameters and frame together are fully determined.
+        let eigenvalues = information.sum(&(0..50).collect::<Vec<_>>()).symmetric_eigenvalues();
+        assert!(eigenvalues.min() > 1e-10 * eigenvalues.max());
+    }
+
+    #[test]
+    fn unusable_pools_are_refused() {
+        let (model, parameters, joint_box) = soochow();
+        let some = places(&joint_box, 60, 1);
+        let new = |parameters: &[FreeParameter], candidates: &[TargetAt], fresh: &[TargetAt]| {
+            Information::new(&model, parameters, candidates, fresh).unwrap_err()
+        };
+        assert_eq!(new(&[], &some, &some), PlanningError::NoParameters);
+        assert_eq!(new(&parameters, &some, &some[..2]), PlanningError::FreshPoses { given: 2, needed: 3 });
+        assert!(matches!(new(&parameters, &[], &some), PlanningError::Candidates(_)));
+        let base = ParameterId::Link { joint: 0, parameter: LinkParameter::Theta };
+        let blind = [FreeParameter { id: base, expected: 1e-3 }];
+        assert_eq!(new(&blind, &some, &some), PlanningError::NothingIdentifiable { parameters: 1 });
+        let mut short = some.clone();
+        short[5].configuration.pop();
+        assert!(matches!(new(&parameters, &short, &some), PlanningError::Candidates(_)));
+        assert!(matches!(new(&parameters, &some, &short), PlanningError::Candidates(_)));
+    }
+}

@@ -1,0 +1,3 @@
+//! Work on named threads, for the parts of the program that are pure themselves.
+
+pub mod search;
