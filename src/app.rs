@@ -1,11 +1,14 @@
 //! Runs a command: loads its files, calls the maths, writes the results.
 
 mod assess;
+mod cell;
 mod constraints;
 mod estimate;
 mod identify;
 mod load;
+mod plan;
 mod profile;
+mod program;
 mod progress;
 mod verify;
 
@@ -49,6 +52,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Identify(args) => identify::run(&args, console),
         Command::Verify(args) => verify::run(&args, console),
         Command::Constraints(args) => constraints::run(&args, console),
+        Command::Plan(args) => plan::run(&args, console),
+        Command::Program(args) => program::run(&args, console),
         Command::Profile(command) => profile::run(&command, console),
     }
 }

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::program::{DEFAULT_DWELL, Dialect, MAX_SPEED};
 use crate::session::measurements::Layout;
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, MILLIRADIAN};
 
@@ -26,6 +27,10 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Identify from direct distances: shared points (ball and sockets) or measured lengths, no coordinates
     Constraints(ConstraintsArgs),
+    /// Plan which poses to measure, and in which order
+    Plan(PlanArgs),
+    /// Write a robot program that visits the poses of a plan
+    Program(ProgramArgs),
     /// List, show or check robot profiles
     #[command(subcommand)]
     Profile(ProfileCommand),
@@ -152,6 +157,192 @@ pub struct ConstraintsArgs {
     pub leave_one_out: Option<String>,
 }
 
+/// Arguments of `plan`.
+#[derive(Args, Debug)]
+pub struct PlanArgs {
+    /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
+    #[arg(long, value_name = "NAME|FILE")]
+    pub profile: String,
+    /// Score the poses of this plan or list instead of choosing new ones
+    #[arg(long, value_name = "CSV", conflicts_with_all = ["poses", "objective", "include", "out"])]
+    pub check: Option<PathBuf>,
+    /// Number of poses to identify from
+    #[arg(long, value_name = "N", default_value_t = 56)]
+    pub poses: usize,
+    /// Number of poses to verify with
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub verification: usize,
+    /// Number of candidates to choose from
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(10..=1_000_000))]
+    pub candidates: usize,
+    /// What to choose for
+    #[arg(long, value_enum, default_value_t)]
+    pub objective: ObjectiveArg,
+    /// Seed of all random decisions: the same seed gives the same plan
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Stop searching after so many seconds and take the best set so far
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub time_limit: Option<f64>,
+    /// Threads to search with [default: one per core]; the result does not depend on it
+    #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=256))]
+    pub threads: Option<usize>,
+    /// Narrow a joint, such as 'j2=-30..60' (degrees, sliding joints mm); may be repeated
+    #[arg(long = "limit", value_name = "JOINT=LOW..HIGH", allow_hyphen_values = true)]
+    pub limits: Vec<JointLimit>,
+    /// Keep the reflector inside a box in the robot base, such as '500..1500,-800..800,200..1600' (mm, x,y,z)
+    #[arg(long = "box", value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub region: Option<BoxMm>,
+    /// Poses that must be in because they are already measured (any table with q1… columns and a pose column)
+    #[arg(long, value_name = "CSV")]
+    pub include: Option<PathBuf>,
+    /// No check of collisions and sight, only joint limits
+    #[arg(long)]
+    pub no_filters: bool,
+    /// Clearance to keep from everything
+    #[arg(long, value_name = "MM", default_value_t = 10.0, value_parser = positive)]
+    pub clearance_mm: f64,
+    /// Expected deviation of every length and every angle instead of the profile's, such as '1mm,0.1deg'
+    #[arg(long, value_name = "LENGTH,ANGLE")]
+    pub expected_deviation: Option<ExpectedDeviation>,
+    /// What will be identified
+    #[arg(long, value_enum, default_value_t)]
+    pub level: LevelArg,
+    /// Standard deviation of a measured coordinate [default: of the profile's instrument]
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub sigma_mm: Option<f64>,
+    /// Measure the first pose again after so many poses, to see a drift; 0: never
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub drift_every: usize,
+    /// Part of the full joint speed that the program will use
+    #[arg(long, value_name = "PERCENT", default_value_t = 10.0, value_parser = speed_percent)]
+    pub speed_percent: f64,
+    /// Wait before the first reading of a pose
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive)]
+    pub settle_s: f64,
+    /// Readings per pose, one second each
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub shots: u32,
+    /// File for the plan
+    #[arg(long, value_name = "CSV")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `program`.
+#[derive(Args, Debug)]
+pub struct ProgramArgs {
+    /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
+    #[arg(long, value_name = "NAME|FILE")]
+    pub profile: String,
+    /// Plan to write a program for
+    #[arg(long, value_name = "CSV")]
+    pub plan: PathBuf,
+    /// Language of the robot controller
+    #[arg(long, value_parser = Dialect::from_str, value_name = "rapid|krl|fanuc|urscript|val3|inform|ros")]
+    pub dialect: Dialect,
+    /// Name of the program
+    #[arg(long, default_value = "calposes")]
+    pub name: String,
+    /// Wait at each pose that is measured
+    #[arg(long, value_name = "S", default_value_t = DEFAULT_DWELL, value_parser = positive)]
+    pub dwell_s: f64,
+    /// Wait for the operator at each pose instead of a fixed time
+    #[arg(long, conflicts_with = "dwell_s")]
+    pub acknowledge: bool,
+    /// Part of the full joint speed
+    #[arg(long, value_name = "PERCENT", default_value_t = 10.0, value_parser = speed_percent)]
+    pub speed_percent: f64,
+    /// Folder for the program's files [default: print them]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// `--objective`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ObjectiveArg {
+    /// Lowest condition number among sets that predict within 4 % of the best
+    #[default]
+    Balanced,
+    /// Lowest condition number; predicts worse than random poses
+    Condition,
+    /// Lowest predicted error
+    Prediction,
+    /// D-optimal: largest determinant of the information
+    D,
+    /// Observability index O1
+    O1,
+    /// Observability index O2
+    O2,
+    /// Observability index O3
+    O3,
+    /// Observability index O4
+    O4,
+    /// Observability index O5
+    O5,
+}
+
+/// `--limit`: a joint by name or number with a range in degrees or mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointLimit {
+    /// Name of the joint, or `j` and its number.
+    pub joint: String,
+    /// Lower limit (deg or mm).
+    pub low: f64,
+    /// Upper limit (deg or mm).
+    pub high: f64,
+}
+
+impl FromStr for JointLimit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let expected =
+            || format!("'{text}' is not a limit; write for example 'j2=-30..60' (degrees, sliding joints mm)");
+        let (joint, range) = text.split_once('=').ok_or_else(expected)?;
+        let (low, high) = parse_range(range).ok_or_else(expected)?;
+        if joint.trim().is_empty() || low >= high {
+            return Err(expected());
+        }
+        Ok(Self { joint: joint.trim().to_owned(), low, high })
+    }
+}
+
+/// `--box`: ranges of x, y and z (mm).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoxMm {
+    /// Lower and upper end per axis (mm).
+    pub ranges: [(f64, f64); 3],
+}
+
+impl FromStr for BoxMm {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let ranges: Option<Vec<(f64, f64)>> = text.split(',').map(parse_range).collect();
+        match ranges.as_deref() {
+            Some(&[x, y, z]) if [x, y, z].iter().all(|(low, high)| low < high) => Ok(Self { ranges: [x, y, z] }),
+            _ => Err(format!("'{text}' is not a box; write for example '500..1500,-800..800,200..1600' (mm, x,y,z)")),
+        }
+    }
+}
+
+/// `LOW..HIGH`, both finite.
+fn parse_range(text: &str) -> Option<(f64, f64)> {
+    let (low, high) = text.split_once("..")?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    Some((number(low)?, number(high)?))
+}
+
+fn speed_percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 100.0 * MAX_SPEED => Ok(value),
+        _ => Err(format!("'{text}' is not a speed between 0 and {:.0} percent", 100.0 * MAX_SPEED)),
+    }
+}
+
 /// `--estimator`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum EstimatorArg {
@@ -252,6 +443,20 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn limits_and_boxes_are_ranges() {
+        let limit: JointLimit = "j2=-30..60".parse().unwrap();
+        assert_eq!(limit, JointLimit { joint: "j2".to_owned(), low: -30.0, high: 60.0 });
+        let space: BoxMm = "500..1500,-800..800,200..1600".parse().unwrap();
+        assert_eq!(space.ranges, [(500.0, 1500.0), (-800.0, 800.0), (200.0, 1600.0)]);
+        for wrong in ["j2", "j2=1", "j2=60..-30", "=1..2", "j2=nan..3"] {
+            assert!(wrong.parse::<JointLimit>().is_err(), "{wrong}");
+        }
+        for wrong in ["1..2,3..4", "1..2,3..4,6..5", "a..b,1..2,3..4"] {
+            assert!(wrong.parse::<BoxMm>().is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -2,7 +2,9 @@
 //!
 //! Knows the plain summaries of `session` and nothing of how they were made.
 
+mod plan;
 mod tables;
 mod text;
 
+pub use plan::plan_text;
 pub use text::{identification_text, verification_text};

@@ -13,6 +13,7 @@ pub mod constraints;
 pub mod filter;
 pub mod measurements;
 pub mod plan;
+pub mod plan_summary;
 pub mod summary;
 mod table;
 

@@ -19,7 +19,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "profile", "session"]),
     ("error", &[]),
-    ("cli", &["units", "session"]),
+    ("cli", &["units", "session", "program"]),
     (
         "app",
         &["cli", "error", "geometry", "identification", "kinematics", "profile", "report", "session", "store", "units"],
@@ -27,7 +27,8 @@ const LAYERS: &[(&str, &[&str])] = &[
 ];
 
 /// Modules that read no file, no clock, no environment and print nothing.
-const PURE: &[&str] = &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "program"];
+const PURE: &[&str] =
+    &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "program"];
 
 /// What a pure module must not name.
 const IMPURE: &[&str] =

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use super::load::{LoadedProfile, now, sha256};
 use super::progress::Progress;
 use super::{Console, assess};
-use crate::cli::{EstimationArgs, EstimatorArg, LevelArg, PriorArg};
+use crate::cli::{EstimationArgs, EstimatorArg, ExpectedDeviation, LevelArg, PriorArg};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::plausibility::weaknesses;
 use crate::identification::{
@@ -57,15 +57,19 @@ pub(super) fn parameters(args: &EstimationArgs, profile: &Profile) -> Vec<FreePa
         LevelArg::Geometric => Level::Geometric,
     };
     let mut parameters = profile.free_parameters(level);
-    if let Some(expected) = args.expected_deviation {
-        for parameter in parameters.iter_mut().filter(|parameter| matches!(parameter.id, ParameterId::Link { .. })) {
-            parameter.expected = match parameter.id.quantity() {
-                Quantity::Length => expected.length,
-                Quantity::Angle => expected.angle,
-            };
-        }
-    }
+    expected_by(args.expected_deviation, &mut parameters);
     parameters
+}
+
+/// Replaces the expected deviations of the link constants by those of the command line, if it gives any.
+pub(super) fn expected_by(expected: Option<ExpectedDeviation>, parameters: &mut [FreeParameter]) {
+    let Some(ExpectedDeviation { length, angle }) = expected else { return };
+    for parameter in parameters.iter_mut().filter(|parameter| matches!(parameter.id, ParameterId::Link { .. })) {
+        parameter.expected = match parameter.id.quantity() {
+            Quantity::Length => length,
+            Quantity::Angle => angle,
+        };
+    }
 }
 
 /// The target coordinates among `parameters`.

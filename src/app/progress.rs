@@ -1,4 +1,4 @@
-//! Progress on stderr for solves that take longer than half a second.
+//! Progress on stderr for work that takes longer than half a second, and the time it took.
 
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -8,33 +8,53 @@ use crate::identification::Iteration;
 /// Silence before the first line, and between two lines.
 const INTERVAL: Duration = Duration::from_millis(500);
 
-/// Prints solver steps, but only when there is time to read them.
+/// Time since it was made.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stopwatch {
+    started: Instant,
+}
+
+impl Stopwatch {
+    #[expect(clippy::disallowed_methods, reason = "the edge of the program may look at the clock")]
+    pub(super) fn new() -> Self {
+        Self { started: Instant::now() }
+    }
+
+    /// Seconds so far.
+    pub(super) fn seconds(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+}
+
+/// Prints remarks, but only when there is time to read them.
 #[derive(Debug)]
 pub(super) struct Progress<'a, W: Write> {
     out: &'a mut W,
-    last: Instant,
+    last: Stopwatch,
     steps: usize,
 }
 
 impl<'a, W: Write> Progress<'a, W> {
-    #[expect(clippy::disallowed_methods, reason = "the edge of the program may look at the clock")]
     pub(super) fn new(out: &'a mut W) -> Self {
-        Self { out, last: Instant::now(), steps: 0 }
+        Self { out, last: Stopwatch::new(), steps: 0 }
     }
 
-    /// Takes note of a step.
+    /// Takes note of a solver step.
     pub(super) fn step(&mut self, iteration: &Iteration) {
         self.steps += 1;
-        if self.last.elapsed() >= INTERVAL {
-            #[expect(clippy::disallowed_methods, reason = "the edge of the program may look at the clock")]
-            let now = Instant::now();
-            self.last = now;
+        let Iteration { cost, step, .. } = iteration;
+        let steps = self.steps;
+        self.say(|| {
+            format!("identifying: step {steps}, cost {cost:.6e}, largest change {step:.1e} expected deviations")
+        });
+    }
+
+    /// Says something, if the last time was long enough ago.
+    pub(super) fn say(&mut self, text: impl FnOnce() -> String) {
+        if self.last.seconds() >= INTERVAL.as_secs_f64() {
+            self.last = Stopwatch::new();
             // Nobody may be listening.
-            drop(writeln!(
-                self.out,
-                "identifying: step {}, cost {:.6e}, largest change {:.1e} expected deviations",
-                self.steps, iteration.cost, iteration.step
-            ));
+            drop(writeln!(self.out, "{}", text()));
         }
     }
 }

@@ -17,6 +17,12 @@ pub(super) fn decimals_for(sigma: f64) -> usize {
         .map_or(6, |decimals| decimals.unsigned_abs() as usize)
 }
 
+/// Adds a line with its line break.
+pub(super) fn push_line(text: &mut String, line: &str) {
+    text.push_str(line);
+    text.push('\n');
+}
+
 /// Breaks a paragraph into lines; the first begins with `first`, the others with as many blanks.
 pub(super) fn paragraph(first: &str, text: &str) -> String {
     let indent = " ".repeat(first.chars().count());

@@ -1,6 +1,6 @@
 //! The reports of `identify`, `constraints` and `verify` on a terminal.
 
-use super::tables::{decimals_for, fixed, paragraph};
+use super::tables::{decimals_for, fixed, paragraph, push_line};
 use crate::session::summary::{
     IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict,
     VerificationReport, VerificationSummary, Warning,
@@ -44,12 +44,7 @@ pub fn verification_text(report: &VerificationReport) -> String {
     text
 }
 
-fn push_line(text: &mut String, line: &str) {
-    text.push_str(line);
-    text.push('\n');
-}
-
-fn title(what: &str, provenance: &Provenance) -> String {
+pub(super) fn title(what: &str, provenance: &Provenance) -> String {
     let mut text = paragraph("", &format!("{what} of {} ({})", provenance.robot, provenance.profile));
     for input in &provenance.inputs {
         push_line(&mut text, &format!("  {}: {}", input.role, input.file));
@@ -59,7 +54,7 @@ fn title(what: &str, provenance: &Provenance) -> String {
     text
 }
 
-fn warnings(warnings: &[Warning]) -> String {
+pub(super) fn warnings(warnings: &[Warning]) -> String {
     let mut text = String::new();
     for warning in warnings {
         let mark = if warning.blocks_acceptance { "WARNING " } else { "note    " };

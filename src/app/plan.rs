@@ -1,0 +1,593 @@
+//! `trupose plan`: which poses to measure, and how good a list of poses is.
+
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use super::cell::{cell, limits, pace};
+use super::estimate::{expected_by, provenance, warning};
+use super::load::{self, LoadedProfile};
+use super::progress::{Progress, Stopwatch};
+use super::{Console, to_json};
+use crate::cli::{LevelArg, ObjectiveArg, PlanArgs};
+use crate::error::{ExitStatus, Failure};
+use crate::identification::{ArmModel, TargetAt};
+use crate::kinematics::{FreeParameter, JointType};
+use crate::planning::candidates::{Candidate, CandidateFilter, Candidates, Rejections};
+use crate::planning::order::{OrderError, Route, StepKind, Stops, home_pose, order};
+use crate::planning::{
+    Chosen, DesignBound, Information, JointBox, Objective, PlanningError, Score, Search, SearchSettings, Stage,
+    TradeOff, Yardstick, low_discrepancy, random, trade_off, verification_set,
+};
+use crate::profile::{Level, Profile};
+use crate::report;
+use crate::runtime::search::plan_in_parallel;
+use crate::session::plan::{self, PlannedPose, PoseKind};
+use crate::session::plan_summary::{
+    CandidateSummary, ObservabilitySummary, PlanSummary, PoseSummary, RandomSummary, RejectionSummary, SCHEMA,
+    SpreadSummary, TimeSummary, TradeOffSummary, WeakParameterSummary,
+};
+use crate::session::summary::{InputFile, Warning};
+use crate::store;
+use crate::units::{from_mm, to_mm};
+
+/// Configurations tried per candidate asked for: with ±30° of acceptance about one in twenty faces the tracker.
+const TRIES_PER_CANDIDATE: usize = 200;
+/// Fresh poses over which a prediction is averaged.
+const FRESH_POSES: usize = 1000;
+/// Random sets of equal size to compare with.
+const RANDOM_SETS: usize = 500;
+/// Sizes of the trade-off table.
+const SIZES: [usize; 9] = [20, 30, 40, 50, 60, 70, 80, 90, 100];
+/// Rounds of leaving out poses that cannot be reached and choosing again.
+const ROUNDS: usize = 8;
+/// Candidates offered as intermediate stops where a direct move is blocked.
+const VIAS: usize = 30;
+
+pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let clock = Stopwatch::new();
+    let loaded = load::profile(&args.profile)?;
+    for diagnostic in &loaded.warnings {
+        console.remark(&diagnostic.to_string());
+    }
+    let planner = Planner::new(args, &loaded)?;
+    let interrupted = interrupt_flag()?;
+    let keep_going =
+        || !interrupted.load(Ordering::Relaxed) && args.time_limit.is_none_or(|limit| clock.seconds() < limit);
+    let mut summary = match &args.check {
+        Some(file) => planner.check(file, &keep_going)?,
+        None => planner.choose(console, &keep_going)?,
+    };
+    summary.elapsed_s = clock.seconds();
+    if let Some(file) = &args.out {
+        let rows = planned_rows(&summary, &planner.joint_types);
+        let text = plan::write(&rows, &planner.joint_types);
+        store::replace(file, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+        summary.written.push(file.display().to_string());
+    }
+    let text = if args.json { to_json(&summary)? } else { report::plan_text(&summary) };
+    console.print(&text)?;
+    let is_blocked = summary.warnings.iter().any(|warning| warning.blocks_acceptance);
+    Ok(if is_blocked { ExitStatus::NotAccepted } else { ExitStatus::Accepted })
+}
+
+/// Set by Ctrl-C: the first one ends the search with the best set so far, the second one the program.
+fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let signal = signal_hook::consts::SIGINT;
+    let interrupted = 128 + signal;
+    signal_hook::flag::register_conditional_shutdown(signal, interrupted, Arc::clone(&flag))
+        .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
+        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    Ok(flag)
+}
+
+/// What stays the same over all ways of planning.
+struct Planner<'a> {
+    args: &'a PlanArgs,
+    loaded: &'a LoadedProfile,
+    model: ArmModel,
+    parameters: Vec<FreeParameter>,
+    joint_types: Vec<JointType>,
+    limits: Vec<(f64, f64)>,
+    filter: CandidateFilter<'a>,
+}
+
+/// A chosen set with its order.
+struct Ordered {
+    chosen: Chosen,
+    /// Poses to measure with their kinds, in the order of `Stops::poses`.
+    stops: Vec<(PoseKind, String, Candidate)>,
+    route: Route,
+}
+
+impl<'a> Planner<'a> {
+    fn new(args: &'a PlanArgs, loaded: &'a LoadedProfile) -> Result<Self, Failure> {
+        let profile = &loaded.profile;
+        let limits = limits(profile, &args.limits)?;
+        let cell = cell(profile, limits.clone(), args)?;
+        let filter = CandidateFilter::new(profile.chain(), &cell, from_mm(args.clearance_mm))
+            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        let level = match args.level {
+            LevelArg::Offsets => Level::Offsets,
+            LevelArg::Geometric => Level::Geometric,
+        };
+        // The poses are for the first target: coordinates of others cannot be seen with it.
+        let is_seen = |parameter: &FreeParameter| match parameter.id {
+            crate::kinematics::ParameterId::Target { target, .. } => target == 0,
+            crate::kinematics::ParameterId::Link { .. } => true,
+        };
+        let mut parameters = profile.free_parameters(level);
+        parameters.retain(is_seen);
+        expected_by(args.expected_deviation, &mut parameters);
+        let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
+        Ok(Self {
+            args,
+            loaded,
+            model: ArmModel { chain: profile.chain().clone(), targets },
+            parameters,
+            joint_types: load::joint_types(profile),
+            limits,
+            filter,
+        })
+    }
+
+    const fn profile(&self) -> &'a Profile {
+        &self.loaded.profile
+    }
+
+    /// Standard deviation of a coordinate (m) that predictions are for.
+    fn sigma(&self) -> Option<f64> {
+        let distance = self.profile().tracker().position_in_base.coords.norm();
+        let instrument = || self.profile().instrument().map(|instrument| instrument.sigma_at(distance));
+        self.args.sigma_mm.map(from_mm).or_else(instrument)
+    }
+
+    fn joint_box(&self) -> Result<JointBox, Failure> {
+        JointBox::new(self.limits.clone()).map_err(|error| planning_failure(&error))
+    }
+
+    fn information(&self, pool: &[Candidate]) -> Result<Information, Failure> {
+        let at = |configuration: Vec<f64>| TargetAt { configuration, target: 0 };
+        let candidates: Vec<TargetAt> = pool.iter().map(|candidate| at(candidate.configuration.clone())).collect();
+        let fresh: Vec<TargetAt> = random(&self.joint_box()?, !self.args.seed).take(FRESH_POSES).map(at).collect();
+        Information::new(&self.model, &self.parameters, &candidates, &fresh).map_err(|error| planning_failure(&error))
+    }
+
+    /// Candidates, those that must be in first.
+    fn candidates(&self, needed: usize) -> Result<(Candidates, usize), Failure> {
+        let included = match &self.args.include {
+            Some(file) => self.listed_poses(file)?.0,
+            None => Vec::new(),
+        };
+        let count = self.args.candidates;
+        let joint_box = self.joint_box()?;
+        let stream = low_discrepancy(&joint_box, self.args.seed).take(count.saturating_mul(TRIES_PER_CANDIDATE));
+        let mut candidates = self
+            .filter
+            .collect_at_least(stream, count, needed)
+            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        let mut kept: Vec<Candidate> = included.iter().map(|row| self.candidate(&row.configuration)).collect();
+        let required = kept.len();
+        kept.append(&mut candidates.kept);
+        candidates.kept = kept;
+        Ok((candidates, required))
+    }
+
+    fn candidate(&self, configuration: &[f64]) -> Candidate {
+        let at = TargetAt { configuration: configuration.to_vec(), target: 0 };
+        Candidate { point_in_base: self.model.point_in_base(&at), configuration: at.configuration }
+    }
+
+    /// The identification poses of a plan, or all rows of a plain list.
+    fn listed_poses(&self, file: &Path) -> Result<(Vec<PlannedPose>, Vec<Warning>, InputFile), Failure> {
+        let bytes = store::read(file).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        let name = file.display().to_string();
+        let listed = plan::read_bytes(&bytes, &name, &self.joint_types)
+            .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
+        let warnings = listed.warnings.iter().map(|problem| warning("table", problem.to_string(), false)).collect();
+        Ok((listed.rows, warnings, load::input_file("plan", name, &bytes)))
+    }
+
+    /// Chooses, orders and scores a new plan.
+    fn choose<O: Write, E: Write>(
+        &self,
+        console: &mut Console<O, E>,
+        keep_going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<PlanSummary, Failure> {
+        let args = self.args;
+        let (mut candidates, required) = self.candidates(args.poses + args.verification)?;
+        let mut round = 0;
+        let (information, ordered) = loop {
+            round += 1;
+            let information = self.information(&candidates.kept)?;
+            let chosen = self.search(&information, required, console, keep_going)?;
+            match self.order(&candidates.kept, required, chosen)? {
+                Ok(ordered) => break (information, ordered),
+                Err(unreachable) if round < ROUNDS => {
+                    console.remark(&format!(
+                        "{} poses cannot be reached without a collision: choosing again",
+                        unreachable.len()
+                    ));
+                    let mut index = 0;
+                    candidates.kept.retain(|_| {
+                        index += 1;
+                        !unreachable.contains(&(index - 1))
+                    });
+                }
+                Err(_) => {
+                    return Err(Failure::new(ExitStatus::Usage, "the poses cannot be visited without a collision")
+                        .hint(
+                            "narrow the joint ranges with '--limit' to one side of the cell, or lower '--clearance-mm'",
+                        ));
+                }
+            }
+        };
+        let set = &ordered.chosen.set;
+        let mut summary = self.summary(&information, set, &candidates.rejections, keep_going)?;
+        summary.objective = Some(objective_name(args.objective).to_owned());
+        summary.interrupted = ordered.chosen.interrupted;
+        summary.verification_poses = ordered.stops.len() - set.len().min(ordered.stops.len()) + required;
+        let minutes = |seconds: f64| seconds / 60.0;
+        let Route { moving_time, measuring_time, .. } = ordered.route;
+        let total = ordered.route.time();
+        summary.time = Some(TimeSummary {
+            total_min: minutes(total),
+            moving_min: minutes(moving_time),
+            measuring_min: minutes(measuring_time),
+        });
+        let stops = ordered.stops.len().max(1);
+        let extra = ordered.stops.len().saturating_sub(set.len() - required);
+        for size in &mut summary.trade_off {
+            size.time_min = Some(minutes(total) * (size.poses + extra) as f64 / stops as f64);
+        }
+        summary.verification_poses = extra;
+        summary.poses = self.route_rows(&ordered);
+        Ok(summary)
+    }
+
+    fn search<O: Write, E: Write>(
+        &self,
+        information: &Information,
+        required: usize,
+        console: &mut Console<O, E>,
+        keep_going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Chosen, Failure> {
+        let settings = SearchSettings {
+            poses: self.args.poses + required,
+            required: (0..required).collect(),
+            objective: objective(self.args.objective),
+            seed: self.args.seed,
+            ..SearchSettings::default()
+        };
+        let starts = settings.starts;
+        let search = Search::new(information, settings).map_err(|error| planning_failure(&error))?;
+        let threads = self.args.threads.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
+        let (sender, receiver) = std::sync::mpsc::sync_channel::<crate::planning::Progress>(64);
+        let mut lines = Progress::new(&mut console.err);
+        let result = thread::scope(|scope| {
+            let worker = thread::Builder::new().name("plan".to_owned()).spawn_scoped(scope, || {
+                // A progress line that nobody has room for is dropped: the search never waits for a terminal.
+                let told = |progress: &crate::planning::Progress| drop(sender.try_send(*progress));
+                let chosen = plan_in_parallel(&search, threads, keep_going, &told);
+                drop(sender);
+                chosen
+            });
+            let worker = worker.map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+            while let Ok(progress) = receiver.recv() {
+                let stage = match progress.stage {
+                    Stage::Prediction => "predicting",
+                    Stage::Objective { .. } => "choosing",
+                };
+                lines.say(|| {
+                    format!(
+                        "{stage}: start {} of {starts}, sweep {} of {}, condition number {:.1}, predicted error {:.3} sigma",
+                        progress.start + 1,
+                        progress.sweep,
+                        search.settings().sweeps_of(progress.stage),
+                        progress.condition_number,
+                        progress.predicted_error
+                    )
+                });
+            }
+            worker.join().map_err(|_| Failure::new(ExitStatus::Internal, "the search ended unexpectedly"))
+        })?;
+        result.map_err(|error| planning_failure(&error))
+    }
+
+    /// Orders the chosen poses that are not measured yet and the verification poses; the inner error names candidates
+    /// that cannot be reached.
+    fn order(
+        &self,
+        pool: &[Candidate],
+        required: usize,
+        chosen: Chosen,
+    ) -> Result<Result<Ordered, Vec<usize>>, Failure> {
+        let verification = verification_set::choose(pool, &chosen.set, &self.limits, self.args.verification);
+        let new = chosen.set.iter().copied().filter(|index| *index >= required);
+        let stops: Vec<(PoseKind, usize)> = new
+            .map(|index| (PoseKind::Identification, index))
+            .chain(verification.iter().map(|&index| (PoseKind::Verification, index)))
+            .collect();
+        let poses: Vec<Vec<f64>> = stops.iter().map(|(_, index)| pool[*index].configuration.clone()).collect();
+        let shape = self.filter.shape();
+        let Some(home) = home_pose(shape, pool.iter().map(|candidate| candidate.configuration.as_slice())) else {
+            return Err(Failure::new(ExitStatus::Usage, "the arm cannot stand anywhere in its planning limits"));
+        };
+        let spread = (pool.len() / VIAS).max(1);
+        let vias: Vec<Vec<f64>> =
+            pool.iter().step_by(spread).map(|candidate| candidate.configuration.clone()).collect();
+        let request = Stops { home: &home, poses: &poses, vias: &vias, drift_every: Some(self.args.drift_every) };
+        let named = |order: usize| match stops[order].0 {
+            PoseKind::Verification => format!("v{}", order + 1 - (stops.len() - verification.len())),
+            _ => format!("p{}", order + 1),
+        };
+        match order(shape, &request, &pace(self.profile(), self.args)) {
+            Ok(route) => {
+                let stops = stops
+                    .iter()
+                    .enumerate()
+                    .map(|(order, (kind, index))| (*kind, named(order), pool[*index].clone()))
+                    .collect();
+                Ok(Ok(Ordered { chosen, stops, route }))
+            }
+            Err(OrderError::Unreachable { poses }) => Ok(Err(poses.iter().map(|order| stops[*order].1).collect())),
+            Err(error) => Err(Failure::from_error(ExitStatus::Usage, &error)),
+        }
+    }
+
+    fn route_rows(&self, ordered: &Ordered) -> Vec<PoseSummary> {
+        let (mut homes, mut drifts, mut vias) = (0, 0, 0);
+        let mut counted = |kind: StepKind| -> (PoseKind, String) {
+            let (kind, letter, count) = match kind {
+                StepKind::Home => (PoseKind::Home, 'h', &mut homes),
+                StepKind::Drift => (PoseKind::Drift, 'd', &mut drifts),
+                StepKind::Via | StepKind::Measure => (PoseKind::Via, 't', &mut vias),
+            };
+            *count += 1;
+            (kind, format!("{letter}{count}"))
+        };
+        ordered
+            .route
+            .steps
+            .iter()
+            .map(|step| {
+                let (kind, pose) = match (step.kind, step.pose.and_then(|pose| ordered.stops.get(pose))) {
+                    (StepKind::Measure, Some((kind, name, _))) => (*kind, name.clone()),
+                    _ => counted(step.kind),
+                };
+                self.row(kind, pose, &step.configuration, Vec::new())
+            })
+            .collect()
+    }
+
+    fn row(&self, kind: PoseKind, pose: String, configuration: &[f64], problems: Vec<String>) -> PoseSummary {
+        let edge = |(joint_type, value): (&JointType, &f64)| joint_type.quantity().to_edge(*value);
+        let point = self.candidate(configuration).point_in_base;
+        PoseSummary {
+            pose,
+            kind: kind.name().to_owned(),
+            configuration: self.joint_types.iter().zip(configuration).map(edge).collect(),
+            point_in_base_mm: Some([to_mm(point.x), to_mm(point.y), to_mm(point.z)]),
+            problems,
+        }
+    }
+
+    /// Scores the poses of a file.
+    fn check(&self, file: &Path, keep_going: &(dyn Fn() -> bool + Sync)) -> Result<PlanSummary, Failure> {
+        let (rows, mut warnings, input) = self.listed_poses(file)?;
+        let scored: Vec<&PlannedPose> = rows.iter().filter(|row| row.kind == PoseKind::Identification).collect();
+        let (mut candidates, _) = self.candidates(scored.len())?;
+        let count = scored.len();
+        let mut pool: Vec<Candidate> = scored.iter().map(|row| self.candidate(&row.configuration)).collect();
+        pool.append(&mut candidates.kept);
+        let information = self.information(&pool)?;
+        let set: Vec<usize> = (0..count).collect();
+        let mut summary = self.summary(&information, &set, &candidates.rejections, keep_going)?;
+        summary.poses = rows
+            .iter()
+            .map(|row| {
+                let problems = match row.kind {
+                    PoseKind::Home | PoseKind::Via => {
+                        self.filter.shape().obstructions(&row.configuration).iter().map(ToString::to_string).collect()
+                    }
+                    _ => self.filter.reasons(&row.configuration),
+                };
+                self.row(row.kind, row.pose.clone(), &row.configuration, problems)
+            })
+            .collect();
+        let bad: Vec<String> = summary
+            .poses
+            .iter()
+            .filter(|pose| !pose.problems.is_empty())
+            .map(|pose| format!("pose {}: {}", pose.pose, pose.problems.join(", ")))
+            .collect();
+        if !bad.is_empty() {
+            warnings.push(warning("not_measurable", shortened(&bad), true));
+        }
+        let blocked: Vec<String> = rows
+            .windows(2)
+            .filter_map(|pair| {
+                let obstruction =
+                    self.filter.shape().check_move(&pair[0].configuration, &pair[1].configuration).err()?;
+                Some(format!("from {} to {}: {obstruction}", pair[0].pose, pair[1].pose))
+            })
+            .collect();
+        if !blocked.is_empty() {
+            let text =
+                format!("moves that are not free (joint moves in the order of the file): {}", shortened(&blocked));
+            warnings.push(warning("blocked_move", text, true));
+        }
+        summary.verification_poses = rows.iter().filter(|row| row.kind == PoseKind::Verification).count();
+        warnings.append(&mut summary.warnings);
+        summary.warnings = warnings;
+        summary.provenance.inputs.push(input);
+        Ok(summary)
+    }
+
+    /// Scores `set` and compares it with random sets, the bound and other sizes.
+    fn summary(
+        &self,
+        information: &Information,
+        set: &[usize],
+        rejections: &Rejections,
+        keep_going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<PlanSummary, Failure> {
+        let failure = |error: PlanningError| planning_failure(&error);
+        let score = Score::new(information, set).map_err(failure)?;
+        let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.args.seed).map_err(failure)?;
+        let bound = DesignBound::new(information, &|| true);
+        let d_efficiency = bound.efficiency(information, set).map_err(failure)?;
+        let sizes = trade_off(information, &[], &SIZES, self.args.seed, keep_going).map_err(failure)?;
+        let sigma = self.sigma();
+        let spread = |spread: &crate::planning::Spread| SpreadSummary { median: spread.median, best: spread.best };
+        let indices = &score.observability;
+        let mut warnings = Vec::new();
+        if let Some(sigma) = sigma
+            && score.weak(sigma).any(|weak| weak.identifiable)
+        {
+            let text = "some identifiable parameters stay weakly determined (listed below); more poses or wider joint ranges help";
+            warnings.push(warning("weak_parameters", text.to_owned(), false));
+        }
+        Ok(PlanSummary {
+            schema: SCHEMA,
+            provenance: provenance(self.profile(), &self.loaded.text, Vec::new()),
+            objective: None,
+            warnings,
+            identification_poses: set.len(),
+            verification_poses: 0,
+            parameter_count: self.parameters.len(),
+            rank: score.rank,
+            condition_number: score.condition_number,
+            condition_number_raw: score.condition_number_raw,
+            observability: ObservabilitySummary {
+                o1: indices.o1,
+                o2: indices.o2,
+                o3: indices.o3,
+                o4: indices.o4,
+                o5: indices.o5,
+            },
+            predicted_error_sigma: score.predicted_error,
+            sigma_mm: sigma.map(to_mm),
+            predicted_rms_mm: sigma.map(|sigma| to_mm(score.predicted_rms(sigma))),
+            random: RandomSummary {
+                sets: yardstick.sets,
+                condition_number: spread(&yardstick.condition_number),
+                predicted_error_sigma: spread(&yardstick.predicted_error),
+            },
+            d_efficiency,
+            d_bound_gap: bound.gap,
+            trade_off: sizes.iter().map(|size| trade_off_row(size, sigma)).collect(),
+            weak_parameters: sigma.map_or_else(Vec::new, |sigma| weak_parameters(&score, sigma)),
+            blind_groups: information.observability().groups.iter().map(|group| group.description.clone()).collect(),
+            candidates: candidate_summary(rejections),
+            time: None,
+            poses: Vec::new(),
+            elapsed_s: 0.0,
+            interrupted: false,
+            written: Vec::new(),
+        })
+    }
+}
+
+fn trade_off_row(size: &TradeOff, sigma: Option<f64>) -> TradeOffSummary {
+    TradeOffSummary {
+        poses: size.poses,
+        predicted_error_sigma: size.predicted_error,
+        predicted_rms_mm: sigma.map(|sigma| to_mm(size.predicted_error * sigma)),
+        time_min: None,
+    }
+}
+
+fn weak_parameters(score: &Score, sigma: f64) -> Vec<WeakParameterSummary> {
+    score
+        .weak(sigma)
+        .filter(|weak| weak.identifiable)
+        .map(|weak| {
+            let quantity = weak.parameter.id.quantity();
+            WeakParameterSummary {
+                name: weak.parameter.id.to_string(),
+                unit: quantity.unit().to_owned(),
+                predicted_sigma: quantity.to_edge(weak.deviation_per_sigma * sigma),
+                expected: quantity.to_edge(weak.parameter.expected),
+            }
+        })
+        .collect()
+}
+
+fn candidate_summary(rejections: &Rejections) -> CandidateSummary {
+    CandidateSummary {
+        tried: rejections.tried,
+        kept: rejections.kept,
+        rejections: rejections
+            .rules()
+            .map(|(rule, rejected)| RejectionSummary {
+                rule: rule.name().to_owned(),
+                rejected: rejected.all,
+                alone: rejected.alone,
+            })
+            .collect(),
+    }
+}
+
+/// The rows of a plan file from the summary.
+fn planned_rows(summary: &PlanSummary, joint_types: &[JointType]) -> Vec<PlannedPose> {
+    summary
+        .poses
+        .iter()
+        .map(|row| PlannedPose {
+            pose: row.pose.clone(),
+            kind: row.kind.parse().unwrap_or(PoseKind::Via),
+            configuration: joint_types
+                .iter()
+                .zip(&row.configuration)
+                .map(|(joint_type, value)| joint_type.quantity().from_edge(*value))
+                .collect(),
+            point_in_base: row
+                .point_in_base_mm
+                .map(|[x, y, z]| nalgebra::Point3::new(from_mm(x), from_mm(y), from_mm(z))),
+        })
+        .collect()
+}
+
+/// The first few of many findings.
+fn shortened(findings: &[String]) -> String {
+    const SHOWN: usize = 5;
+    let more = findings.len().saturating_sub(SHOWN);
+    let list = findings.iter().take(SHOWN).cloned().collect::<Vec<_>>().join("; ");
+    if more > 0 { format!("{list}; and {more} more") } else { list }
+}
+
+fn planning_failure(error: &PlanningError) -> Failure {
+    Failure::from_error(ExitStatus::Usage, error)
+}
+
+const fn objective(argument: ObjectiveArg) -> Objective {
+    match argument {
+        ObjectiveArg::Balanced => Objective::Balanced,
+        ObjectiveArg::Condition => Objective::Condition,
+        ObjectiveArg::Prediction => Objective::Prediction,
+        ObjectiveArg::D => Objective::D,
+        ObjectiveArg::O1 => Objective::O1,
+        ObjectiveArg::O2 => Objective::O2,
+        ObjectiveArg::O3 => Objective::O3,
+        ObjectiveArg::O4 => Objective::O4,
+        ObjectiveArg::O5 => Objective::O5,
+    }
+}
+
+const fn objective_name(argument: ObjectiveArg) -> &'static str {
+    match argument {
+        ObjectiveArg::Balanced => "balanced",
+        ObjectiveArg::Condition => "condition",
+        ObjectiveArg::Prediction => "prediction",
+        ObjectiveArg::D => "d",
+        ObjectiveArg::O1 => "o1",
+        ObjectiveArg::O2 => "o2",
+        ObjectiveArg::O3 => "o3",
+        ObjectiveArg::O4 => "o4",
+        ObjectiveArg::O5 => "o5",
+    }
+}

@@ -1,0 +1,161 @@
+//! The report of `plan` on a terminal.
+
+use super::tables::{fixed, paragraph, push_line};
+use super::text::{title, warnings};
+use crate::session::plan_summary::PlanSummary;
+
+/// Report of a plan: how good it is, compared with what, what it costs, what stays weak.
+pub fn plan_text(summary: &PlanSummary) -> String {
+    let mut text = title("Pose plan", &summary.provenance);
+    text.push_str(&warnings(&summary.warnings));
+    if summary.interrupted {
+        text.push_str(&paragraph("note    ", "the search was cut short; this is the best set found so far"));
+        text.push('\n');
+    }
+    text.push_str(&figures(summary));
+    text.push_str(&comparison(summary));
+    text.push_str(&trade_off(summary));
+    text.push_str(&weak(summary));
+    text.push_str(&candidates(summary));
+    for file in &summary.written {
+        push_line(&mut text, &format!("written: {file}"));
+    }
+    text
+}
+
+fn figures(summary: &PlanSummary) -> String {
+    let objective = summary.objective.as_deref().map_or(String::new(), |objective| format!(", objective {objective}"));
+    let mut text = paragraph(
+        "",
+        &format!(
+            "{} poses to identify {} parameters (rank {}), {} to verify{objective}",
+            summary.identification_poses, summary.parameter_count, summary.rank, summary.verification_poses
+        ),
+    );
+    if let Some(rms) = summary.predicted_rms_mm {
+        let sigma = summary.sigma_mm.unwrap_or_default();
+        let line = format!(
+            "  predicted position error on fresh poses {} mm rms (sigma {} mm), from the instrument alone",
+            fixed(rms, 4),
+            fixed(sigma, 4)
+        );
+        text.push_str(&paragraph("  ", line.trim_start()));
+    }
+    if let Some(time) = &summary.time {
+        push_line(
+            &mut text,
+            &format!(
+                "  about {:.0} min: {:.0} min on the way, {:.0} min measuring",
+                time.total_min, time.moving_min, time.measuring_min
+            ),
+        );
+    }
+    push_line(&mut text, &format!("  planned in {:.1} s", summary.elapsed_s));
+    text.push('\n');
+    text
+}
+
+fn comparison(summary: &PlanSummary) -> String {
+    let mut text = String::new();
+    let random = &summary.random;
+    push_line(&mut text, &format!("  {:<34}{:>12}{:>16}{:>14}", "", "this set", "random median", "random best"));
+    push_line(
+        &mut text,
+        &format!(
+            "  {:<34}{:>12}{:>16}{:>14}",
+            "predicted error (sigma)",
+            fixed(summary.predicted_error_sigma, 3),
+            fixed(random.predicted_error_sigma.median, 3),
+            fixed(random.predicted_error_sigma.best, 3)
+        ),
+    );
+    push_line(
+        &mut text,
+        &format!(
+            "  {:<34}{:>12}{:>16}{:>14}",
+            "condition number (expected dev.)",
+            fixed(summary.condition_number, 1),
+            fixed(random.condition_number.median, 1),
+            fixed(random.condition_number.best, 1)
+        ),
+    );
+    push_line(
+        &mut text,
+        &format!("  {:<34}{:>12}", "condition number (mm, rad)", fixed(summary.condition_number_raw, 0)),
+    );
+    let o = &summary.observability;
+    push_line(
+        &mut text,
+        &format!("  observability O1 {:.3e}  O2 {:.3e}  O3 {:.3e}  O4 {:.3e}  O5 {:.3e}", o.o1, o.o2, o.o3, o.o4, o.o5),
+    );
+    push_line(
+        &mut text,
+        &format!("  D-efficiency {} % of the upper bound for these candidates", fixed(100.0 * summary.d_efficiency, 1)),
+    );
+    text.push('\n');
+    text
+}
+
+fn trade_off(summary: &PlanSummary) -> String {
+    let mut text = String::new();
+    if summary.trade_off.is_empty() {
+        return text;
+    }
+    push_line(&mut text, "What more or fewer poses would give (quick sets):");
+    push_line(
+        &mut text,
+        &format!("  {:>6}{:>18}{:>18}{:>12}", "poses", "error (sigma)", "error rms (mm)", "time (min)"),
+    );
+    for row in &summary.trade_off {
+        let optional =
+            |value: Option<f64>, decimals| value.map_or_else(|| "-".to_owned(), |value| fixed(value, decimals));
+        push_line(
+            &mut text,
+            &format!(
+                "  {:>6}{:>18}{:>18}{:>12}",
+                row.poses,
+                fixed(row.predicted_error_sigma, 3),
+                optional(row.predicted_rms_mm, 4),
+                optional(row.time_min, 0)
+            ),
+        );
+    }
+    text.push('\n');
+    text
+}
+
+fn weak(summary: &PlanSummary) -> String {
+    let mut text = String::new();
+    if !summary.weak_parameters.is_empty() {
+        push_line(&mut text, "Weakly determined (predicted sigma, expected deviation):");
+        for weak in &summary.weak_parameters {
+            push_line(
+                &mut text,
+                &format!("  {:<12}{:>10.4} {:>10.4} {}", weak.name, weak.predicted_sigma, weak.expected, weak.unit),
+            );
+        }
+        text.push('\n');
+    }
+    if !summary.blind_groups.is_empty() {
+        push_line(&mut text, "What no set of poses can tell:");
+        for group in &summary.blind_groups {
+            text.push_str(&paragraph("  - ", group));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn candidates(summary: &PlanSummary) -> String {
+    let candidates = &summary.candidates;
+    let mut text =
+        format!("Candidates: {} of {} configurations tried can be measured\n", candidates.kept, candidates.tried);
+    if !candidates.rejections.is_empty() {
+        push_line(&mut text, &format!("  {:<24}{:>12}{:>14}", "rule", "rejected", "by it alone"));
+        for rejection in &candidates.rejections {
+            push_line(&mut text, &format!("  {:<24}{:>12}{:>14}", rejection.rule, rejection.rejected, rejection.alone));
+        }
+    }
+    text.push('\n');
+    text
+}
