@@ -270,7 +270,9 @@ impl<'a> Planner<'a> {
         let result = thread::scope(|scope| {
             let worker = thread::Builder::new().name("plan".to_owned()).spawn_scoped(scope, || {
                 // A progress line that nobody has room for is dropped: the search never waits for a terminal.
-                let told = |progress: &crate::planning::Progress| drop(sender.try_send(*progress));
+                let told = |progress: &crate::planning::Progress| {
+                    let _was_full = sender.try_send(*progress).is_err();
+                };
                 let chosen = plan_in_parallel(&search, threads, keep_going, &told);
                 drop(sender);
                 chosen
