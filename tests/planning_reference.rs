@@ -337,6 +337,10 @@ fn the_smallest_set_is_found_and_a_smaller_one_refused() {
         PlanningError::TooFewCandidates { poses: 301, candidates: 300 }
     );
     assert_eq!(
+        Yardstick::new(information, 301, 1, 1).unwrap_err(),
+        PlanningError::TooFewCandidates { poses: 301, candidates: 300 }
+    );
+    assert_eq!(
         refused(SearchSettings { required: vec![3, 300], ..default() }),
         PlanningError::UnknownCandidate { pose: 300, candidates: 300 }
     );
