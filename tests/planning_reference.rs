@@ -116,7 +116,7 @@ impl Reference {
     }
 }
 
-/// Standard deviation of a measured coordinate in the simulations [m].
+/// Standard deviation of a measured coordinate in the simulations (m).
 const SIGMA: f64 = 10.0 * MICROMETRE;
 
 #[expect(clippy::disallowed_methods, reason = "times are printed for the reader; nothing depends on them")]
