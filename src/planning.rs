@@ -11,7 +11,19 @@
 //!
 //! The condition number alone is a bad master: sets that minimise it predict worse than random ones, because they give up the
 //! strong directions. The default objective ([`Objective::Balanced`]) therefore minimises it only among sets whose predicted
-//! error is near the best found. A bound from approximate design ([`DesignBound`]) says how much a better set could still gain.
+//! error is near the best found. Measured on the paper's robot (1 mm and 0.1° expected, 1500 random candidates; the last column
+//! is the median error at fresh poses over 1000 simulated calibrations, against 56 random poses, σ = 10 µm):
+//!
+//! | poses | condition number | predicted error (σ) | error of the identified arm |
+//! |---|---|---|---|
+//! | 56 random (median) | 94 | 0.76 | 0.75 σ |
+//! | 56 balanced | 62 | 0.68 | −11 % |
+//! | 56 by prediction | 86 | 0.65 | −14 % |
+//! | 56 D-optimal | 86 | 0.67 | −13 % |
+//! | 46 balanced | 62 | 0.75 | −1 % |
+//! | 56 by condition number | 28 | 2.56 | +188 % |
+//!
+//! A bound from approximate design ([`DesignBound`]) says how much a better set could still gain.
 //!
 //! Lengths in metres, angles in radians, configurations in pendant values. Nothing here reads a file or a clock or starts a
 //! thread; randomness comes only from a passed seed, time limits only as a callback. [`crate::runtime::search`] runs the

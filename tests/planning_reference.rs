@@ -116,7 +116,7 @@ impl Reference {
     }
 }
 
-/// Standard deviation of a measured coordinate in the simulations [m].
+/// Standard deviation of a measured coordinate in the simulations (m).
 const SIGMA: f64 = 10.0 * MICROMETRE;
 
 #[expect(clippy::disallowed_methods, reason = "times are printed for the reader; nothing depends on them")]
@@ -334,6 +334,10 @@ fn the_smallest_set_is_found_and_a_smaller_one_refused() {
     );
     assert_eq!(
         refused(SearchSettings { poses: 301, ..default() }),
+        PlanningError::TooFewCandidates { poses: 301, candidates: 300 }
+    );
+    assert_eq!(
+        Yardstick::new(information, 301, 1, 1).unwrap_err(),
         PlanningError::TooFewCandidates { poses: 301, candidates: 300 }
     );
     assert_eq!(

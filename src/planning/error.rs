@@ -22,9 +22,9 @@ pub enum PlanningError {
     CrossedLimits {
         /// Number of the joint, from 1.
         joint: String,
-        /// Lower limit [rad] or [m].
+        /// Lower limit (rad) or (m).
         low: f64,
-        /// Upper limit [rad] or [m].
+        /// Upper limit (rad) or (m).
         high: f64,
     },
     /// Limits that have nothing in common with those of the profile.
@@ -32,11 +32,11 @@ pub enum PlanningError {
     OutsideLimits {
         /// Number of the joint, from 1.
         joint: String,
-        /// Lower limit asked for [rad] or [m].
+        /// Lower limit asked for (rad) or (m).
         low: f64,
-        /// Upper limit asked for [rad] or [m].
+        /// Upper limit asked for (rad) or (m).
         high: f64,
-        /// Limits of the joint [rad] or [m].
+        /// Limits of the joint (rad) or (m).
         limits: (f64, f64),
     },
     /// A joint that the arm does not have.

@@ -31,12 +31,12 @@ const ROUNDING: f64 = 1e-11;
 pub struct Information {
     parameters: Vec<FreeParameter>,
     observability: Observability,
-    /// `S V`: from reduced to real parameters, n × rank ([m] or [rad]).
+    /// `S V`: from reduced to real parameters, n × rank ((m) or (rad)).
     basis: DMatrix<f64>,
     points: Vec<Point3<f64>>,
-    /// G of every candidate, row by row: x, y, z of m numbers each [m].
+    /// G of every candidate, row by row: x, y, z of m numbers each (m).
     rows: Vec<f64>,
-    /// W: mean of `GᵀG` over the fresh poses, m × m [m²].
+    /// W: mean of `GᵀG` over the fresh poses, m × m (m²).
     fresh: DMatrix<f64>,
 }
 
@@ -114,7 +114,7 @@ impl Information {
         (self.rank() + FRAME).div_ceil(3)
     }
 
-    /// Predicted position of a candidate in the base [m].
+    /// Predicted position of a candidate in the base (m).
     pub fn point(&self, candidate: usize) -> &Point3<f64> {
         &self.points[candidate]
     }
@@ -135,12 +135,12 @@ impl Information {
         &self.basis
     }
 
-    /// W, m × m [m²].
+    /// W, m × m (m²).
     pub(super) const fn fresh(&self) -> &DMatrix<f64> {
         &self.fresh
     }
 
-    /// Sum of `GᵀG` over a set, m × m [m²].
+    /// Sum of `GᵀG` over a set, m × m (m²).
     pub(super) fn sum(&self, set: &[usize]) -> DMatrix<f64> {
         let width = self.width();
         let mut stacked = DMatrix::zeros(width, 3 * set.len());
@@ -194,7 +194,7 @@ struct Reduction<'a> {
 }
 
 impl Reduction<'_> {
-    /// Predicted points [m] and `B S V` of `places`: the rows x, y, z of each as columns of a rank × 3N matrix.
+    /// Predicted points (m) and `B S V` of `places`: the rows x, y, z of each as columns of a rank × 3N matrix.
     fn jacobians(&self, places: &[TargetAt]) -> (Vec<Point3<f64>>, DMatrix<f64>) {
         let n = self.parameters.len();
         let arm = ForwardKinematics::new(&self.model.chain);

@@ -14,7 +14,7 @@ pub(super) fn direction(information: &Information, from: usize, to: usize) -> Ve
     if length < SAME_POINT { Vector3::zeros() } else { difference / length }
 }
 
-/// Gram matrix of all pairs of a set, rank × rank [m²].
+/// Gram matrix of all pairs of a set, rank × rank (m²).
 pub(super) fn pair_gram(information: &Information, set: &[usize]) -> DMatrix<f64> {
     let rank = information.rank();
     let mut gram = DMatrix::zeros(rank, rank);

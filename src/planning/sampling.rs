@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::PlanningError;
 use crate::profile::Profile;
 
-/// Lowest and highest pendant value of every joint [rad] or [m].
+/// Lowest and highest pendant value of every joint (rad) or (m).
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointBox {
     ranges: Vec<(f64, f64)>,

@@ -53,7 +53,7 @@ pub struct ObservabilityIndices {
 }
 
 impl ObservabilityIndices {
-    /// From the eigenvalues `σ²` of the Gram matrix of the pair rows [m²], all positive, in any order, for `poses` poses.
+    /// From the eigenvalues `σ²` of the Gram matrix of the pair rows (m²), all positive, in any order, for `poses` poses.
     pub(super) fn new(eigenvalues: &[f64], poses: usize) -> Self {
         let smallest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
         let largest = eigenvalues.iter().copied().fold(0.0, f64::max).sqrt();
@@ -80,7 +80,7 @@ pub struct ParameterPrecision {
 }
 
 impl ParameterPrecision {
-    /// Whether a measurement with `sigma` [m] leaves it more than a third of its expected deviation unknown.
+    /// Whether a measurement with `sigma` (m) leaves it more than a third of its expected deviation unknown.
     pub fn is_weak(&self, sigma: f64) -> bool {
         !self.identifiable || self.deviation_per_sigma * sigma > WEAK_SHARE * self.parameter.expected
     }
@@ -134,14 +134,14 @@ impl Score {
         })
     }
 
-    /// Predicted RMS position error at fresh poses [m] for an instrument with standard deviation `sigma` [m] per coordinate.
+    /// Predicted RMS position error at fresh poses (m) for an instrument with standard deviation `sigma` (m) per coordinate.
     ///
     /// It holds what the instrument causes; what no kinematic model can express comes on top.
     pub fn predicted_rms(&self, sigma: f64) -> f64 {
         self.predicted_error * sigma
     }
 
-    /// The parameters that stay weak when measured with `sigma` [m].
+    /// The parameters that stay weak when measured with `sigma` (m).
     pub fn weak(&self, sigma: f64) -> impl Iterator<Item = &ParameterPrecision> {
         self.precision.iter().filter(move |precision| precision.is_weak(sigma))
     }

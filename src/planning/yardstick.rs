@@ -1,7 +1,7 @@
 //! What random sets of the same size reach: the yardstick beside every plan.
 
 use rand::SeedableRng as _;
-use rand::seq::index::sample;
+use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::exchange::Merit;
@@ -38,13 +38,17 @@ impl Yardstick {
     pub fn new(information: &Information, poses: usize, sets: usize, seed: u64) -> Result<Self, PlanningError> {
         check_count(information, poses)?;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        if poses > information.len() {
+            return Err(PlanningError::TooFewCandidates { poses, candidates: information.len() });
+        }
         let sets = sets.max(1);
+        let mut pool: Vec<usize> = (0..information.len()).collect();
         let (conditions, errors) = (0..sets)
             .map(|_| {
-                let set = sample(&mut rng, information.len(), poses).into_vec();
-                let eigenvalues = pair_gram(information, &set).symmetric_eigenvalues();
+                let (set, _) = pool.partial_shuffle(&mut rng, poses);
+                let eigenvalues = pair_gram(information, set).symmetric_eigenvalues();
                 let condition = condition_number(eigenvalues.as_slice()).unwrap_or(f64::INFINITY);
-                (condition, Merit::new(information, information.sum(&set)).predicted_error())
+                (condition, Merit::new(information, information.sum(set)).predicted_error())
             })
             .unzip();
         Ok(Self { sets, condition_number: Spread::new(conditions), predicted_error: Spread::new(errors) })
