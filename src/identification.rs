@@ -38,7 +38,7 @@ pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedP
 use crate::geometry::{principal_spread, register};
 use crate::kinematics::ParameterId;
 use crate::units::{MICROMETRE, to_mm};
-use linearise::{Evaluation, Weights, length_rows};
+use linearise::{Evaluation, SMALLEST_SIGMA, Weights, length_rows};
 use solver::{Basis, Linearised, Solve};
 
 /// How pairs of points are weighted.
@@ -82,6 +82,8 @@ pub enum SigmaSource {
     Instrument,
     /// Estimated from the residuals of this fit.
     Residuals,
+    /// Nothing was stated and the data are too few to tell: a guess.
+    Assumed,
 }
 
 /// How to identify.
@@ -147,12 +149,14 @@ pub struct Sigma {
     /// What the residuals say (m): root mean square per coordinate, corrected for the parameters fitted; `None` without
     /// enough data.
     pub from_residuals: Option<f64>,
+    /// Root mean square of the residuals in units of the σ of each reading, corrected likewise; 1 where σ is right.
+    pub normalised: Option<f64>,
 }
 
 impl Sigma {
     /// How much larger the residuals are than σ promised; 1 where they fit.
     pub fn excess(&self) -> f64 {
-        self.from_residuals.map_or(1.0, |residual| (residual / self.used).max(1.0))
+        self.normalised.map_or(1.0, |normalised| normalised.max(1.0))
     }
 }
 
@@ -182,14 +186,23 @@ pub enum RejectionReason {
     SwappedWith(usize),
 }
 
+/// Which sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SampleIndex {
+    /// A measured point or the seat of a shared point, in the order of [`Observations::places`].
+    Place(usize),
+    /// A measured length.
+    Length(usize),
+}
+
 /// A sample that does not count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rejected {
-    /// Index of the place, in the order of [`Observations::places`].
-    pub place: usize,
+    /// Which one.
+    pub sample: SampleIndex,
     /// Distance from the prediction of the model fitted without it (m).
     pub residual: f64,
-    /// The same in robust standard deviations of the accepted samples.
+    /// The same in units of what it should scatter by, judged by the accepted samples.
     pub ratio: f64,
     /// Likely cause.
     pub reason: RejectionReason,
@@ -223,7 +236,7 @@ pub struct Identification {
 impl Identification {
     /// Whether the place was left out.
     pub fn is_rejected(&self, place: usize) -> bool {
-        self.rejected.iter().any(|rejected| rejected.place == place)
+        self.rejected.iter().any(|rejected| rejected.sample == SampleIndex::Place(place))
     }
 
     /// Correlation of two parameters, −1 … 1; zero where one has no uncertainty.
@@ -317,10 +330,10 @@ pub enum IdentificationError {
     Diverged,
 }
 
-/// Smallest σ that is ever assumed (m): below the resolution of any instrument, above the arithmetic.
-const SMALLEST_SIGMA: f64 = 1e-3 * MICROMETRE;
 /// First guess of σ where it is estimated (m).
 const FIRST_SIGMA: f64 = 50.0 * MICROMETRE;
+/// Two rows are swapped if exchanging their points leaves less than this fraction of their residuals.
+const SWAP_FITS: f64 = 0.05;
 /// Rounds of estimating σ, and the relative change that ends them.
 const SIGMA_ROUNDS: usize = 50;
 const SIGMA_TOLERANCE: f64 = 1e-4;
@@ -361,12 +374,13 @@ pub fn identify(
     }
     let mut at = fit.solve(zero.clone());
     if settings.estimator == Estimator::Robust {
-        let floor = settings.sigma.map_or(SMALLEST_SIGMA, |(sigma, _)| sigma);
+        // Where σ was stated, a sample within it is never an outlier, however good the others are.
+        let floor = if settings.sigma.is_some() || has_own_sigmas(problem) { 1.0 } else { 1e-3 };
         let solve = Solve { problem, weighting: settings.weighting, basis: &basis, weights: &fit.weights };
-        let trust = robust::find_outliers(&solve, &at.0, floor);
-        if trust != fit.weights.trust {
+        let trusted = robust::find_outliers(&solve, &at.0, floor);
+        if (&trusted.trust, &trusted.length_trust) != (&fit.weights.trust, &fit.weights.length_trust) {
             // From the start: the steps on record are those that lead to the result.
-            fit.weights.trust = trust;
+            fit.weights = trusted;
             fit.iterations.clear();
             at = fit.solve(zero);
         }
@@ -378,6 +392,12 @@ pub fn identify(
     check_chirality(problem, &at.model, Some(&fit.weights))?;
     let Fit { weights, iterations, .. } = fit;
     Ok(summarise(Solved { problem, settings, basis: &basis, weights, iterations, termination, at, observability }))
+}
+
+/// Whether every point comes with its own σ.
+fn has_own_sigmas(problem: &Problem<'_>) -> bool {
+    let points = &problem.observations.points;
+    !points.is_empty() && points.iter().all(|sample| sample.sigma.is_some())
 }
 
 /// The running state of an identification.
@@ -404,14 +424,18 @@ impl Fit<'_, '_> {
             };
             let before = self.iterations.len();
             let left = self.settings.iterations.saturating_sub(before).max(usize::from(before == 0));
-            let (at, termination) = solve.run(z, left, &mut self.iterations);
-            for iteration in &self.iterations[before..] {
-                (self.progress)(iteration);
-            }
+            let (iterations, progress) = (&mut self.iterations, &mut *self.progress);
+            let mut record = |iteration| {
+                progress(&iteration);
+                iterations.push(iteration);
+            };
+            let (at, termination) = solve.run(z, left, &mut record);
             rounds += 1;
             let stop = termination != TerminationReason::Converged || rounds >= SIGMA_ROUNDS;
             let estimated = self.settings.sigma.is_none().then(|| residual_sigma(&solve, &at)).flatten();
-            let Some(sigma) = estimated.map(|sigma| sigma.max(SMALLEST_SIGMA)) else { return (at, termination) };
+            let Some(sigma) = estimated.map(|scatter| scatter.absolute.max(SMALLEST_SIGMA)) else {
+                return (at, termination);
+            };
             // Without a prior σ only scales the cost: the solution is the same.
             let settled =
                 (sigma / self.weights.sigma - 1.0).abs() < SIGMA_TOLERANCE || self.settings.prior == Prior::None;
@@ -430,18 +454,30 @@ fn solve_with(fit: &Fit<'_, '_>, z: DVector<f64>) -> Linearised {
         .linearise(z)
 }
 
-/// σ of a coordinate from the residuals (m): square sum over independent values less the parameters that the data (not the
-/// prior) determined. Lengths that come with their own σ do not count.
-fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<f64> {
+/// Scatter of the residuals.
+#[derive(Clone, Copy, Debug)]
+struct Scatter {
+    /// Root mean square (m), of samples without a σ of their own if there are any.
+    absolute: f64,
+    /// Root mean square in units of the σ of each sample.
+    normalised: f64,
+}
+
+/// Scatter of the residuals, over independent values less the parameters that the data (not the prior) determined. `None` where
+/// nothing is left over to tell.
+fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<Scatter> {
     let Solve { problem, weights, basis, .. } = solve;
     let observations = problem.observations;
-    let mut square = 0.0;
-    let mut values = 0.0;
+    let (mut square, mut normalised, mut values) = (0.0, 0.0, 0.0);
+    let mut add = |residual: f64, sigma: f64| {
+        square += residual;
+        normalised += residual / (sigma * sigma);
+    };
     let stations = at.points.base_from_station.len();
     let mut seen = vec![0.0; stations];
     for (index, sample) in observations.points.iter().enumerate() {
         if weights.trust[index] > 0.0 {
-            square += at.points.of_places[index].norm_squared();
+            add(at.points.of_places[index].norm_squared(), weights.sigma_of(problem, index));
             seen[sample.station] += 3.0;
         }
     }
@@ -449,17 +485,22 @@ fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<f64> {
     let mut place = observations.points.len();
     for shared in &observations.shared {
         let seats = (place..place + shared.at.len()).filter(|&index| weights.trust[index] > 0.0);
-        let count = seats.clone().count();
-        square += seats.map(|index| at.points.of_places[index].norm_squared()).sum::<f64>();
-        values += 3.0 * count.saturating_sub(1) as f64;
+        values += 3.0 * seats.clone().count().saturating_sub(1) as f64;
+        for index in seats {
+            add(at.points.of_places[index].norm_squared(), weights.sigma);
+        }
         place += shared.at.len();
     }
-    if observations.lengths.iter().any(|length| length.sigma.is_none()) {
+    if !observations.lengths.is_empty() {
         let evaluation = Evaluation::new(problem, &at.model);
-        let rows = length_rows(problem, &evaluation, weights);
-        for (length, residual) in observations.lengths.iter().zip(&rows.residuals) {
-            if length.sigma.is_none() {
-                square += (residual * weights.sigma).powi(2);
+        let rows = length_rows(problem, &evaluation, weights, weights);
+        for ((length, residual), trust) in observations.lengths.iter().zip(&rows.residuals).zip(&weights.length_trust) {
+            // A known distance between sockets is a condition, not a sample of the scatter.
+            if *trust > 0.0
+                && (length.sigma.is_none() || observations.points.is_empty() && observations.shared.is_empty())
+            {
+                let sigma = length.sigma.unwrap_or(weights.sigma).max(SMALLEST_SIGMA);
+                add((residual * sigma).powi(2), sigma);
                 values += 1.0;
             }
         }
@@ -467,7 +508,7 @@ fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<f64> {
     let data = basis.transform.transpose() * (&at.normal.gram * &basis.transform);
     let determined = solve.hessian(at).cholesky().map(|factor| factor.solve(&data).trace())?;
     let freedom = values - determined;
-    (freedom >= 1.0).then(|| (square / freedom).sqrt())
+    (freedom >= 1.0).then(|| Scatter { absolute: (square / freedom).sqrt(), normalised: (normalised / freedom).sqrt() })
 }
 
 /// A finished solve.
@@ -485,16 +526,19 @@ struct Solved<'a, 'p> {
 fn summarise(solved: Solved<'_, '_>) -> Identification {
     let Solved { problem, settings, basis, weights, iterations, termination, at, observability } = solved;
     let solve = Solve { problem, weighting: settings.weighting, basis, weights: &weights };
-    let from_residuals = residual_sigma(&solve, &at);
+    let scatter = residual_sigma(&solve, &at);
+    let (from_residuals, normalised) = (scatter.map(|s| s.absolute), scatter.map(|s| s.normalised));
     let readings = problem.observations.points.iter().map(|sample| sample.sigma).collect::<Option<Vec<f64>>>();
-    let sigma = match (readings.filter(|readings| !readings.is_empty()), settings.sigma) {
+    let (used, source) = match (readings.filter(|readings| !readings.is_empty()), settings.sigma) {
         (Some(readings), _) => {
             let mean = readings.iter().map(|sigma| sigma * sigma).sum::<f64>() / readings.len() as f64;
-            Sigma { used: mean.sqrt(), source: SigmaSource::Readings, from_residuals }
+            (mean.sqrt(), SigmaSource::Readings)
         }
-        (None, Some((used, source))) => Sigma { used, source, from_residuals },
-        (None, None) => Sigma { used: weights.sigma, source: SigmaSource::Residuals, from_residuals },
+        (None, Some((_, source))) => (weights.sigma, source),
+        (None, None) if scatter.is_some() => (weights.sigma, SigmaSource::Residuals),
+        (None, None) => (weights.sigma, SigmaSource::Assumed),
     };
+    let sigma = Sigma { used, source, from_residuals, normalised };
     let covariance = covariance(&solve, &at, sigma.excess());
     let estimates = problem
         .parameters
@@ -509,8 +553,13 @@ fn summarise(solved: Solved<'_, '_>) -> Identification {
             identifiable: observability.is_identifiable(index),
         })
         .collect();
-    let floor = settings.sigma.map_or(SMALLEST_SIGMA, |(sigma, _)| sigma);
-    let rejected = rejected(problem, &at, &weights, floor);
+    let rejected = rejected(&solve, &at, &weights);
+    let observability = if rejected.is_empty() {
+        observability
+    } else {
+        let accepted = problem.observations.without(&rejected);
+        Observability::new(&Problem { observations: &accepted, ..*problem })
+    };
     Identification {
         model: at.model,
         estimates,
@@ -550,28 +599,45 @@ fn covariance(solve: &Solve<'_, '_>, at: &Linearised, excess: f64) -> DMatrix<f6
 }
 
 /// The samples without trust, with the likely cause.
-fn rejected(problem: &Problem<'_>, at: &Linearised, weights: &Weights, floor: f64) -> Vec<Rejected> {
-    let places: Vec<usize> = (0..weights.trust.len()).filter(|&place| weights.trust[place] <= 0.0).collect();
-    let sigma = robust::robust_sigma(problem, &at.points.of_places, &weights.trust, floor);
-    let limit = robust::REJECT_AT * sigma;
+fn rejected(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights) -> Vec<Rejected> {
+    let problem = solve.problem;
     let points = &problem.observations.points;
+    let lengths = &problem.observations.lengths;
+    let places = points.len() + problem.observations.shared.iter().map(|shared| shared.at.len()).sum::<usize>();
+    let left_out: Vec<usize> =
+        (0..places + lengths.len()).filter(|&sample| weights.of_sample(sample, places) <= 0.0).collect();
+    if left_out.is_empty() {
+        return Vec::new();
+    }
+    let judged = robust::judge(solve, at, weights, 0.0);
     let predicted = |place: usize| at.model.point_in_base(&points[place].at);
     let measured = |place: usize| at.points.base_from_station[points[place].station] * points[place].point;
-    let swapped = |place: usize| {
-        places.iter().copied().find(|&other| {
-            other != place
-                && place < points.len()
-                && other < points.len()
-                && (measured(other) - predicted(place)).norm() <= limit
-                && (measured(place) - predicted(other)).norm() <= limit
-        })
+    // Close enough to be the other's point: a small part of how far off each is where it stands.
+    let fits = |place: usize, other: usize| {
+        let own = at.points.of_places[place].norm().min(at.points.of_places[other].norm());
+        (measured(other) - predicted(place)).norm() < SWAP_FITS * own
     };
-    places
+    let swapped = |place: usize| {
+        left_out
+            .iter()
+            .copied()
+            .filter(|&other| other != place && place < points.len() && other < points.len())
+            .find(|&other| fits(place, other) && fits(other, place))
+    };
+    let length_residual = |index: usize| {
+        let errors = verification::DirectErrors::new(&at.model, problem.observations);
+        errors.lengths.get(index).map_or(0.0, |error| error.abs())
+    };
+    left_out
         .iter()
-        .map(|&place| {
-            let residual = at.points.of_places[place].norm();
-            let reason = swapped(place).map_or(RejectionReason::Outlier, RejectionReason::SwappedWith);
-            Rejected { place, residual, ratio: residual / sigma, reason }
+        .map(|&sample| {
+            let (index, residual) = if sample < places {
+                (SampleIndex::Place(sample), at.points.of_places[sample].norm())
+            } else {
+                (SampleIndex::Length(sample - places), length_residual(sample - places))
+            };
+            let reason = swapped(sample).map_or(RejectionReason::Outlier, RejectionReason::SwappedWith);
+            Rejected { sample: index, residual, ratio: judged.ratios[sample], reason }
         })
         .collect()
 }

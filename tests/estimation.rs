@@ -1,6 +1,6 @@
 //! Estimates against truth that is known: error bars by Monte Carlo, outliers, mirrored frames, other kinds of data.
 
-#![expect(clippy::unwrap_used, reason = "a failure of a test or benchmark is a panic")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure of a test or benchmark is a panic")]
 
 mod support;
 
@@ -67,6 +67,13 @@ fn normalised_errors(settings: &Settings, noise: f64) -> Vec<f64> {
     squares.into_iter().map(f64::sqrt).collect()
 }
 
+fn place(rejected: &Rejected) -> usize {
+    match rejected.sample {
+        SampleIndex::Place(place) => place,
+        SampleIndex::Length(length) => panic!("length {length} was rejected"),
+    }
+}
+
 fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
@@ -109,7 +116,7 @@ fn outliers_are_named_and_really_removed() {
             case.observations.points[index].point.coords += nalgebra::Vector3::new(0.6, -0.64, 0.48) * size;
         }
         let found = run(&case, &settings());
-        let rejected: Vec<usize> = found.rejected.iter().map(|rejected| rejected.place).collect();
+        let rejected: Vec<usize> = found.rejected.iter().map(|rejected| place(rejected)).collect();
         assert_eq!(rejected, bumped, "seed {seed}");
         assert!(found.rejected.iter().all(|rejected| rejected.reason == RejectionReason::Outlier));
 
@@ -146,7 +153,7 @@ fn swapped_rows_are_recognised() {
     points[17].point = points[40].point;
     points[40].point = first;
     let found = run(&case, &settings());
-    let reasons: Vec<_> = found.rejected.iter().map(|rejected| (rejected.place, rejected.reason)).collect();
+    let reasons: Vec<_> = found.rejected.iter().map(|rejected| (place(rejected), rejected.reason)).collect();
     assert_eq!(reasons, [(17, RejectionReason::SwappedWith(40)), (40, RejectionReason::SwappedWith(17))]);
 }
 

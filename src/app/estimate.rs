@@ -11,8 +11,8 @@ use crate::cli::{EstimationArgs, EstimatorArg, ExpectedDeviation, LevelArg, Prio
 use crate::error::{ExitStatus, Failure};
 use crate::identification::plausibility::weaknesses;
 use crate::identification::{
-    Estimator, Identification, IdentificationError, Observability, Prior, Problem, RejectionReason, Settings,
-    SigmaSource, TerminationReason, Weighting, identify,
+    Estimator, Identification, IdentificationError, Observability, Prior, Problem, RejectionReason, SampleIndex,
+    Settings, SigmaSource, TerminationReason, Weighting, identify,
 };
 use crate::kinematics::{FreeParameter, ParameterId};
 use crate::profile::{Level, Profile};
@@ -147,7 +147,7 @@ pub(super) fn warning(code: &str, message: String, blocks_acceptance: bool) -> W
 /// What the result itself gives reason to warn about.
 pub(super) fn result_warnings(problem: &Problem<'_>, found: &Identification, settings: &Settings) -> Vec<Warning> {
     let joints = problem.chain.joints();
-    let mut warnings: Vec<Warning> = weaknesses(problem, &found.observability, found.sigma.used)
+    let mut warnings: Vec<Warning> = weaknesses(problem, found)
         .iter()
         .map(|weakness| {
             let text = weakness.describe(|joint| joints[joint].name.clone(), |joint| joints[joint].joint_type);
@@ -259,7 +259,14 @@ fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary
         .rejected
         .iter()
         .map(|rejected| {
-            let SampleName { pose, line } = name(rejected.place);
+            let SampleName { pose, line } = match rejected.sample {
+                SampleIndex::Place(place) => name(place),
+                // Rows of a table of lengths name both ends; a known distance between sockets has no row.
+                SampleIndex::Length(length) => {
+                    let line = names.get(2 * length).filter(|name| name.pose == "from").map_or(0, |name| name.line);
+                    SampleName { pose: format!("length {}", length + 1), line }
+                }
+            };
             let reason = match rejected.reason {
                 RejectionReason::Outlier => format!("{:.0} times the scatter of the others", rejected.ratio),
                 RejectionReason::SwappedWith(other) => format!("looks swapped with {}", name(other).text()),
@@ -311,6 +318,7 @@ fn sigma_summary(found: &Identification) -> SigmaSummary {
         SigmaSource::Option => "option",
         SigmaSource::Instrument => "instrument",
         SigmaSource::Residuals => "residuals",
+        SigmaSource::Assumed => "assumed",
     };
     SigmaSummary {
         used_mm: to_mm(found.sigma.used),

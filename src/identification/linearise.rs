@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, SymmetricEigen, Vec
 use super::problem::{LengthEnd, Problem, TargetAt};
 use crate::geometry::register;
 use crate::kinematics::{ForwardKinematics, IdentificationJacobian, KinematicChain, ParameterId};
+use crate::units::MICROMETRE;
 
 /// An arm and its targets at some value of the parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,6 +75,17 @@ impl Evaluation {
         Self { n, points, rows }
     }
 
+    /// Norm of the largest Jacobian column over all places, columns scaled by `scale`.
+    pub(crate) fn largest_column(&self, scale: &[f64]) -> f64 {
+        let mut squares = vec![0.0; self.n];
+        for row in self.rows.chunks(self.n.max(1)) {
+            for (sum, (value, scale)) in squares.iter_mut().zip(row.iter().zip(scale)) {
+                *sum += (value * scale).powi(2);
+            }
+        }
+        squares.into_iter().fold(0.0, f64::max).sqrt()
+    }
+
     /// The three rows of a place.
     fn place(&self, index: usize) -> &[f64] {
         &self.rows[3 * self.n * index..3 * self.n * (index + 1)]
@@ -87,18 +99,53 @@ pub(crate) struct Weights {
     pub(crate) sigma: f64,
     /// Factor per place in 0 … 1: below one for a suspicious sample, zero for a rejected one.
     pub(crate) trust: Vec<f64>,
+    /// The same per measured length.
+    pub(crate) length_trust: Vec<f64>,
 }
+
+/// No instrument is better than this (m). Smaller values, a σ typed in the wrong unit, would drown the expected deviations in
+/// rounding errors.
+pub(crate) const SMALLEST_SIGMA: f64 = 0.1 * MICROMETRE;
 
 impl Weights {
     pub(crate) fn uniform(problem: &Problem<'_>, sigma: f64) -> Self {
-        Self { sigma, trust: vec![1.0; problem.observations.places().count()] }
+        let observations = problem.observations;
+        Self {
+            sigma,
+            trust: vec![1.0; observations.places().count()],
+            length_trust: vec![1.0; observations.lengths.len()],
+        }
+    }
+
+    /// Standard deviation of a coordinate of place `index` (m): of its reading, else the common one.
+    pub(crate) fn sigma_of(&self, problem: &Problem<'_>, index: usize) -> f64 {
+        let reading = problem.observations.points.get(index).and_then(|sample| sample.sigma);
+        reading.map_or(self.sigma, |sigma| sigma.max(SMALLEST_SIGMA))
+    }
+
+    /// Trust of a sample, counted over places with a residual of their own and then lengths.
+    pub(crate) fn of_sample(&self, sample: usize, places: usize) -> f64 {
+        let trust = if sample < places { self.trust.get(sample) } else { self.length_trust.get(sample - places) };
+        trust.copied().unwrap_or(0.0)
+    }
+
+    /// Sets the trust of a sample, counted as in [`Self::of_sample`].
+    pub(crate) fn set_sample(&mut self, sample: usize, places: usize, value: f64) {
+        let trust =
+            if sample < places { self.trust.get_mut(sample) } else { self.length_trust.get_mut(sample - places) };
+        if let Some(trust) = trust {
+            *trust = value;
+        }
+    }
+
+    /// Number of samples with trust, counted as in [`Self::of_sample`].
+    pub(crate) fn accepted(&self, places: usize) -> usize {
+        self.trust.iter().take(places).chain(&self.length_trust).filter(|trust| **trust > 0.0).count()
     }
 
     /// Inverse variance of each coordinate of place `index`.
     fn of_place(&self, problem: &Problem<'_>, index: usize) -> f64 {
-        let reading = problem.observations.points.get(index).and_then(|sample| sample.sigma);
-        let sigma = reading.unwrap_or(self.sigma);
-        self.trust[index] / (sigma * sigma)
+        self.trust[index] / self.sigma_of(problem, index).powi(2)
     }
 }
 
@@ -202,14 +249,18 @@ pub(crate) struct ProjectedRows {
 /// About the centroid the columns of a shift and of a turn are orthogonal, so the projection needs no decomposition:
 /// `B − mean(B)`, then `− (I⁻¹ Σ w r×B) × r` with the inertia I. Shared points do not see a turn of the base either; their
 /// rows would show one of the size of the residuals, `ω × (p − mean)`, which means nothing.
+///
+/// What is projected out is fitted with `weights`; the rows themselves are multiplied by the weights of `scale`, which is the
+/// same except where samples that do not count are to be judged.
 pub(crate) fn project(
     problem: &Problem<'_>,
     mut evaluation: Evaluation,
     residuals: &PointResiduals,
     weights: &Weights,
+    scale: &Weights,
 ) -> ProjectedRows {
     let n = evaluation.n;
-    let lengths = length_rows(problem, &evaluation, weights);
+    let lengths = length_rows(problem, &evaluation, weights, scale);
     let samples = &problem.observations.points;
     for (station, centroid) in residuals.centroids.iter().enumerate() {
         let members: Vec<usize> = (0..samples.len()).filter(|&index| samples[index].station == station).collect();
@@ -230,7 +281,7 @@ pub(crate) fn project(
     rows.truncate(3 * n * independent);
     let mut values = Vec::with_capacity(3 * independent + lengths.residuals.len());
     for index in 0..independent {
-        let root = weights.of_place(problem, index).sqrt();
+        let root = scale.of_place(problem, index).sqrt();
         for value in &mut rows[3 * n * index..3 * n * (index + 1)] {
             *value *= root;
         }
@@ -331,14 +382,19 @@ fn pseudo_inverse(inertia: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// Rows of the measured lengths: `u · (B_to − B_from)`, equations (16) and (21) with a measured length.
-pub(crate) fn length_rows(problem: &Problem<'_>, evaluation: &Evaluation, weights: &Weights) -> ProjectedRows {
+pub(crate) fn length_rows(
+    problem: &Problem<'_>,
+    evaluation: &Evaluation,
+    weights: &Weights,
+    scale: &Weights,
+) -> ProjectedRows {
     let n = evaluation.n;
     let observations = problem.observations;
     let ranges: Vec<_> = shared_ranges(problem).collect();
     let mut next_place =
         observations.points.len() + observations.shared.iter().map(|shared| shared.at.len()).sum::<usize>();
     let mut system = ProjectedRows { n, rows: Vec::new(), residuals: Vec::new() };
-    for length in &observations.lengths {
+    for (index, length) in observations.lengths.iter().enumerate() {
         let mut end = |end: &LengthEnd| match end {
             LengthEnd::Target(_) => {
                 let index = next_place;
@@ -361,7 +417,8 @@ pub(crate) fn length_rows(problem: &Problem<'_>, evaluation: &Evaluation, weight
         let u = if predicted > f64::EPSILON { difference / predicted } else { Vector3::zeros() };
         // A shared point is known only as the mean of its seats.
         let sigma = length.sigma.unwrap_or(weights.sigma);
-        let root = 1.0 / (sigma * sigma + from_variance + to_variance).sqrt();
+        let sigma = sigma.max(SMALLEST_SIGMA);
+        let root = (scale.length_trust[index] / (sigma * sigma + from_variance + to_variance)).sqrt();
         let (fx, fy, fz) = split_rows(&from_rows, n);
         let (tx, ty, tz) = split_rows(&to_rows, n);
         for c in 0..n {

@@ -17,7 +17,7 @@ use crate::units::{MILLIMETRE, Quantity};
 const CLEAR_GAP: f64 = 1e3;
 /// Singular values below this fraction of the largest may be called zero.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Arithmetic noise of the singular values, relative to the largest.
+/// Arithmetic noise of the singular values, relative to the columns before the frames were taken out.
 const NOISE_FLOOR: f64 = 1e-13;
 /// The pair rows of at most this many points, evenly picked, enter the condition number.
 const SCORED_POINTS: usize = 400;
@@ -69,13 +69,14 @@ impl Observability {
         let scale: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.expected).collect();
         let (pair_gram, scored_points) = scored_pair_gram(problem, &evaluation, weights);
         let residuals = point_residuals(problem, &evaluation.points, weights);
-        let rows = project(problem, evaluation, &residuals, weights);
+        let size = evaluation.largest_column(&scale);
+        let rows = project(problem, evaluation, &residuals, weights, weights);
         let n = scale.len();
         let svd = rows.triangular_factor(&scale).svd(false, true);
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
         let singular_values: Vec<f64> = order.iter().map(|&index| svd.singular_values[index]).collect();
-        let (rank, gap) = rank_by_gap(&singular_values);
+        let (rank, gap) = rank_by_gap(&singular_values, NOISE_FLOOR * size);
         let blind = match (rank, &svd.v_t) {
             (Some(rank), Some(v_t)) => {
                 let columns: Vec<_> = order[rank..].iter().map(|&index| v_t.row(index).transpose()).collect();
@@ -114,12 +115,13 @@ pub(crate) const fn raw_unit(id: ParameterId) -> f64 {
 }
 
 /// The rank at the largest ratio of neighbouring singular values, if that ratio is a clear gap down to negligible values.
-fn rank_by_gap(values: &[f64]) -> (Option<usize>, f64) {
+/// `noise` is the size of rounding errors: what the frames took away from the rows may have been much larger than the rest.
+fn rank_by_gap(values: &[f64], noise: f64) -> (Option<usize>, f64) {
     let largest = values.first().copied().unwrap_or(0.0);
-    if largest <= 0.0 {
+    if largest <= CLEAR_GAP * noise {
         return (Some(0), f64::INFINITY);
     }
-    let floor = NOISE_FLOOR * largest;
+    let floor = noise.max(NOISE_FLOOR * largest);
     let at = |index: usize| values.get(index).map_or(floor, |value| value.max(floor));
     let candidate = (1..=values.len())
         .filter(|&rank| at(rank) <= NEGLIGIBLE * largest)
@@ -301,16 +303,17 @@ mod tests {
 
     #[test]
     fn the_rank_stands_at_a_clear_gap() {
-        assert_eq!(rank_by_gap(&[3.0, 1.0, 1e-3, 1e-12, 0.0]), (Some(3), 1e-3 / 1e-12));
-        let (rank, gap) = rank_by_gap(&[1.0, 0.5, 0.2]);
+        assert_eq!(rank_by_gap(&[3.0, 1.0, 1e-3, 1e-12, 0.0], 1e-14), (Some(3), 1e-3 / 1e-12));
+        let (rank, gap) = rank_by_gap(&[1.0, 0.5, 0.2], 1e-13);
         assert_eq!(rank, Some(3), "gap {gap}");
-        assert_eq!(rank_by_gap(&[0.0, 0.0]).0, Some(0));
+        assert_eq!(rank_by_gap(&[0.0, 0.0], 0.0).0, Some(0));
+        assert_eq!(rank_by_gap(&[6e-15, 0.0], 1e-13).0, Some(0), "rounding errors of a frame");
     }
 
     #[test]
     fn values_that_fade_out_evenly_have_no_rank() {
         let fading: Vec<f64> = (0..14).map(|index| 10_f64.powi(-index)).collect();
-        let (rank, gap) = rank_by_gap(&fading);
+        let (rank, gap) = rank_by_gap(&fading, 1e-16);
         assert_eq!(rank, None);
         assert!((gap - 10.0).abs() < 1e-6);
     }

@@ -8,9 +8,9 @@
 use nalgebra::Point3;
 
 use super::linearise::{ArmModel, Evaluation, Weights, point_residuals, project};
-use super::problem::{Observations, PointSample, Problem};
+use super::problem::{Observations, PointSample, Problem, TargetAt};
 use super::robust::gross_trust;
-use super::{Estimator, IdentificationError, Observability, Settings, SigmaSource, identify};
+use super::{Estimator, Identification, IdentificationError, Observability, Settings, SigmaSource, identify};
 use crate::geometry::principal_spread;
 use crate::kinematics::{FreeParameter, JointType, ParameterId};
 use crate::units::{DEGREE, INCH, MILLIMETRE, to_deg, to_mm};
@@ -23,6 +23,8 @@ const ALWAYS_PLAUSIBLE: f64 = 5.0 * MILLIMETRE;
 const EXPLAINS: f64 = 0.25;
 /// A mistake explains the data only if what is left is below this fraction of their extent.
 const FITS: f64 = 0.1;
+/// Evenly picked points that are tried against each mistake: a mistake in a whole table shows in any part of it.
+const TRIED_POINTS: usize = 500;
 /// A joint that moves less than this over the whole set does not move (rad).
 const STILL_JOINT: f64 = 5.0 * DEGREE;
 /// The same for a prismatic joint (m).
@@ -122,11 +124,13 @@ pub fn compare_with_nominal(problem: &Problem<'_>) -> Result<Plausibility, Ident
     problem.check()?;
     let expected = expected_residual(problem);
     let trial = Trial::new(problem);
-    let points = &problem.observations.points;
-    let fit = trial.fit(points);
+    let all = &problem.observations.points;
+    let used = all.len().min(TRIED_POINTS);
+    let points: Vec<PointSample> = (0..used).map(|index| all[index * all.len() / used].clone()).collect();
+    let fit = trial.fit(&points);
     let mut plausibility = Plausibility { nominal: fit.typical, expected, mistake: None };
     if points.len() >= 4 && !plausibility.is_plausible() {
-        plausibility.mistake = trial.find_mistake(points, fit.relative());
+        plausibility.mistake = trial.find_mistake(&points, fit.relative());
     }
     Ok(plausibility)
 }
@@ -137,7 +141,7 @@ fn expected_residual(problem: &Problem<'_>) -> f64 {
     let evaluation = Evaluation::new(problem, &model);
     let weights = Weights::uniform(problem, 1.0);
     let residuals = point_residuals(problem, &evaluation.points, &weights);
-    let gram = project(problem, evaluation, &residuals, &weights).normal_equations().gram;
+    let gram = project(problem, evaluation, &residuals, &weights, &weights).normal_equations().gram;
     let of_links = problem.parameters.iter().enumerate().filter(|(_, p)| matches!(p.id, ParameterId::Link { .. }));
     let variance: f64 = of_links.map(|(index, p)| gram[(index, index)] * p.expected * p.expected).sum();
     (variance / problem.observations.points.len().max(1) as f64).sqrt()
@@ -342,11 +346,40 @@ impl Weakness {
     }
 }
 
-/// Looks at how rich the data are; `sigma` is the standard deviation of a measured coordinate (m).
-pub fn weaknesses(problem: &Problem<'_>, observability: &Observability, sigma: f64) -> Vec<Weakness> {
+/// The rank that this robot with these parameters has for points all over its joint space.
+fn structural_rank(problem: &Problem<'_>) -> usize {
+    const POSES: usize = 60;
+    let joints = problem.chain.joints();
+    let points = (0..POSES)
+        .map(|pose| {
+            // Multiples of irrational numbers spread evenly (Weyl); any generic set of poses shows the same rank.
+            let place = |joint: usize| ((pose + 1) as f64 * ((joint + 2) as f64).sqrt()).fract() - 0.5;
+            let configuration = joints.iter().enumerate().map(|(joint, definition)| match definition.joint_type {
+                JointType::Revolute => 4.0 * place(joint),
+                JointType::Prismatic => 0.5 * place(joint),
+            });
+            let at = TargetAt { configuration: configuration.collect(), target: pose % problem.targets.len().max(1) };
+            PointSample { at, station: 0, point: Point3::origin(), sigma: None }
+        })
+        .collect();
+    let observations = Observations { points, ..Observations::default() };
+    let generic = Problem { observations: &observations, ..*problem };
+    Observability::new(&generic).rank.unwrap_or(problem.parameters.len())
+}
+
+/// Looks at how rich the accepted data of an identification are.
+pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec<Weakness> {
+    let accepted = problem.observations.without(&identification.rejected);
+    let problem = &Problem { observations: &accepted, ..*problem };
+    let (observability, sigma) = (&identification.observability, identification.sigma.used);
     let mut found = Vec::new();
     let values = problem.observations.independent_values();
-    let combinations = observability.rank.unwrap_or(problem.parameters.len());
+    // A handful of samples cannot show the rank that the robot has: what could be found sets the demand.
+    let combinations = if values < VALUES_PER_COMBINATION * problem.parameters.len() {
+        structural_rank(problem)
+    } else {
+        observability.rank.unwrap_or(problem.parameters.len())
+    };
     if values < VALUES_PER_COMBINATION * combinations {
         found.push(Weakness::TooFewData { values, combinations });
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::IdentificationError;
+use super::{IdentificationError, Rejected, SampleIndex};
 use crate::kinematics::{FreeParameter, KinematicChain, ParameterId};
 
 /// A configuration and the target that was observed there.
@@ -76,6 +76,25 @@ impl Observations {
         let points: usize = (0..stations).map(|station| (3 * of_station(station)).saturating_sub(6)).sum();
         let shared: usize = self.shared.iter().map(|shared| 3 * shared.at.len().saturating_sub(1)).sum();
         points + shared + self.lengths.len()
+    }
+
+    /// The observations without the rejected ones. Shared points keep their place in the list, also without a seat.
+    #[must_use]
+    pub fn without(&self, rejected: &[Rejected]) -> Self {
+        let is_rejected = |sample: SampleIndex| rejected.iter().any(|rejected| rejected.sample == sample);
+        let mut place = 0;
+        let mut keeps = || {
+            place += 1;
+            !is_rejected(SampleIndex::Place(place - 1))
+        };
+        let points = self.points.iter().filter(|_| keeps()).cloned().collect();
+        let shared = self
+            .shared
+            .iter()
+            .map(|shared| SharedPoint { at: shared.at.iter().filter(|_| keeps()).cloned().collect() });
+        let shared = shared.collect();
+        let kept = self.lengths.iter().enumerate().filter(|(index, _)| !is_rejected(SampleIndex::Length(*index)));
+        Self { points, shared, lengths: kept.map(|(_, length)| length.clone()).collect() }
     }
 
     /// All places where the target was observed, in a fixed order: points, shared points, lengths.

@@ -1,21 +1,28 @@
-//! Outliers: robust estimation over whole points, and the decision which samples to reject.
+//! Outliers: which samples do not belong to the others, and which of them to trust.
 //!
-//! A bumped SMR spoils one point and with it all M − 1 distances that end there, so trust is a property of a point. Clean data
-//! keep the full efficiency of least squares: the robust loss only finds the outliers, which are then removed for real and the
-//! rest is fitted with full weights.
+//! A bumped SMR spoils one point and with it all M − 1 distances that end there, so trust is a property of a point (or of a
+//! measured length), not of a pair. Clean data keep the full efficiency of least squares: the robust loss only finds the
+//! outliers, which are then removed for real and the rest is fitted with full weights.
+//!
+//! Samples are judged by their *studentised* residual: the residual in units of what it should scatter by once the fit has
+//! followed it, `√(eᵀ (I − h)⁻¹ e)` with the leverage h, and for a sample left out `√(eᵀ (I + h)⁻¹ e)`. A mistyped joint that
+//! otherwise hardly moves has all the say about its own parameters: its plain residual is zero, its studentised one is not,
+//! because the expected deviations disagree.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Point3, SymmetricEigen, Vector3};
 
-use super::linearise::{Weights, point_residuals};
+use super::linearise::{Evaluation, Weights, point_residuals, project};
 use super::problem::Problem;
 use super::solver::{Linearised, Solve};
 use crate::units::MILLIMETRE;
 
-/// A point further off than this many robust standard deviations is rejected. Real arms have heavy tails (gravity, backlash,
+/// A sample further off than this many robust standard deviations is rejected. Real arms have heavy tails (gravity, backlash,
 /// gear harmonics): good points of the measured UR5 set reach five.
-pub(crate) const REJECT_AT: f64 = 6.0;
+const REJECT_AT: f64 = 6.0;
 /// Median of the norm of three standard normal numbers (chi distribution, 3 degrees of freedom).
 const MEDIAN_CHI_3: f64 = 1.538_172_254_455_052;
+/// Median of the absolute value of a standard normal number.
+const MEDIAN_CHI_1: f64 = 0.674_489_750_196_082;
 /// Each step of the graduated search makes the loss this much less convex (Yang et al. 2020, "Graduated non-convexity for
 /// robust spatial perception", section III).
 const GRADUATION: f64 = 1.4;
@@ -26,32 +33,96 @@ const GROSS_STEPS: usize = 60;
 /// Steps of each fit within the search.
 const SEARCH_STEPS: usize = 30;
 /// Rounds in which samples may change sides before the decision stands.
-const ROUNDS: usize = 10;
+const ROUNDS: usize = 30;
+/// In one round only samples at least this bad, relative to the worst, are left out: one wild sample makes others look bad.
+const WORST_FIRST: f64 = 0.3;
+/// `1 − h` is not taken below this: beyond, a residual is rounding noise.
+const FULL_LEVERAGE: f64 = 1e-9;
 
-/// Robust standard deviation of a coordinate (m) from the median residual of the trusted places, corrected for the share of the
-/// residual that the fit took up.
-pub(crate) fn robust_sigma(problem: &Problem<'_>, residuals: &[Vector3<f64>], trust: &[f64], floor: f64) -> f64 {
-    let mut norms: Vec<f64> = residuals
-        .iter()
-        .zip(trust)
-        .take(judged_places(problem))
-        .filter(|(_, trust)| **trust > 0.0)
-        .map(|(residual, _)| residual.norm())
-        .collect();
-    if norms.is_empty() {
-        return floor;
-    }
-    let values = (3 * norms.len()) as f64;
-    let middle = norms.len() / 2;
-    let (_, median, _) = norms.select_nth_unstable_by(middle, f64::total_cmp);
-    let fitted = (problem.parameters.len() + 6) as f64;
-    let shrink = (1.0 - fitted / values).max(0.1).sqrt();
-    (*median / MEDIAN_CHI_3 / shrink).max(floor)
+/// Trust and studentised residual of every sample: places with a residual of their own first (points, seats of shared points),
+/// then lengths.
+#[derive(Clone, Debug)]
+pub(crate) struct Judgement {
+    /// In units of the robust scatter of the accepted samples of its kind.
+    pub(crate) ratios: Vec<f64>,
 }
 
 /// Places with a residual vector of their own: points and seats of shared points.
 fn judged_places(problem: &Problem<'_>) -> usize {
     problem.observations.points.len() + problem.observations.shared.iter().map(|shared| shared.at.len()).sum::<usize>()
+}
+
+/// Standard deviation behind the median of some norms, with the median of the standard distribution.
+fn robust_scale(mut norms: Vec<f64>, median_of_standard: f64) -> Option<f64> {
+    let middle = norms.len() / 2;
+    (!norms.is_empty()).then(|| {
+        let (_, median, _) = norms.select_nth_unstable_by(middle, f64::total_cmp);
+        *median / median_of_standard
+    })
+}
+
+/// Judges every sample at a fit made with `weights`. `floor` is the smallest scatter, in units of the σ of the weights, that
+/// samples are judged by.
+pub(crate) fn judge(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, floor: f64) -> Judgement {
+    let problem = solve.problem;
+    let evaluation = Evaluation::new(problem, &at.model);
+    let residuals = point_residuals(problem, &evaluation.points, weights);
+    let full = Weights::uniform(problem, weights.sigma);
+    let rows = project(problem, evaluation, &residuals, weights, &full);
+    let places = judged_places(problem);
+    let trusted = |sample: usize| weights.of_sample(sample, places) > 0.0;
+    let t = &solve.basis.transform;
+    let row_count = rows.residuals.len();
+    let reduced = t.transpose() * DMatrix::from_column_slice(rows.n, row_count, &rows.rows);
+    let sample_of = |row: usize| if row < 3 * places { row / 3 } else { places + row - 3 * places };
+    let mut counted = reduced.clone();
+    for (row, mut column) in counted.column_iter_mut().enumerate() {
+        if !trusted(sample_of(row)) {
+            column.fill(0.0);
+        }
+    }
+    let mut information = &counted * counted.transpose();
+    for index in 0..information.nrows() {
+        information[(index, index)] += solve.basis.prior_weight;
+    }
+    let samples = places + problem.observations.lengths.len();
+    let whitened = Cholesky::<f64, Dyn>::new(information)
+        .and_then(|factor| factor.l().solve_lower_triangular(&reduced))
+        .unwrap_or_else(|| DMatrix::zeros(reduced.nrows(), row_count));
+    let studentised: Vec<f64> = (0..samples)
+        .map(|sample| {
+            let sign = if trusted(sample) { -1.0 } else { 1.0 };
+            if sample < places {
+                let block = whitened.columns(3 * sample, 3);
+                let leverage = Matrix3::from_fn(|i, j| block.column(i).dot(&block.column(j)));
+                let residual = Vector3::from_column_slice(&rows.residuals[3 * sample..3 * sample + 3]);
+                let spread = SymmetricEigen::new(Matrix3::identity() + leverage * sign);
+                let along = spread.eigenvectors.transpose() * residual;
+                along.component_div(&spread.eigenvalues.map(|value| value.max(FULL_LEVERAGE).sqrt())).norm()
+            } else {
+                let row = 3 * places + sample - places;
+                let leverage = whitened.column(row).norm_squared();
+                rows.residuals[row].abs() / (1.0 + sign * leverage).max(FULL_LEVERAGE).sqrt()
+            }
+        })
+        .collect();
+    let scale = |range: std::ops::Range<usize>, median: f64| {
+        let accepted = range.filter(|sample| trusted(*sample)).map(|sample| studentised[sample]).collect();
+        robust_scale(accepted, median).unwrap_or(floor).max(floor)
+    };
+    let (of_places, of_lengths) = (scale(0..places, MEDIAN_CHI_3), scale(places..samples, MEDIAN_CHI_1));
+    let ratios = studentised
+        .into_iter()
+        .enumerate()
+        .map(|(sample, value)| value / if sample < places { of_places } else { of_lengths })
+        .collect();
+    Judgement { ratios }
+}
+
+/// More than this many robust standard deviations is what Gaussian noise of so many samples shows in one set of a hundred (chi
+/// distribution, 3 degrees of freedom): the data deserve a search for outliers.
+fn suspect_at(samples: usize) -> f64 {
+    (4.4 + 0.5 * (samples as f64 / 50.0).log10()).clamp(4.0, REJECT_AT)
 }
 
 /// Leaves out, for a start, what the nominal arm already shows to be impossible: a mistyped joint puts a point metres off, and one
@@ -60,114 +131,135 @@ fn judged_places(problem: &Problem<'_>) -> usize {
 pub(crate) fn gross_trust(problem: &Problem<'_>, predicted: &[Point3<f64>]) -> Vec<f64> {
     let all = Weights::uniform(problem, MILLIMETRE);
     let places = problem.observations.points.len();
+    let spread = |residuals: &[Vector3<f64>]| {
+        robust_scale(residuals.iter().take(places).map(Vector3::norm).collect(), MEDIAN_CHI_3).unwrap_or(0.0)
+    };
     let mut residuals = point_residuals(problem, predicted, &all).of_places;
-    let sigma = robust_sigma(problem, &residuals, &all.trust, f64::MIN_POSITIVE);
-    if residuals.iter().all(|residual| residual.norm() <= GROSS / 2.0 * sigma) {
+    let sigma = spread(&residuals);
+    if residuals.iter().take(places).all(|residual| residual.norm() <= GROSS / 2.0 * sigma) {
         return all.trust;
     }
     let mut convexity = f64::INFINITY;
     for _ in 0..GROSS_STEPS {
-        let sigma = robust_sigma(problem, &residuals, &all.trust, f64::MIN_POSITIVE);
-        let scale = (REJECT_AT * sigma / 2.0).powi(2);
+        let scale = (REJECT_AT * spread(&residuals) / 2.0).powi(2).max(f64::MIN_POSITIVE);
         let largest = residuals.iter().map(Vector3::norm_squared).fold(0.0, f64::max);
         convexity = (convexity / GRADUATION).min(2.0 * largest / scale).max(1.0);
         let mut weights = all.clone();
         for (trust, residual) in weights.trust.iter_mut().zip(&residuals).take(places) {
-            *trust = geman_mcclure(residual, convexity * scale);
+            *trust = geman_mcclure(residual.norm_squared(), convexity * scale);
         }
         residuals = point_residuals(problem, predicted, &weights).of_places;
         if convexity <= 1.0 {
             break;
         }
     }
-    let sigma = robust_sigma(problem, &residuals, &all.trust, f64::MIN_POSITIVE);
+    let limit = GROSS * spread(&residuals);
     let mut trust = all.trust;
     for (trust, residual) in trust.iter_mut().zip(&residuals).take(places) {
-        if residual.norm() > GROSS * sigma {
+        if residual.norm() > limit {
             *trust = 0.0;
         }
     }
     trust
 }
 
-/// Weight of a point with the Geman–McClure loss of squared width `width`.
-fn geman_mcclure(residual: &Vector3<f64>, width: f64) -> f64 {
-    (width / (residual.norm_squared() + width)).powi(2)
+/// Weight of a square residual with the Geman–McClure loss of squared width `width`.
+fn geman_mcclure(square: f64, width: f64) -> f64 {
+    (width / (square + width)).powi(2)
 }
 
-/// Finds outliers at a least-squares solution. Returns the trust of every place: 1 or 0.
-///
-/// `floor` is the smallest standard deviation (m) that residuals are judged by.
-pub(crate) fn find_outliers(solve: &Solve<'_, '_>, least_squares: &Linearised, floor: f64) -> Vec<f64> {
+/// Decides which samples to trust, beginning with a fit made with the trust of `solve`. Trust is 1 or 0.
+pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised, floor: f64) -> Weights {
     let problem = solve.problem;
     let places = judged_places(problem);
-    let all = vec![1.0; solve.weights.trust.len()];
-    let residuals = &least_squares.points.of_places;
-    let sigma = robust_sigma(problem, residuals, &all, floor);
-    let largest = residuals.iter().take(places).map(Vector3::norm).fold(0.0, f64::max);
-    if largest <= suspect_at(places) * sigma {
-        return all;
+    let start = solve.weights.clone();
+    let judged = judge(solve, first, &start, floor);
+    let suspect = suspect_at(judged.ratios.len());
+    let settled = judged.ratios.iter().enumerate().all(|(sample, ratio)| {
+        if start.of_sample(sample, places) > 0.0 { *ratio <= suspect } else { *ratio > REJECT_AT }
+    });
+    if settled {
+        return start;
     }
-    let (start, sigma) = graduated_search(solve, least_squares, floor);
-    let mut trust = decide(&start.points.of_places, places, &all, sigma);
-    let mut from = start.z;
-    for _ in 0..ROUNDS {
-        if trust.iter().sum::<f64>() < 4.0 {
-            return all;
-        }
-        let weights = Weights { sigma: solve.weights.sigma, trust: trust.clone() };
-        let refit = Solve { weights: &weights, ..*solve };
-        let (fit, _) = refit.run(from, SEARCH_STEPS, &mut Vec::new());
-        let sigma = robust_sigma(problem, &fit.points.of_places, &trust, floor);
-        let decided = decide(&fit.points.of_places, places, &all, sigma);
-        from = fit.z;
-        if decided == trust {
-            break;
-        }
-        trust = decided;
-    }
-    trust
+    let from_fit = peel(solve, first.clone(), start.clone(), floor);
+    // Several outliers can hide each other from least squares; the graduated search does not start from their fit.
+    let searched = graduated_search(solve, first);
+    let from_search = peel(solve, searched.0, searched.1, floor);
+    if from_search.accepted(places) > from_fit.accepted(places) { from_search } else { from_fit }
 }
 
-/// Geman–McClure loss, from convex to redescending; one step of the solver per degree.
-fn graduated_search(solve: &Solve<'_, '_>, start: &Linearised, floor: f64) -> (Linearised, f64) {
+/// Lets samples change sides, the worst first, until the decision agrees with the fit that it leads to.
+fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Weights, floor: f64) -> Weights {
     let problem = solve.problem;
-    let all = vec![1.0; solve.weights.trust.len()];
-    let mut at = start.clone();
-    let mut sigma = robust_sigma(problem, &at.points.of_places, &all, floor);
-    let scale = |sigma: f64| (REJECT_AT * sigma / 2.0).powi(2);
-    let largest = at.points.of_places.iter().map(Vector3::norm_squared).fold(0.0, f64::max);
-    let mut convexity = (2.0 * largest / scale(sigma)).max(1.0);
+    let places = judged_places(problem);
+    let mut weights = start;
+    let mut at = from;
+    let mut seen: Vec<Weights> = Vec::new();
+    for round in 0..ROUNDS {
+        if round > 0 {
+            let refit = Solve { weights: &weights, ..*solve };
+            at = refit.run(at.z, SEARCH_STEPS, &mut |_| {}).0;
+        }
+        let judged = judge(solve, &at, &weights, floor);
+        let accepted = |sample: usize| weights.of_sample(sample, places) > 0.0;
+        let accepted_ratios = judged.ratios.iter().enumerate().filter(|(sample, _)| accepted(*sample));
+        let worst = accepted_ratios.map(|(_, ratio)| *ratio).fold(0.0, f64::max);
+        let mut decided = weights.clone();
+        for (sample, ratio) in judged.ratios.iter().enumerate() {
+            let is_bad =
+                if accepted(sample) { *ratio > REJECT_AT && *ratio >= WORST_FIRST * worst } else { *ratio > REJECT_AT };
+            decided.set_sample(sample, places, if is_bad { 0.0 } else { 1.0 });
+        }
+        if decided == weights {
+            return weights;
+        }
+        if seen.contains(&decided) || decided.accepted(places) < 4 {
+            // Samples go back and forth: a sample that half of the time belongs is not rejected.
+            return if decided.accepted(places) > weights.accepted(places) { decided } else { weights };
+        }
+        seen.push(std::mem::replace(&mut weights, decided));
+    }
+    weights
+}
+
+/// Geman–McClure loss on the residuals, from convex to redescending, one step of the solver per degree; the samples without
+/// trust in `solve` stay out.
+fn graduated_search(solve: &Solve<'_, '_>, first: &Linearised) -> (Linearised, Weights) {
+    let problem = solve.problem;
+    let places = judged_places(problem);
+    let squares = |at: &Linearised, weights: &Weights| -> Vec<f64> {
+        let sigma = |place: usize| weights.sigma_of(problem, place);
+        at.points.of_places.iter().take(places).enumerate().map(|(p, e)| e.norm_squared() / sigma(p).powi(2)).collect()
+    };
+    let spread = |squares: &[f64]| -> f64 {
+        let trusted = squares.iter().zip(&solve.weights.trust).filter(|(_, trust)| **trust > 0.0);
+        let scale = robust_scale(trusted.map(|(square, _)| square.sqrt()).collect(), MEDIAN_CHI_3).unwrap_or(1.0);
+        (REJECT_AT * scale / 2.0).powi(2).max(f64::MIN_POSITIVE)
+    };
+    let mut at = first.clone();
+    let mut now = squares(&at, solve.weights);
+    let mut convexity = (2.0 * now.iter().copied().fold(0.0, f64::max) / spread(&now)).max(1.0);
     loop {
-        let trust: Vec<f64> =
-            at.points.of_places.iter().map(|residual| geman_mcclure(residual, convexity * scale(sigma))).collect();
-        let weights = Weights { sigma: solve.weights.sigma, trust };
+        let mut weights = solve.weights.clone();
+        let width = convexity * spread(&now);
+        for (trust, square) in weights.trust.iter_mut().zip(&now) {
+            *trust *= geman_mcclure(*square, width);
+        }
         let step = Solve { weights: &weights, ..*solve };
         let here = step.linearise(at.z.clone());
-        match step.step(&here) {
-            Ok((next, _)) => at = next,
-            Err(_) => at = here,
-        }
-        sigma = robust_sigma(problem, &at.points.of_places, &all, floor);
+        at = step.step(&here).map_or(here, |(next, _)| next);
+        now = squares(&at, solve.weights);
         if convexity <= 1.0 {
-            return (at, sigma);
+            break;
         }
         convexity = (convexity / GRADUATION).max(1.0);
     }
-}
-
-fn decide(residuals: &[Vector3<f64>], places: usize, all: &[f64], sigma: f64) -> Vec<f64> {
-    let mut trust = all.to_vec();
-    for (trust, residual) in trust.iter_mut().zip(residuals).take(places) {
-        if residual.norm() > REJECT_AT * sigma {
+    let limit = 4.0 * spread(&now);
+    let mut weights = solve.weights.clone();
+    for (trust, square) in weights.trust.iter_mut().zip(&now) {
+        if *square > limit {
             *trust = 0.0;
         }
     }
-    trust
-}
-
-/// A largest residual beyond this many robust standard deviations starts the robust search: more than what Gaussian noise of
-/// so many points shows in about one set of a hundred (chi distribution, 3 degrees of freedom).
-fn suspect_at(places: usize) -> f64 {
-    (4.4 + 0.5 * (places as f64 / 50.0).log10()).clamp(4.0, REJECT_AT)
+    (at, weights)
 }

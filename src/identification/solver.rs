@@ -94,7 +94,9 @@ impl Solve<'_, '_> {
         let evaluation = Evaluation::new(self.problem, &model);
         let points = point_residuals(self.problem, &evaluation.points, self.weights);
         let normal = match self.weighting {
-            Weighting::Covariance => project(self.problem, evaluation, &points, self.weights).normal_equations(),
+            Weighting::Covariance => {
+                project(self.problem, evaluation, &points, self.weights, self.weights).normal_equations()
+            }
             Weighting::Uniform => self.uniform_pairs(&evaluation),
         };
         let cost = normal.cost + self.basis.prior_weight * z.norm_squared();
@@ -105,7 +107,7 @@ impl Solve<'_, '_> {
     /// as the 3M coordinates they come from and the prior keeps its meaning.
     fn uniform_pairs(&self, evaluation: &Evaluation) -> NormalEquations {
         let n = evaluation.n;
-        let mut normal = length_rows(self.problem, evaluation, self.weights).normal_equations();
+        let mut normal = length_rows(self.problem, evaluation, self.weights, self.weights).normal_equations();
         let mut covariance = normal.gram.clone();
         let samples = &self.problem.observations.points;
         let stations = samples.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
@@ -171,7 +173,7 @@ impl Solve<'_, '_> {
                     return Ok((next, record));
                 }
                 if negligible {
-                    return Err(TerminationReason::NoImprovement);
+                    return Err(TerminationReason::Converged);
                 }
             }
             damping = if damping == 0.0 { FIRST_DAMPING } else { damping * 10.0 };
@@ -179,30 +181,27 @@ impl Solve<'_, '_> {
         Err(if at.cost.is_finite() { TerminationReason::NoImprovement } else { TerminationReason::NonFinite })
     }
 
-    /// Steps until converged or `limit` steps were taken; records go to `iterations`.
+    /// Steps until converged or `limit` steps were taken; `record` sees each as it is taken.
     pub(crate) fn run(
         &self,
         start: DVector<f64>,
         limit: usize,
-        iterations: &mut Vec<Iteration>,
+        record: &mut dyn FnMut(Iteration),
     ) -> (Linearised, TerminationReason) {
         let mut at = self.linearise(start);
         let mut last_step = 0.0;
         for _ in 0..limit {
             match self.step(&at) {
-                Ok((next, record)) => {
+                Ok((next, step)) => {
                     at = next;
                     // Steps shrink by about the same factor each time: what is left is the next one of the series.
-                    let left = record.step * (record.step / last_step).min(1.0);
-                    let converged = record.damping == 0.0 && left <= STEP_TOLERANCE || record.negligible;
-                    last_step = record.step;
-                    iterations.push(record);
+                    let left = step.step * (step.step / last_step).min(1.0);
+                    let converged = step.damping == 0.0 && left <= STEP_TOLERANCE || step.negligible;
+                    last_step = step.step;
+                    record(step);
                     if converged {
                         return (at, TerminationReason::Converged);
                     }
-                }
-                Err(TerminationReason::NoImprovement) if !iterations.is_empty() => {
-                    return (at, TerminationReason::Converged);
                 }
                 Err(reason) => return (at, reason),
             }

@@ -143,6 +143,7 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
         "readings" => "given with the readings",
         "option" => "given on the command line",
         "instrument" => "of the profile's instrument",
+        "assumed" => "assumed, for want of data to estimate it",
         _ => "estimated from the residuals",
     };
     let mut text = paragraph(
