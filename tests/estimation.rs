@@ -9,8 +9,8 @@ use rand::RngExt as _;
 use support::{PaperCase, measure, normal, paper_deviations, paper_parameters, random_configurations, seeded};
 use trupose::identification::verification::{DirectErrors, ModelErrors};
 use trupose::identification::{
-    ArmModel, Identification, IdentificationError, Length, LengthEnd, Observations, PointSample, RejectionReason,
-    Settings, SharedPoint, SigmaSource, TargetAt, Weighting, identify,
+    ArmModel, Estimator, Identification, IdentificationError, Length, LengthEnd, Observations, PointSample, Rejected,
+    RejectionReason, SampleIndex, Settings, SharedPoint, SigmaSource, TargetAt, Weighting, identify,
 };
 use trupose::kinematics::{Axis, FreeParameter, ParameterId};
 use trupose::units::{MICROMETRE, MILLIMETRE};
@@ -327,4 +327,94 @@ fn balls_in_sockets_identify_the_robot_without_an_instrument() {
     .unwrap();
     let errors = ModelErrors::new(&setup.model, &setup.base_from_station, &fresh).unwrap();
     assert!(errors.position.rms < 0.2 * MILLIMETRE, "{:?}", errors.position);
+}
+
+#[test]
+fn a_few_loose_readings_do_not_hide_a_wrong_sigma() {
+    let mut rng = seeded(11);
+    let mut case = PaperCase::simulated(&paper_deviations(), 56, 0.0, &mut rng);
+    // Fifty readings promise 10 µm and scatter by 200, six promise 5 mm and keep it.
+    for (index, sample) in case.observations.points.iter_mut().enumerate() {
+        let (stated, real) = if index < 50 { (NOISE, 20.0 * NOISE) } else { (5.0 * MILLIMETRE, 5.0 * MILLIMETRE) };
+        sample.sigma = Some(stated);
+        for axis in 0..3 {
+            sample.point[axis] += real * normal(&mut rng);
+        }
+    }
+    let found = run(&case, &Settings { estimator: Estimator::LeastSquares, ..Settings::default() });
+    assert!((15.0..25.0).contains(&found.sigma.excess()), "{:?}", found.sigma);
+    for (estimate, truth) in found.estimates.iter().zip(&paper_deviations()) {
+        assert!((estimate.deviation - truth).abs() < 4.5 * estimate.sigma, "{} {estimate:?} {truth}", estimate.id);
+    }
+}
+
+#[test]
+fn readings_that_declare_their_scatter_are_not_outliers() {
+    let mut rng = seeded(12);
+    let mut case = PaperCase::simulated(&paper_deviations(), 56, 0.0, &mut rng);
+    for (index, sample) in case.observations.points.iter_mut().enumerate() {
+        let sigma = if index % 8 == 0 { 3.0 * MILLIMETRE } else { NOISE };
+        sample.sigma = Some(sigma);
+        for axis in 0..3 {
+            sample.point[axis] += sigma * normal(&mut rng);
+        }
+    }
+    let found = run(&case, &Settings::default());
+    assert_eq!(found.rejected, []);
+    assert!(found.sigma.excess() < 1.3, "{:?}", found.sigma);
+}
+
+#[test]
+fn a_mistyped_joint_is_found_although_that_joint_hardly_moves() {
+    for (range, wanted) in [(2.0_f64, 17), (10.0, 19), (40.0, 19), (360.0, 19)] {
+        let mut found_alone = 0;
+        for seed in 0..20 {
+            let mut rng = seeded(100 + seed);
+            let mut configurations = random_configurations(50, &mut rng);
+            for configuration in &mut configurations {
+                configuration[3] *= range / 360.0;
+            }
+            let mut case = PaperCase::new(Vec::new());
+            let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
+            case.observations.points = measure(&truth, &configurations, NOISE, &mut rng);
+            let wrong = rng.random_range(0..50);
+            let typed = rng.random_range(30.0..120.0_f64) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+            case.observations.points[wrong].at.configuration[3] += typed.to_radians();
+            let found = run(&case, &settings());
+            let rejected: Vec<usize> = found.rejected.iter().map(place).collect();
+            found_alone += usize::from(rejected == [wrong]);
+        }
+        println!("joint 4 over {range} deg: {found_alone} of 20");
+        assert!(found_alone >= wanted, "joint 4 over {range} deg: {found_alone} of 20");
+    }
+}
+
+#[test]
+fn wrong_lengths_are_found_as_well() {
+    let mut rng = seeded(13);
+    let mut case = PaperCase::new(Vec::new());
+    let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
+    let mut place = || TargetAt { configuration: random_configurations(1, &mut rng).remove(0), target: 0 };
+    let pairs: Vec<(TargetAt, TargetAt)> = (0..120).map(|_| (place(), place())).collect();
+    let lengths = pairs.into_iter().enumerate().map(|(index, (from, to))| {
+        let wrong = if [7, 50, 93].contains(&index) { 2.0 * MILLIMETRE } else { 0.0 };
+        let length = (truth.point_in_base(&to) - truth.point_in_base(&from)).norm() + NOISE * normal(&mut rng) + wrong;
+        Length { from: LengthEnd::Target(from), to: LengthEnd::Target(to), length, sigma: Some(NOISE) }
+    });
+    case.observations = Observations { lengths: lengths.collect(), ..Observations::default() };
+    let found = run(&case, &settings());
+    let rejected: Vec<SampleIndex> = found.rejected.iter().map(|rejected| rejected.sample).collect();
+    assert_eq!(rejected, [7, 50, 93].map(SampleIndex::Length));
+    assert!(found.rejected.iter().all(|rejected| (rejected.residual / MILLIMETRE - 2.0).abs() < 0.1));
+    assert!(found.sigma.excess() < 1.3, "{:?}", found.sigma);
+}
+
+#[test]
+fn a_sigma_in_the_wrong_unit_does_not_drown_the_expected_deviations() {
+    let case = PaperCase::simulated(&paper_deviations(), 56, NOISE, &mut seeded(14));
+    let found = run(&case, &Settings { sigma: Some((1e-12, SigmaSource::Option)), ..Settings::default() });
+    for estimate in found.estimates.iter().filter(|estimate| estimate.id.to_string() == "theta1") {
+        assert!((estimate.sigma / estimate.expected - 1.0).abs() < 0.01, "{estimate:?}");
+    }
+    assert!(found.sigma.excess() > 10.0);
 }

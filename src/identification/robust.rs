@@ -9,7 +9,7 @@
 //! otherwise hardly moves has all the say about its own parameters: its plain residual is zero, its studentised one is not,
 //! because the expected deviations disagree.
 
-use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Point3, SymmetricEigen, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, SymmetricEigen, Vector3};
 
 use super::linearise::{Evaluation, Weights, point_residuals, project};
 use super::problem::Problem;
@@ -36,6 +36,10 @@ const SEARCH_STEPS: usize = 30;
 const ROUNDS: usize = 30;
 /// In one round only samples at least this bad, relative to the worst, are left out: one wild sample makes others look bad.
 const WORST_FIRST: f64 = 0.3;
+/// Samples that stand out from the nominal arm by this many times what is typical are left out of the first fit of one search.
+const SUSPECT_OF_NOMINAL: f64 = 3.0;
+/// Parameters this many expected deviations from nominal deserve a search for a sample that bent them.
+const RAN_AWAY: f64 = 5.0;
 /// `1 − h` is not taken below this: beyond, a residual is rounding noise.
 const FULL_LEVERAGE: f64 = 1e-9;
 
@@ -45,6 +49,8 @@ const FULL_LEVERAGE: f64 = 1e-9;
 pub(crate) struct Judgement {
     /// In units of the robust scatter of the accepted samples of its kind.
     pub(crate) ratios: Vec<f64>,
+    /// That scatter for places, in units of what the weights promise.
+    scatter: f64,
 }
 
 /// Places with a residual vector of their own: points and seats of shared points.
@@ -64,13 +70,18 @@ fn robust_scale(mut norms: Vec<f64>, median_of_standard: f64) -> Option<f64> {
 /// Judges every sample at a fit made with `weights`. `floor` is the smallest scatter, in units of the σ of the weights, that
 /// samples are judged by.
 pub(crate) fn judge(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, floor: f64) -> Judgement {
+    judge_with(solve, at, weights, weights, floor)
+}
+
+/// As [`judge`], with the frames fitted to the samples that `weights` trusts and the parameters known from those of `counting`.
+fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, counting: &Weights, floor: f64) -> Judgement {
     let problem = solve.problem;
     let evaluation = Evaluation::new(problem, &at.model);
     let residuals = point_residuals(problem, &evaluation.points, weights);
     let full = Weights::uniform(problem, weights.sigma);
     let rows = project(problem, evaluation, &residuals, weights, &full);
     let places = judged_places(problem);
-    let trusted = |sample: usize| weights.of_sample(sample, places) > 0.0;
+    let trusted = |sample: usize| counting.of_sample(sample, places) > 0.0;
     let t = &solve.basis.transform;
     let row_count = rows.residuals.len();
     let reduced = t.transpose() * DMatrix::from_column_slice(rows.n, row_count, &rows.rows);
@@ -116,7 +127,7 @@ pub(crate) fn judge(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, f
         .enumerate()
         .map(|(sample, value)| value / if sample < places { of_places } else { of_lengths })
         .collect();
-    Judgement { ratios }
+    Judgement { ratios, scatter: of_places }
 }
 
 /// More than this many robust standard deviations is what Gaussian noise of so many samples shows in one set of a hundred (chi
@@ -178,29 +189,75 @@ pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised, floor: f6
     let settled = judged.ratios.iter().enumerate().all(|(sample, ratio)| {
         if start.of_sample(sample, places) > 0.0 { *ratio <= suspect } else { *ratio > REJECT_AT }
     });
-    if settled {
+    // One sample can also bend parameters so far that everything fits: they then leave what is expected of them.
+    let ran_away = solve.basis.prior_weight > 0.0 && first.z.amax() > RAN_AWAY;
+    if settled && !ran_away {
         return start;
     }
-    let from_fit = peel(solve, first.clone(), start.clone(), floor);
-    // Several outliers can hide each other from least squares; the graduated search does not start from their fit.
+    // Several outliers, or one with all the say about some parameter, can bend a fit so that it accepts them. So the decision
+    // is made from three starts that go wrong in different ways, and the cheapest explanation counts.
+    let nominal = suspects_of_nominal(solve, floor);
     let searched = graduated_search(solve, first);
-    let from_search = peel(solve, searched.0, searched.1, floor);
-    if from_search.accepted(places) > from_fit.accepted(places) { from_search } else { from_fit }
+    let candidates = [
+        peel(solve, first.clone(), start, floor, false),
+        peel(solve, nominal.0, nominal.1, floor, true),
+        peel(solve, searched.0, searched.1, floor, false),
+    ];
+    let scatter = candidates.iter().map(|candidate| candidate.scatter).fold(floor, f64::max);
+    let all = places + problem.observations.lengths.len();
+    let price = |candidate: &Candidate| {
+        let rejected = all - candidate.weights.accepted(places);
+        candidate.cost + rejected as f64 * (REJECT_AT * scatter).powi(2)
+    };
+    let [first, others @ ..] = candidates;
+    others.into_iter().fold(first, |best, other| if price(&other) < price(&best) { other } else { best }).weights
 }
 
-/// Lets samples change sides, the worst first, until the decision agrees with the fit that it leads to.
-fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Weights, floor: f64) -> Weights {
+/// A decision with what it costs.
+struct Candidate {
+    weights: Weights,
+    /// Square sum of the accepted residuals in units of σ, plus the prior's share.
+    cost: f64,
+    /// Robust scatter of the accepted places.
+    scatter: f64,
+}
+
+/// The nominal arm without the samples that stand out from it, given what its parameters may deviate. Good samples among them come
+/// back as soon as the arm is fitted to the rest.
+fn suspects_of_nominal(solve: &Solve<'_, '_>, floor: f64) -> (Linearised, Weights) {
+    let places = judged_places(solve.problem);
+    let mut weights = solve.weights.clone();
+    let at = solve.linearise(DVector::zeros(solve.basis.transform.ncols()));
+    let mut nobody = weights.clone();
+    nobody.trust.fill(0.0);
+    nobody.length_trust.fill(0.0);
+    // Registered with everyone, judged by what the prior alone allows.
+    let judged = judge_with(solve, &at, &weights, &nobody, floor);
+    let typical = robust_scale(judged.ratios.clone(), 1.0).unwrap_or(1.0);
+    for (sample, ratio) in judged.ratios.iter().enumerate() {
+        if *ratio > SUSPECT_OF_NOMINAL * typical {
+            weights.set_sample(sample, places, 0.0);
+        }
+    }
+    (at, weights)
+}
+
+/// Lets samples change sides, the worst first, until the decision agrees with the fit that it leads to. With `refit` the
+/// parameters of `from` are not yet those of a fit.
+fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Weights, floor: f64, refit: bool) -> Candidate {
     let problem = solve.problem;
     let places = judged_places(problem);
     let mut weights = start;
     let mut at = from;
     let mut seen: Vec<Weights> = Vec::new();
+    let mut scatter = floor;
+    let fit = |weights: &Weights, z| Solve { weights, ..*solve }.run(z, SEARCH_STEPS, &mut |_| {}).0;
     for round in 0..ROUNDS {
-        if round > 0 {
-            let refit = Solve { weights: &weights, ..*solve };
-            at = refit.run(at.z, SEARCH_STEPS, &mut |_| {}).0;
+        if round > 0 || refit {
+            at = fit(&weights, at.z);
         }
         let judged = judge(solve, &at, &weights, floor);
+        scatter = judged.scatter;
         let accepted = |sample: usize| weights.of_sample(sample, places) > 0.0;
         let accepted_ratios = judged.ratios.iter().enumerate().filter(|(sample, _)| accepted(*sample));
         let worst = accepted_ratios.map(|(_, ratio)| *ratio).fold(0.0, f64::max);
@@ -211,15 +268,19 @@ fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Weights, floor: f64) -> 
             decided.set_sample(sample, places, if is_bad { 0.0 } else { 1.0 });
         }
         if decided == weights {
-            return weights;
+            break;
         }
         if seen.contains(&decided) || decided.accepted(places) < 4 {
             // Samples go back and forth: a sample that half of the time belongs is not rejected.
-            return if decided.accepted(places) > weights.accepted(places) { decided } else { weights };
+            if decided.accepted(places) > weights.accepted(places) {
+                weights = decided;
+            }
+            break;
         }
         seen.push(std::mem::replace(&mut weights, decided));
     }
-    weights
+    let cost = fit(&weights, at.z).cost;
+    Candidate { weights, cost, scatter }
 }
 
 /// Geman–McClure loss on the residuals, from convex to redescending, one step of the solver per degree; the samples without
