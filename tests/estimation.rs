@@ -116,7 +116,7 @@ fn outliers_are_named_and_really_removed() {
             case.observations.points[index].point.coords += nalgebra::Vector3::new(0.6, -0.64, 0.48) * size;
         }
         let found = run(&case, &settings());
-        let rejected: Vec<usize> = found.rejected.iter().map(|rejected| place(rejected)).collect();
+        let rejected: Vec<usize> = found.rejected.iter().map(place).collect();
         assert_eq!(rejected, bumped, "seed {seed}");
         assert!(found.rejected.iter().all(|rejected| rejected.reason == RejectionReason::Outlier));
 

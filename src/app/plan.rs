@@ -283,18 +283,19 @@ impl<'a> Planner<'a> {
                     Stage::Prediction => "predicting",
                     Stage::Objective { .. } => "choosing",
                 };
+                let sweeps = search.settings().sweeps_of(progress.stage);
                 lines.say(|| {
                     format!(
-                        "{stage}: start {} of {starts}, sweep {} of {}, condition number {:.1}, predicted error {:.3} sigma",
+                        "{stage} [{}] start {} of {starts}, condition {:.1}, predicted error {:.3} sigma",
+                        bar(progress.sweep, sweeps),
                         progress.start + 1,
-                        progress.sweep,
-                        search.settings().sweeps_of(progress.stage),
                         progress.condition_number,
                         progress.predicted_error
                     )
                 });
             }
-            worker.join().map_err(|_| Failure::new(ExitStatus::Internal, "the search ended unexpectedly"))
+            // A panic of the search is a defect: let it be seen where it happened.
+            worker.join().map_err(|panic| std::panic::resume_unwind(panic))
         })?;
         result.map_err(|error| planning_failure(&error))
     }
@@ -552,6 +553,13 @@ fn planned_rows(summary: &PlanSummary, joint_types: &[JointType]) -> Vec<Planned
                 .map(|[x, y, z]| nalgebra::Point3::new(from_mm(x), from_mm(y), from_mm(z))),
         })
         .collect()
+}
+
+/// A bar of twenty signs.
+fn bar(done: usize, of: usize) -> String {
+    const WIDTH: usize = 20;
+    let full = (WIDTH * done / of.max(1)).min(WIDTH);
+    format!("{}{}", "#".repeat(full), ".".repeat(WIDTH - full))
 }
 
 /// The first few of many findings.

@@ -53,24 +53,21 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
     };
     let program = write(args.dialect, &robot, &listed.rows, &options)
         .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-    match &args.out {
-        Some(folder) => {
-            let store_failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
-            store::create_folder(folder).map_err(store_failure)?;
-            for file in &program.files {
-                let path = folder.join(&file.file_name);
-                store::replace(&path, &file.text).map_err(store_failure)?;
-                console.print(&format!("written: {}\n", path.display()))?;
-            }
+    if let Some(folder) = &args.out {
+        let store_failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
+        store::create_folder(folder).map_err(store_failure)?;
+        for file in &program.files {
+            let path = folder.join(&file.file_name);
+            store::replace(&path, &file.text).map_err(store_failure)?;
+            console.print(&format!("written: {}\n", path.display()))?;
         }
-        None => {
-            let several = program.files.len() > 1;
-            for file in &program.files {
-                if several {
-                    console.remark(&format!("file {}:", file.file_name));
-                }
-                console.print(&file.text)?;
+    } else {
+        let several = program.files.len() > 1;
+        for file in &program.files {
+            if several {
+                console.remark(&format!("file {}:", file.file_name));
             }
+            console.print(&file.text)?;
         }
     }
     Ok(ExitStatus::Accepted)

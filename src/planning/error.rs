@@ -11,12 +11,6 @@ pub enum PlanningError {
     /// A box without joints.
     #[error("there is no joint to sample")]
     NoJoints,
-    /// A joint whose limits the profile does not give.
-    #[error("joint '{joint}' has no limits: poses cannot be sampled; give them in the profile or narrow the joint")]
-    NoLimits {
-        /// Name of the joint.
-        joint: String,
-    },
     /// Limits in the wrong order, or not finite.
     #[error("the limits of joint {joint} are crossed or not finite: {low} to {high}")]
     CrossedLimits {

@@ -244,7 +244,8 @@ pub(super) mod tests {
         let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "").unwrap();
         let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
         let model = ArmModel { chain: profile.chain().clone(), targets };
-        (model, profile.free_parameters(Level::Geometric), JointBox::of_profile(&profile).unwrap())
+        let joint_box = JointBox::new(profile.joints().iter().map(|j| j.planning_limits.unwrap()).collect()).unwrap();
+        (model, profile.free_parameters(Level::Geometric), joint_box)
     }
 
     fn places(joint_box: &JointBox, count: usize, seed: u64) -> Vec<TargetAt> {

@@ -4,7 +4,6 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::PlanningError;
-use crate::profile::Profile;
 
 /// Lowest and highest pendant value of every joint (rad) or (m).
 #[derive(Clone, Debug, PartialEq)]
@@ -25,23 +24,6 @@ impl JointBox {
             check_range(&format!("{}", index + 1), low, high)?;
         }
         Ok(Self { ranges })
-    }
-
-    /// The planning limits of a profile.
-    ///
-    /// # Errors
-    /// A joint without limits.
-    pub fn of_profile(profile: &Profile) -> Result<Self, PlanningError> {
-        let ranges = profile
-            .joints()
-            .iter()
-            .zip(profile.chain().joints())
-            .map(|(range, joint)| {
-                let limits = range.planning_limits.or(range.limits);
-                limits.ok_or_else(|| PlanningError::NoLimits { joint: joint.name.clone() })
-            })
-            .collect::<Result<_, _>>()?;
-        Self::new(ranges)
     }
 
     /// The same box with the range of joint `joint` (from 0) replaced by its common part with `low` … `high`.
