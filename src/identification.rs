@@ -505,7 +505,7 @@ fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<Scatter> {
             }
         }
     }
-    let data = basis.transform.transpose() * (&at.normal.gram * &basis.transform);
+    let data = basis.reduce(&at.normal.gram);
     let determined = solve.hessian(at).cholesky().map(|factor| factor.solve(&data).trace())?;
     let freedom = values - determined;
     (freedom >= 1.0).then(|| Scatter { absolute: (square / freedom).sqrt(), normalised: (normalised / freedom).sqrt() })
@@ -589,7 +589,7 @@ fn covariance(solve: &Solve<'_, '_>, at: &Linearised, excess: f64) -> DMatrix<f6
     let n = t.nrows();
     let Some(factor) = solve.hessian(at).cholesky() else { return DMatrix::from_element(n, n, f64::NAN) };
     let gradient_covariance = at.normal.gradient_covariance.as_ref().unwrap_or(&at.normal.gram);
-    let mut middle = t.transpose() * (gradient_covariance * t) * (excess * excess);
+    let mut middle = solve.basis.reduce(gradient_covariance) * (excess * excess);
     for index in 0..middle.nrows() {
         middle[(index, index)] += solve.basis.prior_weight;
     }

@@ -107,9 +107,7 @@ fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, countin
                 let block = whitened.columns(3 * sample, 3);
                 let leverage = Matrix3::from_fn(|i, j| block.column(i).dot(&block.column(j)));
                 let residual = Vector3::from_column_slice(&rows.residuals[3 * sample..3 * sample + 3]);
-                let spread = SymmetricEigen::new(Matrix3::identity() + leverage * sign);
-                let along = spread.eigenvectors.transpose() * residual;
-                along.component_div(&spread.eigenvalues.map(|value| value.max(FULL_LEVERAGE).sqrt())).norm()
+                studentised_norm(&(Matrix3::identity() + leverage * sign), &residual)
             } else {
                 let row = 3 * places + sample - places;
                 let leverage = whitened.column(row).norm_squared();
@@ -128,6 +126,18 @@ fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, countin
         .map(|(sample, value)| value / if sample < places { of_places } else { of_lengths })
         .collect();
     Judgement { ratios, scatter: of_places }
+}
+
+/// `√(eᵀ V⁻¹ e)`, with the eigenvalues of V not taken below [`FULL_LEVERAGE`].
+fn studentised_norm(variance: &Matrix3<f64>, residual: &Vector3<f64>) -> f64 {
+    if let Some(factor) = variance.cholesky()
+        && factor.l_dirty().diagonal().min() > FULL_LEVERAGE.sqrt()
+    {
+        return residual.dot(&factor.solve(residual)).max(0.0).sqrt();
+    }
+    let spread = SymmetricEigen::new(*variance);
+    let along = spread.eigenvectors.transpose() * residual;
+    along.component_div(&spread.eigenvalues.map(|value| value.max(FULL_LEVERAGE).sqrt())).norm()
 }
 
 /// More than this many robust standard deviations is what Gaussian noise of so many samples shows in one set of a hundred (chi

@@ -32,6 +32,16 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
+    /// `Tᵀ M T`.
+    pub(crate) fn reduce(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let t = &self.transform;
+        if self.prior_weight > 0.0 {
+            // T is diagonal with the prior.
+            return DMatrix::from_fn(t.nrows(), t.ncols(), |i, j| t[(i, i)] * matrix[(i, j)] * t[(j, j)]);
+        }
+        t.transpose() * (matrix * t)
+    }
+
     pub(crate) fn new(
         problem: &Problem<'_>,
         prior: Prior,
@@ -137,8 +147,7 @@ impl Solve<'_, '_> {
 
     /// Normal matrix of `z` with the prior, `TᵀGT + Λ`.
     pub(crate) fn hessian(&self, at: &Linearised) -> DMatrix<f64> {
-        let t = &self.basis.transform;
-        let mut hessian = t.transpose() * (&at.normal.gram * t);
+        let mut hessian = self.basis.reduce(&at.normal.gram);
         for index in 0..hessian.nrows() {
             hessian[(index, index)] += self.basis.prior_weight;
         }
