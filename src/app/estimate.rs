@@ -16,14 +16,23 @@ use crate::identification::{
 };
 use crate::kinematics::{FreeParameter, ParameterId};
 use crate::profile::{Level, Profile};
+use crate::report::number;
 use crate::session::summary::{
-    BlindGroupSummary, CorrelationSummary, IdentificationSettings, IdentificationSummary, InputFile, IterationSummary,
-    ParameterSummary, Provenance, RejectedSummary, SCHEMA, SigmaSummary, Verdict, Warning,
+    BlindGroupSummary, CorrelationSummary, EstimatorName, IdentificationSettings, IdentificationSummary, InputFile,
+    IterationSummary, ParameterSummary, Provenance, RejectedSummary, SCHEMA, SigmaOrigin, SigmaSummary, Termination,
+    Verdict, VerificationMode, Warning,
 };
-use crate::units::{MILLIMETRE, Quantity, from_mm, to_mm};
+use crate::units::{MILLIMETRE, Quantity, from_mm, to_deg, to_mm};
 
 /// A parameter further from nominal than this many expected deviations is called out.
 const RAN_AWAY: f64 = 5.0;
+/// A parameter further from nominal than this many expected deviations, prior and all, is not this robot's.
+const FAR_AWAY: f64 = 10.0;
+/// Residuals up to this many times what the fixed constants are expected to cause are put down to them.
+const FIXED_CONSTANTS: f64 = 6.0;
+/// Codes of warnings that leave nothing to use.
+const UNUSABLE: [&str; 3] = ["does_not_fit", "implausible", NOT_CONVERGED];
+const NOT_CONVERGED: &str = "not_converged";
 /// Residuals larger than stated by this factor are called out.
 const SIGMA_EXCESS: f64 = 1.5;
 /// Residuals beyond this (m) after identification mean that the data are not this robot's.
@@ -56,6 +65,11 @@ pub(super) fn parameters(args: &EstimationArgs, profile: &Profile) -> Vec<FreePa
         LevelArg::Offsets => Level::Offsets,
         LevelArg::Geometric => Level::Geometric,
     };
+    parameters_of(level, args, profile)
+}
+
+/// The free parameters of a level with the expected deviations of the command line.
+pub(super) fn parameters_of(level: Level, args: &EstimationArgs, profile: &Profile) -> Vec<FreeParameter> {
     let mut parameters = profile.free_parameters(level);
     expected_by(args.expected_deviation, &mut parameters);
     parameters
@@ -144,8 +158,22 @@ pub(super) fn warning(code: &str, message: String, blocks_acceptance: bool) -> W
     Warning { code: code.to_owned(), message, blocks_acceptance }
 }
 
+/// What is known about a problem besides its data.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Context {
+    /// What is identified.
+    pub(super) level: LevelArg,
+    /// Root mean square residual (m) that the expected deviations of all link constants explain, where points tell.
+    pub(super) expected: Option<f64>,
+}
+
 /// What the result itself gives reason to warn about.
-pub(super) fn result_warnings(problem: &Problem<'_>, found: &Identification, settings: &Settings) -> Vec<Warning> {
+pub(super) fn result_warnings(
+    problem: &Problem<'_>,
+    found: &Identification,
+    settings: &Settings,
+    context: Context,
+) -> Vec<Warning> {
     let joints = problem.chain.joints();
     let mut warnings: Vec<Warning> = weaknesses(problem, &found.observability, found.sigma.used)
         .iter()
@@ -155,20 +183,27 @@ pub(super) fn result_warnings(problem: &Problem<'_>, found: &Identification, set
         })
         .collect();
     let residual = found.sigma.from_residuals.unwrap_or(0.0);
-    if residual > NONSENSE_RESIDUAL {
+    let explained = context.expected.map_or(0.0, |expected| FIXED_CONSTANTS * expected / 3.0_f64.sqrt());
+    if residual > NONSENSE_RESIDUAL && context.level == LevelArg::Offsets && residual <= explained {
         let message = format!(
-            "the identified robot misses the measured points by {:.3} mm per coordinate: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
-            to_mm(residual)
+            "joint offsets alone leave {} mm per coordinate, as much as the other link constants are expected to cause; '--level geometric' identifies those too",
+            number(to_mm(residual), 3)
+        );
+        warnings.push(warning("offsets_only", message, false));
+    } else if !(residual <= NONSENSE_RESIDUAL) {
+        let message = format!(
+            "the identified robot misses the measured points by {} mm per coordinate: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
+            number(to_mm(residual), 3)
         );
         warnings.push(warning("does_not_fit", message, true));
     }
     warnings.extend(run_away(found, settings));
     if found.sigma.excess() > SIGMA_EXCESS {
         let message = format!(
-            "the residuals ({:.4} mm per coordinate) are {:.1} times the stated sigma ({:.4} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below are widened by that factor",
-            to_mm(residual),
-            found.sigma.excess(),
-            to_mm(found.sigma.used)
+            "the residuals ({} mm per coordinate) are {} times the stated sigma ({} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below are widened by that factor",
+            number(to_mm(residual), 4),
+            number(found.sigma.excess(), 1),
+            number(to_mm(found.sigma.used), 4)
         );
         warnings.push(warning("sigma_excess", message, false));
     }
@@ -185,14 +220,10 @@ pub(super) fn result_warnings(problem: &Problem<'_>, found: &Identification, set
         TerminationReason::Converged => {}
         TerminationReason::IterationLimit => {
             let message = format!("stopped after {} solver steps without having converged", found.iterations.len());
-            warnings.push(warning("not_converged", message, true));
+            warnings.push(warning(NOT_CONVERGED, message, true));
         }
         TerminationReason::NoImprovement | TerminationReason::NonFinite => {
-            warnings.push(warning(
-                "not_converged",
-                "the solver could not improve the fit any further".to_owned(),
-                true,
-            ));
+            warnings.push(warning(NOT_CONVERGED, "the solver could not improve the fit any further".to_owned(), true));
         }
     }
     warnings
@@ -207,11 +238,12 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
         .map(|estimate| {
             let quantity = estimate.id.quantity();
             format!(
-                "{} by {:+.3} {} ({:.0} times the expected deviation)",
+                "{} by {}{} {} ({} times the expected deviation)",
                 estimate.id,
-                quantity.to_edge(estimate.deviation),
+                if estimate.deviation > 0.0 { "+" } else { "" },
+                number(quantity.to_edge(estimate.deviation), 3),
                 quantity.unit(),
-                estimate.deviation.abs() / estimate.expected
+                number(estimate.deviation.abs() / estimate.expected, 0)
             )
         })
         .collect();
@@ -219,6 +251,7 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
         return None;
     }
     let list = listed.join(", ");
+    let far = found.estimates.iter().any(|estimate| estimate.deviation.abs() > FAR_AWAY * estimate.expected);
     Some(match settings.prior {
         Prior::None => warning(
             "ran_away",
@@ -232,9 +265,18 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
             format!(
                 "far from nominal: {list}. Check the profile (is it this robot?), or state larger expected deviations"
             ),
-            false,
+            far,
         ),
     })
+}
+
+/// Whether `found` with its warnings is of no use; a limit on the steps that the operator asked for is no defect.
+pub(super) fn is_unusable(warnings: &[Warning], found: &Identification, settings: &Settings) -> bool {
+    let as_asked =
+        found.termination == TerminationReason::IterationLimit && settings.iterations < Settings::default().iterations;
+    warnings
+        .iter()
+        .any(|warning| UNUSABLE.contains(&warning.code.as_str()) && !(as_asked && warning.code == NOT_CONVERGED))
 }
 
 /// Where the samples of an identification were written down.
@@ -270,7 +312,7 @@ fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary
 }
 
 /// The identified parameters in edge units.
-fn parameter_summaries(found: &Identification) -> Vec<ParameterSummary> {
+fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSummary> {
     found
         .estimates
         .iter()
@@ -281,7 +323,7 @@ fn parameter_summaries(found: &Identification) -> Vec<ParameterSummary> {
                 unit: quantity.unit().to_owned(),
                 nominal: quantity.to_edge(estimate.nominal),
                 deviation: quantity.to_edge(estimate.deviation),
-                sigma: quantity.to_edge(estimate.sigma),
+                sigma: (estimate.identifiable || prior == Prior::Expected).then(|| quantity.to_edge(estimate.sigma)),
                 expected: quantity.to_edge(estimate.expected),
                 identifiable: estimate.identifiable,
             }
@@ -307,19 +349,16 @@ fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
 
 fn sigma_summary(found: &Identification) -> SigmaSummary {
     let source = match found.sigma.source {
-        SigmaSource::Readings => "readings",
-        SigmaSource::Option => "option",
-        SigmaSource::Instrument => "instrument",
-        SigmaSource::Residuals => "residuals",
+        SigmaSource::Readings => SigmaOrigin::Readings,
+        SigmaSource::Option => SigmaOrigin::Option,
+        SigmaSource::Instrument => SigmaOrigin::Instrument,
+        SigmaSource::Residuals => SigmaOrigin::Residuals,
     };
-    SigmaSummary {
-        used_mm: to_mm(found.sigma.used),
-        source: source.to_owned(),
-        from_residuals_mm: found.sigma.from_residuals.map(to_mm),
-    }
+    SigmaSummary { used_mm: to_mm(found.sigma.used), source, from_residuals_mm: found.sigma.from_residuals.map(to_mm) }
 }
 
-fn settings_summary(args: &EstimationArgs, settings: &Settings) -> IdentificationSettings {
+fn settings_summary(args: &EstimationArgs, settings: &Settings, special: Special) -> IdentificationSettings {
+    let Special { layout, socket_distance_mm, socket_distance_sigma_mm, verification } = special;
     let name = |text: &str| text.to_owned();
     IdentificationSettings {
         level: name(match args.level {
@@ -334,13 +373,28 @@ fn settings_summary(args: &EstimationArgs, settings: &Settings) -> Identificatio
             Prior::Expected => "expected",
             Prior::None => "none",
         }),
-        estimator: name(match settings.estimator {
-            Estimator::Robust => "robust",
-            Estimator::LeastSquares => "least-squares",
-        }),
+        estimator: match settings.estimator {
+            Estimator::Robust => EstimatorName::Robust,
+            Estimator::LeastSquares => EstimatorName::LeastSquares,
+        },
         iterations: settings.iterations,
         filter: args.filter.clone(),
+        expected_length_mm: args.expected_deviation.map(|expected| to_mm(expected.length)),
+        expected_angle_deg: args.expected_deviation.map(|expected| to_deg(expected.angle)),
+        layout,
+        socket_distance_mm,
+        socket_distance_sigma_mm,
+        verification,
     }
+}
+
+/// Settings that only one command has.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Special {
+    pub(super) layout: Option<String>,
+    pub(super) socket_distance_mm: Option<f64>,
+    pub(super) socket_distance_sigma_mm: Option<f64>,
+    pub(super) verification: VerificationMode,
 }
 
 /// A finished identification, ready to be summed up.
@@ -349,6 +403,7 @@ pub(super) struct Finished<'a> {
     pub(super) loaded: &'a LoadedProfile,
     pub(super) inputs: Vec<InputFile>,
     pub(super) settings: &'a Settings,
+    pub(super) special: Special,
     pub(super) found: &'a Identification,
     pub(super) names: &'a [SampleName],
     pub(super) warnings: Vec<Warning>,
@@ -358,20 +413,20 @@ pub(super) struct Finished<'a> {
 impl Finished<'_> {
     /// The summary with its verdict.
     pub(super) fn summary(self) -> IdentificationSummary {
-        let Self { args, loaded, inputs, settings, found, names, warnings, verification } = self;
+        let Self { args, loaded, inputs, settings, special, found, names, warnings, verification } = self;
         let Observability { rank, gap, condition_number, condition_number_raw, scored_points, groups, .. } =
             &found.observability;
         let verdict: Verdict = assess::verdict(loaded.profile.acceptance(), verification.as_ref(), &warnings);
         let termination = match found.termination {
-            TerminationReason::Converged => "converged",
-            TerminationReason::IterationLimit => "iteration_limit",
-            TerminationReason::NoImprovement => "no_improvement",
-            TerminationReason::NonFinite => "non_finite",
+            TerminationReason::Converged => Termination::Converged,
+            TerminationReason::IterationLimit => Termination::IterationLimit,
+            TerminationReason::NoImprovement => Termination::NoImprovement,
+            TerminationReason::NonFinite => Termination::NonFinite,
         };
         IdentificationSummary {
             schema: SCHEMA,
             provenance: provenance(&loaded.profile, &loaded.text, inputs),
-            settings: settings_summary(args, settings),
+            settings: settings_summary(args, settings, special),
             warnings,
             verdict,
             verification,
@@ -383,7 +438,7 @@ impl Finished<'_> {
             condition_number_mm_rad: *condition_number_raw,
             condition_number_points: *scored_points,
             sigma: sigma_summary(found),
-            parameters: parameter_summaries(found),
+            parameters: parameter_summaries(found, settings.prior),
             blind_groups: groups
                 .iter()
                 .map(|group| BlindGroupSummary {
@@ -394,7 +449,7 @@ impl Finished<'_> {
                 .collect(),
             correlations: correlations(found),
             rejected: rejected(found, names),
-            termination: termination.to_owned(),
+            termination,
             iterations: found
                 .iterations
                 .iter()
