@@ -11,6 +11,7 @@ mod plan;
 mod profile;
 mod program;
 mod progress;
+mod result;
 mod verify;
 
 use std::io::{self, Write};

@@ -361,6 +361,33 @@ fn parameters_that_nothing_determines_have_no_sigma() {
 }
 
 #[test]
+fn a_calibration_with_impossible_numbers_is_refused() {
+    let (_folder, calibration) = calibrated(&[]);
+    let text = fs::read_to_string(&calibration).unwrap();
+    let after = |mark: &str, wrong: &str| {
+        let start = text.find(mark).unwrap() + mark.len();
+        let end = start + text[start..].find(['\n', ')']).unwrap();
+        format!("{}{wrong}{}", &text[..start], &text[end..])
+    };
+    let cases = [
+        (after("quaternion_xyzw: (", "0.0, 0.0, 0.0, 0.5"), "'base_from_station' is not a pose"),
+        (after("xyz_mm: (", "NaN, 0.0, 0.0"), "'base_from_station' is not a pose"),
+        (text.replacen("unit: \"deg\"", "unit: \"mm\"", 1), "'alpha1' has the unit 'mm'"),
+        (after("sigma: Some(", "-1.0"), "'alpha1' has a standard or expected deviation"),
+        (after("deviation: ", "inf,"), "'alpha1' has a number that is not finite"),
+        (text.replacen("\"1: ", "\"0: ", 1), "is not a sample"),
+    ];
+    for (wrong, cause) in cases {
+        fs::write(&calibration, wrong).unwrap();
+        let verification = "sessions/soochow-example/verification.csv";
+        let output = trupose(&["verify", "--calibration", &calibration, "--measurements", verification]);
+        let message = String::from_utf8(output.stderr).unwrap().replace("\n ", "");
+        assert_eq!(output.status.code(), Some(2), "{cause}: {message}");
+        assert!(message.contains(cause), "{cause}: {message}");
+    }
+}
+
+#[test]
 fn joint_offsets_alone_do_not_accuse_the_robot() {
     let table = Table::changed(|_, _| {});
     let (code, report) = table.json(&["--level", "offsets"]);

@@ -6,9 +6,10 @@ use std::io::Write;
 use super::Console;
 use super::assess::{direct_summary, joint_summaries};
 use super::checks;
-use super::estimate::{self, Context, Finished, SampleName, Special, identification_failure, nominal_targets, warning};
+use super::estimate::{self, Finished, SampleName, Special, identification_failure, nominal_targets, warning};
 use super::identify::{calibration, deliver};
 use super::load::{self, LoadedProfile};
+use super::result::{self, Context};
 use crate::cli::ConstraintsArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{DirectErrors, FittedSetup, fit_setup};
@@ -88,7 +89,7 @@ pub(super) fn run<O: Write, E: Write>(
     let found = setup.identify(&identification.observations, console)?;
     let problem = setup.problem(&identification.observations);
     let context = Context { level: estimation.level, expected: None };
-    warnings.extend(estimate::result_warnings(&problem, &found, &setup.settings, context));
+    warnings.extend(result::result_warnings(&problem, &found, &setup.settings, context));
     let of_identification = warnings.clone();
     let mut verification = if args.verify_rest {
         if rest.observations.places().next().is_none() {
@@ -112,17 +113,8 @@ pub(super) fn run<O: Write, E: Write>(
         }
     }
     let nominal = setup.nominal(&identification.observations)?;
-    let unusable = estimate::is_unusable(&warnings, &found, &setup.settings);
-    let special = Special {
-        layout: None,
-        socket_distance_mm: args.socket_distance_mm,
-        socket_distance_sigma_mm: args.socket_distance_mm.map(|_| args.socket_distance_sigma_mm),
-        verification: match (args.verify_rest, &args.leave_one_out) {
-            (true, _) => VerificationMode::Rest,
-            (false, Some(_)) => VerificationMode::LeaveOneOut,
-            (false, None) => VerificationMode::None,
-        },
-    };
+    let unusable = result::is_unusable(&warnings, &found, &setup.settings);
+    let special = special(args);
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let finished = Finished {
         args: estimation,
@@ -139,6 +131,20 @@ pub(super) fn run<O: Write, E: Write>(
     let calibration =
         (!unusable).then(|| calibration(&summary, &loaded.text, &nominal, &problem, of_identification, None));
     deliver(summary, calibration.as_ref(), estimation, console)
+}
+
+/// The settings that only this command has.
+fn special(args: &ConstraintsArgs) -> Special {
+    Special {
+        layout: None,
+        socket_distance_mm: args.socket_distance_mm,
+        socket_distance_sigma_mm: args.socket_distance_mm.map(|_| args.socket_distance_sigma_mm),
+        verification: match (args.verify_rest, &args.leave_one_out) {
+            (true, _) => VerificationMode::Rest,
+            (false, Some(_)) => VerificationMode::LeaveOneOut,
+            (false, None) => VerificationMode::None,
+        },
+    }
 }
 
 /// Line and configuration of every place in a table.

@@ -4,7 +4,8 @@ use std::io::Write;
 use std::path::Path;
 
 use super::assess::point_verification;
-use super::estimate::{self, Context, Finished, SampleName, Special, nominal_targets};
+use super::estimate::{self, Finished, SampleName, Special, nominal_targets};
+use super::result::{self, Context};
 use super::{Console, checks, load, to_json};
 use crate::cli::{EstimationArgs, IdentifyArgs, WeightingArg};
 use crate::error::{ExitStatus, Failure};
@@ -66,7 +67,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     let settings = estimate::settings(estimation, weighting, profile, Some(distance));
     let found = estimate::solve(&problem, &settings, console)?;
     let context = Context { level: estimation.level, expected: Some(compared.expected) };
-    warnings.extend(estimate::result_warnings(&problem, &found, &settings, context));
+    warnings.extend(result::result_warnings(&problem, &found, &settings, context));
 
     let nominal = nominal_setup(&problem, &found)?;
     let of_identification = warnings.clone();
@@ -84,7 +85,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         warnings.extend(doubts);
     }
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
-    let unusable = estimate::is_unusable(&warnings, &found, &settings);
+    let unusable = result::is_unusable(&warnings, &found, &settings);
     let special = Special {
         layout: Some(args.layout.to_string()),
         verification: match (&verification, args.verify_rest) {

@@ -83,9 +83,12 @@ impl TryFrom<String> for SampleText {
     fn try_from(text: String) -> Result<Self, Self::Error> {
         let wrong = || format!("'{text}' is not a sample; it reads like '1: 10.5 -20 30'");
         let (target, joints) = text.split_once(':').ok_or_else(wrong)?;
-        let target: usize = target.trim().parse().map_err(|_| wrong())?;
-        let joints: Vec<f64> =
-            joints.split_whitespace().map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
+        let target: usize = target.trim().parse().map_err(|error| format!("{}: {error}", wrong()))?;
+        let joints: Vec<f64> = joints
+            .split_whitespace()
+            .map(str::parse)
+            .collect::<Result<_, _>>()
+            .map_err(|error: std::num::ParseFloatError| format!("{}: {error}", wrong()))?;
         let usable = target > 0 && joints.iter().all(|value| value.is_finite());
         if usable { Ok(Self { target: target - 1, joints }) } else { Err(wrong()) }
     }
