@@ -347,8 +347,13 @@ fn no_usable_solution_ends_with_4_and_leaves_no_calibration() {
     let folder = tempfile::tempdir().unwrap();
     let (code, out, err) = shifted.identify(&["--out", folder.path().to_str().unwrap()]);
     assert_eq!(code, 4, "{err}");
+    assert!(!folder.path().join("calibration.ron").exists());
     assert!(out.contains("Verdict: NOT ACCEPTED") && err.contains("not written: calibration.ron"), "{out}{err}");
-    assert!(folder.path().join("report.json").exists() && !folder.path().join("calibration.ron").exists());
+    fs::write(folder.path().join("calibration.ron"), "old").unwrap();
+    let (_, _, err) = shifted.identify(&["--out", folder.path().to_str().unwrap()]);
+    assert!(err.contains("from an earlier run"), "{err}");
+    assert_eq!(fs::read_to_string(folder.path().join("calibration.ron")).unwrap(), "old");
+    assert!(folder.path().join("report.json").exists());
 }
 
 #[test]

@@ -103,12 +103,11 @@ pub(super) fn set_warnings(joints: &[Joint], known: &[TargetAt], tested: &[Targe
     if shared > 0 {
         let verb = if shared == 1 { "is" } else { "are" };
         let message = format!(
-            "{shared} of {} also {verb} in the identification set: the figures below are not an independent verification",
+            "{shared} of {} {verb} also in the identification set: the figures below are not an independent verification",
             counted(tested.len())
         );
         warnings.push(warning(NOT_INDEPENDENT, message, true));
     }
-    warnings.extend(few_warning(tested.len()));
     let known: Vec<&[f64]> = known.iter().map(|at| at.configuration.as_slice()).collect();
     let tested: Vec<&[f64]> = tested.iter().map(|at| at.configuration.as_slice()).collect();
     warnings.extend(coverage_gaps(joints, &known, &tested).iter().map(|gap| coverage_warning(joints, gap)));

@@ -108,9 +108,8 @@ pub(super) fn run<O: Write, E: Write>(
             let places = |named: &Named| named.observations.places().cloned().collect::<Vec<_>>();
             warnings.extend(checks::set_warnings(joints, &places(&identification), &places(&rest)));
             verification.independent = checks::is_independent(&warnings);
-        } else {
-            warnings.extend(checks::few_warning(verification.samples));
         }
+        warnings.extend(checks::few_warning(verification.samples));
     }
     let nominal = setup.nominal(&identification.observations)?;
     let unusable = result::is_unusable(&warnings, &found, &setup.settings);

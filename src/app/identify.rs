@@ -83,6 +83,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         let doubts = checks::set_warnings(profile.chain().joints(), &known, &tested);
         checked.independent = checks::is_independent(&doubts);
         warnings.extend(doubts);
+        warnings.extend(checks::few_warning(checked.samples));
     }
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let unusable = result::is_unusable(&warnings, &found, &settings);
@@ -206,6 +207,9 @@ pub(super) fn deliver<O: Write, E: Write>(
     if calibration.is_none() {
         if args.out.is_some() {
             console.remark("not written: calibration.ron, because there is no usable solution");
+            if args.out.as_ref().is_some_and(|folder| folder.join("calibration.ron").exists()) {
+                console.remark("the calibration.ron in that folder is from an earlier run");
+            }
         }
         return Ok(ExitStatus::Numerical);
     }

@@ -72,6 +72,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let known = identification_places(&calibration, profile, &file)?;
     let tested: Vec<TargetAt> = samples.iter().map(|sample| sample.at.clone()).collect();
     warnings.extend(checks::set_warnings(profile.chain().joints(), &known, &tested));
+    warnings.extend(checks::few_warning(samples.len()));
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let mut verification = point_verification(
         profile.chain().joints(),
