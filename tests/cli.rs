@@ -393,6 +393,27 @@ fn a_calibration_with_impossible_numbers_is_refused() {
 }
 
 #[test]
+fn deviations_far_beyond_the_expected_ones_are_not_accepted() {
+    let table = Table::changed(|_, _| {});
+    for (expected, blocks) in [("0.2mm,0.1deg", true), ("0.5mm,0.3deg", false)] {
+        let (_, report) = table.json(&["--expected-deviation", expected]);
+        let warnings = report["warnings"].as_array().unwrap();
+        let far = warnings.iter().find(|warning| warning["code"] == "large_deviation").unwrap();
+        assert_eq!(far["blocks_acceptance"], blocks, "{expected}: {far}");
+        let status = report["verdict"]["status"].as_str().unwrap();
+        assert_eq!(status == "accepted", !blocks, "{expected}: {warnings:?}");
+    }
+}
+
+#[test]
+fn warnings_about_rows_name_the_file_where_there_are_two() {
+    let (_, report) = Table::changed(|_, rows| rows[3][1] = "500".to_owned()).json(&[]);
+    let warnings = report["warnings"].as_array().unwrap();
+    let limits = warnings.iter().find(|warning| warning["code"] == "joint_limits").unwrap();
+    assert!(limits["message"].as_str().unwrap().contains("table.csv' "), "{limits}");
+}
+
+#[test]
 fn joint_offsets_alone_do_not_accuse_the_robot() {
     let table = Table::changed(|_, _| {});
     let (code, report) = table.json(&["--level", "offsets"]);
