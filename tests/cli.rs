@@ -4,6 +4,7 @@
     clippy::unwrap_used,
     clippy::panic,
     clippy::disallowed_methods,
+    clippy::string_slice,
     reason = "a failure of a test is a panic; test files need no atomic writes"
 )]
 
