@@ -2,6 +2,7 @@
 
 mod assess;
 mod cell;
+mod checks;
 mod constraints;
 mod estimate;
 mod identify;
@@ -10,12 +11,14 @@ mod plan;
 mod profile;
 mod program;
 mod progress;
+mod result;
 mod verify;
 
 use std::io::{self, Write};
 
 use crate::cli::{Cli, Command};
 use crate::error::{ExitStatus, Failure};
+use crate::session::printable;
 
 /// Where a command prints: data to `out`, everything else to `err`.
 #[derive(Debug)]
@@ -39,7 +42,8 @@ impl<O: Write, E: Write> Console<O, E> {
 
     /// Prints a remark. Nobody may be listening, and nothing depends on it.
     fn remark(&mut self, text: &str) {
-        drop(writeln!(self.err, "{text}"));
+        let lines: Vec<String> = text.split('\n').map(printable).collect();
+        drop(writeln!(self.err, "{}", lines.join("\n")));
     }
 }
 

@@ -11,7 +11,7 @@ use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, MILLIRADIAN};
 
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
 #[derive(Debug, Parser)]
-#[command(name = "trupose", version, about, max_term_width = 100, arg_required_else_help = true)]
+#[command(name = "trupose", version, about, max_term_width = 80, arg_required_else_help = true)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -46,9 +46,9 @@ pub enum ProfileCommand {
         /// Name of a shipped profile, or path of a profile file
         profile: String,
     },
-    /// Check a profile file and show every problem with its place
+    /// Check a profile and show every problem with its place
     Check {
-        /// Path of the profile file
+        /// Path of the profile file, or name of a shipped profile
         file: PathBuf,
     },
 }

@@ -4,6 +4,8 @@ use std::error::Error;
 use std::fmt;
 use std::process::ExitCode;
 
+use crate::session::printable;
+
 /// How a command ended, with the exit code of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExitStatus {
@@ -79,12 +81,53 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error: {}", self.message)?;
+        f.write_str(&laid_out("error: ", &self.message))?;
         for hint in &self.hints {
-            write!(f, "\nhint: {hint}")?;
+            write!(f, "\n{}", laid_out("hint: ", hint))?;
         }
         Ok(())
     }
+}
+
+/// Width of a message on a terminal.
+const WIDTH: usize = 80;
+/// Deepest indentation that the lines below a broken one take over.
+const DEEPEST: usize = 8;
+
+/// A message fit for a terminal: no control characters, lines broken at 80 columns and indented. A message with carets below an
+/// excerpt keeps its lines, or the carets would point elsewhere.
+fn laid_out(lead: &str, message: &str) -> String {
+    let lines: Vec<String> = format!("{lead}{message}").split('\n').map(printable).collect();
+    let is_caret_line = |line: &String| line.contains('^') && line.chars().all(|c| matches!(c, ' ' | '|' | '^'));
+    if lines.iter().any(is_caret_line) {
+        return lines.join("\n");
+    }
+    lines.iter().map(|line| broken(line)).collect::<Vec<_>>().join("\n")
+}
+
+/// A line broken at blanks; what follows is indented two deeper. A word that is longer than a line stays whole.
+fn broken(line: &str) -> String {
+    if line.chars().count() <= WIDTH {
+        return line.to_owned();
+    }
+    let depth = line.chars().take_while(|c| *c == ' ').count().min(DEEPEST);
+    let mut lines = vec![" ".repeat(depth)];
+    let mut empty = true;
+    for word in line.split_whitespace() {
+        let room = lines.last().map_or(0, |last| last.chars().count()) + word.chars().count() < WIDTH;
+        if !empty && !room {
+            lines.push(" ".repeat(depth + 2));
+            empty = true;
+        }
+        if let Some(last) = lines.last_mut() {
+            if !empty {
+                last.push(' ');
+            }
+            last.push_str(word);
+            empty = false;
+        }
+    }
+    lines.join("\n")
 }
 
 impl Error for Failure {}
@@ -98,6 +141,17 @@ mod tests {
         use ExitStatus as S;
         let codes = [S::Accepted, S::NotAccepted, S::Usage, S::Numerical, S::Store, S::Internal].map(S::code);
         assert_eq!(codes, [0, 1, 2, 4, 5, 70]);
+    }
+
+    #[test]
+    fn messages_keep_to_80_columns_and_disturb_no_terminal() {
+        let failure = Failure::new(ExitStatus::Usage, format!("\u{1b}[31m {}", "word ".repeat(40)));
+        let text = failure.hint("more ".repeat(40)).to_string();
+        assert!(text.starts_with("error: \u{fffd}[31m word"), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert!(text.contains("\n  word") && text.contains("\nhint: more"), "{text}");
+        let excerpt = format!("x\n | {}\n | ^^", "y ".repeat(60));
+        assert_eq!(Failure::new(ExitStatus::Usage, excerpt.clone()).to_string(), format!("error: {excerpt}"));
     }
 
     #[test]

@@ -7,4 +7,5 @@ mod tables;
 mod text;
 
 pub use plan::plan_text;
+pub use tables::fixed as number;
 pub use text::{identification_text, verification_text};

@@ -17,4 +17,4 @@ pub mod plan_summary;
 pub mod summary;
 mod table;
 
-pub use table::{Defect, TableErrors, TableProblem};
+pub use table::{Defect, TableErrors, TableProblem, printable};

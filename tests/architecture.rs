@@ -18,7 +18,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("runtime", &["planning"]),
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "profile", "session"]),
-    ("error", &[]),
+    ("error", &["session"]),
     ("cli", &["units", "session", "program"]),
     (
         "app",

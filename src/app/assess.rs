@@ -1,21 +1,15 @@
 //! From errors to a verification summary and a verdict.
 
 use crate::identification::PointSample;
-use crate::identification::verification::{
-    CoverageGap, DirectErrors, ErrorStatistics, ModelErrors, coverage_gaps, residual_against_joints,
-};
+use crate::identification::verification::{DirectErrors, ErrorStatistics, ModelErrors, residual_against_joints};
 use crate::kinematics::Joint;
 use crate::profile::Acceptance;
+use crate::report::number;
 use crate::session::summary::{
-    AxisSummary, JointBin, JointSummary, LimitCheck, ModelSummary, StatisticsSummary, Verdict, VerificationSummary,
-    Warning,
+    AxisSummary, JointBin, JointSummary, LimitCheck, ModelSummary, StatisticsSummary, Verdict, VerdictStatus,
+    VerificationSummary, Warning,
 };
 use crate::units::to_mm;
-
-use super::estimate::warning;
-
-/// Fewer verification samples than this say little about the largest error.
-const FEW_SAMPLES: usize = 10;
 
 pub(super) fn statistics(statistics: &ErrorStatistics) -> StatisticsSummary {
     let ErrorStatistics { count, mean, rms, p95, max } = *statistics;
@@ -83,57 +77,12 @@ pub(super) fn point_verification(
     VerificationSummary {
         samples: samples.len(),
         basis,
+        independent: true,
         refit: refit.to_owned(),
         nominal: model_summary(nominal),
         identified: model_summary(identified),
         residual_by_joint: joint_summaries(joints, &configurations, &identified.vectors),
     }
-}
-
-/// What is doubtful about a pair of identification and verification sets.
-pub(super) fn set_warnings(
-    joints: &[Joint],
-    identification: &[PointSample],
-    verification: &[PointSample],
-) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    let shared = verification
-        .iter()
-        .filter(|sample| identification.iter().any(|known| known.at == sample.at && known.point == sample.point));
-    let shared = shared.count();
-    if shared > 0 {
-        let message = format!(
-            "{shared} of {} verification samples are also in the identification set: the figures below are not an independent verification",
-            verification.len()
-        );
-        warnings.push(warning("not_independent", message, true));
-    }
-    if verification.len() < FEW_SAMPLES {
-        let message = format!("only {} verification samples: the largest error is hardly known", verification.len());
-        warnings.push(warning("few_verification_samples", message, false));
-    }
-    let known: Vec<&[f64]> = identification.iter().map(|sample| sample.at.configuration.as_slice()).collect();
-    let tested: Vec<&[f64]> = verification.iter().map(|sample| sample.at.configuration.as_slice()).collect();
-    warnings.extend(coverage_gaps(joints, &known, &tested).iter().map(|gap| coverage_warning(joints, gap)));
-    warnings
-}
-
-fn coverage_warning(joints: &[Joint], gap: &CoverageGap) -> Warning {
-    let joint = &joints[gap.joint];
-    let quantity = joint.joint_type.quantity();
-    let range = |(low, high): (f64, f64)| {
-        format!("{:.0}…{:.0} {}", quantity.to_edge(low), quantity.to_edge(high), quantity.unit())
-    };
-    let (known, tested) = (range(gap.identification), range(gap.verification));
-    let message = if gap.extrapolates {
-        format!("verification reaches outside the identification set: {} {tested}, identified on {known}", joint.name)
-    } else {
-        format!(
-            "verification covers a part only: {} {tested}, identified on {known}; the rest is not verified",
-            joint.name
-        )
-    };
-    warning("coverage", message, false)
 }
 
 /// Compares a verification with the acceptance limits of the profile.
@@ -142,33 +91,47 @@ pub(super) fn verdict(
     verification: Option<&VerificationSummary>,
     warnings: &[Warning],
 ) -> Verdict {
-    let decided = |status: &str, reasons: Vec<String>, checks| Verdict { status: status.to_owned(), reasons, checks };
+    let decided = |status, reasons: Vec<String>, checks| Verdict { status, reasons, checks };
     let Some(verification) = verification else {
         let reason = "there are no verification samples; give '--verify FILE', or '--use CONDITION --verify-rest'";
-        return decided("not_evaluated", vec![reason.to_owned()], Vec::new());
+        return decided(VerdictStatus::NotEvaluated, vec![reason.to_owned()], Vec::new());
     };
     let checks = limit_checks(acceptance, &verification.identified);
     let mut reasons: Vec<String> = checks
         .iter()
-        .filter(|check| !check.met)
+        .filter(|check| check.met == Some(false))
         .map(|check| {
-            format!(
-                "{} {:.3} mm is above the limit of {:.3} mm",
-                check.quantity.replace('_', " "),
-                check.value_mm,
-                check.limit_mm
-            )
+            let (name, limit) = (check.quantity.replace('_', " "), number(check.limit_mm, 3));
+            match check.value_mm {
+                Some(value) if value.is_finite() => {
+                    format!("{name} {} mm is above the limit of {limit} mm", number(value, 3))
+                }
+                _ => format!("{name} is not a number; the limit is {limit} mm"),
+            }
         })
         .collect();
-    let failed = !reasons.is_empty();
-    let doubts = warnings.iter().filter(|warning| warning.blocks_acceptance);
-    reasons.extend(doubts.map(|warning| format!("see the warning '{}'", warning.code)));
-    if !reasons.is_empty() && (failed || !checks.is_empty()) {
-        return decided("not_accepted", reasons, checks);
+    let mut doubts: Vec<&str> = Vec::new();
+    for warning in warnings.iter().filter(|warning| warning.blocks_acceptance) {
+        if !doubts.contains(&warning.code.as_str()) {
+            doubts.push(&warning.code);
+        }
     }
+    reasons.extend(doubts.iter().map(|code| format!("see the warning '{code}'")));
     if checks.is_empty() {
-        reasons.insert(0, "the profile states no acceptance limits for these figures".to_owned());
-        return decided("not_evaluated", reasons, checks);
+        reasons.insert(0, "the profile states no acceptance limits".to_owned());
+        return decided(VerdictStatus::NotEvaluated, reasons, checks);
+    }
+    let open: Vec<String> =
+        checks.iter().filter(|check| check.met.is_none()).map(|check| check.quantity.replace('_', " ")).collect();
+    let refused = !reasons.is_empty();
+    if !open.is_empty() {
+        reasons.push(format!("these data do not tell: {}", open.join(", ")));
+    }
+    if refused {
+        return decided(VerdictStatus::NotAccepted, reasons, checks);
+    }
+    if !open.is_empty() {
+        return decided(VerdictStatus::NotEvaluated, reasons, checks);
     }
     let count = checks.len();
     let reason = if count == 1 {
@@ -176,11 +139,13 @@ pub(super) fn verdict(
     } else {
         format!("all {count} acceptance limits are met")
     };
-    decided("accepted", vec![reason], checks)
+    decided(VerdictStatus::Accepted, vec![reason], checks)
 }
 
+/// Every limit of the profile with what was found. The distance of a seat from its shared point is a position error.
 fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck> {
-    let position = |pick: fn(&StatisticsSummary) -> f64| found.position_mm.as_ref().map(pick);
+    let position_errors = found.position_mm.as_ref().or(found.seat_mm.as_ref());
+    let position = |pick: fn(&StatisticsSummary) -> f64| position_errors.map(pick);
     let distance = |pick: fn(&StatisticsSummary) -> f64| found.distance_mm.as_ref().map(pick);
     [
         ("position_mean", acceptance.position_mean, position(|s| s.mean)),
@@ -191,9 +156,49 @@ fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck
         ("distance_max", acceptance.distance_max, distance(|s| s.max)),
     ]
     .into_iter()
-    .filter_map(|(quantity, limit, value)| {
-        let (limit_mm, value_mm) = (to_mm(limit?), value?);
-        Some(LimitCheck { quantity: quantity.to_owned(), value_mm, limit_mm, met: value_mm <= limit_mm })
+    .filter_map(|(quantity, limit, value_mm)| {
+        let limit_mm = to_mm(limit?);
+        // Not a number is not met.
+        let met = value_mm.map(|value| value <= limit_mm);
+        Some(LimitCheck { quantity: quantity.to_owned(), value_mm, limit_mm, met })
     })
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::estimate::warning;
+    use super::*;
+
+    fn of(distance_mm: Option<f64>) -> VerificationSummary {
+        let statistics = |value: f64| StatisticsSummary { count: 9, mean: value, rms: value, p95: value, max: value };
+        let identified = ModelSummary {
+            seat_mm: Some(statistics(0.1)),
+            distance_mm: distance_mm.map(statistics),
+            ..ModelSummary::default()
+        };
+        VerificationSummary {
+            samples: 9,
+            basis: String::new(),
+            independent: true,
+            refit: "none".to_owned(),
+            nominal: identified.clone(),
+            identified,
+            residual_by_joint: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn limits_that_cannot_be_evaluated_are_never_accepted() {
+        let acceptance = Acceptance { position_rms: Some(2e-4), distance_rms: Some(2e-4), ..Acceptance::default() };
+        let status = |distance, warnings: &[Warning]| verdict(&acceptance, Some(&of(distance)), warnings).status;
+        assert_eq!(status(Some(0.1), &[]), VerdictStatus::Accepted);
+        assert_eq!(status(None, &[]), VerdictStatus::NotEvaluated);
+        assert_eq!(status(Some(0.3), &[]), VerdictStatus::NotAccepted);
+        assert_eq!(status(Some(f64::NAN), &[]), VerdictStatus::NotAccepted);
+        let twice = [warning("poor_data", String::new(), true), warning("poor_data", String::new(), true)];
+        let found = verdict(&acceptance, Some(&of(None)), &twice);
+        assert_eq!(found.status, VerdictStatus::NotAccepted);
+        assert_eq!(found.reasons, ["see the warning 'poor_data'", "these data do not tell: distance rms"]);
+    }
 }

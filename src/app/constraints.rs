@@ -5,9 +5,11 @@ use std::io::Write;
 
 use super::Console;
 use super::assess::{direct_summary, joint_summaries};
-use super::estimate::{self, Finished, SampleName, identification_failure, nominal_targets, warning};
+use super::checks;
+use super::estimate::{self, Finished, SampleName, Special, identification_failure, nominal_targets, warning};
 use super::identify::{calibration, deliver};
 use super::load::{self, LoadedProfile};
+use super::result::{self, Context};
 use crate::cli::ConstraintsArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{DirectErrors, FittedSetup, fit_setup};
@@ -17,7 +19,7 @@ use crate::identification::{
 use crate::kinematics::FreeParameter;
 use crate::session::constraints::{Constraints, SharedPoints, read_constraints_bytes};
 use crate::session::filter::Filter;
-use crate::session::summary::{ModelSummary, VerificationSummary, Warning};
+use crate::session::summary::{ModelSummary, VerificationMode, VerificationSummary};
 use crate::store;
 use crate::units::from_mm;
 
@@ -47,8 +49,8 @@ pub(super) fn run<O: Write, E: Write>(
         Constraints::SharedPoints(shared) => (&shared.columns, &shared.warnings),
         Constraints::Lengths(lengths) => (&lengths.columns, &lengths.warnings),
     };
-    let mut warnings: Vec<Warning> =
-        table_warnings.iter().map(|problem| warning("table", problem.to_string(), false)).collect();
+    let mut warnings = checks::table_warnings(None, table_warnings);
+    warnings.extend(checks::limit_warning(&loaded.profile, None, configurations(&table)));
     let filter = load::filter(estimation.filter.as_deref(), columns)?;
     let (identification, rest) = match &table {
         Constraints::SharedPoints(shared) => (
@@ -86,8 +88,10 @@ pub(super) fn run<O: Write, E: Write>(
     let setup = Setup::new(args, &loaded);
     let found = setup.identify(&identification.observations, console)?;
     let problem = setup.problem(&identification.observations);
-    warnings.extend(estimate::result_warnings(&problem, &found, &setup.settings));
-    let verification = if args.verify_rest {
+    let context = Context { level: estimation.level, expected: None };
+    warnings.extend(result::result_warnings(&problem, &found, &setup.settings, context));
+    let of_identification = warnings.clone();
+    let mut verification = if args.verify_rest {
         if rest.observations.places().next().is_none() {
             return Err(Failure::new(ExitStatus::Usage, "no row is left for the verification")
                 .hint("'--use' must leave some rows out"));
@@ -98,21 +102,62 @@ pub(super) fn run<O: Write, E: Write>(
     } else {
         None
     };
+    if let Some(verification) = &mut verification {
+        let joints = loaded.profile.chain().joints();
+        if args.verify_rest {
+            let places = |named: &Named| named.observations.places().cloned().collect::<Vec<_>>();
+            warnings.extend(checks::set_warnings(joints, &places(&identification), &places(&rest)));
+            verification.independent = checks::is_independent(&warnings);
+        }
+        warnings.extend(checks::few_warning(verification.samples));
+    }
     let nominal = setup.nominal(&identification.observations)?;
+    let unusable = result::is_unusable(&warnings, &found, &setup.settings);
+    let special = special(args);
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let finished = Finished {
         args: estimation,
         loaded: &loaded,
         inputs: vec![load::input_file("identification", file, &bytes)],
         settings: &setup.settings,
+        special,
         found: &found,
         names: &identification.names,
         warnings,
         verification,
     };
     let summary = finished.summary();
-    let calibration = calibration(&summary, &loaded.text, &nominal, None);
-    deliver(summary, &calibration, estimation.out.as_deref(), estimation.json, console)
+    let calibration =
+        (!unusable).then(|| calibration(&summary, &loaded.text, &nominal, &problem, of_identification, None));
+    deliver(summary, calibration.as_ref(), estimation, console)
+}
+
+/// The settings that only this command has.
+fn special(args: &ConstraintsArgs) -> Special {
+    Special {
+        layout: None,
+        socket_distance_mm: args.socket_distance_mm,
+        socket_distance_sigma_mm: args.socket_distance_mm.map(|_| args.socket_distance_sigma_mm),
+        verification: match (args.verify_rest, &args.leave_one_out) {
+            (true, _) => VerificationMode::Rest,
+            (false, Some(_)) => VerificationMode::LeaveOneOut,
+            (false, None) => VerificationMode::None,
+        },
+    }
+}
+
+/// Line and configuration of every place in a table.
+fn configurations(table: &Constraints) -> Vec<(usize, &[f64])> {
+    match table {
+        Constraints::SharedPoints(shared) => {
+            let rows = shared.groups.iter().flat_map(|group| &group.samples);
+            rows.map(|row| (row.line, row.configuration.as_slice())).collect()
+        }
+        Constraints::Lengths(lengths) => {
+            let ends = lengths.rows.iter().map(|row| (row.line, [row.from.as_slice(), row.to.as_slice()]));
+            ends.flat_map(|(line, ends)| ends.map(|end| (line, end))).collect()
+        }
+    }
 }
 
 /// Whether a row is on the wanted side of the filter.
@@ -287,6 +332,7 @@ impl<'a> Setup<'a> {
         VerificationSummary {
             samples: identified.seats.len() + identified.lengths.len(),
             basis,
+            independent: true,
             refit: "none".to_owned(),
             nominal,
             identified: identified_summary,

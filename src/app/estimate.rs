@@ -9,7 +9,6 @@ use super::progress::Progress;
 use super::{Console, assess};
 use crate::cli::{EstimationArgs, EstimatorArg, ExpectedDeviation, LevelArg, PriorArg};
 use crate::error::{ExitStatus, Failure};
-use crate::identification::plausibility::weaknesses;
 use crate::identification::{
     Estimator, Identification, IdentificationError, Observability, Prior, Problem, RejectionReason, SampleIndex,
     Settings, SigmaSource, TerminationReason, Weighting, identify,
@@ -17,19 +16,12 @@ use crate::identification::{
 use crate::kinematics::{FreeParameter, ParameterId};
 use crate::profile::{Level, Profile};
 use crate::session::summary::{
-    BlindGroupSummary, CorrelationSummary, IdentificationSettings, IdentificationSummary, InputFile, IterationSummary,
-    ParameterSummary, Provenance, RejectedSummary, SCHEMA, SigmaSummary, Verdict, Warning,
+    BlindGroupSummary, CorrelationSummary, EstimatorName, IdentificationSettings, IdentificationSummary, InputFile,
+    IterationSummary, ParameterSummary, Provenance, RejectedSummary, SCHEMA, SigmaOrigin, SigmaSummary, Termination,
+    Verdict, VerificationMode, Warning,
 };
-use crate::units::{MILLIMETRE, Quantity, from_mm, to_mm};
+use crate::units::{Quantity, from_mm, to_deg, to_mm};
 
-/// A parameter further from nominal than this many expected deviations is called out.
-const RAN_AWAY: f64 = 5.0;
-/// Residuals larger than stated by this factor are called out.
-const SIGMA_EXCESS: f64 = 1.5;
-/// Residuals beyond this (m) after identification mean that the data are not this robot's.
-const NONSENSE_RESIDUAL: f64 = MILLIMETRE;
-/// A larger share of rejected samples means that there is no consistent majority to trust.
-const MANY_REJECTED: f64 = 0.2;
 /// Correlations beyond this are listed.
 const STRONG_CORRELATION: f64 = 0.9;
 
@@ -56,6 +48,11 @@ pub(super) fn parameters(args: &EstimationArgs, profile: &Profile) -> Vec<FreePa
         LevelArg::Offsets => Level::Offsets,
         LevelArg::Geometric => Level::Geometric,
     };
+    parameters_of(level, args, profile)
+}
+
+/// The free parameters of a level with the expected deviations of the command line.
+pub(super) fn parameters_of(level: Level, args: &EstimationArgs, profile: &Profile) -> Vec<FreeParameter> {
     let mut parameters = profile.free_parameters(level);
     expected_by(args.expected_deviation, &mut parameters);
     parameters
@@ -144,99 +141,6 @@ pub(super) fn warning(code: &str, message: String, blocks_acceptance: bool) -> W
     Warning { code: code.to_owned(), message, blocks_acceptance }
 }
 
-/// What the result itself gives reason to warn about.
-pub(super) fn result_warnings(problem: &Problem<'_>, found: &Identification, settings: &Settings) -> Vec<Warning> {
-    let joints = problem.chain.joints();
-    let mut warnings: Vec<Warning> = weaknesses(problem, found)
-        .iter()
-        .map(|weakness| {
-            let text = weakness.describe(|joint| joints[joint].name.clone(), |joint| joints[joint].joint_type);
-            warning("poor_data", text, true)
-        })
-        .collect();
-    let residual = found.sigma.from_residuals.unwrap_or(0.0);
-    if residual > NONSENSE_RESIDUAL {
-        let message = format!(
-            "the identified robot misses the measured points by {:.3} mm per coordinate: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
-            to_mm(residual)
-        );
-        warnings.push(warning("does_not_fit", message, true));
-    }
-    warnings.extend(run_away(found, settings));
-    if found.sigma.excess() > SIGMA_EXCESS {
-        let message = format!(
-            "the residuals ({:.4} mm per coordinate) are {:.1} times the stated sigma ({:.4} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below are widened by that factor",
-            to_mm(residual),
-            found.sigma.excess(),
-            to_mm(found.sigma.used)
-        );
-        warnings.push(warning("sigma_excess", message, false));
-    }
-    let judged = problem.observations.places().count();
-    let share = found.rejected.len() as f64 / judged.max(1) as f64;
-    if share > MANY_REJECTED {
-        let message = format!(
-            "{} of {judged} samples were rejected: there is no consistent majority to trust; look for rows in a wrong order or a moved instrument",
-            found.rejected.len()
-        );
-        warnings.push(warning("many_rejected", message, true));
-    }
-    match found.termination {
-        TerminationReason::Converged => {}
-        TerminationReason::IterationLimit => {
-            let message = format!("stopped after {} solver steps without having converged", found.iterations.len());
-            warnings.push(warning("not_converged", message, true));
-        }
-        TerminationReason::NoImprovement | TerminationReason::NonFinite => {
-            warnings.push(warning(
-                "not_converged",
-                "the solver could not improve the fit any further".to_owned(),
-                true,
-            ));
-        }
-    }
-    warnings
-}
-
-/// Parameters that are further from nominal than any robot of this make should be.
-fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
-    let listed: Vec<String> = found
-        .estimates
-        .iter()
-        .filter(|estimate| estimate.deviation.abs() > RAN_AWAY * estimate.expected)
-        .map(|estimate| {
-            let quantity = estimate.id.quantity();
-            format!(
-                "{} by {:+.3} {} ({:.0} times the expected deviation)",
-                estimate.id,
-                quantity.to_edge(estimate.deviation),
-                quantity.unit(),
-                estimate.deviation.abs() / estimate.expected
-            )
-        })
-        .collect();
-    if listed.is_empty() {
-        return None;
-    }
-    let list = listed.join(", ");
-    Some(match settings.prior {
-        Prior::None => warning(
-            "ran_away",
-            format!(
-                "parameters ran away: {list}. Without a prior, badly determined combinations take any value that lowers the residual; the robot may be worse than nominal in another part of its workspace, and a hold-out from the same series does not show it. Use '--prior expected'"
-            ),
-            true,
-        ),
-        Prior::Expected => warning(
-            "large_deviation",
-            format!(
-                "far from nominal: {list}. Check the profile (is it this robot?), or state larger expected deviations"
-            ),
-            false,
-        ),
-    })
-}
-
 /// Where the samples of an identification were written down.
 #[derive(Clone, Debug)]
 pub(super) struct SampleName {
@@ -277,7 +181,7 @@ fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary
 }
 
 /// The identified parameters in edge units.
-fn parameter_summaries(found: &Identification) -> Vec<ParameterSummary> {
+fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSummary> {
     found
         .estimates
         .iter()
@@ -288,7 +192,7 @@ fn parameter_summaries(found: &Identification) -> Vec<ParameterSummary> {
                 unit: quantity.unit().to_owned(),
                 nominal: quantity.to_edge(estimate.nominal),
                 deviation: quantity.to_edge(estimate.deviation),
-                sigma: quantity.to_edge(estimate.sigma),
+                sigma: (estimate.identifiable || prior == Prior::Expected).then(|| quantity.to_edge(estimate.sigma)),
                 expected: quantity.to_edge(estimate.expected),
                 identifiable: estimate.identifiable,
             }
@@ -314,20 +218,17 @@ fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
 
 fn sigma_summary(found: &Identification) -> SigmaSummary {
     let source = match found.sigma.source {
-        SigmaSource::Readings => "readings",
-        SigmaSource::Option => "option",
-        SigmaSource::Instrument => "instrument",
-        SigmaSource::Residuals => "residuals",
-        SigmaSource::Assumed => "assumed",
+        SigmaSource::Readings => SigmaOrigin::Readings,
+        SigmaSource::Option => SigmaOrigin::Option,
+        SigmaSource::Instrument => SigmaOrigin::Instrument,
+        SigmaSource::Residuals => SigmaOrigin::Residuals,
+        SigmaSource::Assumed => SigmaOrigin::Assumed,
     };
-    SigmaSummary {
-        used_mm: to_mm(found.sigma.used),
-        source: source.to_owned(),
-        from_residuals_mm: found.sigma.from_residuals.map(to_mm),
-    }
+    SigmaSummary { used_mm: to_mm(found.sigma.used), source, from_residuals_mm: found.sigma.from_residuals.map(to_mm) }
 }
 
-fn settings_summary(args: &EstimationArgs, settings: &Settings) -> IdentificationSettings {
+fn settings_summary(args: &EstimationArgs, settings: &Settings, special: Special) -> IdentificationSettings {
+    let Special { layout, socket_distance_mm, socket_distance_sigma_mm, verification } = special;
     let name = |text: &str| text.to_owned();
     IdentificationSettings {
         level: name(match args.level {
@@ -342,13 +243,28 @@ fn settings_summary(args: &EstimationArgs, settings: &Settings) -> Identificatio
             Prior::Expected => "expected",
             Prior::None => "none",
         }),
-        estimator: name(match settings.estimator {
-            Estimator::Robust => "robust",
-            Estimator::LeastSquares => "least-squares",
-        }),
+        estimator: match settings.estimator {
+            Estimator::Robust => EstimatorName::Robust,
+            Estimator::LeastSquares => EstimatorName::LeastSquares,
+        },
         iterations: settings.iterations,
         filter: args.filter.clone(),
+        expected_length_mm: args.expected_deviation.map(|expected| to_mm(expected.length)),
+        expected_angle_deg: args.expected_deviation.map(|expected| to_deg(expected.angle)),
+        layout,
+        socket_distance_mm,
+        socket_distance_sigma_mm,
+        verification,
     }
+}
+
+/// Settings that only one command has.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Special {
+    pub(super) layout: Option<String>,
+    pub(super) socket_distance_mm: Option<f64>,
+    pub(super) socket_distance_sigma_mm: Option<f64>,
+    pub(super) verification: VerificationMode,
 }
 
 /// A finished identification, ready to be summed up.
@@ -357,6 +273,7 @@ pub(super) struct Finished<'a> {
     pub(super) loaded: &'a LoadedProfile,
     pub(super) inputs: Vec<InputFile>,
     pub(super) settings: &'a Settings,
+    pub(super) special: Special,
     pub(super) found: &'a Identification,
     pub(super) names: &'a [SampleName],
     pub(super) warnings: Vec<Warning>,
@@ -366,20 +283,20 @@ pub(super) struct Finished<'a> {
 impl Finished<'_> {
     /// The summary with its verdict.
     pub(super) fn summary(self) -> IdentificationSummary {
-        let Self { args, loaded, inputs, settings, found, names, warnings, verification } = self;
+        let Self { args, loaded, inputs, settings, special, found, names, warnings, verification } = self;
         let Observability { rank, gap, condition_number, condition_number_raw, scored_points, groups, .. } =
             &found.observability;
         let verdict: Verdict = assess::verdict(loaded.profile.acceptance(), verification.as_ref(), &warnings);
         let termination = match found.termination {
-            TerminationReason::Converged => "converged",
-            TerminationReason::IterationLimit => "iteration_limit",
-            TerminationReason::NoImprovement => "no_improvement",
-            TerminationReason::NonFinite => "non_finite",
+            TerminationReason::Converged => Termination::Converged,
+            TerminationReason::IterationLimit => Termination::IterationLimit,
+            TerminationReason::NoImprovement => Termination::NoImprovement,
+            TerminationReason::NonFinite => Termination::NonFinite,
         };
         IdentificationSummary {
             schema: SCHEMA,
             provenance: provenance(&loaded.profile, &loaded.text, inputs),
-            settings: settings_summary(args, settings),
+            settings: settings_summary(args, settings, special),
             warnings,
             verdict,
             verification,
@@ -391,7 +308,7 @@ impl Finished<'_> {
             condition_number_mm_rad: *condition_number_raw,
             condition_number_points: *scored_points,
             sigma: sigma_summary(found),
-            parameters: parameter_summaries(found),
+            parameters: parameter_summaries(found, settings.prior),
             blind_groups: groups
                 .iter()
                 .map(|group| BlindGroupSummary {
@@ -402,7 +319,7 @@ impl Finished<'_> {
                 .collect(),
             correlations: correlations(found),
             rejected: rejected(found, names),
-            termination: termination.to_owned(),
+            termination,
             iterations: found
                 .iterations
                 .iter()

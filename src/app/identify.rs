@@ -3,19 +3,19 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::assess::{point_verification, set_warnings};
-use super::estimate::{self, Finished, SampleName, nominal_targets, warning};
-use super::{Console, load, to_json};
-use crate::cli::{IdentifyArgs, WeightingArg};
+use super::assess::point_verification;
+use super::estimate::{self, Finished, SampleName, Special, nominal_targets};
+use super::result::{self, Context};
+use super::{Console, checks, load, to_json};
+use crate::cli::{EstimationArgs, IdentifyArgs, WeightingArg};
 use crate::error::{ExitStatus, Failure};
-use crate::identification::plausibility::{Plausibility, compare_with_nominal};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{ArmModel, Identification, Observations, PointSample, Problem, Weighting};
-use crate::profile::Profile;
+use crate::identification::{ArmModel, Identification, Observations, PointSample, Problem, TargetAt, Weighting};
+use crate::profile::{Level, Profile};
 use crate::report;
-use crate::session::calibration::{self, Calibration};
-use crate::session::measurements::{Measurements, Row};
-use crate::session::summary::{IdentificationSummary, VerificationSummary, Warning};
+use crate::session::calibration::{self, Calibration, SampleText};
+use crate::session::measurements::Row;
+use crate::session::summary::{IdentificationSummary, VerdictStatus, VerificationMode, VerificationSummary, Warning};
 use crate::store;
 use crate::units::to_mm;
 
@@ -50,13 +50,13 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     let problem =
         Problem { chain: profile.chain(), targets: &targets, parameters: &parameters, observations: &observations };
 
-    let mut warnings = table_warnings(&identification.table);
-    if let Some(loaded) = &verification {
-        warnings.extend(table_warnings(&loaded.table));
-    }
-    warnings.extend(limit_warnings(profile, &rows));
-    warnings.extend(limit_warnings(profile, &verification_rows));
-    warnings.extend(check_plausibility(&problem)?);
+    // With two files in play, what is said about rows names the file.
+    let file = verification.as_ref().map(|_| identification.input.file.as_str());
+    let mut warnings = checks::table_warnings(file, &identification.table.warnings);
+    warnings.extend(checks::limit_warning(profile, file, configurations(&rows)));
+    let expected = estimate::parameters_of(Level::Geometric, estimation, profile);
+    let compared = checks::check_plausibility(&Problem { parameters: &expected, ..problem })?;
+    warnings.extend(compared.warning);
 
     let distance = observations.points.iter().map(|sample| sample.point.coords.norm()).sum::<f64>()
         / observations.points.len().max(1) as f64;
@@ -66,28 +66,57 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     };
     let settings = estimate::settings(estimation, weighting, profile, Some(distance));
     let found = estimate::solve(&problem, &settings, console)?;
-    warnings.extend(estimate::result_warnings(&problem, &found, &settings));
+    let context = Context { level: estimation.level, expected: Some(compared.expected) };
+    warnings.extend(result::result_warnings(&problem, &found, &settings, context));
 
     let nominal = nominal_setup(&problem, &found)?;
-    let checked = verify(profile, &nominal, &found, &verification_samples, basis);
-    if checked.is_some() {
-        warnings.extend(set_warnings(profile.chain().joints(), &observations.points, &verification_samples));
+    let of_identification = warnings.clone();
+    let file = verification.as_ref().map(|loaded| loaded.input.file.as_str());
+    if let Some(loaded) = &verification {
+        warnings.extend(checks::table_warnings(file, &loaded.table.warnings));
+    }
+    warnings.extend(checks::limit_warning(profile, file, configurations(&verification_rows)));
+    let mut checked = verify(profile, &nominal, &found, &verification_samples, basis);
+    if let Some(checked) = &mut checked {
+        let places = |samples: &[PointSample]| samples.iter().map(|sample| sample.at.clone()).collect::<Vec<_>>();
+        let (known, tested) = (places(&observations.points), places(&verification_samples));
+        let doubts = checks::set_warnings(profile.chain().joints(), &known, &tested);
+        checked.independent = checks::is_independent(&doubts);
+        warnings.extend(doubts);
+        warnings.extend(checks::few_warning(checked.samples));
     }
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
+    let unusable = result::is_unusable(&warnings, &found, &settings);
+    let special = Special {
+        layout: Some(args.layout.to_string()),
+        verification: match (&verification, args.verify_rest) {
+            (Some(_), _) => VerificationMode::File,
+            (None, true) => VerificationMode::Rest,
+            (None, false) => VerificationMode::None,
+        },
+        ..Special::default()
+    };
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
     let finished = Finished {
         args: estimation,
         loaded: &loaded,
         inputs,
         settings: &settings,
+        special,
         found: &found,
         names: &names,
         warnings,
         verification: checked,
     };
     let summary = finished.summary();
-    let calibration = calibration(&summary, &loaded.text, &nominal, Some(&found));
-    deliver(summary, &calibration, estimation.out.as_deref(), estimation.json, console)
+    let calibration =
+        (!unusable).then(|| calibration(&summary, &loaded.text, &nominal, &problem, of_identification, Some(&found)));
+    deliver(summary, calibration.as_ref(), estimation, console)
+}
+
+/// Line and configuration of rows.
+pub(super) fn configurations<'a>(rows: &[&'a Row]) -> impl Iterator<Item = (usize, &'a [f64])> {
+    rows.iter().map(|row| (row.line, row.configuration.as_slice()))
 }
 
 /// The nominal arm with frame and free target fitted to the accepted identification samples.
@@ -118,83 +147,28 @@ fn verify(
     Some(point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, "none"))
 }
 
-fn table_warnings(table: &Measurements) -> Vec<Warning> {
-    table.warnings.iter().map(|problem| warning("table", problem.to_string(), false)).collect()
-}
-
-/// Rows whose joints are outside the limits of the profile.
-fn limit_warnings(profile: &Profile, rows: &[&Row]) -> Option<Warning> {
-    const SHOWN: usize = 3;
-    let joints = profile.chain().joints();
-    let mut outside = Vec::new();
-    for row in rows {
-        for ((joint, range), value) in joints.iter().zip(profile.joints()).zip(&row.configuration) {
-            let quantity = joint.joint_type.quantity();
-            if let Some((low, high)) = range.limits
-                && !(low - 1e-9..=high + 1e-9).contains(value)
-            {
-                outside.push(format!(
-                    "line {}: {} at {:.2} {unit}, allowed {:.2}…{:.2} {unit}",
-                    row.line,
-                    joint.name,
-                    quantity.to_edge(*value),
-                    quantity.to_edge(low),
-                    quantity.to_edge(high),
-                    unit = quantity.unit()
-                ));
-            }
-        }
-    }
-    let more = outside.len().saturating_sub(SHOWN);
-    let list = outside.iter().take(SHOWN).cloned().collect::<Vec<_>>().join("; ");
-    let tail = if more > 0 { format!("; and {more} more") } else { String::new() };
-    (!outside.is_empty()).then(|| {
-        warning("joint_limits", format!("joint values outside the limits of the profile (degrees and radians mixed up, or another robot?): {list}{tail}"), false)
-    })
-}
-
-/// Refuses data that a known mistake explains better than this robot does.
-fn check_plausibility(problem: &Problem<'_>) -> Result<Vec<Warning>, Failure> {
-    let plausibility = compare_with_nominal(problem).map_err(|error| estimate::identification_failure(&error))?;
-    if plausibility.is_plausible() {
-        return Ok(Vec::new());
-    }
-    let Plausibility { nominal, expected, mistake } = &plausibility;
-    let joints = problem.chain.joints();
-    let gap = format!(
-        "the measured points are typically {:.1} mm off the nominal robot, {:.1} mm can be expected",
-        to_mm(*nominal),
-        to_mm(*expected)
-    );
-    match mistake {
-        Some(mistake) => {
-            let text = mistake.describe(|joint| joints[joint].name.clone());
-            Err(Failure::new(ExitStatus::Usage, format!("{gap}: {text}")))
-        }
-        None => Ok(vec![warning(
-            "implausible",
-            format!(
-                "{gap}, and no single mistake explains it (rows in another order, another robot, two joints wrong?)"
-            ),
-            true,
-        )]),
-    }
-}
-
-/// The calibration file of a result.
+/// The calibration file of a result; `warnings` are those about the identification itself.
 pub(super) fn calibration(
     summary: &IdentificationSummary,
     profile_text: &str,
     nominal: &FittedSetup,
+    problem: &Problem<'_>,
+    warnings: Vec<Warning>,
     found: Option<&Identification>,
 ) -> Calibration {
     let station = found.and_then(|found| found.base_from_station.first());
+    let joints = problem.chain.joints();
+    let sample = |at: &TargetAt| {
+        let values = at.configuration.iter().zip(joints);
+        SampleText::new(at.target, values.map(|(value, joint)| joint.joint_type.quantity().to_edge(*value)))
+    };
     Calibration {
         schema: calibration::SCHEMA,
         provenance: summary.provenance.clone(),
         settings: summary.settings.clone(),
         sigma: summary.sigma.clone(),
         verdict: summary.verdict.clone(),
+        warnings,
         rank: summary.rank,
         parameters: summary.parameters.clone(),
         base_from_station: station.map(Into::into),
@@ -205,33 +179,59 @@ pub(super) fn calibration(
             .iter()
             .map(|point| (to_mm(point.x), to_mm(point.y), to_mm(point.z)))
             .collect(),
+        samples: problem.observations.places().map(sample).collect(),
         profile: profile_text.to_owned(),
     }
 }
 
-/// Writes the result files and prints the summary.
+/// Writes the result files and prints the summary: also where writing fails, so that the numbers are not lost. Without a
+/// `calibration` there is no usable solution, and only the report is written.
 pub(super) fn deliver<O: Write, E: Write>(
     mut summary: IdentificationSummary,
-    calibration: &Calibration,
-    out: Option<&Path>,
-    json: bool,
+    calibration: Option<&Calibration>,
+    args: &EstimationArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    if let Some(folder) = out {
-        let store_failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
-        store::create_folder(folder).map_err(store_failure)?;
-        let text = calibration.to_text().map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
-        let (calibration_file, report_file) = (folder.join("calibration.ron"), folder.join("report.json"));
-        summary.written = vec![calibration_file.display().to_string(), report_file.display().to_string()];
-        store::replace(&calibration_file, &text).map_err(store_failure)?;
-        store::replace(&report_file, &to_json(&summary)?).map_err(store_failure)?;
+    let mut failed = None;
+    if let Some(folder) = &args.out {
+        failed = save(&mut summary, calibration, folder).err();
+        if failed.is_some() {
+            summary.written.clear();
+        }
     }
-    let text = if json { to_json(&summary)? } else { report::identification_text(&summary) };
+    let text = if args.json { to_json(&summary)? } else { report::identification_text(&summary) };
     console.print(&text)?;
-    Ok(exit_status(&summary.verdict.status))
+    if let Some(failure) = failed {
+        return Err(failure.hint("choose another folder with '--out'"));
+    }
+    if calibration.is_none() {
+        if args.out.is_some() {
+            console.remark("not written: calibration.ron, because there is no usable solution");
+            if args.out.as_ref().is_some_and(|folder| folder.join("calibration.ron").exists()) {
+                console.remark("the calibration.ron in that folder is from an earlier run");
+            }
+        }
+        return Ok(ExitStatus::Numerical);
+    }
+    Ok(exit_status(summary.verdict.status))
+}
+
+/// Writes the result files into `folder` and lists them in the summary.
+fn save(summary: &mut IdentificationSummary, calibration: Option<&Calibration>, folder: &Path) -> Result<(), Failure> {
+    let store_failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
+    store::create_folder(folder).map_err(store_failure)?;
+    if let Some(calibration) = calibration {
+        let text = calibration.to_text().map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+        let file = folder.join("calibration.ron");
+        store::replace(&file, &text).map_err(store_failure)?;
+        summary.written.push(file.display().to_string());
+    }
+    let file = folder.join("report.json");
+    summary.written.push(file.display().to_string());
+    store::replace(&file, &to_json(summary)?).map_err(store_failure)
 }
 
 /// 1 only where limits were checked and not met.
-pub(super) fn exit_status(verdict: &str) -> ExitStatus {
-    if verdict == "not_accepted" { ExitStatus::NotAccepted } else { ExitStatus::Accepted }
+pub(super) fn exit_status(verdict: VerdictStatus) -> ExitStatus {
+    if verdict == VerdictStatus::NotAccepted { ExitStatus::NotAccepted } else { ExitStatus::Accepted }
 }

@@ -30,7 +30,10 @@ pub(super) fn run<O: Write, E: Write>(
         }
         ProfileCommand::Check { file } => {
             let name = file.display().to_string();
-            let text = load::text(file)?;
+            let text = match builtin(&name) {
+                Some(text) if !file.exists() => text.to_owned(),
+                _ => load::text(file)?,
+            };
             let outcome = Profile::parse(&text, &name);
             console.print(&check_text(&name, &outcome))?;
             Ok(if outcome.is_ok() { ExitStatus::Accepted } else { ExitStatus::Usage })

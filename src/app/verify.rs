@@ -5,22 +5,25 @@ use std::io::Write;
 use nalgebra::{Isometry3, Point3};
 
 use super::assess::{point_verification, verdict};
-use super::estimate::{identification_failure, provenance, warning};
-use super::identify::exit_status;
+use super::checks::{self, Compared};
+use super::estimate::{identification_failure, nominal_targets, provenance, warning};
+use super::identify::{configurations, exit_status};
 use super::{Console, load, to_json};
 use crate::cli::{RefitArg, VerifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{ArmModel, Observations, PointSample};
+use crate::identification::{ArmModel, Observations, PointSample, Problem, TargetAt};
 use crate::kinematics::{FreeParameter, ParameterId};
 use crate::profile::{Level, Profile};
 use crate::report;
-use crate::session::calibration::Calibration;
-use crate::session::summary::{SCHEMA, VerificationReport};
+use crate::session::calibration::{Calibration, SampleText};
+use crate::session::summary::{SCHEMA, VerificationReport, Warning};
 use crate::units::{MILLIMETRE, from_mm};
 
 /// How freely a target that was mounted anew is fitted (m).
 const NEW_MOUNTING: f64 = 50.0 * MILLIMETRE;
+/// Fewer points than this cannot show a mistake in a whole table.
+const ENOUGH_TO_COMPARE: usize = 4;
 
 pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let file = args.calibration.display().to_string();
@@ -39,6 +42,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         return Err(Failure::new(ExitStatus::Usage, "no row is left for the verification").hint("check '--use'"));
     }
 
+    let plausible = check_table(args, profile, &samples)?;
     let models = Models::new(&calibration, profile, &file)?;
     let (nominal, identified) = models.set_up(args.refit, profile, &samples, &file)?;
     let errors = |setup: &FittedSetup| {
@@ -46,13 +50,16 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
             .ok_or_else(|| Failure::new(ExitStatus::Numerical, "the frame of the instrument could not be fitted"))
     };
     let (nominal_errors, identified_errors) = (errors(&nominal)?, errors(&identified)?);
-    let mut warnings: Vec<_> =
-        measured.table.warnings.iter().map(|problem| warning("table", problem.to_string(), false)).collect();
+    let mut warnings = checks::table_warnings(None, &measured.table.warnings);
+    warnings.extend(checks::limit_warning(profile, None, configurations(&rows)));
+    warnings.extend(carried_over(&calibration));
+    warnings.extend(plausible.and_then(|compared| compared.warning));
     let (refit, basis, fitted) = match args.refit {
         RefitArg::None => ("none", "same set-up as the identification", 0),
         RefitArg::Frame => ("frame", "another set-up: the place of the tracker was fitted to these very points", 6),
         RefitArg::FrameAndTarget => {
-            ("frame+target", "another set-up: the place of the tracker and the SMR were fitted to these very points", 9)
+            let basis = "another set-up: the place of the tracker and the SMR were fitted to these very points";
+            ("frame+target", basis, 6 + remounted_targets(profile, &samples).len())
         }
     };
     if fitted > 0 && 3 * samples.len() < 4 * fitted {
@@ -62,7 +69,12 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         );
         warnings.push(warning("few_data", message, true));
     }
-    let verification = point_verification(
+    let known = identification_places(&calibration, profile, &file)?;
+    let tested: Vec<TargetAt> = samples.iter().map(|sample| sample.at.clone()).collect();
+    warnings.extend(checks::set_warnings(profile.chain().joints(), &known, &tested));
+    warnings.extend(checks::few_warning(samples.len()));
+    warnings.sort_by_key(|warning| !warning.blocks_acceptance);
+    let mut verification = point_verification(
         profile.chain().joints(),
         &samples,
         &nominal_errors,
@@ -70,6 +82,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         format!("'{}', {basis}", measured.input.file),
         refit,
     );
+    verification.independent = checks::is_independent(&warnings);
     let inputs = vec![load::input_file("calibration", file, text.as_bytes()), measured.input];
     let report = VerificationReport {
         schema: SCHEMA,
@@ -80,7 +93,54 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     };
     let text = if args.json { to_json(&report)? } else { report::verification_text(&report) };
     console.print(&text)?;
-    Ok(exit_status(&report.verdict.status))
+    Ok(exit_status(report.verdict.status))
+}
+
+/// Looks for mistakes in the whole table, as `identify` does. Too few points to tell are left to other checks.
+fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) -> Result<Option<Compared>, Failure> {
+    if samples.len() < ENOUGH_TO_COMPARE {
+        return Ok(None);
+    }
+    let mut parameters = profile.free_parameters(Level::Geometric);
+    if args.refit == RefitArg::FrameAndTarget {
+        parameters.retain(|parameter| matches!(parameter.id, ParameterId::Link { .. }));
+        parameters.extend(remounted_targets(profile, samples));
+    }
+    let targets = nominal_targets(profile);
+    let observations = Observations { points: samples.to_vec(), ..Observations::default() };
+    let problem =
+        Problem { chain: profile.chain(), targets: &targets, parameters: &parameters, observations: &observations };
+    checks::check_plausibility(&problem).map(Some)
+}
+
+/// What ruled out acceptance of the identification itself also rules it out here.
+fn carried_over(calibration: &Calibration) -> Option<Warning> {
+    let mut codes: Vec<&str> = Vec::new();
+    for warning in calibration.warnings.iter().filter(|warning| warning.blocks_acceptance) {
+        if !codes.contains(&warning.code.as_str()) {
+            codes.push(&warning.code);
+        }
+    }
+    let message = format!(
+        "the calibration itself was not acceptable: {}; a good figure here does not mend it. Identify again from better data",
+        codes.join(", ")
+    );
+    (!codes.is_empty()).then(|| warning("calibration_not_acceptable", message, true))
+}
+
+/// The configurations and targets that the calibration was identified from.
+fn identification_places(calibration: &Calibration, profile: &Profile, file: &str) -> Result<Vec<TargetAt>, Failure> {
+    let joints = profile.chain().joints();
+    let place = |(index, sample): (usize, &SampleText)| {
+        if sample.joints.len() != joints.len() || sample.target >= profile.targets().len() {
+            let message = format!("'{file}': identification sample {} does not fit its profile", index + 1);
+            return Err(Failure::new(ExitStatus::Usage, message));
+        }
+        let values = sample.joints.iter().zip(joints);
+        let configuration = values.map(|(value, joint)| joint.joint_type.quantity().from_edge(*value)).collect();
+        Ok(TargetAt { configuration, target: sample.target })
+    };
+    calibration.samples.iter().enumerate().map(place).collect()
 }
 
 /// Nominal and identified arm of a calibration with the set-up of its identification.

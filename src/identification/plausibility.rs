@@ -349,11 +349,13 @@ impl Weakness {
 /// The rank that this robot with these parameters has for points all over its joint space.
 fn structural_rank(problem: &Problem<'_>) -> usize {
     const POSES: usize = 60;
+    /// Primes, whose square roots are independent.
+    const IRRATIONAL: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
     let joints = problem.chain.joints();
     let points = (0..POSES)
         .map(|pose| {
-            // Multiples of irrational numbers spread evenly (Weyl); any generic set of poses shows the same rank.
-            let place = |joint: usize| ((pose + 1) as f64 * ((joint + 2) as f64).sqrt()).fract() - 0.5;
+            // Multiples of independent irrational numbers spread evenly (Weyl); any generic set of poses shows the same rank.
+            let place = |joint: usize| ((pose + 1) as f64 * IRRATIONAL[joint % IRRATIONAL.len()].sqrt()).fract() - 0.5;
             let configuration = joints.iter().enumerate().map(|(joint, definition)| match definition.joint_type {
                 JointType::Revolute => 4.0 * place(joint),
                 JointType::Prismatic => 0.5 * place(joint),

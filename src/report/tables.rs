@@ -1,10 +1,18 @@
 //! Numbers and paragraphs laid out for 80 columns.
 
+use crate::session::printable;
+
 /// Width of a report.
 pub(super) const WIDTH: usize = 80;
 
-/// A number with fixed decimals; no negative zero.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
+/// Numbers beyond this are shown with an exponent: nobody reads three hundred digits.
+const LARGE: f64 = 1e9;
+
+/// A number with fixed decimals; no negative zero, and an exponent above 1e9.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if value.abs() > LARGE {
+        return format!("{value:.3e}");
+    }
     let text = format!("{value:.decimals$}");
     let is_zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
     if is_zero { text.trim_start_matches('-').to_owned() } else { text }
@@ -19,7 +27,7 @@ pub(super) fn decimals_for(sigma: f64) -> usize {
 
 /// Adds a line with its line break.
 pub(super) fn push_line(text: &mut String, line: &str) {
-    text.push_str(line);
+    text.push_str(&printable(line));
     text.push('\n');
 }
 
@@ -37,7 +45,7 @@ pub(super) fn paragraph(first: &str, text: &str) -> String {
         if !empty {
             line.push(' ');
         }
-        line.push_str(word);
+        line.push_str(&printable(word));
         empty = false;
     }
     lines.push(line);
@@ -58,6 +66,7 @@ mod tests {
     fn zero_has_no_sign() {
         assert_eq!(fixed(-0.0004, 3), "0.000");
         assert_eq!(fixed(-0.0006, 3), "-0.001");
+        assert_eq!(fixed(-1e308, 3), "-1.000e308");
     }
 
     #[test]

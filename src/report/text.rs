@@ -2,8 +2,8 @@
 
 use super::tables::{decimals_for, fixed, paragraph, push_line};
 use crate::session::summary::{
-    IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict,
-    VerificationReport, VerificationSummary, Warning,
+    EstimatorName, IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, SigmaOrigin,
+    StatisticsSummary, Termination, Verdict, VerdictStatus, VerificationReport, VerificationSummary, Warning,
 };
 
 /// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
@@ -67,21 +67,25 @@ pub(super) fn warnings(warnings: &[Warning]) -> String {
 }
 
 fn verdict(verdict: &Verdict) -> String {
-    let name = match verdict.status.as_str() {
-        "accepted" => "ACCEPTED",
-        "not_accepted" => "NOT ACCEPTED",
-        _ => "NOT EVALUATED",
+    let name = match verdict.status {
+        VerdictStatus::Accepted => "ACCEPTED",
+        VerdictStatus::NotAccepted => "NOT ACCEPTED",
+        VerdictStatus::NotEvaluated => "NOT EVALUATED",
     };
     let mut text = paragraph("", &format!("Verdict: {name}: {}", verdict.reasons.join("; ")));
     for check in &verdict.checks {
-        let sign = if check.met { "<=" } else { "> " };
-        let result = if check.met { "met" } else { "NOT MET" };
+        let (sign, result) = match check.met {
+            Some(true) => ("<=", "met"),
+            Some(false) => ("> ", "NOT MET"),
+            None => ("  ", "NOT EVALUATED"),
+        };
+        let value = check.value_mm.map_or_else(|| "-".to_owned(), |value| fixed(value, 4));
         push_line(
             &mut text,
             &format!(
                 "  {:<16}{:>9} mm  {sign} {:>7} mm  {result}",
                 check.quantity.replace('_', " "),
-                fixed(check.value_mm, 4),
+                value,
                 fixed(check.limit_mm, 3)
             ),
         );
@@ -95,9 +99,11 @@ type Pick = fn(&ModelSummary) -> Option<StatisticsSummary>;
 
 /// Nominal and identified side by side: tables III and IV of the method paper, with root mean square and 95 %.
 fn verification_tables(verification: &VerificationSummary) -> String {
-    let VerificationSummary { samples, basis, nominal, identified, .. } = verification;
-    let mut text =
-        paragraph("", &format!("Accuracy on {samples} samples that the identification did not see: {basis}"));
+    let VerificationSummary { samples, basis, independent, nominal, identified, .. } = verification;
+    let noun = if *samples == 1 { "sample" } else { "samples" };
+    let which =
+        if *independent { "that the identification did not see" } else { "that the identification saw in part or all" };
+    let mut text = paragraph("", &format!("Accuracy on {samples} {noun} {which}: {basis}"));
     push_line(&mut text, &format!("  {:<34}{:>12}{:>14}", "mm", "nominal", "identified"));
     let pairs: [(&str, Pick); 3] = [
         ("position error", |model| model.position_mm),
@@ -137,14 +143,19 @@ fn row(text: &mut String, name: &str, nominal: f64, identified: f64) {
     push_line(text, &format!("  {name:<34}{:>12}{:>14}", fixed(nominal, 4), fixed(identified, 4)));
 }
 
+/// The gap in the singular values. Beyond a million the rest is rounding noise, and its size means nothing.
+fn gap(ratio: f64) -> String {
+    if ratio > 1e6 { "gap over 1e6".to_owned() } else { format!("gap {ratio:.0e}") }
+}
+
 fn fit_lines(summary: &IdentificationSummary) -> String {
     let sigma = &summary.sigma;
-    let source = match sigma.source.as_str() {
-        "readings" => "given with the readings",
-        "option" => "given on the command line",
-        "instrument" => "of the profile's instrument",
-        "assumed" => "assumed, for want of data to estimate it",
-        _ => "estimated from the residuals",
+    let source = match sigma.source {
+        SigmaOrigin::Readings => "given with the readings",
+        SigmaOrigin::Option => "given on the command line",
+        SigmaOrigin::Instrument => "of the profile's instrument",
+        SigmaOrigin::Residuals => "estimated from the residuals",
+        SigmaOrigin::Assumed => "assumed, for want of data to estimate it",
     };
     let mut text = paragraph(
         "",
@@ -155,17 +166,22 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
             summary.settings.level,
             summary.settings.weighting,
             summary.settings.prior,
-            summary.settings.estimator
+            match summary.settings.estimator {
+                EstimatorName::Robust => "robust",
+                EstimatorName::LeastSquares => "least-squares",
+            }
         ),
     );
     let residual = match sigma.from_residuals_mm {
-        Some(residual) if sigma.source != "residuals" => format!("; the residuals say {} mm", fixed(residual, 4)),
+        Some(residual) if sigma.source != SigmaOrigin::Residuals => {
+            format!("; the residuals say {} mm", fixed(residual, 4))
+        }
         _ => String::new(),
     };
     push_line(&mut text, &format!("  sigma {} mm, {source}{residual}", fixed(sigma.used_mm, 4)));
     let rank = summary.rank.map_or_else(
         || "rank not clear".to_owned(),
-        |rank| format!("rank {rank} of {} (gap {:.0e})", summary.parameter_count, summary.singular_value_gap),
+        |rank| format!("rank {rank} of {} ({})", summary.parameter_count, gap(summary.singular_value_gap)),
     );
     push_line(&mut text, &format!("  {rank}"));
     if let (Some(scaled), Some(raw)) = (summary.condition_number, summary.condition_number_mm_rad) {
@@ -175,10 +191,19 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
     }
     push_line(
         &mut text,
-        &format!("  {} after {} solver steps", summary.termination.replace('_', " "), summary.iterations.len()),
+        &format!("  {} after {} solver steps", termination(summary.termination), summary.iterations.len()),
     );
     text.push('\n');
     text
+}
+
+fn termination(reason: Termination) -> &'static str {
+    match reason {
+        Termination::Converged => "converged",
+        Termination::IterationLimit => "iteration limit",
+        Termination::NoImprovement => "no improvement",
+        Termination::NonFinite => "numbers that are not finite",
+    }
 }
 
 fn parameter_table(parameters: &[ParameterSummary]) -> String {
@@ -191,10 +216,10 @@ fn parameter_table(parameters: &[ParameterSummary]) -> String {
         ),
     );
     for parameter in parameters {
-        let decimals = decimals_for(parameter.sigma);
+        let decimals = parameter.sigma.map_or(4, decimals_for);
         let found = if !parameter.identifiable {
             "only combined"
-        } else if parameter.sigma > WEAK * parameter.expected {
+        } else if parameter.sigma.is_none_or(|sigma| sigma > WEAK * parameter.expected) {
             "weakly"
         } else {
             "yes"
@@ -208,7 +233,7 @@ fn parameter_table(parameters: &[ParameterSummary]) -> String {
                 fixed(parameter.nominal, 4),
                 fixed(parameter.deviation, decimals),
                 fixed(parameter.nominal + parameter.deviation, decimals),
-                fixed(parameter.sigma, decimals)
+                parameter.sigma.map_or_else(|| "-".to_owned(), |sigma| fixed(sigma, decimals))
             ),
         );
     }
@@ -237,7 +262,7 @@ fn blind_lines(summary: &IdentificationSummary) -> String {
 }
 
 fn rejected_lines(summary: &IdentificationSummary) -> String {
-    if summary.settings.estimator != "robust" {
+    if summary.settings.estimator != EstimatorName::Robust {
         return String::new();
     }
     if summary.rejected.is_empty() {

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::summary::{IdentificationSettings, ParameterSummary, Provenance, SigmaSummary, Verdict};
+use super::summary::{IdentificationSettings, ParameterSummary, Provenance, SigmaSummary, Verdict, Warning};
 use crate::units::{from_mm, to_mm};
 
 /// Version of the layout.
@@ -20,6 +20,19 @@ pub struct PoseText {
     pub xyz_mm: (f64, f64, f64),
     /// Orientation.
     pub quaternion_xyzw: (f64, f64, f64, f64),
+}
+
+/// How far from 1 the length of a quaternion may be in a file.
+const QUATERNION_TOLERANCE: f64 = 1e-6;
+
+impl PoseText {
+    /// Whether it is finite and its quaternion of length 1.
+    fn is_usable(self) -> bool {
+        let (x, y, z) = self.xyz_mm;
+        let (i, j, k, w) = self.quaternion_xyzw;
+        let length = Quaternion::new(w, i, j, k).norm();
+        [x, y, z].into_iter().all(f64::is_finite) && (length - 1.0).abs() < QUATERNION_TOLERANCE
+    }
 }
 
 impl From<&Isometry3<f64>> for PoseText {
@@ -39,6 +52,48 @@ impl From<&PoseText> for Isometry3<f64> {
     }
 }
 
+/// An identification sample: what `verify` must know to tell independent samples from these. In the file it is one text,
+/// `1: 10.5 -20 30`: number of the target, from 1, and the pendant joint values (deg, sliding joints mm).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct SampleText {
+    /// Index of the target.
+    pub target: usize,
+    /// Pendant joint values (deg, sliding joints mm), rounded to 0.0001.
+    pub joints: Vec<f64>,
+}
+
+impl SampleText {
+    /// A sample from joint values in deg and mm.
+    pub fn new(target: usize, joints: impl IntoIterator<Item = f64>) -> Self {
+        Self { target, joints: joints.into_iter().map(|value| (value * 1e4).round() / 1e4).collect() }
+    }
+}
+
+impl From<SampleText> for String {
+    fn from(sample: SampleText) -> Self {
+        let joints: Vec<Self> = sample.joints.iter().map(|value| (value + 0.0).to_string()).collect();
+        format!("{}: {}", sample.target + 1, joints.join(" "))
+    }
+}
+
+impl TryFrom<String> for SampleText {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        let wrong = || format!("'{text}' is not a sample; it reads like '1: 10.5 -20 30'");
+        let (target, joints) = text.split_once(':').ok_or_else(wrong)?;
+        let target: usize = target.trim().parse().map_err(|error| format!("{}: {error}", wrong()))?;
+        let joints: Vec<f64> = joints
+            .split_whitespace()
+            .map(str::parse)
+            .collect::<Result<_, _>>()
+            .map_err(|error: std::num::ParseFloatError| format!("{}: {error}", wrong()))?;
+        let usable = target > 0 && joints.iter().all(|value| value.is_finite());
+        if usable { Ok(Self { target: target - 1, joints }) } else { Err(wrong()) }
+    }
+}
+
 /// An identified robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -53,6 +108,8 @@ pub struct Calibration {
     pub sigma: SigmaSummary,
     /// The verdict at that time.
     pub verdict: Verdict,
+    /// What had to be known about the identification itself; a later verification carries it on.
+    pub warnings: Vec<Warning>,
     /// Independent combinations that the data determined.
     pub rank: Option<usize>,
     /// Nominal, deviation and σ of every free parameter.
@@ -63,6 +120,8 @@ pub struct Calibration {
     pub nominal_base_from_station: Option<PoseText>,
     /// Target coordinates in the flange of the nominal arm with its own fit (mm), one per target.
     pub nominal_targets_mm: Vec<(f64, f64, f64)>,
+    /// The identification samples: a verification on the same ones would say nothing.
+    pub samples: Vec<SampleText>,
     /// The profile, as it was read.
     pub profile: String,
 }
@@ -97,6 +156,32 @@ pub enum CalibrationError {
         /// Name of the parameter.
         parameter: String,
     },
+    /// A unit that a parameter cannot have.
+    #[error("parameter '{parameter}' has the unit '{unit}'; it must be 'mm' or 'deg', as its name says")]
+    Unit {
+        /// Name of the parameter.
+        parameter: String,
+        /// Unit found.
+        unit: String,
+    },
+    /// A standard or expected deviation that is not a positive number.
+    #[error("parameter '{parameter}' has a standard or expected deviation that is negative or not finite")]
+    Sigma {
+        /// Name of the parameter.
+        parameter: String,
+    },
+    /// A pose whose numbers are not finite, or whose quaternion is not of length 1.
+    #[error("'{field}' is not a pose: its numbers must be finite and its quaternion of length 1")]
+    Pose {
+        /// Name of the field.
+        field: &'static str,
+    },
+    /// Target coordinates that are not finite.
+    #[error("the nominal coordinates of target {target} are not finite")]
+    Target {
+        /// Number of the target, from 1.
+        target: usize,
+    },
 }
 
 impl Calibration {
@@ -126,10 +211,39 @@ impl Calibration {
             return Err(CalibrationError::Schema { found: calibration.schema, program });
         }
         for parameter in &calibration.parameters {
-            if !(parameter.nominal.is_finite() && parameter.deviation.is_finite()) {
-                return Err(CalibrationError::NotFinite { parameter: parameter.name.clone() });
+            check_parameter(parameter)?;
+        }
+        let stations = [
+            ("base_from_station", calibration.base_from_station),
+            ("nominal_base_from_station", calibration.nominal_base_from_station),
+        ];
+        for (field, pose) in stations {
+            if pose.is_some_and(|pose| !pose.is_usable()) {
+                return Err(CalibrationError::Pose { field });
+            }
+        }
+        for (index, (x, y, z)) in calibration.nominal_targets_mm.iter().enumerate() {
+            if ![x, y, z].into_iter().all(|value| value.is_finite()) {
+                return Err(CalibrationError::Target { target: index + 1 });
             }
         }
         Ok(calibration)
     }
+}
+
+/// Finite numbers, a unit that exists, and deviations that can be standard deviations.
+fn check_parameter(parameter: &ParameterSummary) -> Result<(), CalibrationError> {
+    let name = || parameter.name.clone();
+    if !(parameter.nominal.is_finite() && parameter.deviation.is_finite()) {
+        return Err(CalibrationError::NotFinite { parameter: name() });
+    }
+    let is_angle = ["alpha", "beta", "theta"].iter().any(|angle| parameter.name.starts_with(angle));
+    if parameter.unit != if is_angle { "deg" } else { "mm" } {
+        return Err(CalibrationError::Unit { parameter: name(), unit: parameter.unit.clone() });
+    }
+    let usable = |value: f64| value.is_finite() && value >= 0.0;
+    if !(parameter.sigma.is_none_or(usable) && usable(parameter.expected)) {
+        return Err(CalibrationError::Sigma { parameter: name() });
+    }
+    Ok(())
 }

@@ -47,11 +47,90 @@ pub struct IdentificationSettings {
     /// `expected` or `none`.
     pub prior: String,
     /// `robust` or `least-squares`.
-    pub estimator: String,
+    pub estimator: EstimatorName,
     /// Largest number of solver steps.
     pub iterations: usize,
     /// Condition that picked the identification rows.
     pub filter: Option<String>,
+    /// Expected deviation of every length, where the command line replaced the profile's.
+    pub expected_length_mm: Option<f64>,
+    /// The same of every angle.
+    pub expected_angle_deg: Option<f64>,
+    /// Layout of the tables, where there is a choice.
+    pub layout: Option<String>,
+    /// Known distance between two sockets.
+    pub socket_distance_mm: Option<f64>,
+    /// Standard deviation of that distance.
+    pub socket_distance_sigma_mm: Option<f64>,
+    /// Where the verification samples came from.
+    pub verification: VerificationMode,
+}
+
+/// Where verification samples come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VerificationMode {
+    /// There are none.
+    #[default]
+    None,
+    /// Another file.
+    File,
+    /// The rows that the condition leaves out.
+    Rest,
+    /// Each position of the plate in turn.
+    LeaveOneOut,
+}
+
+/// How samples were trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorName {
+    /// Outliers are found, named and left out.
+    Robust,
+    /// Every sample counts.
+    LeastSquares,
+}
+
+/// Where the measurement σ comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SigmaOrigin {
+    /// Given with the readings.
+    Readings,
+    /// The command line.
+    Option,
+    /// The instrument of the profile.
+    Instrument,
+    /// Estimated from the residuals.
+    Residuals,
+    /// Nothing was stated and the data are too few to tell: a guess.
+    Assumed,
+}
+
+/// Why the solver stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Termination {
+    /// Nothing was left to gain.
+    Converged,
+    /// The allowed number of steps was taken.
+    IterationLimit,
+    /// No step lowered the cost any further.
+    NoImprovement,
+    /// A number overflowed; the parameters are not usable.
+    NonFinite,
+}
+
+/// How a result compares with the acceptance limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VerdictStatus {
+    /// Every limit was checked and is met, and nothing speaks against it.
+    Accepted,
+    /// A limit is not met, or a warning rules acceptance out.
+    NotAccepted,
+    /// There was nothing to compare, or not for every limit.
+    NotEvaluated,
 }
 
 /// Measurement σ.
@@ -59,8 +138,8 @@ pub struct IdentificationSettings {
 pub struct SigmaSummary {
     /// What balanced data and prior, per coordinate.
     pub used_mm: f64,
-    /// `readings`, `option`, `instrument` or `residuals`.
-    pub source: String,
+    /// Where it comes from.
+    pub source: SigmaOrigin,
     /// What the residuals say.
     pub from_residuals_mm: Option<f64>,
 }
@@ -76,8 +155,8 @@ pub struct ParameterSummary {
     pub nominal: f64,
     /// Identified − nominal.
     pub deviation: f64,
-    /// Standard deviation of the deviation.
-    pub sigma: f64,
+    /// Standard deviation of the deviation; none where neither data nor prior say anything about it.
+    pub sigma: Option<f64>,
     /// Deviation expected before measuring, one standard deviation.
     pub expected: f64,
     /// Whether it can be found on its own.
@@ -197,13 +276,15 @@ pub struct JointSummary {
     pub bins: Vec<JointBin>,
 }
 
-/// Accuracy on samples that the identification did not see.
+/// Accuracy on verification samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerificationSummary {
     /// Number of verification samples.
     pub samples: usize,
     /// Where they come from, and what was fitted to them.
     pub basis: String,
+    /// Whether the identification saw none of them.
+    pub independent: bool,
     /// What was fitted to the verification samples themselves: `none`, `frame` or `frame+target`.
     pub refit: String,
     /// The nominal model with its own registration.
@@ -217,21 +298,21 @@ pub struct VerificationSummary {
 /// One comparison with an acceptance limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitCheck {
-    /// What is limited, such as `position_rms`.
+    /// What is limited, such as `position_rms`. For shared points the position error is the distance from the shared point.
     pub quantity: String,
-    /// What was found.
-    pub value_mm: f64,
+    /// What was found; none where these data cannot tell.
+    pub value_mm: Option<f64>,
     /// What is allowed.
     pub limit_mm: f64,
-    /// Whether it is met.
-    pub met: bool,
+    /// Whether it is met; none where it could not be evaluated.
+    pub met: Option<bool>,
 }
 
 /// The verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// `accepted`, `not_accepted` or `not_evaluated`.
-    pub status: String,
+    pub status: VerdictStatus,
     /// Why, in words.
     pub reasons: Vec<String>,
     /// Every limit of the profile.
@@ -286,8 +367,8 @@ pub struct IdentificationSummary {
     pub correlations: Vec<CorrelationSummary>,
     /// Samples left out.
     pub rejected: Vec<RejectedSummary>,
-    /// `converged`, `iteration_limit` or `no_improvement`.
-    pub termination: String,
+    /// Why the solver stopped.
+    pub termination: Termination,
     /// Steps of the solver.
     pub iterations: Vec<IterationSummary>,
     /// Files written.

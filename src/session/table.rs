@@ -14,8 +14,7 @@ mod problem;
 pub(super) use columns::{Header, Measure, NumberColumn};
 pub(super) use encoding::decode;
 pub(super) use number::Numbers;
-pub(super) use problem::printable;
-pub use problem::{Defect, TableErrors, TableProblem};
+pub use problem::{Defect, TableErrors, TableProblem, printable};
 
 /// One line of a table, split into cells.
 #[derive(Debug)]

@@ -392,7 +392,7 @@ impl fmt::Display for TableErrors {
 impl std::error::Error for TableErrors {}
 
 /// `text` with replacement characters for control characters and for the invisible ones that reorder a line.
-pub(in crate::session) fn printable(text: &str) -> String {
+pub fn printable(text: &str) -> String {
     if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
         return text.to_owned();
     }

@@ -1,0 +1,146 @@
+//! What the result of an identification itself gives reason to warn about, and when it is of no use.
+
+use super::estimate::warning;
+use crate::cli::LevelArg;
+use crate::identification::plausibility::weaknesses;
+use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason};
+use crate::report::number;
+use crate::session::summary::Warning;
+use crate::units::{MILLIMETRE, to_mm};
+
+/// A parameter further from nominal than this many expected deviations is called out.
+const RAN_AWAY: f64 = 5.0;
+/// A parameter further from nominal than this many expected deviations, prior and all, is not this robot's.
+const FAR_AWAY: f64 = 10.0;
+/// Residuals up to this many times what the fixed constants are expected to cause are put down to them.
+const FIXED_CONSTANTS: f64 = 6.0;
+/// Codes of warnings that leave nothing to use.
+const UNUSABLE: [&str; 3] = ["does_not_fit", "implausible", NOT_CONVERGED];
+const NOT_CONVERGED: &str = "not_converged";
+/// Residuals larger than stated by this factor are called out.
+const SIGMA_EXCESS: f64 = 1.5;
+/// Residuals beyond this (m) after identification mean that the data are not this robot's.
+const NONSENSE_RESIDUAL: f64 = MILLIMETRE;
+/// A larger share of rejected samples means that there is no consistent majority to trust.
+const MANY_REJECTED: f64 = 0.2;
+
+/// What is known about a problem besides its data.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Context {
+    /// What is identified.
+    pub(super) level: LevelArg,
+    /// Root mean square residual (m) that the expected deviations of all link constants explain, where points tell.
+    pub(super) expected: Option<f64>,
+}
+
+/// What the result itself gives reason to warn about.
+pub(super) fn result_warnings(
+    problem: &Problem<'_>,
+    found: &Identification,
+    settings: &Settings,
+    context: Context,
+) -> Vec<Warning> {
+    let joints = problem.chain.joints();
+    let mut warnings: Vec<Warning> = weaknesses(problem, found)
+        .iter()
+        .map(|weakness| {
+            let text = weakness.describe(|joint| joints[joint].name.clone(), |joint| joints[joint].joint_type);
+            warning("poor_data", text, true)
+        })
+        .collect();
+    let residual = found.sigma.from_residuals.unwrap_or(0.0);
+    let explained = context.expected.map_or(0.0, |expected| FIXED_CONSTANTS * expected / 3.0_f64.sqrt());
+    if residual > NONSENSE_RESIDUAL && context.level == LevelArg::Offsets && residual <= explained {
+        let message = format!(
+            "joint offsets alone leave {} mm per coordinate, as much as the other link constants are expected to cause; '--level geometric' identifies those too",
+            number(to_mm(residual), 3)
+        );
+        warnings.push(warning("offsets_only", message, false));
+    } else if residual.is_nan() || residual > NONSENSE_RESIDUAL {
+        let message = format!(
+            "the identified robot misses the measured points by {} mm per coordinate: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
+            number(to_mm(residual), 3)
+        );
+        warnings.push(warning("does_not_fit", message, true));
+    }
+    warnings.extend(run_away(found, settings));
+    if found.sigma.excess() > SIGMA_EXCESS {
+        let message = format!(
+            "the residuals ({} mm per coordinate) are {} times the stated sigma ({} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below are widened by that factor",
+            number(to_mm(residual), 4),
+            number(found.sigma.excess(), 1),
+            number(to_mm(found.sigma.used), 4)
+        );
+        warnings.push(warning("sigma_excess", message, false));
+    }
+    let judged = problem.observations.places().count();
+    let share = found.rejected.len() as f64 / judged.max(1) as f64;
+    if share > MANY_REJECTED {
+        let message = format!(
+            "{} of {judged} samples were rejected: there is no consistent majority to trust; look for rows in a wrong order or a moved instrument",
+            found.rejected.len()
+        );
+        warnings.push(warning("many_rejected", message, true));
+    }
+    match found.termination {
+        TerminationReason::Converged => {}
+        TerminationReason::IterationLimit => {
+            let message = format!("stopped after {} solver steps without having converged", found.iterations.len());
+            warnings.push(warning(NOT_CONVERGED, message, true));
+        }
+        TerminationReason::NoImprovement | TerminationReason::NonFinite => {
+            warnings.push(warning(NOT_CONVERGED, "the solver could not improve the fit any further".to_owned(), true));
+        }
+    }
+    warnings
+}
+
+/// Parameters that are further from nominal than any robot of this make should be.
+fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
+    let listed: Vec<String> = found
+        .estimates
+        .iter()
+        .filter(|estimate| estimate.deviation.abs() > RAN_AWAY * estimate.expected)
+        .map(|estimate| {
+            let quantity = estimate.id.quantity();
+            format!(
+                "{} by {}{} {} ({} times the expected deviation)",
+                estimate.id,
+                if estimate.deviation > 0.0 { "+" } else { "" },
+                number(quantity.to_edge(estimate.deviation), 3),
+                quantity.unit(),
+                number(estimate.deviation.abs() / estimate.expected, 0)
+            )
+        })
+        .collect();
+    if listed.is_empty() {
+        return None;
+    }
+    let list = listed.join(", ");
+    let far = found.estimates.iter().any(|estimate| estimate.deviation.abs() > FAR_AWAY * estimate.expected);
+    Some(match settings.prior {
+        Prior::None => warning(
+            "ran_away",
+            format!(
+                "parameters ran away: {list}. Without a prior, badly determined combinations take any value that lowers the residual; the robot may be worse than nominal in another part of its workspace, and a hold-out from the same series does not show it. Use '--prior expected'"
+            ),
+            true,
+        ),
+        Prior::Expected => warning(
+            "large_deviation",
+            format!(
+                "far from nominal: {list}. Check the profile (is it this robot?), or state larger expected deviations"
+            ),
+            far,
+        ),
+    })
+}
+
+/// Whether `found` with its warnings is of no use; a limit on the steps that the operator asked for is no defect.
+pub(super) fn is_unusable(warnings: &[Warning], found: &Identification, settings: &Settings) -> bool {
+    let as_asked =
+        found.termination == TerminationReason::IterationLimit && settings.iterations < Settings::default().iterations;
+    warnings
+        .iter()
+        .any(|warning| UNUSABLE.contains(&warning.code.as_str()) && !(as_asked && warning.code == NOT_CONVERGED))
+}
