@@ -17,318 +17,34 @@
 
 #![warn(missing_docs)]
 
+mod error;
 mod linearise;
 mod observability;
 mod pairs;
 pub mod plausibility;
 mod problem;
+mod result;
 mod robust;
+mod settings;
 mod solver;
 pub mod verification;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
-use thiserror::Error;
+use nalgebra::{DMatrix, DVector, Point3};
 
+pub use error::IdentificationError;
 pub use linearise::ArmModel;
 pub(crate) use observability::raw_unit;
 pub use observability::{BlindGroup, Observability};
 pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint, TargetAt};
+pub use result::{Estimate, Identification, Rejected, RejectionReason, SampleIndex, Sigma};
+pub use settings::{Estimator, Iteration, Prior, Settings, SigmaSource, TerminationReason, Weighting};
 
 use crate::geometry::{principal_spread, register};
 use crate::kinematics::ParameterId;
-use crate::units::{MICROMETRE, to_mm};
+use crate::units::MICROMETRE;
 use linearise::{Evaluation, SMALLEST_SIGMA, Weights, length_rows};
 use solver::{Basis, Linearised, Solve};
-
-/// How pairs of points are weighted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Weighting {
-    /// With the covariance that pairs really have: cost O(M), about 10 % better parameters.
-    #[default]
-    Covariance,
-    /// All pairs alike, as the paper has it: cost O(M²).
-    Uniform,
-}
-
-/// What is assumed about the deviations before measuring.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Prior {
-    /// Zero mean, expected deviations as standard deviations.
-    #[default]
-    Expected,
-    /// Nothing: the minimum-norm solution in rad and mm, as in the paper. Badly determined parameters may run away.
-    None,
-}
-
-/// How samples are trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Estimator {
-    /// Outliers are found with a robust loss, named and removed.
-    #[default]
-    Robust,
-    /// Every sample counts.
-    LeastSquares,
-}
-
-/// Where the measurement σ comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SigmaSource {
-    /// Every reading has its own.
-    Readings,
-    /// The operator gave it.
-    Option,
-    /// The instrument of the profile.
-    Instrument,
-    /// Estimated from the residuals of this fit.
-    Residuals,
-    /// Nothing was stated and the data are too few to tell: a guess.
-    Assumed,
-}
-
-/// How to identify.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Weighting of the pairs.
-    pub weighting: Weighting,
-    /// Prior on the deviations.
-    pub prior: Prior,
-    /// Treatment of outliers.
-    pub estimator: Estimator,
-    /// Largest number of solver steps; 1 is the paper's single linear step.
-    pub iterations: usize,
-    /// Standard deviation of a coordinate (m) and where it comes from; `None`: estimated from the residuals.
-    pub sigma: Option<(f64, SigmaSource)>,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            weighting: Weighting::default(),
-            prior: Prior::default(),
-            estimator: Estimator::default(),
-            iterations: 100,
-            sigma: None,
-        }
-    }
-}
-
-/// One step of the solver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Iteration {
-    /// Cost after the step: weighted square sum of residuals plus the prior's share.
-    pub cost: f64,
-    /// Largest change of a parameter, in expected deviations.
-    pub step: f64,
-    /// Damping that was needed, relative to the diagonal of the normal matrix.
-    pub damping: f64,
-    /// The step could not be expected to lower the cost any more.
-    pub negligible: bool,
-}
-
-/// Why the solver stopped. In every case but [`Self::NonFinite`] the parameters are the best found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TerminationReason {
-    /// The step or the expected decrease of the cost became negligible.
-    Converged,
-    /// The allowed number of steps was taken; parameters are those after the last one.
-    IterationLimit,
-    /// No step lowers the cost although the gradient is not zero.
-    NoImprovement,
-    /// A number overflowed; parameters are not usable.
-    NonFinite,
-}
-
-/// The measurement σ of a fit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sigma {
-    /// What balanced data and prior (m); with own σ per reading their root mean square.
-    pub used: f64,
-    /// Where it comes from.
-    pub source: SigmaSource,
-    /// What the residuals say (m): root mean square per coordinate, corrected for the parameters fitted; `None` without
-    /// enough data.
-    pub from_residuals: Option<f64>,
-    /// Root mean square of the residuals in units of the σ of each reading, corrected likewise; 1 where σ is right.
-    pub normalised: Option<f64>,
-}
-
-impl Sigma {
-    /// How much larger the residuals are than σ promised; 1 where they fit.
-    pub fn excess(&self) -> f64 {
-        self.normalised.map_or(1.0, |normalised| normalised.max(1.0))
-    }
-}
-
-/// One identified parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// Which parameter.
-    pub id: ParameterId,
-    /// Nominal value (m) or (rad).
-    pub nominal: f64,
-    /// Identified − nominal (m) or (rad).
-    pub deviation: f64,
-    /// Standard deviation of the deviation (m) or (rad).
-    pub sigma: f64,
-    /// Expected deviation (m) or (rad).
-    pub expected: f64,
-    /// Whether it can be found on its own; if not, a [`BlindGroup`] says what can.
-    pub identifiable: bool,
-}
-
-/// Why a sample was rejected.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RejectionReason {
-    /// Too far from where the rest of the data says it should be.
-    Outlier,
-    /// Its point fits the configuration of another rejected sample, and the reverse: two rows were swapped.
-    SwappedWith(usize),
-}
-
-/// Which sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SampleIndex {
-    /// A measured point or the seat of a shared point, in the order of [`Observations::places`].
-    Place(usize),
-    /// A measured length.
-    Length(usize),
-}
-
-/// A sample that does not count.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rejected {
-    /// Which one.
-    pub sample: SampleIndex,
-    /// Distance from the prediction of the model fitted without it (m).
-    pub residual: f64,
-    /// The same in units of what it should scatter by, judged by the accepted samples.
-    pub ratio: f64,
-    /// Likely cause.
-    pub reason: RejectionReason,
-}
-
-/// The result of an identification.
-#[derive(Clone, Debug)]
-pub struct Identification {
-    /// The identified arm and targets.
-    pub model: ArmModel,
-    /// Every free parameter.
-    pub estimates: Vec<Estimate>,
-    /// Covariance of the deviations, n × n ((m) and (rad)).
-    pub covariance: DMatrix<f64>,
-    /// What the data can tell.
-    pub observability: Observability,
-    /// Measurement σ.
-    pub sigma: Sigma,
-    /// Samples left out, with reasons.
-    pub rejected: Vec<Rejected>,
-    /// Steps of the solver.
-    pub iterations: Vec<Iteration>,
-    /// Why it stopped.
-    pub termination: TerminationReason,
-    /// Pose of each instrument station in the base of the identified arm.
-    pub base_from_station: Vec<Isometry3<f64>>,
-    /// Measured − predicted in the base (m) for every place, in-sample: for finding outliers, never to be shown as accuracy.
-    pub residuals: Vec<Vector3<f64>>,
-}
-
-impl Identification {
-    /// Whether the place was left out.
-    pub fn is_rejected(&self, place: usize) -> bool {
-        self.rejected.iter().any(|rejected| rejected.sample == SampleIndex::Place(place))
-    }
-
-    /// Correlation of two parameters, −1 … 1; zero where one has no uncertainty.
-    pub fn correlation(&self, i: usize, j: usize) -> f64 {
-        let product = self.covariance[(i, i)] * self.covariance[(j, j)];
-        if product > 0.0 { self.covariance[(i, j)] / product.sqrt() } else { 0.0 }
-    }
-}
-
-/// Misuse, or data from which nothing can be identified.
-#[derive(Clone, Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum IdentificationError {
-    /// A parameter that the arm or its targets do not have.
-    #[error("the arm has no parameter '{parameter}'")]
-    UnknownParameter {
-        /// Its name.
-        parameter: String,
-    },
-    /// An expected deviation that is not a positive number.
-    #[error("the expected deviation of '{parameter}' is {expected}; it must be positive")]
-    ExpectedDeviation {
-        /// Its name.
-        parameter: String,
-        /// What was given.
-        expected: f64,
-    },
-    /// A configuration with the wrong number of joints.
-    #[error("sample {sample} has {given} joint values; the arm has {joints} joints")]
-    Joints {
-        /// Index of the place.
-        sample: usize,
-        /// Values given.
-        given: usize,
-        /// Joints of the arm.
-        joints: usize,
-    },
-    /// A target that does not exist.
-    #[error("sample {sample} names target {target}; there are {targets}")]
-    Target {
-        /// Index of the place.
-        sample: usize,
-        /// Index given.
-        target: usize,
-        /// Number of targets.
-        targets: usize,
-    },
-    /// NaN or infinity in the data.
-    #[error("sample {sample} has a number that is not finite")]
-    NotFinite {
-        /// Index of the place.
-        sample: usize,
-    },
-    /// A length that is not positive, or ends at a shared point that does not exist.
-    #[error("measured length {length} is not usable (value {value} m)")]
-    Length {
-        /// Index of the length.
-        length: usize,
-        /// What was given (m).
-        value: f64,
-    },
-    /// Nothing that a distance could be made of.
-    #[error(
-        "there is nothing to identify from: at least three measured points, a shared point seen twice, or a length are needed"
-    )]
-    NoData,
-    /// No parameter is free.
-    #[error("no parameter is free to be identified")]
-    NoParameters,
-    /// The minimum-norm solution needs a rank, and there is no clear gap.
-    #[error(
-        "the rank is not clear (largest gap in the singular values {gap:.1}); without a prior the solution would be a guess"
-    )]
-    RankUnclear {
-        /// The largest ratio of neighbouring singular values that could have been the gap.
-        gap: f64,
-    },
-    /// The points fit only when mirrored.
-    #[error(
-        "the measured points are a mirror image of the robot's: residual {:.3} mm mirrored, {:.3} mm as given",
-        to_mm(*mirrored), to_mm(*proper)
-    )]
-    Mirrored {
-        /// Root mean square residual of the best proper registration (m).
-        proper: f64,
-        /// The same with one axis reversed (m).
-        mirrored: f64,
-    },
-    /// The solver ran into numbers that are not finite.
-    #[error("the solver ran into numbers that are not finite; the data do not describe this robot")]
-    Diverged,
-}
 
 /// First guess of σ where it is estimated (m).
 const FIRST_SIGMA: f64 = 50.0 * MICROMETRE;

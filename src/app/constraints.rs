@@ -295,8 +295,8 @@ impl<'a> Setup<'a> {
         }
         let mut pooled: Option<(DirectErrors, DirectErrors, Observations)> = None;
         for (index, position) in positions.iter().enumerate() {
-            let kept = all.observations.of_positions(&all.positions, |other| other != *position);
-            let left_out = all.observations.of_positions(&all.positions, |other| other == *position);
+            let kept = all.observations.of_shared(|index| all.positions.get(index) != Some(*position));
+            let left_out = all.observations.of_shared(|index| all.positions.get(index) == Some(*position));
             let found = self.identify(&kept, console)?;
             let nominal = DirectErrors::new(&self.nominal(&kept)?.model, &left_out);
             let identified = DirectErrors::new(&found.model, &left_out);
@@ -342,29 +342,5 @@ impl<'a> Setup<'a> {
                 joint_summaries(self.loaded.profile.chain().joints(), &configurations, &identified.seats)
             },
         }
-    }
-}
-
-impl Observations {
-    /// The shared points whose position `keep` picks, with the lengths between them.
-    fn of_positions(&self, positions: &[String], keep: impl Fn(&String) -> bool) -> Self {
-        let mut new_index = vec![None; self.shared.len()];
-        let mut picked = Self::default();
-        for (index, (shared, position)) in self.shared.iter().zip(positions).enumerate() {
-            if keep(position) {
-                new_index[index] = Some(picked.shared.len());
-                picked.shared.push(shared.clone());
-            }
-        }
-        let moved = |end: &LengthEnd| match end {
-            LengthEnd::SharedPoint(index) => new_index.get(*index).copied().flatten().map(LengthEnd::SharedPoint),
-            LengthEnd::Target(at) => Some(LengthEnd::Target(at.clone())),
-        };
-        for length in &self.lengths {
-            if let (Some(from), Some(to)) = (moved(&length.from), moved(&length.to)) {
-                picked.lengths.push(Length { from, to, ..length.clone() });
-            }
-        }
-        picked
     }
 }

@@ -97,6 +97,29 @@ impl Observations {
         Self { points, shared, lengths: kept.map(|(_, length)| length.clone()).collect() }
     }
 
+    /// The shared points whose index `keep` picks, with the lengths between them.
+    #[must_use]
+    pub fn of_shared(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut new_index = vec![None; self.shared.len()];
+        let mut picked = Self::default();
+        for (index, shared) in self.shared.iter().enumerate() {
+            if keep(index) {
+                new_index[index] = Some(picked.shared.len());
+                picked.shared.push(shared.clone());
+            }
+        }
+        let moved = |end: &LengthEnd| match end {
+            LengthEnd::SharedPoint(index) => new_index.get(*index).copied().flatten().map(LengthEnd::SharedPoint),
+            LengthEnd::Target(at) => Some(LengthEnd::Target(at.clone())),
+        };
+        for length in &self.lengths {
+            if let (Some(from), Some(to)) = (moved(&length.from), moved(&length.to)) {
+                picked.lengths.push(Length { from, to, ..length.clone() });
+            }
+        }
+        picked
+    }
+
     /// All places where the target was observed, in a fixed order: points, shared points, lengths.
     pub fn places(&self) -> impl Iterator<Item = &TargetAt> {
         let lengths = self.lengths.iter().flat_map(|length| [&length.from, &length.to]).filter_map(|end| match end {

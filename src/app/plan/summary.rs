@@ -1,0 +1,118 @@
+//! The numbers of a planned or checked set: its score, what it is compared with, what stays weak.
+
+use super::{Planner, RANDOM_SETS, SIZES, planning_failure};
+use crate::app::estimate::{provenance, warning};
+use crate::error::Failure;
+use crate::planning::candidates::Rejections;
+use crate::planning::{DesignBound, Information, PlanningError, Score, Spread, TradeOff, Yardstick, trade_off};
+use crate::session::plan_summary::{
+    CandidateSummary, ObservabilitySummary, PlanSummary, RandomSummary, RejectionSummary, SCHEMA, SpreadSummary,
+    TradeOffSummary, WeakParameterSummary,
+};
+use crate::units::to_mm;
+
+impl Planner<'_> {
+    /// Scores `set` and compares it with random sets, the bound and other sizes.
+    pub(super) fn summary(
+        &self,
+        information: &Information,
+        set: &[usize],
+        rejections: &Rejections,
+        keep_going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<PlanSummary, Failure> {
+        let failure = |error: PlanningError| planning_failure(&error);
+        let score = Score::new(information, set).map_err(failure)?;
+        let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.args.seed).map_err(failure)?;
+        let bound = DesignBound::new(information, &|| true);
+        let d_efficiency = bound.efficiency(information, set).map_err(failure)?;
+        let sizes = trade_off(information, &[], &SIZES, self.args.seed, keep_going).map_err(failure)?;
+        let sigma = self.sigma();
+        let spread = |spread: &Spread| SpreadSummary { median: spread.median, best: spread.best };
+        let indices = &score.observability;
+        let mut warnings = Vec::new();
+        if let Some(sigma) = sigma
+            && score.weak(sigma).any(|weak| weak.identifiable)
+        {
+            let text = "some identifiable parameters stay weakly determined (listed below); more poses or wider joint ranges help";
+            warnings.push(warning("weak_parameters", text.to_owned(), false));
+        }
+        Ok(PlanSummary {
+            schema: SCHEMA,
+            provenance: provenance(self.profile(), &self.loaded.text, Vec::new()),
+            objective: None,
+            warnings,
+            identification_poses: set.len(),
+            verification_poses: 0,
+            parameter_count: self.parameters.len(),
+            rank: score.rank,
+            condition_number: score.condition_number,
+            condition_number_raw: score.condition_number_raw,
+            observability: ObservabilitySummary {
+                o1: indices.o1,
+                o2: indices.o2,
+                o3: indices.o3,
+                o4: indices.o4,
+                o5: indices.o5,
+            },
+            predicted_error_sigma: score.predicted_error,
+            sigma_mm: sigma.map(to_mm),
+            predicted_rms_mm: sigma.map(|sigma| to_mm(score.predicted_rms(sigma))),
+            random: RandomSummary {
+                sets: yardstick.sets,
+                condition_number: spread(&yardstick.condition_number),
+                predicted_error_sigma: spread(&yardstick.predicted_error),
+            },
+            d_efficiency,
+            d_bound_gap: bound.gap,
+            trade_off: sizes.iter().map(|size| trade_off_row(size, sigma)).collect(),
+            weak_parameters: sigma.map_or_else(Vec::new, |sigma| weak_parameters(&score, sigma)),
+            blind_groups: information.observability().groups.iter().map(|group| group.description.clone()).collect(),
+            candidates: candidate_summary(rejections),
+            time: None,
+            poses: Vec::new(),
+            elapsed_s: 0.0,
+            interrupted: false,
+            written: Vec::new(),
+        })
+    }
+}
+
+fn trade_off_row(size: &TradeOff, sigma: Option<f64>) -> TradeOffSummary {
+    TradeOffSummary {
+        poses: size.poses,
+        predicted_error_sigma: size.predicted_error,
+        predicted_rms_mm: sigma.map(|sigma| to_mm(size.predicted_error * sigma)),
+        time_min: None,
+    }
+}
+
+fn weak_parameters(score: &Score, sigma: f64) -> Vec<WeakParameterSummary> {
+    score
+        .weak(sigma)
+        .filter(|weak| weak.identifiable)
+        .map(|weak| {
+            let quantity = weak.parameter.id.quantity();
+            WeakParameterSummary {
+                name: weak.parameter.id.to_string(),
+                unit: quantity.unit().to_owned(),
+                predicted_sigma: quantity.to_edge(weak.deviation_per_sigma * sigma),
+                expected: quantity.to_edge(weak.parameter.expected),
+            }
+        })
+        .collect()
+}
+
+fn candidate_summary(rejections: &Rejections) -> CandidateSummary {
+    CandidateSummary {
+        tried: rejections.tried,
+        kept: rejections.kept,
+        rejections: rejections
+            .rules()
+            .map(|(rule, rejected)| RejectionSummary {
+                rule: rule.name().to_owned(),
+                rejected: rejected.all,
+                alone: rejected.alone,
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,115 @@
+//! What an identification returns.
+
+use nalgebra::{DMatrix, Isometry3, Vector3};
+
+use super::linearise::ArmModel;
+use super::observability::Observability;
+use super::settings::{Iteration, SigmaSource, TerminationReason};
+use crate::kinematics::ParameterId;
+
+/// The measurement σ of a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sigma {
+    /// What balanced data and prior (m); with own σ per reading their root mean square.
+    pub used: f64,
+    /// Where it comes from.
+    pub source: SigmaSource,
+    /// What the residuals say (m): root mean square per coordinate, corrected for the parameters fitted; `None` without
+    /// enough data.
+    pub from_residuals: Option<f64>,
+    /// Root mean square of the residuals in units of the σ of each reading, corrected likewise; 1 where σ is right.
+    pub normalised: Option<f64>,
+}
+
+impl Sigma {
+    /// How much larger the residuals are than σ promised; 1 where they fit.
+    pub fn excess(&self) -> f64 {
+        self.normalised.map_or(1.0, |normalised| normalised.max(1.0))
+    }
+}
+
+/// One identified parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Which parameter.
+    pub id: ParameterId,
+    /// Nominal value (m) or (rad).
+    pub nominal: f64,
+    /// Identified − nominal (m) or (rad).
+    pub deviation: f64,
+    /// Standard deviation of the deviation (m) or (rad).
+    pub sigma: f64,
+    /// Expected deviation (m) or (rad).
+    pub expected: f64,
+    /// Whether it can be found on its own; if not, a [`BlindGroup`] says what can.
+    pub identifiable: bool,
+}
+
+/// Why a sample was rejected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RejectionReason {
+    /// Too far from where the rest of the data says it should be.
+    Outlier,
+    /// Its point fits the configuration of another rejected sample, and the reverse: two rows were swapped.
+    SwappedWith(usize),
+}
+
+/// Which sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SampleIndex {
+    /// A measured point or the seat of a shared point, in the order of [`Observations::places`].
+    Place(usize),
+    /// A measured length.
+    Length(usize),
+}
+
+/// A sample that does not count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rejected {
+    /// Which one.
+    pub sample: SampleIndex,
+    /// Distance from the prediction of the model fitted without it (m).
+    pub residual: f64,
+    /// The same in units of what it should scatter by, judged by the accepted samples.
+    pub ratio: f64,
+    /// Likely cause.
+    pub reason: RejectionReason,
+}
+
+/// The result of an identification.
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// The identified arm and targets.
+    pub model: ArmModel,
+    /// Every free parameter.
+    pub estimates: Vec<Estimate>,
+    /// Covariance of the deviations, n × n ((m) and (rad)).
+    pub covariance: DMatrix<f64>,
+    /// What the data can tell.
+    pub observability: Observability,
+    /// Measurement σ.
+    pub sigma: Sigma,
+    /// Samples left out, with reasons.
+    pub rejected: Vec<Rejected>,
+    /// Steps of the solver.
+    pub iterations: Vec<Iteration>,
+    /// Why it stopped.
+    pub termination: TerminationReason,
+    /// Pose of each instrument station in the base of the identified arm.
+    pub base_from_station: Vec<Isometry3<f64>>,
+    /// Measured − predicted in the base (m) for every place, in-sample: for finding outliers, never to be shown as accuracy.
+    pub residuals: Vec<Vector3<f64>>,
+}
+
+impl Identification {
+    /// Whether the place was left out.
+    pub fn is_rejected(&self, place: usize) -> bool {
+        self.rejected.iter().any(|rejected| rejected.sample == SampleIndex::Place(place))
+    }
+
+    /// Correlation of two parameters, −1 … 1; zero where one has no uncertainty.
+    pub fn correlation(&self, i: usize, j: usize) -> f64 {
+        let product = self.covariance[(i, i)] * self.covariance[(j, j)];
+        if product > 0.0 { self.covariance[(i, j)] / product.sqrt() } else { 0.0 }
+    }
+}
