@@ -120,12 +120,19 @@ fn edit_distance(left: &str, right: &str) -> usize {
     row.last().copied().unwrap_or_default()
 }
 
-/// A finite number.
+/// Larger numbers (mm, deg) describe no robot and would end as infinity.
+const LARGEST: f64 = 1e9;
+
+/// A number that is finite and not absurd.
 pub(super) fn number(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64> {
     match &ast.node {
-        Node::Number(number) if number.is_finite() => Some(*number),
+        Node::Number(number) if number.abs() <= LARGEST => Some(*number),
         Node::Number(number) => {
-            findings.error(ast.span, format!("{number} is not a finite number"), "write a plain number".to_owned());
+            findings.error(
+                ast.span,
+                format!("{number:e} is not a finite number of a sensible size"),
+                "write a plain number".to_owned(),
+            );
             None
         }
         other => {

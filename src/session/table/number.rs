@@ -2,6 +2,9 @@
 
 use super::{Defect, NumberColumn, Record, TableProblem};
 
+/// Larger numbers (m, rad) are no measurement in any unit: a lost decimal point, or rubbish that would end as infinity.
+const LARGEST: f64 = 1e6;
+
 /// Reads the number cells of one table and gathers what is wrong with them.
 #[derive(Debug)]
 pub(in crate::session) struct Numbers<'a> {
@@ -54,7 +57,7 @@ impl<'a> Numbers<'a> {
         let Ok(value) = value else {
             return refuse(Defect::NotANumber { text: text.to_owned() });
         };
-        if !value.is_finite() {
+        if !value.is_finite() || (value * column.unit).abs() > LARGEST {
             return refuse(Defect::NotFinite { text: text.to_owned() });
         }
         // "1,234" is 1.234 or a thousand: only a file that uses one decimal sign throughout is unambiguous.

@@ -146,7 +146,10 @@ pub enum Defect {
         text: String,
     },
     /// NaN, an infinity, or a number too large.
-    #[error("'{}' is not a finite number; write its value, or leave the row out with a '#' before it", excerpt(text))]
+    #[error(
+        "'{}' is not a number that can be measured; write its value, or leave the row out with a '#' before it",
+        excerpt(text)
+    )]
     NotFinite {
         /// Text of the cell.
         text: String,
