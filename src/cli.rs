@@ -166,7 +166,7 @@ pub struct PlanArgs {
     /// Score the poses of this plan or list instead of choosing new ones
     #[arg(long, value_name = "CSV", conflicts_with_all = ["poses", "objective", "include", "out"])]
     pub check: Option<PathBuf>,
-    /// Number of poses to identify from
+    /// Number of new poses to identify from; those of '--include' come on top
     #[arg(long, value_name = "N", default_value_t = 56)]
     pub poses: usize,
     /// Number of poses to verify with
@@ -221,7 +221,7 @@ pub struct PlanArgs {
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive)]
     pub settle_s: f64,
     /// Readings per pose, one second each
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub shots: u32,
     /// File for the plan
     #[arg(long, value_name = "CSV")]

@@ -113,10 +113,26 @@ fn a_plan_is_the_same_for_any_number_of_threads_and_scores_the_same_when_read_ba
         assert!((checked / made - 1.0).abs() < 1e-6, "{key}: {made} {checked}");
     }
     assert_eq!(checked["warnings"].as_array().unwrap().len(), 0, "{}", checked["warnings"]);
+    // Measured poses are numbered in the order of the program, so that 'pose % 4' can pick them later.
+    let kinds = ["identification", "verification"];
+    let measured: Vec<&str> = made["poses"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|pose| kinds.contains(&pose["kind"].as_str().unwrap()))
+        .map(|pose| pose["pose"].as_str().unwrap())
+        .collect();
+    let numbers: Vec<String> = (1..=38).map(|number| number.to_string()).collect();
+    assert_eq!(measured, numbers);
+    // What the operator will see holds the tracker's noise as well.
+    let seen = number(&made, "predicted_verification_rms_mm");
+    assert!(seen > 0.02 * 3.0_f64.sqrt() && seen < 0.06, "{seen}");
 
     // A pose through the floor, written by hand, is named.
     let text = fs::read_to_string(&one).unwrap();
-    let (at, pose) = text.lines().enumerate().find(|(_, line)| line.contains(",identification,")).unwrap();
+    // Pose 1 is repeated as drift pose: two configurations for one name would be refused before anything is scored.
+    let is_edited = |line: &str| line.contains(",identification,") && !line.starts_with("1,");
+    let (at, pose) = text.lines().enumerate().find(|(_, line)| is_edited(line)).unwrap();
     let name = pose.split(',').next().unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     lines[at] = format!("{name},identification,0,80,0,0,0,0,,,");
@@ -151,6 +167,33 @@ fn measured_poses_stay_in_and_new_ones_complete_them() {
     assert_eq!(plan["identification_poses"], 23);
     let new = plan["poses"].as_array().unwrap().iter().filter(|pose| pose["kind"] == "identification").count();
     assert_eq!(new, 20, "the measured ones are not visited again");
+    let codes: Vec<&str> =
+        plan["warnings"].as_array().unwrap().iter().map(|warning| warning["code"].as_str().unwrap()).collect();
+    assert_eq!(codes, ["not_checked"], "a plan without checks says so");
+
+    // Of a plan that is included, only identification poses count as measured.
+    let text = fs::read_to_string(&measured).unwrap().replace("pose,", "pose,kind,");
+    let kinds = ["kind", "identification", "verification", "home"];
+    let lines: Vec<String> =
+        text.lines().zip(kinds).map(|(line, kind)| line.replacen(',', &format!(",{kind},"), 1)).collect();
+    let lines = [&["pose,kind,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg".to_owned()], &lines[1..]].concat();
+    fs::write(&measured, lines.join("\n")).unwrap();
+    let plan = json(&[
+        "plan",
+        "--profile",
+        "soochow",
+        "--candidates",
+        "300",
+        "--poses",
+        "20",
+        "--verification",
+        "5",
+        "--no-filters",
+        "--include",
+        measured.to_str().unwrap(),
+    ]);
+    assert_eq!(plan["identification_poses"], 21);
+    assert_eq!(plan["warnings"][0]["code"], "not_included");
 }
 
 #[test]

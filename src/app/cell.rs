@@ -57,12 +57,17 @@ pub(super) fn limits(profile: &Profile, narrowed: &[JointLimit]) -> Result<Vec<(
 }
 
 /// The cell of a profile with these joint limits; without filters an empty one.
-pub(super) fn cell(profile: &Profile, limits: Vec<(f64, f64)>, args: &PlanArgs) -> Result<Cell, Failure> {
+pub(super) fn cell(
+    profile: &Profile,
+    limits: Vec<(f64, f64)>,
+    region: Option<&BoxMm>,
+    no_filters: bool,
+) -> Result<Cell, Failure> {
     let target =
         profile.targets().first().ok_or_else(|| Failure::new(ExitStatus::Usage, "the profile has no target"))?;
     let target = MountedTarget { position_in_flange: target.position_in_flange, axis_in_flange: target.axis_in_flange };
-    let region = args.region.as_ref().map(box_in_base);
-    if args.no_filters {
+    let region = region.map(box_in_base);
+    if no_filters {
         return Ok(Cell {
             limits,
             bodies: Vec::new(),

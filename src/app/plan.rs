@@ -20,8 +20,8 @@ use crate::kinematics::{FreeParameter, JointType};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
-    Chosen, Information, JointBox, Objective, PlanningError, Search, SearchSettings, Stage, low_discrepancy, random,
-    verification_set,
+    Chosen, Information, JointBox, Objective, PlanningError, Score, Search, SearchSettings, Stage, low_discrepancy,
+    random, verification_set,
 };
 use crate::profile::{Level, Profile};
 use crate::report;
@@ -56,7 +56,7 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
     let keep_going =
         || !interrupted.load(Ordering::Relaxed) && args.time_limit.is_none_or(|limit| clock.seconds() < limit);
     let mut summary = match &args.check {
-        Some(file) => planner.check(file, &keep_going)?,
+        Some(file) => planner.check(file)?,
         None => planner.choose(console, &keep_going)?,
     };
     summary.elapsed_s = clock.seconds();
@@ -72,13 +72,11 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
     Ok(if is_blocked { ExitStatus::NotAccepted } else { ExitStatus::Accepted })
 }
 
-/// Set by Ctrl-C: the first one ends the search with the best set so far, the second one the program.
+/// Set by Ctrl-C: the search ends with the best set so far. A second Ctrl-C changes nothing, since wrappers send two at once and
+/// the rest takes a second or two.
 fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
-    let signal = signal_hook::consts::SIGINT;
-    let interrupted = 128 + signal;
-    signal_hook::flag::register_conditional_shutdown(signal, interrupted, Arc::clone(&flag))
-        .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
+    signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&flag))
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     Ok(flag)
 }
@@ -98,7 +96,7 @@ struct Planner<'a> {
 struct Ordered {
     chosen: Chosen,
     /// Poses to measure with their kinds, in the order of `Stops::poses`.
-    stops: Vec<(PoseKind, String, Candidate)>,
+    stops: Vec<(PoseKind, Candidate)>,
     route: Route,
 }
 
@@ -106,7 +104,7 @@ impl<'a> Planner<'a> {
     fn new(args: &'a PlanArgs, loaded: &'a LoadedProfile) -> Result<Self, Failure> {
         let profile = &loaded.profile;
         let limits = limits(profile, &args.limits)?;
-        let cell = cell(profile, limits.clone(), args)?;
+        let cell = cell(profile, limits.clone(), args.region.as_ref(), args.no_filters)?;
         let filter = CandidateFilter::new(profile.chain(), &cell, from_mm(args.clearance_mm))
             .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
         let level = match args.level {
@@ -156,11 +154,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Candidates, those that must be in first.
-    fn candidates(&self, needed: usize) -> Result<(Candidates, usize), Failure> {
-        let included = match &self.args.include {
-            Some(file) => self.listed_poses(file)?.0,
-            None => Vec::new(),
-        };
+    fn candidates(&self, needed: usize, included: &[PlannedPose]) -> Result<Candidates, Failure> {
         let count = self.args.candidates;
         let joint_box = self.joint_box()?;
         let stream = low_discrepancy(&joint_box, self.args.seed).take(count.saturating_mul(TRIES_PER_CANDIDATE));
@@ -169,10 +163,53 @@ impl<'a> Planner<'a> {
             .collect_at_least(stream, count, needed)
             .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
         let mut kept: Vec<Candidate> = included.iter().map(|row| self.candidate(&row.configuration)).collect();
-        let required = kept.len();
         kept.append(&mut candidates.kept);
         candidates.kept = kept;
-        Ok((candidates, required))
+        Ok(candidates)
+    }
+
+    /// The identification poses that are already measured, and what to say about them.
+    fn included(&self) -> Result<(Vec<PlannedPose>, Vec<Warning>), Failure> {
+        let Some(file) = &self.args.include else { return Ok((Vec::new(), Vec::new())) };
+        let (rows, mut warnings, _) = self.listed_poses(file)?;
+        let all = rows.len();
+        let included: Vec<PlannedPose> = rows.into_iter().filter(|row| row.kind == PoseKind::Identification).collect();
+        if included.len() < all {
+            let text = format!(
+                "{} of {all} rows of '{}' are not identification poses and do not count as measured",
+                all - included.len(),
+                file.display()
+            );
+            warnings.push(warning("not_included", text, false));
+        }
+        let outside: Vec<String> =
+            included.iter().filter(|row| self.is_outside(&row.configuration)).map(|row| row.pose.clone()).collect();
+        if !outside.is_empty() {
+            let text = format!("measured poses outside the joint limits of the profile: {}", shortened(&outside));
+            warnings.push(warning("joint_limits", text, false));
+        }
+        Ok((included, warnings))
+    }
+
+    /// Whether a configuration is outside the limits that the arm itself has.
+    fn is_outside(&self, configuration: &[f64]) -> bool {
+        let ranges = self.profile().joints().iter().zip(configuration);
+        ranges
+            .filter_map(|(range, value)| Some((range.limits?, value)))
+            .any(|((low, high), value)| !(low - 1e-9..=high + 1e-9).contains(value))
+    }
+
+    /// What makes a plan unfit to be run as it is.
+    fn safety_warnings(&self) -> Vec<Warning> {
+        if self.args.no_filters {
+            let text = "no check of collisions and sight was made ('--no-filters'): such a plan is for comparison, do not run it on a robot";
+            return vec![warning("not_checked", text.to_owned(), false)];
+        }
+        if self.profile().bodies().is_empty() {
+            let text = "the profile has no bodies, so the arm was not checked against itself, the floor or keep-out boxes: add 'bodies', or check every move by hand";
+            return vec![warning("not_checked", text.to_owned(), false)];
+        }
+        Vec::new()
     }
 
     fn candidate(&self, configuration: &[f64]) -> Candidate {
@@ -197,7 +234,9 @@ impl<'a> Planner<'a> {
         keep_going: &(dyn Fn() -> bool + Sync),
     ) -> Result<PlanSummary, Failure> {
         let args = self.args;
-        let (mut candidates, required) = self.candidates(args.poses + args.verification)?;
+        let (included, mut warnings) = self.included()?;
+        let required = included.len();
+        let mut candidates = self.candidates(args.poses + args.verification, &included)?;
         let mut round = 0;
         let (information, ordered) = loop {
             round += 1;
@@ -225,7 +264,11 @@ impl<'a> Planner<'a> {
             }
         };
         let set = &ordered.chosen.set;
-        let mut summary = self.summary(&information, set, &candidates.rejections, keep_going)?;
+        let mut summary = self.summary(&information, set, required, &candidates.rejections)?;
+        warnings.extend(self.safety_warnings());
+        warnings.append(&mut summary.warnings);
+        summary.warnings = warnings;
+        summary.predicted_verification_rms_mm = self.predicted_verification(&candidates.kept, set, &ordered)?;
         summary.objective = Some(objective_name(args.objective).to_owned());
         summary.interrupted = ordered.chosen.interrupted;
         let minutes = |seconds: f64| seconds / 60.0;
@@ -242,7 +285,7 @@ impl<'a> Planner<'a> {
             size.time_min = Some(minutes(total) * (size.poses + extra) as f64 / stops as f64);
         }
         summary.verification_poses = extra;
-        summary.poses = self.route_rows(&ordered);
+        summary.poses = self.route_rows(&ordered, &included);
         Ok(summary)
     }
 
@@ -321,17 +364,9 @@ impl<'a> Planner<'a> {
         let vias: Vec<Vec<f64>> =
             pool.iter().step_by(spread).map(|candidate| candidate.configuration.clone()).collect();
         let request = Stops { home: &home, poses: &poses, vias: &vias, drift_every: Some(self.args.drift_every) };
-        let named = |order: usize| match stops[order].0 {
-            PoseKind::Verification => format!("v{}", order + 1 - (stops.len() - verification.len())),
-            _ => format!("p{}", order + 1),
-        };
         match order(shape, &request, &pace(self.profile(), self.args)) {
             Ok(route) => {
-                let stops = stops
-                    .iter()
-                    .enumerate()
-                    .map(|(order, (kind, index))| (*kind, named(order), pool[*index].clone()))
-                    .collect();
+                let stops = stops.iter().map(|(kind, index)| (*kind, pool[*index].clone())).collect();
                 Ok(Ok(Ordered { chosen, stops, route }))
             }
             Err(OrderError::Unreachable { poses }) => Ok(Err(poses.iter().map(|order| stops[*order].1).collect())),
@@ -339,29 +374,59 @@ impl<'a> Planner<'a> {
         }
     }
 
-    fn route_rows(&self, ordered: &Ordered) -> Vec<PoseSummary> {
-        let (mut homes, mut drifts, mut vias) = (0, 0, 0);
-        let mut counted = |kind: StepKind| -> (PoseKind, String) {
-            let (kind, letter, count) = match kind {
-                StepKind::Home => (PoseKind::Home, 'h', &mut homes),
-                StepKind::Drift => (PoseKind::Drift, 'd', &mut drifts),
-                StepKind::Via | StepKind::Measure => (PoseKind::Via, 't', &mut vias),
+    /// The rows of a plan. Measured poses are numbered as they are visited, after those that are measured already; a drift pose
+    /// has the number of the pose that it repeats.
+    fn route_rows(&self, ordered: &Ordered, included: &[PlannedPose]) -> Vec<PoseSummary> {
+        let mut last = included.iter().filter_map(|row| row.pose.parse::<u64>().ok()).max().unwrap_or(0);
+        let mut numbers = vec![String::new(); ordered.stops.len()];
+        let mut vias = 0;
+        let mut rows = Vec::with_capacity(ordered.route.steps.len());
+        for step in &ordered.route.steps {
+            let stop = step.pose.and_then(|pose| Some((pose, ordered.stops.get(pose)?)));
+            let (kind, pose) = match (step.kind, stop) {
+                (StepKind::Measure, Some((index, (kind, _)))) => {
+                    last += 1;
+                    numbers[index] = last.to_string();
+                    (*kind, numbers[index].clone())
+                }
+                (StepKind::Drift, Some((index, _))) => (PoseKind::Drift, numbers[index].clone()),
+                (StepKind::Home, _) => (PoseKind::Home, "home".to_owned()),
+                _ => {
+                    vias += 1;
+                    (PoseKind::Via, format!("via{vias}"))
+                }
             };
-            *count += 1;
-            (kind, format!("{letter}{count}"))
-        };
-        ordered
-            .route
-            .steps
+            rows.push(self.row(kind, pose, &step.configuration, Vec::new()));
+        }
+        rows
+    }
+
+    /// Root mean square (mm) that the verification poses of the plan will show, tracker noise included.
+    fn predicted_verification(
+        &self,
+        pool: &[Candidate],
+        set: &[usize],
+        ordered: &Ordered,
+    ) -> Result<Option<f64>, Failure> {
+        const FEWEST: usize = 3;
+        let verification: Vec<TargetAt> = ordered
+            .stops
             .iter()
-            .map(|step| {
-                let (kind, pose) = match (step.kind, step.pose.and_then(|pose| ordered.stops.get(pose))) {
-                    (StepKind::Measure, Some((kind, name, _))) => (*kind, name.clone()),
-                    _ => counted(step.kind),
-                };
-                self.row(kind, pose, &step.configuration, Vec::new())
-            })
-            .collect()
+            .filter(|(kind, _)| *kind == PoseKind::Verification)
+            .map(|(_, candidate)| TargetAt { configuration: candidate.configuration.clone(), target: 0 })
+            .collect();
+        let Some(sigma) = self.sigma().filter(|_| verification.len() >= FEWEST) else { return Ok(None) };
+        let chosen: Vec<TargetAt> = set
+            .iter()
+            .filter_map(|index| pool.get(*index))
+            .map(|candidate| TargetAt { configuration: candidate.configuration.clone(), target: 0 })
+            .collect();
+        let information = Information::new(&self.model, &self.parameters, &chosen, &verification)
+            .map_err(|error| planning_failure(&error))?;
+        let all: Vec<usize> = (0..chosen.len()).collect();
+        let score = Score::new(&information, &all).map_err(|error| planning_failure(&error))?;
+        // Three coordinates of a reading scatter by σ each on top of what the robot misses.
+        Ok(Some(to_mm(sigma * (score.predicted_error.powi(2) + 3.0).sqrt())))
     }
 
     fn row(&self, kind: PoseKind, pose: String, configuration: &[f64], problems: Vec<String>) -> PoseSummary {
@@ -377,22 +442,34 @@ impl<'a> Planner<'a> {
     }
 
     /// Scores the poses of a file.
-    fn check(&self, file: &Path, keep_going: &(dyn Fn() -> bool + Sync)) -> Result<PlanSummary, Failure> {
+    fn check(&self, file: &Path) -> Result<PlanSummary, Failure> {
         let (rows, mut warnings, input) = self.listed_poses(file)?;
         let scored: Vec<&PlannedPose> = rows.iter().filter(|row| row.kind == PoseKind::Identification).collect();
-        let (mut candidates, _) = self.candidates(scored.len())?;
         let count = scored.len();
+        if count == 0 {
+            return Err(Failure::new(
+                ExitStatus::Usage,
+                format!("none of the {} rows of '{}' is of kind 'identification'", rows.len(), file.display()),
+            )
+            .hint("a plain list needs no 'kind' column: all its rows are then scored"));
+        }
+        let mut candidates = self.candidates(count, &[])?;
         let mut pool: Vec<Candidate> = scored.iter().map(|row| self.candidate(&row.configuration)).collect();
         pool.append(&mut candidates.kept);
         let information = self.information(&pool)?;
         let set: Vec<usize> = (0..count).collect();
-        let mut summary = self.summary(&information, &set, &candidates.rejections, keep_going)?;
+        let mut summary = self.summary(&information, &set, 0, &candidates.rejections)?;
+        warnings.extend(self.safety_warnings());
         summary.poses = rows
             .iter()
             .map(|row| {
                 let problems = match row.kind {
                     PoseKind::Home | PoseKind::Via => {
-                        self.filter.shape().obstructions(&row.configuration).iter().map(ToString::to_string).collect()
+                        let outside =
+                            self.is_outside(&row.configuration).then(|| "outside the joint limits".to_owned());
+                        let shape = self.filter.shape();
+                        let obstructions = shape.obstructions(&row.configuration);
+                        outside.into_iter().chain(obstructions.iter().map(ToString::to_string)).collect()
                     }
                     _ => self.filter.reasons(&row.configuration),
                 };

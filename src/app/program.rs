@@ -1,12 +1,18 @@
 //! `trupose program`: a plan in the language of a robot controller.
 
+use std::f64::consts::PI;
 use std::io::Write;
 
+use super::cell::cell;
 use super::{Console, load};
 use crate::cli::ProgramArgs;
 use crate::error::{ExitStatus, Failure};
+use crate::kinematics::{Joint, JointType};
+use crate::planning::CellError;
+use crate::planning::collision::ArmShape;
+use crate::profile::Profile;
 use crate::program::{Options, Pause, Robot, write};
-use crate::session::plan;
+use crate::session::plan::{self, PlannedPose};
 use crate::store;
 
 pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
@@ -41,6 +47,9 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
             }
         }
     }
+    for danger in dangers(profile, &listed.rows)? {
+        console.remark(&format!("WARNING: {danger}"));
+    }
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
     let pulses: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
     let robot =
@@ -71,4 +80,38 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
         }
     }
     Ok(ExitStatus::Accepted)
+}
+
+/// What the arm would run into, by the bodies of the profile: the first few findings of poses and of moves between them.
+fn dangers(profile: &Profile, rows: &[PlannedPose]) -> Result<Vec<String>, Failure> {
+    const SHOWN: usize = 5;
+    if profile.bodies().is_empty() {
+        return Ok(vec!["the profile has no bodies: collisions were not checked".to_owned()]);
+    }
+    let usage = |error: &CellError| Failure::from_error(ExitStatus::Usage, error);
+    let wide = |joint: &Joint, limits: Option<(f64, f64)>| {
+        limits.unwrap_or(match joint.joint_type {
+            JointType::Revolute => (-2.0 * PI, 2.0 * PI),
+            JointType::Prismatic => (-10.0, 10.0),
+        })
+    };
+    let joints = profile.chain().joints().iter().zip(profile.joints());
+    let limits = joints.map(|(joint, range)| wide(joint, range.limits)).collect();
+    let cell = cell(profile, limits, None, false)?;
+    let shape = ArmShape::new(profile.chain(), &cell, 0.0).map_err(|error| usage(&error))?;
+    let poses = rows.iter().filter_map(|row| {
+        let obstruction = shape.check(&row.configuration).err()?;
+        Some(format!("in pose {} {obstruction}", row.pose))
+    });
+    let moves = rows.windows(2).filter_map(|pair| {
+        let obstruction = shape.check_move(&pair[0].configuration, &pair[1].configuration).err()?;
+        Some(format!("on the way from {} to {} {obstruction}", pair[0].pose, pair[1].pose))
+    });
+    let mut found: Vec<String> = poses.chain(moves).collect();
+    let more = found.len().saturating_sub(SHOWN);
+    found.truncate(SHOWN);
+    if more > 0 {
+        found.push(format!("and {more} more; see 'trupose plan --check'"));
+    }
+    Ok(found)
 }

@@ -13,7 +13,7 @@ const DECIMALS: usize = 8;
 /// Peak of a cubic between two stops, in parts of its mean speed.
 const CUBIC_PEAK: f64 = 1.5;
 
-/// Time to the first point (s), where the arm should be already, and shortest time of a move.
+/// Shortest time of a move (s).
 const LEAST_TIME: f64 = 2.0;
 
 pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
@@ -32,7 +32,10 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
         let q = urdf_values(job, &pose.configuration);
         let slowest = before.iter().flatten().zip(&q).zip(&speeds);
         let moving = slowest.map(|((from, to), speed)| CUBIC_PEAK * (to - from).abs() / (speed * job.options.speed));
-        time += moving.fold(LEAST_TIME, f64::max);
+        // Nobody knows where the arm stands before the first point: half a turn of every joint, at the speed asked for.
+        let first = speeds.iter().map(|speed| CUBIC_PEAK * std::f64::consts::PI / (speed * job.options.speed));
+        let first = if before.is_none() { first.fold(LEAST_TIME, f64::max) } else { LEAST_TIME };
+        time += moving.fold(first, f64::max);
         let positions = job.inside_values(&q, DECIMALS).join(", ");
         let mut point = |time: f64| {
             lines.push(format!("  - positions: [{positions}]"));

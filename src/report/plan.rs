@@ -35,11 +35,16 @@ fn figures(summary: &PlanSummary) -> String {
     if let Some(rms) = summary.predicted_rms_mm {
         let sigma = summary.sigma_mm.unwrap_or_default();
         let line = format!(
-            "  predicted position error on fresh poses {} mm rms (sigma {} mm), from the instrument alone",
+            "  predicted position error of the identified robot, all over its joint ranges: {} mm rms (sigma {} mm, from the instrument alone)",
             fixed(rms, 4),
             fixed(sigma, 4)
         );
         text.push_str(&paragraph("  ", line.trim_start()));
+    }
+    if let Some(rms) = summary.predicted_verification_rms_mm {
+        let line =
+            format!("the verification poses will then show about {} mm rms, tracker noise included", fixed(rms, 4));
+        text.push_str(&paragraph("  ", &line));
     }
     if let Some(time) = &summary.time {
         push_line(

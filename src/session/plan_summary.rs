@@ -146,8 +146,10 @@ pub struct PlanSummary {
     pub predicted_error_sigma: f64,
     /// σ of a coordinate that the prediction is for.
     pub sigma_mm: Option<f64>,
-    /// Predicted RMS position error on verification, from the instrument alone.
+    /// Predicted RMS position error of the identified robot over its joint ranges, from the instrument alone.
     pub predicted_rms_mm: Option<f64>,
+    /// RMS position error that the verification poses of the plan will show, tracker noise included.
+    pub predicted_verification_rms_mm: Option<f64>,
     /// Random sets of the same size.
     pub random: RandomSummary,
     /// D-efficiency against the upper bound for these candidates, 0 … 1.

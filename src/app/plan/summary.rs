@@ -12,24 +12,30 @@ use crate::session::plan_summary::{
 use crate::units::to_mm;
 
 impl Planner<'_> {
-    /// Scores `set` and compares it with random sets, the bound and other sizes.
+    /// Scores `set`, whose first `required` poses are measured already, and compares it with random sets, the bound and other
+    /// sizes.
     pub(super) fn summary(
         &self,
         information: &Information,
         set: &[usize],
+        required: usize,
         rejections: &Rejections,
-        keep_going: &(dyn Fn() -> bool + Sync),
     ) -> Result<PlanSummary, Failure> {
         let failure = |error: PlanningError| planning_failure(&error);
         let score = Score::new(information, set).map_err(failure)?;
+        let measured: Vec<usize> = (0..required).collect();
+        let mut warnings = Vec::new();
         let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.args.seed).map_err(failure)?;
         let bound = DesignBound::new(information, &|| true);
         let d_efficiency = bound.efficiency(information, set).map_err(failure)?;
-        let sizes = trade_off(information, &[], &SIZES, self.args.seed, keep_going).map_err(failure)?;
+        let sizes = trade_off(information, &measured, &SIZES, self.args.seed, &|| true).map_err(failure)?;
         let sigma = self.sigma();
+        if sigma.is_none() {
+            let text = "the sigma of the instrument is not known, so nothing is said in mm and about weak parameters: give '--sigma-mm', or 'instrument' in the profile";
+            warnings.push(warning("no_sigma", text.to_owned(), false));
+        }
         let spread = |spread: &Spread| SpreadSummary { median: spread.median, best: spread.best };
         let indices = &score.observability;
-        let mut warnings = Vec::new();
         if let Some(sigma) = sigma
             && score.weak(sigma).any(|weak| weak.identifiable)
         {
@@ -56,6 +62,7 @@ impl Planner<'_> {
             },
             predicted_error_sigma: score.predicted_error,
             sigma_mm: sigma.map(to_mm),
+            predicted_verification_rms_mm: None,
             predicted_rms_mm: sigma.map(|sigma| to_mm(score.predicted_rms(sigma))),
             random: RandomSummary {
                 sets: yardstick.sets,
