@@ -41,7 +41,7 @@ pub struct Estimate {
     pub sigma: f64,
     /// Expected deviation (m) or (rad).
     pub expected: f64,
-    /// Whether it can be found on its own; if not, a [`BlindGroup`] says what can.
+    /// Whether it can be found on its own; if not, a [`BlindGroup`](super::BlindGroup) says what can.
     pub identifiable: bool,
 }
 
@@ -57,7 +57,7 @@ pub enum RejectionReason {
 /// Which sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SampleIndex {
-    /// A measured point or the seat of a shared point, in the order of [`Observations::places`].
+    /// A measured point or the seat of a shared point, in the order of [`Observations::places`](super::Observations::places).
     Place(usize),
     /// A measured length.
     Length(usize),
