@@ -303,8 +303,11 @@ impl FromStr for JointLimit {
             || format!("'{text}' is not a limit; write for example 'j2=-30..60' (degrees, sliding joints mm)");
         let (joint, range) = text.split_once('=').ok_or_else(expected)?;
         let (low, high) = parse_range(range).ok_or_else(expected)?;
-        if joint.trim().is_empty() || low >= high {
+        if joint.trim().is_empty() {
             return Err(expected());
+        }
+        if low >= high {
+            return Err(format!("'{text}' is crossed: the lower limit {low} is not below the upper one {high}"));
         }
         Ok(Self { joint: joint.trim().to_owned(), low, high })
     }

@@ -64,26 +64,14 @@ fn comparison(summary: &PlanSummary) -> String {
     let mut text = String::new();
     let random = &summary.random;
     push_line(&mut text, &format!("  {:<34}{:>12}{:>16}{:>14}", "", "this set", "random median", "random best"));
-    push_line(
-        &mut text,
-        &format!(
-            "  {:<34}{:>12}{:>16}{:>14}",
-            "predicted error (sigma)",
-            fixed(summary.predicted_error_sigma, 3),
-            fixed(random.predicted_error_sigma.median, 3),
-            fixed(random.predicted_error_sigma.best, 3)
-        ),
-    );
-    push_line(
-        &mut text,
-        &format!(
-            "  {:<34}{:>12}{:>16}{:>14}",
-            "condition number (expected dev.)",
-            fixed(summary.condition_number, 1),
-            fixed(random.condition_number.median, 1),
-            fixed(random.condition_number.best, 1)
-        ),
-    );
+    let error = (summary.predicted_error_sigma, random.predicted_error_sigma);
+    let condition = (summary.condition_number, random.condition_number);
+    for (name, (own, random), decimals) in
+        [("predicted error (sigma)", error, 3), ("condition number (expected dev.)", condition, 1)]
+    {
+        let [own, median, best] = [own, random.median, random.best].map(|value| fixed(value, decimals));
+        push_line(&mut text, &format!("  {name:<34}{own:>12}{median:>16}{best:>14}"));
+    }
     push_line(
         &mut text,
         &format!("  {:<34}{:>12}", "condition number (mm, rad)", fixed(summary.condition_number_raw, 0)),
