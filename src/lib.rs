@@ -22,6 +22,7 @@ pub mod error;
 pub mod geometry;
 pub mod identification;
 pub mod kinematics;
+pub mod link;
 pub mod planning;
 pub mod profile;
 pub mod program;

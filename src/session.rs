@@ -14,6 +14,8 @@ pub mod filter;
 pub mod measurements;
 pub mod plan;
 pub mod plan_summary;
+pub mod reading;
+pub mod simulation;
 pub mod summary;
 mod table;
 

@@ -16,6 +16,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("session", &["units", "geometry", "kinematics", "profile"]),
     ("program", &["units", "kinematics", "session"]),
     ("runtime", &["planning"]),
+    ("link", &["units", "geometry", "kinematics", "profile", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "profile", "session"]),
     ("error", &["session"]),

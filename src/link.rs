@@ -1,0 +1,50 @@
+//! Links to instruments: whatever can be asked for the place of the SMR.
+//!
+//! A link knows wires, files or a simulation, never why it is asked. It gives a reading only on an explicit success; everything
+//! else is a [`LinkError`]. Points are in the frame of the instrument (m), configurations are pendant values (rad, sliding
+//! joints m).
+
+#![warn(missing_docs)]
+
+use thiserror::Error;
+
+use crate::session::reading::{MeasureRequest, Reading};
+
+/// Something that measures.
+pub trait Link: Send {
+    /// What answers at the other end, in one line.
+    ///
+    /// # Errors
+    /// Nothing usable answers.
+    fn connect(&mut self) -> Result<String, LinkError>;
+
+    /// Measures the target. Blocks; `keep_going` is asked at least ten times a second of real time and ends it with
+    /// [`LinkError::Cancelled`] once it says no.
+    ///
+    /// # Errors
+    /// There is no reading.
+    fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError>;
+}
+
+/// Why there is no reading.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The instrument sees no reflector.
+    #[error("the beam is broken: the tracker sees no SMR")]
+    BeamBroken,
+    /// Recorded data have no reading for the pose.
+    #[error("'{file}' has no reading for pose {pose}")]
+    NoReading {
+        /// Which file.
+        file: String,
+        /// Name of the pose.
+        pose: String,
+    },
+    /// The set-up cannot be simulated or played.
+    #[error("{0}")]
+    SetUp(String),
+    /// The operator cancelled.
+    #[error("cancelled")]
+    Cancelled,
+}

@@ -1,0 +1,109 @@
+//! The simulated cell as it is asked for: which robot is hidden in it, how its instrument scatters, and what goes wrong when.
+//!
+//! A fault is written `NAME@FIRST[-LAST][:SIZE]`: `wrong-pose@12`, `target-bumped@20:5mm`, `joint-sign@1:j3`, `beam-break@7-9`.
+//! FIRST and LAST are numbers of measurements in the session, counted from 1. Faults of the operator's set-up (unit, sign, bump)
+//! last from FIRST on unless LAST is given; slips (wrong pose, swapped rows, typing, outlier, motion, beam) happen once.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// A robot, an instrument and an operator that exist in the program only.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Simulation {
+    /// Seed of everything that is random.
+    #[serde(default = "first_seed")]
+    pub seed: u64,
+    /// How the robot really is.
+    #[serde(default)]
+    pub truth: Truth,
+    /// Standard deviation of a coordinate (mm); none: that of the profile's instrument, else 0.01 mm.
+    #[serde(default)]
+    pub noise_mm: Option<f64>,
+    /// What goes wrong.
+    #[serde(default)]
+    pub faults: Vec<Fault>,
+}
+
+const fn first_seed() -> u64 {
+    1
+}
+
+impl Default for Simulation {
+    fn default() -> Self {
+        Self { seed: first_seed(), truth: Truth::default(), noise_mm: None, faults: Vec::new() }
+    }
+}
+
+/// The hidden deviations of a simulated robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Truth {
+    /// Drawn from the expected deviations of the profile, by seed.
+    #[default]
+    Drawn,
+    /// Table II of the method paper; only for the paper's arm.
+    Paper,
+    /// None: the robot is as its maker says.
+    Nominal,
+}
+
+/// A fault with its time and size.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct Fault {
+    /// What goes wrong.
+    pub kind: FaultKind,
+    /// First measurement with it, from 1.
+    pub first: u64,
+    /// Last one; `None`: as long as the kind lasts by itself.
+    pub last: Option<u64>,
+}
+
+/// What can go wrong. Lengths in mm, angles in degrees; joints from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultKind {
+    /// The operator has moved to another pose than the one shown: the one that is shown next, or else stayed at the one before.
+    WrongPose,
+    /// The operator takes this pose and the next one in the wrong order.
+    SwappedRows,
+    /// The instrument counts in inches although millimetres are expected.
+    Inch,
+    /// The instrument counts in metres although millimetres are expected.
+    Metre,
+    /// A joint turns the other way than its profile says.
+    JointSign {
+        /// Which joint.
+        joint: usize,
+    },
+    /// A joint stands elsewhere than shown, by this much (deg or mm).
+    MistypedJoint {
+        /// Which joint.
+        joint: usize,
+        /// True less shown value.
+        by: f64,
+    },
+    /// The SMR sits elsewhere on the flange from then on, by this much (mm), in a direction drawn by seed.
+    TargetBumped {
+        /// How far.
+        by_mm: f64,
+    },
+    /// The robot still moves: the reading is off and its shots scatter by this much (mm).
+    NotAtRest {
+        /// How far.
+        by_mm: f64,
+    },
+    /// One reading is off by this much (mm), in a direction drawn by seed, without any scatter.
+    Outlier {
+        /// How far.
+        by_mm: f64,
+    },
+    /// The beam is broken: no reading.
+    BeamBreak,
+    /// The tracker creeps away steadily, by this much per hour (mm).
+    Drift {
+        /// How fast.
+        mm_per_hour: f64,
+    },
+}
