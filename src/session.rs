@@ -11,12 +11,22 @@
 pub mod calibration;
 pub mod constraints;
 pub mod filter;
+pub mod journal;
 pub mod measurements;
 pub mod plan;
 pub mod plan_summary;
 pub mod reading;
+pub mod set_up;
 pub mod simulation;
+pub mod state;
 pub mod summary;
 mod table;
 
 pub use table::{Defect, TableErrors, TableProblem, printable};
+
+use sha2::{Digest as _, Sha256};
+
+/// SHA-256 in hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
+}

@@ -18,6 +18,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
 
 use super::measurements::{decimal, farthest_joint, joint_cells, joint_names, quoted};
 use super::table::{
@@ -27,7 +28,8 @@ use crate::kinematics::JointType;
 use crate::units::to_mm;
 
 /// What is done at a row of a plan.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PoseKind {
     /// Measured to identify the arm.
     #[default]

@@ -1,0 +1,204 @@
+//! The journal of a session: everything that was decided and measured, one entry per line, nothing ever changed.
+//!
+//! ```text
+//! ("5e0c91d2a47b3f68", 7, "2026-03-01T09:15:02.5Z", Sample((number: 4, …)))
+//! ```
+//!
+//! A line is a RON tuple: check sum, number from 1, time in UTC, [`Entry`]. The check sum is the first half of the SHA-256 of
+//! the check sum of the line before and of the rest of this line: a line that is changed, lost or moved shows itself.
+//!
+//! The session **is** the fold of its journal ([`super::state::Session`]). A last line that is not complete, as a crash or a
+//! full disk leaves it, is dropped and reported; damage anywhere else is an error that names the line.
+//!
+//! The layout has a version, [`SCHEMA`], in the first entry. A later version that changes the meaning of an entry gets a new
+//! number, and [`read`] is the place where older ones are brought up to date; fields that are merely added have a default.
+
+mod entry;
+
+use std::str::FromStr as _;
+
+use jiff::Timestamp;
+use sha2::{Digest as _, Sha256};
+use thiserror::Error;
+
+pub use entry::{
+    CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, MeasuredText, PlanText, PlannedText,
+    from_edge, from_xyz_mm, to_edge, to_xyz_mm,
+};
+
+/// Version of the layout of journals.
+pub const SCHEMA: u32 = 1;
+
+/// Name of the file in a session's folder.
+pub const FILE_NAME: &str = "journal.ron";
+
+/// Bytes of a check sum in hexadecimal.
+const SUM_DIGITS: usize = 16;
+
+/// An entry with its place and time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// From 1, without gaps.
+    pub number: u64,
+    /// When it was made. Clocks are set: a later line may have an earlier time.
+    pub time: Timestamp,
+    /// What happened.
+    pub entry: Entry,
+}
+
+/// The check sum of the last line; the next one continues from it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Sum(String);
+
+/// A journal as it was read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Journal {
+    /// All complete lines.
+    pub lines: Vec<Line>,
+    /// Check sum of the last one.
+    pub sum: Sum,
+    /// Bytes of the complete lines: whatever follows must be cut off before the next line is written.
+    pub good_bytes: usize,
+    /// Bytes after them that are not a line.
+    pub torn_bytes: usize,
+}
+
+/// A journal that cannot be used.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum JournalError {
+    /// A line in the middle is damaged.
+    #[error("line {line} of the journal is damaged ({what}); lines before it are intact, those after it cannot be trusted")]
+    Damaged {
+        /// Line, from 1.
+        line: usize,
+        /// In which way.
+        what: String,
+    },
+    /// Written by a newer program.
+    #[error("the journal has schema {found}, this program understands up to {SCHEMA}; it was written by {program}")]
+    Newer {
+        /// Version found.
+        found: u32,
+        /// Program that wrote it.
+        program: String,
+    },
+    /// There is no complete line.
+    #[error("the journal is empty: nothing was measured in this session")]
+    Empty,
+    /// The first line does not open a session.
+    #[error("the journal does not begin with an opening entry: this is not a session of trupose")]
+    NotAJournal,
+    /// An entry cannot be written; a defect of this program.
+    #[error("an entry cannot be written as text: {0}")]
+    Unwritable(String),
+}
+
+/// The text of a line, line break included, and the check sum to continue from.
+///
+/// # Errors
+/// The entry has no text form; this is a defect.
+pub fn encode(line: &Line, before: &Sum) -> Result<(String, Sum), JournalError> {
+    let entry = ron::to_string(&line.entry).map_err(|error| JournalError::Unwritable(error.to_string()))?;
+    let rest = format!("{}, \"{}\", {entry})", line.number, line.time);
+    let sum = before.next(&rest);
+    Ok((format!("(\"{}\", {rest}\n", sum.0), sum))
+}
+
+/// Reads a journal.
+///
+/// # Errors
+/// Empty, not a journal, of a newer schema, or damaged before its last line.
+pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
+    let mut journal = Journal::default();
+    let mut rest = bytes;
+    while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
+        let (text, after) = (rest.get(..end).unwrap_or_default(), rest.get(end + 1..).unwrap_or_default());
+        let number = journal.lines.len() + 1;
+        match decode(text, &journal.sum) {
+            Ok((line, sum)) if line.number == number as u64 => {
+                journal.lines.push(line);
+                journal.sum = sum;
+                journal.good_bytes += end + 1;
+                rest = after;
+            }
+            // A crash leaves damage at the end only.
+            _ if after.is_empty() => break,
+            Ok((line, _)) => {
+                return Err(damaged(number, format!("it has number {}", line.number)));
+            }
+            Err(error) => return Err(error.at(number)),
+        }
+        if let [Line { entry: Entry::Opened { schema, program, .. }, .. }] = journal.lines.as_slice()
+            && *schema > SCHEMA
+        {
+            return Err(JournalError::Newer { found: *schema, program: program.clone() });
+        }
+    }
+    journal.torn_bytes = bytes.len() - journal.good_bytes;
+    match journal.lines.first().map(|line| &line.entry) {
+        None if bytes.starts_with(b"(\"") || bytes.is_empty() => Err(JournalError::Empty),
+        Some(Entry::Opened { .. }) => Ok(journal),
+        _ => Err(JournalError::NotAJournal),
+    }
+}
+
+impl Sum {
+    fn next(&self, rest: &str) -> Self {
+        let digest = Sha256::new().chain_update(&self.0).chain_update(rest).finalize();
+        Self(digest.iter().take(SUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect())
+    }
+}
+
+/// What is wrong with a line.
+enum LineError {
+    Text(&'static str),
+    Entry(String),
+    Opening { schema: u32, program: String },
+}
+
+impl LineError {
+    fn at(self, line: usize) -> JournalError {
+        match self {
+            Self::Text(what) => damaged(line, what.to_owned()),
+            Self::Entry(what) => damaged(line, what),
+            Self::Opening { schema, program } => JournalError::Newer { found: schema, program },
+        }
+    }
+}
+
+const fn damaged(line: usize, what: String) -> JournalError {
+    JournalError::Damaged { line, what }
+}
+
+fn decode(bytes: &[u8], before: &Sum) -> Result<(Line, Sum), LineError> {
+    let text = std::str::from_utf8(bytes).map_err(|_error| LineError::Text("it is not UTF-8 text"))?;
+    let parts = || {
+        let (sum, rest) = text.strip_prefix("(\"")?.split_once("\", ")?;
+        let (number, after) = rest.split_once(", \"")?;
+        let (time, entry) = after.split_once("\", ")?;
+        Some((sum, rest, number.parse().ok()?, Timestamp::from_str(time).ok()?, entry.strip_suffix(')')?))
+    };
+    let (sum, rest, number, time, entry) = parts().ok_or(LineError::Text("it does not read like a line of a journal"))?;
+    let expected = before.next(rest);
+    if sum != expected.0 {
+        return Err(LineError::Text("its check sum does not fit"));
+    }
+    match ron::from_str(entry) {
+        Ok(entry) => Ok((Line { number, time, entry }, expected)),
+        // The check sum fits, so a newer program has written something that this one does not know.
+        Err(error) => Err(newer_schema(entry).unwrap_or_else(|| LineError::Entry(format!("unknown entry: {}", error.code)))),
+    }
+}
+
+/// An opening entry of a newer schema, whatever else it has.
+fn newer_schema(entry: &str) -> Option<LineError> {
+    let after = entry.strip_prefix("Opened(schema:")?;
+    let digits: String = after.chars().take_while(char::is_ascii_digit).collect();
+    let schema = digits.parse().ok().filter(|schema| *schema > SCHEMA)?;
+    let program = after.split_once("program:\"").and_then(|(_, text)| text.split_once('"')).map_or("?", |(name, _)| name);
+    Some(LineError::Opening { schema, program: program.to_owned() })
+}
+
+#[cfg(test)]
+mod tests;

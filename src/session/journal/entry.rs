@@ -1,0 +1,296 @@
+//! What stands in a journal. Everything in edge units: mm, degrees (sliding joints mm), with the unit in the field's name.
+
+use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+
+use crate::kinematics::JointType;
+use crate::session::calibration::Calibration;
+use crate::session::plan::{PlannedPose, PoseKind};
+use crate::session::set_up::{InstrumentChoice, Step, TargetChoice};
+use crate::session::summary::IdentificationSummary;
+use crate::units::{from_mm, to_mm};
+
+/// Something that happened in a session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Entry {
+    /// The session begins. Always the first entry.
+    Opened {
+        /// Version of the layout.
+        schema: u32,
+        /// Program and version.
+        program: String,
+        /// Name of the session.
+        name: String,
+    },
+    /// The robot, with the whole text of its profile.
+    Profile {
+        /// Name or path that was given.
+        source: String,
+        /// SHA-256 of the text.
+        sha256: String,
+        /// The profile.
+        text: String,
+    },
+    /// The wizard went to a step.
+    Step(Step),
+    /// What measures.
+    Instrument(InstrumentChoice),
+    /// Where the SMR sits on the flange.
+    Target(TargetChoice),
+    /// A point of the circle-point analysis.
+    CirclePoint(CirclePointText),
+    /// The points of the circle-point analysis are to be measured again.
+    CirclesDiscarded,
+    /// Poses to measure; those of an earlier plan that are not measured yet are dropped.
+    Plan(PlanText),
+    /// More poses after those of the plan.
+    PlanExtended(PlanText),
+    /// A measured point.
+    Sample(MeasuredText),
+    /// A measurement that gave no sample.
+    Refused {
+        /// Number of the measurement in the session.
+        number: u64,
+        /// Name of the pose.
+        pose: String,
+        /// Why.
+        reason: String,
+        /// The reading, if there was one (mm).
+        xyz_mm: Option<(f64, f64, f64)>,
+    },
+    /// What the operator decided about a sample.
+    Decision {
+        /// Number of the measurement.
+        sample: u64,
+        /// What.
+        decision: Decision,
+    },
+    /// A correction of what was noted wrongly.
+    Correction(Correction),
+    /// A row of the plan will not be measured, or will be after all.
+    Skipped {
+        /// Row of the plan, from 0.
+        row: usize,
+        /// Whether it is skipped now.
+        skipped: bool,
+    },
+    /// A remark of the operator.
+    Note {
+        /// Name of the pose it is about, if any.
+        pose: Option<String>,
+        /// What he wrote.
+        text: String,
+    },
+    /// A result.
+    Identified(Box<IdentifiedText>),
+    /// Files were written.
+    Delivered {
+        /// Their names in the session's folder.
+        files: Vec<String>,
+    },
+    /// The session was opened again.
+    Resumed {
+        /// Program and version.
+        program: String,
+        /// Bytes of a torn last line that were dropped.
+        torn_bytes: usize,
+    },
+    /// The program ended in good order.
+    Closed {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// A point of the circle-point analysis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CirclePointText {
+    /// Number of the measurement in the session.
+    pub number: u64,
+    /// Joint that is turned, from 0.
+    pub joint: usize,
+    /// Pendant joint values.
+    pub joints: Vec<f64>,
+    /// Measured point in the tracker frame.
+    pub xyz_mm: (f64, f64, f64),
+}
+
+/// Poses to measure and what is expected of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanText {
+    /// Where it comes from, in words.
+    pub origin: String,
+    /// Condition number of the identification poses, if it was computed.
+    pub condition_number: Option<f64>,
+    /// Predicted RMS position error at fresh poses, per σ.
+    pub predicted_error_sigma: Option<f64>,
+    /// Time that the program takes.
+    pub minutes: Option<f64>,
+    /// The rows, in the order of the program.
+    pub rows: Vec<PlannedText>,
+}
+
+/// A row of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedText {
+    /// Name of the pose.
+    pub pose: String,
+    /// What is done there.
+    pub kind: PoseKind,
+    /// Pendant joint values.
+    pub joints: Vec<f64>,
+    /// Where the nominal arm has the SMR then, in the robot base.
+    pub xyz_mm: Option<(f64, f64, f64)>,
+}
+
+impl PlannedText {
+    /// From a row of a plan for an arm with these joints. Joint values are rounded to nine decimals, as in `plan.csv`.
+    pub fn new(row: &PlannedPose, joints: &[JointType]) -> Self {
+        let point = row.point_in_base.map(|point| to_xyz_mm(&point, 3));
+        Self { pose: row.pose.clone(), kind: row.kind, joints: to_edge(&row.configuration, joints), xyz_mm: point }
+    }
+
+    /// The row of the plan.
+    pub fn planned(&self, joints: &[JointType]) -> PlannedPose {
+        PlannedPose {
+            pose: self.pose.clone(),
+            kind: self.kind,
+            configuration: from_edge(&self.joints, joints),
+            point_in_base: self.xyz_mm.map(from_xyz_mm),
+        }
+    }
+}
+
+/// Joint values at the edge (deg, mm), rounded to nine decimals.
+pub fn to_edge(configuration: &[f64], joints: &[JointType]) -> Vec<f64> {
+    joints.iter().zip(configuration).map(|(joint, value)| rounded(joint.quantity().to_edge(*value), 9)).collect()
+}
+
+/// Joint values inside (rad, m).
+pub fn from_edge(values: &[f64], joints: &[JointType]) -> Vec<f64> {
+    joints.iter().zip(values).map(|(joint, value)| joint.quantity().from_edge(*value)).collect()
+}
+
+/// A point (m) in mm with so many decimals.
+pub fn to_xyz_mm(point: &Point3<f64>, decimals: i32) -> (f64, f64, f64) {
+    let edge = |value: f64| rounded(to_mm(value), decimals);
+    (edge(point.x), edge(point.y), edge(point.z))
+}
+
+/// A point (m) from mm.
+pub const fn from_xyz_mm((x, y, z): (f64, f64, f64)) -> Point3<f64> {
+    Point3::new(from_mm(x), from_mm(y), from_mm(z))
+}
+
+/// Rounded to so many decimals, without a negative zero.
+fn rounded(value: f64, decimals: i32) -> f64 {
+    let scale = 10.0_f64.powi(decimals);
+    (value * scale).round() / scale + 0.0
+}
+
+/// A measured point with what was known about it at the time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredText {
+    /// Number of the measurement in the session.
+    pub number: u64,
+    /// Row of the plan, from 0.
+    pub row: usize,
+    /// Name of the pose.
+    pub pose: String,
+    /// What it is for.
+    pub kind: PoseKind,
+    /// Index of the target.
+    pub target: usize,
+    /// Pendant joint values that were shown.
+    pub joints: Vec<f64>,
+    /// Pendant joint values that the robot reported, if it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reported_joints: Option<Vec<f64>>,
+    /// Measured point in the tracker frame, as the instrument or the operator gave it.
+    pub xyz_mm: (f64, f64, f64),
+    /// Standard deviation of a coordinate, if the instrument states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_mm: Option<f64>,
+    /// Scatter of the shots.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scatter_mm: Option<f64>,
+    /// Number of shots.
+    pub shots: u32,
+    /// Temperature.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_degc: Option<f64>,
+    /// Time that the measurement took, motion included (s).
+    pub seconds: f64,
+    /// What the checks said.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<FindingText>,
+}
+
+/// What a check said about a sample.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FindingText {
+    /// Short name of the cause, such as `wrong_pose`.
+    pub cause: String,
+    /// How many standard deviations off.
+    pub ratio: f64,
+    /// In words.
+    pub message: String,
+    /// What would set it right.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remedy: Option<Correction>,
+}
+
+/// What the operator decides about a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Decision {
+    /// It counts, whatever was found.
+    Keep,
+    /// It does not count.
+    LeaveOut,
+    /// It was taken by mistake: its pose is to be measured.
+    Undo,
+}
+
+/// Something that was noted wrongly and is set right. What was measured stays as it was.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Correction {
+    /// From a measurement on, coordinates were in another unit than was thought.
+    Scale {
+        /// First measurement.
+        since: u64,
+        /// What the noted coordinates have to be multiplied by.
+        factor: f64,
+    },
+    /// Two measurements belong to each other's poses.
+    Swap {
+        /// One measurement.
+        first: u64,
+        /// The other.
+        second: u64,
+    },
+    /// A measurement belongs to another row of the plan.
+    Row {
+        /// Number of the measurement.
+        sample: u64,
+        /// The row, from 0.
+        row: usize,
+    },
+    /// The robot stood elsewhere than shown.
+    Joints {
+        /// Number of the measurement.
+        sample: u64,
+        /// True pendant joint values.
+        joints: Vec<f64>,
+    },
+}
+
+/// A result with everything that is needed to deliver it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiedText {
+    /// Numbers of the measurements that went in, identification first, then verification.
+    pub samples: Vec<u64>,
+    /// The numbers.
+    pub summary: IdentificationSummary,
+    /// The result file; none where there is no usable solution.
+    pub calibration: Option<Calibration>,
+}

@@ -1,0 +1,163 @@
+//! What is chosen before measuring: instrument, target, and the steps of the wizard.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::simulation::Simulation;
+use crate::units::{INCH, MICROMETRE, MILLIMETRE};
+
+/// A step of the wizard.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Step {
+    /// The robot.
+    #[default]
+    Profile,
+    /// What measures.
+    Instrument,
+    /// Where the SMR sits on the flange.
+    Target,
+    /// Which poses to measure.
+    Plan,
+    /// Measuring.
+    Capture,
+    /// Identifying the arm.
+    Identify,
+    /// Verifying it on points that the identification did not see.
+    Verify,
+    /// Writing the results.
+    Deliver,
+}
+
+impl Step {
+    /// All steps in order.
+    pub const ALL: [Self; 8] = [
+        Self::Profile,
+        Self::Instrument,
+        Self::Target,
+        Self::Plan,
+        Self::Capture,
+        Self::Identify,
+        Self::Verify,
+        Self::Deliver,
+    ];
+
+    /// From 1.
+    pub fn number(self) -> usize {
+        Self::ALL.iter().position(|step| *step == self).map_or(1, |index| index + 1)
+    }
+
+    /// The step after this one.
+    pub fn next(self) -> Option<Self> {
+        Self::ALL.get(self.number()).copied()
+    }
+
+    /// The step before this one.
+    pub fn previous(self) -> Option<Self> {
+        self.number().checked_sub(2).and_then(|index| Self::ALL.get(index)).copied()
+    }
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Profile => "Profile",
+            Self::Instrument => "Instrument",
+            Self::Target => "Target",
+            Self::Plan => "Plan",
+            Self::Capture => "Capture",
+            Self::Identify => "Identify",
+            Self::Verify => "Verify",
+            Self::Deliver => "Deliver",
+        })
+    }
+}
+
+/// Unit of measured coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CoordinateUnit {
+    /// Millimetre.
+    #[default]
+    Millimetre,
+    /// Metre.
+    Metre,
+    /// Inch.
+    Inch,
+    /// Micrometre.
+    Micrometre,
+}
+
+impl CoordinateUnit {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Millimetre, Self::Metre, Self::Inch, Self::Micrometre];
+
+    /// One unit (m).
+    pub const fn size(self) -> f64 {
+        match self {
+            Self::Millimetre => MILLIMETRE,
+            Self::Metre => 1.0,
+            Self::Inch => INCH,
+            Self::Micrometre => MICROMETRE,
+        }
+    }
+
+    /// As it is written behind a number.
+    pub const fn sign(self) -> &'static str {
+        match self {
+            Self::Millimetre => "mm",
+            Self::Metre => "m",
+            Self::Inch => "in",
+            Self::Micrometre => "um",
+        }
+    }
+}
+
+/// What measures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum InstrumentChoice {
+    /// The operator types or pastes coordinates.
+    Manual {
+        /// In this unit.
+        unit: CoordinateUnit,
+    },
+    /// A simulated cell, to rehearse on.
+    Simulated(Simulation),
+    /// Measurements of earlier days, played as if they were captured.
+    Replay {
+        /// Path of the table.
+        file: String,
+        /// Layout of the table: `named`, `robodk` or `delmia`.
+        #[serde(default = "named")]
+        layout: String,
+    },
+}
+
+fn named() -> String {
+    "named".to_owned()
+}
+
+/// Where the SMR sits on the flange.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum TargetChoice {
+    /// As the profile says.
+    Profile,
+    /// Coordinates in the flange frame, known to some uncertainty.
+    Known {
+        /// Centre of the SMR.
+        xyz_mm: (f64, f64, f64),
+        /// Standard deviation of each coordinate; zero: exact and not identified.
+        sigma_mm: f64,
+    },
+    /// Identified together with the arm, with a wide prior about the place that the profile gives.
+    Free {
+        /// Standard deviation of each coordinate.
+        sigma_mm: f64,
+    },
+    /// Found by circle-point analysis.
+    Circles {
+        /// Centre of the SMR.
+        xyz_mm: (f64, f64, f64),
+        /// Standard deviation of each coordinate.
+        sigma_mm: f64,
+    },
+}

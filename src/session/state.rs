@@ -1,0 +1,462 @@
+//! The state of a session: the fold of its journal, and nothing else.
+//!
+//! A sample is never removed: it is superseded by a later measurement of the same row, left out or undone, and stays to be
+//! seen. What was measured stays as it was noted; corrections are applied when samples are used ([`Sample::point`] and the
+//! configuration).
+
+use jiff::Timestamp;
+use nalgebra::Point3;
+use thiserror::Error;
+
+use super::journal::{
+    CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText,
+    PlannedText, from_edge, from_xyz_mm,
+};
+use super::plan::{PlannedPose, PoseKind};
+use super::set_up::{InstrumentChoice, Step, TargetChoice};
+use crate::kinematics::JointType;
+use crate::profile::Profile;
+use crate::units::from_mm;
+
+/// A session.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Session {
+    /// Its name.
+    pub name: String,
+    /// Program that opened it.
+    pub program: String,
+    /// When it was opened, and when the last entry was made.
+    pub opened: Option<Timestamp>,
+    /// Time of the latest entry (clocks may jump back: this is the largest).
+    pub latest: Option<Timestamp>,
+    /// Entries so far.
+    pub lines: u64,
+    /// The robot.
+    pub robot: Option<Robot>,
+    /// What measures.
+    pub instrument: Option<InstrumentChoice>,
+    /// Where the SMR sits.
+    pub target: Option<TargetChoice>,
+    /// Points of the circle-point analysis.
+    pub circle_points: Vec<CirclePointText>,
+    /// All rows of all plans, in the order of the programs.
+    pub rows: Vec<Row>,
+    /// Plans that were accepted, without their rows.
+    pub plan: Option<PlanText>,
+    /// Everything that was measured.
+    pub samples: Vec<Sample>,
+    /// Measurements that gave no sample.
+    pub refused: Vec<Refused>,
+    /// Number of the last measurement.
+    pub measurements: u64,
+    /// From which measurement on noted coordinates have to be multiplied by what.
+    pub scales: Vec<(u64, f64)>,
+    /// Remarks.
+    pub notes: Vec<Note>,
+    /// Where the wizard is.
+    pub step: Step,
+    /// The last result.
+    pub identified: Option<Box<IdentifiedText>>,
+    /// Files that were written.
+    pub delivered: Vec<String>,
+    /// How often it was opened again.
+    pub resumed: usize,
+    /// Whether it ended in good order.
+    pub closed: bool,
+}
+
+/// The robot of a session.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robot {
+    /// Name or path that was given.
+    pub source: String,
+    /// SHA-256 of the profile's text.
+    pub sha256: String,
+    /// The text.
+    pub text: String,
+    /// The profile as it stands there.
+    pub profile: Profile,
+    /// The joints.
+    pub joint_types: Vec<JointType>,
+}
+
+/// A row of a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What is planned.
+    pub planned: PlannedPose,
+    /// Whether it belongs to the present plan; a row of an earlier plan is done or dropped.
+    pub active: bool,
+    /// The operator does not want to measure it.
+    pub skipped: bool,
+}
+
+/// What has become of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleState {
+    /// It counts.
+    Counts,
+    /// A later measurement of the same row counts instead.
+    Superseded,
+    /// The operator left it out.
+    LeftOut,
+    /// It was taken by mistake.
+    Undone,
+}
+
+/// A measured point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// As it was noted.
+    pub noted: MeasuredText,
+    /// When.
+    pub time: Timestamp,
+    /// Row of the plan that it belongs to now.
+    pub row: usize,
+    /// Where the robot stood, pendant values at the edge (deg, mm).
+    pub joints: Vec<f64>,
+    /// What has become of it.
+    pub state: SampleState,
+    /// Whether the operator said that it counts although something was found.
+    pub kept: bool,
+}
+
+/// A measurement that gave no sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refused {
+    /// Number of the measurement.
+    pub number: u64,
+    /// Name of the pose.
+    pub pose: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// A remark.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    /// When.
+    pub time: Timestamp,
+    /// Name of the pose it is about.
+    pub pose: Option<String>,
+    /// What it says.
+    pub text: String,
+}
+
+/// A journal whose entries do not fit together.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FoldError {
+    /// The profile in the journal cannot be read by this program.
+    #[error("line {line}: the profile in the journal cannot be used: {message}")]
+    Profile {
+        /// Line, from 1.
+        line: u64,
+        /// Why.
+        message: String,
+    },
+    /// An entry refers to something that is not there.
+    #[error("line {line}: {what}; the journal was not written by this program")]
+    Misfit {
+        /// Line, from 1.
+        line: u64,
+        /// What does not fit.
+        what: String,
+    },
+}
+
+impl Session {
+    /// The session of a journal.
+    ///
+    /// # Errors
+    /// Entries that do not fit together.
+    pub fn of(journal: &Journal) -> Result<Self, FoldError> {
+        let mut session = Self::default();
+        for line in &journal.lines {
+            session.apply(line)?;
+        }
+        Ok(session)
+    }
+
+    /// Goes on by one line.
+    ///
+    /// # Errors
+    /// The entry does not fit; the session is then unchanged.
+    pub fn apply(&mut self, line: &Line) -> Result<(), FoldError> {
+        let misfit = |what: &str| FoldError::Misfit { line: line.number, what: what.to_owned() };
+        match &line.entry {
+            Entry::Opened { program, name, .. } => {
+                if self.opened.is_some() {
+                    return Err(misfit("a second opening entry"));
+                }
+                self.name.clone_from(name);
+                self.program.clone_from(program);
+                self.opened = Some(line.time);
+            }
+            Entry::Profile { source, sha256, text } => {
+                if self.has_measurements() {
+                    return Err(misfit("another profile after measuring has begun"));
+                }
+                self.robot = Some(robot(line.number, source, sha256, text)?);
+                self.target = None;
+                self.rows.clear();
+                self.plan = None;
+            }
+            Entry::Step(step) => self.step = *step,
+            Entry::Instrument(instrument) => self.instrument = Some(instrument.clone()),
+            Entry::Target(target) => {
+                self.target = Some(*target);
+            }
+            Entry::CirclePoint(point) => {
+                self.measurements = self.measurements.max(point.number);
+                self.circle_points.push(point.clone());
+            }
+            Entry::CirclesDiscarded => self.circle_points.clear(),
+            Entry::Plan(plan) => {
+                let rows = self.planned_rows(&plan.rows).ok_or_else(|| misfit("a plan that does not fit the robot"))?;
+                for row in &mut self.rows {
+                    row.active = false;
+                }
+                self.rows.extend(rows);
+                self.plan = Some(PlanText { rows: Vec::new(), ..plan.clone() });
+            }
+            Entry::PlanExtended(plan) => {
+                let rows = self.planned_rows(&plan.rows).ok_or_else(|| misfit("poses that do not fit the robot"))?;
+                self.rows.extend(rows);
+                self.plan = Some(PlanText { rows: Vec::new(), ..plan.clone() });
+            }
+            Entry::Sample(noted) => self.add_sample(noted, line).map_err(misfit)?,
+            Entry::Refused { number, pose, reason, .. } => {
+                self.measurements = self.measurements.max(*number);
+                self.refused.push(Refused { number: *number, pose: pose.clone(), reason: reason.clone() });
+            }
+            Entry::Decision { sample, decision } => {
+                self.decide(*sample, *decision).ok_or_else(|| misfit("a decision about an unknown sample"))?;
+            }
+            Entry::Correction(correction) => {
+                self.correct(correction).ok_or_else(|| misfit("a correction of an unknown sample"))?;
+            }
+            Entry::Skipped { row, skipped } => {
+                self.rows.get_mut(*row).ok_or_else(|| misfit("a row that is in no plan"))?.skipped = *skipped;
+            }
+            Entry::Note { pose, text } => {
+                self.notes.push(Note { time: line.time, pose: pose.clone(), text: text.clone() });
+            }
+            Entry::Identified(result) => self.identified = Some(result.clone()),
+            Entry::Delivered { files } => self.delivered.clone_from(files),
+            Entry::Resumed { .. } => {
+                self.resumed += 1;
+                self.closed = false;
+            }
+            Entry::Closed { .. } => self.closed = true,
+        }
+        self.lines = line.number;
+        self.latest = self.latest.max(Some(line.time));
+        Ok(())
+    }
+
+    /// Whether anything was measured.
+    pub fn has_measurements(&self) -> bool {
+        !self.samples.is_empty() || !self.circle_points.is_empty()
+    }
+
+    /// The samples that count.
+    pub fn counted(&self) -> impl Iterator<Item = &Sample> {
+        self.samples.iter().filter(|sample| sample.state == SampleState::Counts)
+    }
+
+    /// The samples of a kind that count.
+    pub fn counted_of(&self, kind: PoseKind) -> impl Iterator<Item = &Sample> {
+        self.counted().filter(move |sample| self.kind_of(sample) == kind)
+    }
+
+    /// What a sample is for.
+    pub fn kind_of(&self, sample: &Sample) -> PoseKind {
+        self.rows.get(sample.row).map_or(sample.noted.kind, |row| row.planned.kind)
+    }
+
+    /// Name of the pose of a sample.
+    pub fn pose_of<'a>(&'a self, sample: &'a Sample) -> &'a str {
+        self.rows.get(sample.row).map_or(&sample.noted.pose, |row| &row.planned.pose)
+    }
+
+    /// The sample of a measurement.
+    pub fn sample(&self, number: u64) -> Option<&Sample> {
+        self.samples.iter().find(|sample| sample.noted.number == number)
+    }
+
+    /// The sample of a row that counts.
+    pub fn sample_of_row(&self, row: usize) -> Option<&Sample> {
+        self.counted().find(|sample| sample.row == row)
+    }
+
+    /// Whether a row still waits to be measured.
+    pub fn is_open(&self, index: usize) -> bool {
+        self.rows.get(index).is_some_and(|row| row.active && !row.skipped && row.planned.kind.is_measured())
+            && !self.samples.iter().any(|sample| {
+                sample.row == index && matches!(sample.state, SampleState::Counts | SampleState::LeftOut)
+            })
+    }
+
+    /// Rows that still wait to be measured, in order.
+    pub fn open_rows(&self) -> impl Iterator<Item = usize> {
+        (0..self.rows.len()).filter(|&row| self.is_open(row))
+    }
+
+    /// Where the SMR of a sample was seen, in the tracker frame (m), corrections applied.
+    pub fn point_of(&self, sample: &Sample) -> Point3<f64> {
+        self.corrected(sample.noted.number, sample.noted.xyz_mm)
+    }
+
+    /// A point that was noted at a measurement, in the tracker frame (m), corrections applied.
+    pub fn corrected(&self, number: u64, xyz_mm: (f64, f64, f64)) -> Point3<f64> {
+        let factors = self.scales.iter().filter(|(since, _)| *since <= number).map(|(_, factor)| factor);
+        from_xyz_mm(xyz_mm) * factors.product::<f64>()
+    }
+
+    /// Where the robot stood at a sample: pendant values (rad, m).
+    pub fn configuration_of(&self, sample: &Sample) -> Vec<f64> {
+        self.robot.as_ref().map_or_else(Vec::new, |robot| from_edge(&sample.joints, &robot.joint_types))
+    }
+
+    /// Standard deviation of a sample (m), where the instrument stated one.
+    pub fn sigma_of(sample: &Sample) -> Option<f64> {
+        sample.noted.sigma_mm.filter(|sigma| *sigma > 0.0).map(from_mm)
+    }
+
+    /// What was found about samples that count and were neither kept nor corrected, oldest first.
+    pub fn doubts(&self) -> impl Iterator<Item = (&Sample, &FindingText)> {
+        self.counted()
+            .filter(|sample| !sample.kept)
+            .flat_map(|sample| sample.noted.findings.iter().map(move |finding| (sample, finding)))
+    }
+
+    /// Numbers of the measurements that a result would rest on now.
+    pub fn basis(&self) -> Vec<u64> {
+        let of = |kind| self.counted_of(kind).map(|sample| sample.noted.number);
+        of(PoseKind::Identification).chain(of(PoseKind::Verification)).collect()
+    }
+
+    /// Whether the last result rests on exactly the samples that count now.
+    pub fn is_current(&self) -> bool {
+        self.identified.as_ref().is_some_and(|result| result.samples == self.basis())
+    }
+
+    fn planned_rows(&self, rows: &[PlannedText]) -> Option<Vec<Row>> {
+        let robot = self.robot.as_ref()?;
+        let fits = |row: &PlannedText| {
+            row.joints.len() == robot.joint_types.len() && row.joints.iter().all(|value| value.is_finite())
+        };
+        rows.iter().all(fits).then(|| {
+            let planned = rows.iter().map(|row| row.planned(&robot.joint_types));
+            planned.map(|planned| Row { planned, active: true, skipped: false }).collect()
+        })
+    }
+
+    fn add_sample(&mut self, noted: &MeasuredText, line: &Line) -> Result<(), &'static str> {
+        if noted.row >= self.rows.len() {
+            return Err("a sample of a row that is in no plan");
+        }
+        if noted.number <= self.measurements {
+            return Err("a measurement with a number that was already used");
+        }
+        self.measurements = noted.number;
+        for sample in self.samples.iter_mut().filter(|sample| sample.row == noted.row) {
+            if matches!(sample.state, SampleState::Counts | SampleState::LeftOut) {
+                sample.state = SampleState::Superseded;
+            }
+        }
+        self.samples.push(Sample {
+            row: noted.row,
+            joints: noted.reported_joints.clone().unwrap_or_else(|| noted.joints.clone()),
+            noted: noted.clone(),
+            time: line.time,
+            state: SampleState::Counts,
+            kept: false,
+        });
+        Ok(())
+    }
+
+    fn sample_mut(&mut self, number: u64) -> Option<&mut Sample> {
+        self.samples.iter_mut().find(|sample| sample.noted.number == number)
+    }
+
+    fn decide(&mut self, number: u64, decision: Decision) -> Option<()> {
+        let sample = self.sample_mut(number)?;
+        match decision {
+            Decision::Keep => {
+                sample.kept = true;
+                if sample.state == SampleState::LeftOut {
+                    sample.state = SampleState::Counts;
+                }
+            }
+            Decision::LeaveOut => sample.state = SampleState::LeftOut,
+            Decision::Undo => sample.state = SampleState::Undone,
+        }
+        Some(())
+    }
+
+    fn correct(&mut self, correction: &Correction) -> Option<()> {
+        match correction {
+            Correction::Scale { since, factor } => {
+                if !(factor.is_finite() && *factor > 0.0) {
+                    return None;
+                }
+                self.scales.push((*since, *factor));
+                self.settle(|number| number >= *since);
+            }
+            Correction::Swap { first, second } => {
+                let place = |number: u64| self.samples.iter().position(|sample| sample.noted.number == number);
+                let (a, b) = (place(*first)?, place(*second)?);
+                let (row, joints) = (self.samples[a].row, self.samples[a].joints.clone());
+                let (other_row, other_joints) = (self.samples[b].row, self.samples[b].joints.clone());
+                (self.samples[a].row, self.samples[a].joints) = (other_row, other_joints);
+                (self.samples[b].row, self.samples[b].joints) = (row, joints);
+                self.settle(|number| number == *first || number == *second);
+            }
+            Correction::Row { sample, row } => {
+                let robot = self.robot.as_ref()?;
+                let joints: Vec<f64> = {
+                    let planned = &self.rows.get(*row)?.planned;
+                    super::journal::to_edge(&planned.configuration, &robot.joint_types)
+                };
+                let moved = *sample;
+                self.sample(moved)?;
+                for other in self.samples.iter_mut().filter(|other| other.row == *row && other.noted.number != moved) {
+                    if other.state == SampleState::Counts {
+                        other.state = SampleState::Superseded;
+                    }
+                }
+                let sample = self.sample_mut(moved)?;
+                (sample.row, sample.joints, sample.kept) = (*row, joints, true);
+            }
+            Correction::Joints { sample, joints } => {
+                let dof = self.robot.as_ref()?.joint_types.len();
+                let sample = self.sample_mut(*sample)?;
+                if joints.len() != dof {
+                    return None;
+                }
+                sample.joints.clone_from(joints);
+                sample.kept = true;
+            }
+        }
+        Some(())
+    }
+
+    /// What was found about these measurements is settled.
+    fn settle(&mut self, concerns: impl Fn(u64) -> bool) {
+        for sample in self.samples.iter_mut().filter(|sample| concerns(sample.noted.number)) {
+            sample.kept = true;
+        }
+    }
+}
+
+fn robot(line: u64, source: &str, sha256: &str, text: &str) -> Result<Robot, FoldError> {
+    let error = |message: String| FoldError::Profile { line, message };
+    if super::sha256(text.as_bytes()) != sha256 {
+        return Err(error("its hash does not fit its text".to_owned()));
+    }
+    let (profile, _) = Profile::parse(text, source).map_err(|errors| error(errors.to_string()))?;
+    let joint_types = profile.chain().joints().iter().map(|joint| joint.joint_type).collect();
+    Ok(Robot { source: source.to_owned(), sha256: sha256.to_owned(), text: text.to_owned(), profile, joint_types })
+}
