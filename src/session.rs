@@ -10,6 +10,7 @@
 
 pub mod calibration;
 pub mod constraints;
+pub mod export;
 pub mod filter;
 pub mod journal;
 pub mod measurements;

@@ -1,5 +1,7 @@
 //! Files on disk: reading with errors that name the file, and replacing results atomically.
 
+pub mod session;
+
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};

@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::plan::PoseKind;
 use super::simulation::Simulation;
 use crate::units::{INCH, MICROMETRE, MILLIMETRE};
 
@@ -124,12 +125,26 @@ pub enum InstrumentChoice {
     Simulated(Simulation),
     /// Measurements of earlier days, played as if they were captured.
     Replay {
-        /// Path of the table.
-        file: String,
-        /// Layout of the table: `named`, `robodk` or `delmia`.
-        #[serde(default = "named")]
-        layout: String,
+        /// The tables, in the order in which their poses are played.
+        sets: Vec<RecordedSet>,
     },
+}
+
+/// Rows of a table of real measurements.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordedSet {
+    /// Path of the table.
+    pub file: String,
+    /// What they are for: `identification` or `verification`.
+    #[serde(default)]
+    pub kind: PoseKind,
+    /// Which rows, such as `pose % 17 == 0`; none: all.
+    #[serde(default)]
+    pub rows: Option<String>,
+    /// Layout of the table: `named`, `robodk` or `delmia`.
+    #[serde(default = "named")]
+    pub layout: String,
 }
 
 fn named() -> String {

@@ -324,11 +324,13 @@ impl Session {
         sample.noted.sigma_mm.filter(|sigma| *sigma > 0.0).map(from_mm)
     }
 
-    /// What was found about samples that count and were neither kept nor corrected, oldest first.
+    /// What was found about samples that count and were neither kept nor corrected, oldest first: the sample it is about and
+    /// the finding.
     pub fn doubts(&self) -> impl Iterator<Item = (&Sample, &FindingText)> {
-        self.counted()
-            .filter(|sample| !sample.kept)
-            .flat_map(|sample| sample.noted.findings.iter().map(move |finding| (sample, finding)))
+        self.counted().flat_map(|holder| &holder.noted.findings).filter_map(|finding| {
+            let about = self.sample(finding.about)?;
+            (about.state == SampleState::Counts && !about.kept).then_some((about, finding))
+        })
     }
 
     /// Numbers of the measurements that a result would rest on now.

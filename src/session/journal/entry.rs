@@ -229,6 +229,8 @@ pub struct MeasuredText {
 /// What a check said about a sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FindingText {
+    /// Number of the measurement it is about: this one or an earlier one.
+    pub about: u64,
     /// Short name of the cause, such as `wrong_pose`.
     pub cause: String,
     /// How many standard deviations off.

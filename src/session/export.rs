@@ -1,0 +1,38 @@
+//! The tables of a session: its plan, and what was measured.
+
+use super::journal::from_edge;
+use super::measurements::{self, Row as MeasuredRow};
+use super::plan::{self, PoseKind};
+use super::state::{Robot, Session};
+
+/// The present plan as `plan.csv` has it; rows of earlier plans only where they were measured.
+pub fn plan_csv(session: &Session, robot: &Robot) -> String {
+    let is_in = |index: &usize| session.rows.get(*index).is_some_and(|row| row.active) || session.sample_of_row(*index).is_some();
+    let rows = (0..session.rows.len()).filter(is_in);
+    let rows: Vec<_> = rows.filter_map(|index| session.rows.get(index)).map(|row| row.planned.clone()).collect();
+    plan::write(&rows, &robot.joint_types)
+}
+
+/// The samples that count as a table that `trupose identify` reads: identification and drift poses, then verification poses.
+/// A column `kind` tells them apart.
+pub fn measurements_csv(session: &Session, robot: &Robot) -> String {
+    let mut kinds = vec!["kind"];
+    let mut rows = Vec::new();
+    for kind in [PoseKind::Identification, PoseKind::Verification, PoseKind::Drift] {
+        for sample in session.counted_of(kind) {
+            kinds.push(kind.name());
+            rows.push(MeasuredRow {
+                line: rows.len() + 2,
+                pose: session.pose_of(sample).to_owned(),
+                target: None,
+                configuration: from_edge(&sample.joints, &robot.joint_types),
+                point: session.point_of(sample),
+                sigma: Session::sigma_of(sample),
+                temperature: sample.noted.temperature_degc,
+                fields: Vec::new(),
+            });
+        }
+    }
+    let table = measurements::write(&rows, &robot.joint_types);
+    table.lines().zip(kinds).map(|(line, kind)| format!("{line},{kind}\n")).collect()
+}

@@ -1,0 +1,199 @@
+//! Readings: coordinates as people type and paste them, and the gates that every reading passes.
+
+use nalgebra::Point3;
+
+use crate::session::set_up::CoordinateUnit;
+use crate::units::{MILLIMETRE, to_mm};
+
+/// Shots scatter by at most this many times what the instrument's σ lets expect.
+const SCATTER_FACTOR: f64 = 5.0;
+/// Scatter that every instrument may have (m).
+const SCATTER_ALWAYS: f64 = 0.03 * MILLIMETRE;
+/// No instrument measures farther (m).
+const FARTHEST: f64 = 1000.0;
+
+/// Reads three coordinates in `unit`: `1234.5 -20 88.1`, `x=1 y=2 z=3`, `1.5; 2.5; 3.5`, `[1, 2, 3]`, `1,5; 2,5; 3,5`, with or
+/// without `mm` behind the numbers.
+///
+/// # Errors
+/// What is wrong, and how it should read.
+pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
+    let expected = || format!("'{}' is not a point; type three numbers in {}, such as '1234.567 -20.1 88'", short(text), unit.sign());
+    let cleaned: String = text
+        .chars()
+        .map(|c| match c {
+            // Signs that people and programs put around coordinates.
+            '(' | ')' | '[' | ']' | '{' | '}' | '<' | '>' | '\t' | '\r' | '\n' | '|' | '\u{a0}' => ' ',
+            '\u{2212}' => '-',
+            c => c,
+        })
+        .collect();
+    let separated = separate(&cleaned).ok_or_else(|| {
+        format!("'{}' can be read in several ways; separate the numbers by blanks or ';'", short(text))
+    })?;
+    let mut values = Vec::with_capacity(3);
+    for word in separated {
+        let word = strip_name(&word);
+        if let Some(other) = CoordinateUnit::ALL.iter().find(|other| other.sign() == word) {
+            if *other != unit {
+                return Err(format!("the reading is in {}, but {} was chosen in the instrument step", other.sign(), unit.sign()));
+            }
+            continue;
+        }
+        let number = word.strip_suffix(unit.sign()).unwrap_or(word);
+        if number.is_empty() {
+            continue;
+        }
+        let value: f64 = number.parse().map_err(|_error| expected())?;
+        if !value.is_finite() {
+            return Err(expected());
+        }
+        values.push(value);
+    }
+    match values[..] {
+        [x, y, z] => Ok(Point3::new(x, y, z) * unit.size()),
+        _ => Err(format!("{}; found {}", expected(), super::counted(values.len(), "number", "numbers"))),
+    }
+}
+
+/// The words of a point. A comma separates numbers, or stands before decimals: which one must be clear.
+fn separate(text: &str) -> Option<Vec<String>> {
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    if text.contains(';') {
+        // Between numbers stands ';', so a comma is a decimal sign, unless there are points as well.
+        if text.contains(',') && text.contains('.') {
+            return None;
+        }
+        return Some(words(&text.replace(';', " ").replace(',', ".")));
+    }
+    if !text.contains(',') {
+        return Some(words(text));
+    }
+    let parts = words(text);
+    let has_outer_commas = parts.iter().any(|part| part.ends_with(',') || part.starts_with(','));
+    if has_outer_commas {
+        // `1, 2, 3`: separators; a comma inside a word would be a second meaning.
+        let inner = parts.iter().any(|part| part.trim_matches(',').contains(','));
+        return (!inner).then(|| words(&text.replace(',', " ")));
+    }
+    if parts.len() >= 3 {
+        // `1,5 2,5 3,5`: decimal commas, if there is no decimal point.
+        return (!text.contains('.')).then(|| words(&text.replace(',', ".")));
+    }
+    // `1.5,2.5,3.5`: separators, if every part can be a number of its own.
+    let parts: Vec<&str> = text.split(',').collect();
+    (parts.len() == 3 && (text.contains('.') || parts.iter().all(|part| part.trim().len() > 3)))
+        .then(|| words(&text.replace(',', " ")))
+}
+
+/// `x=12`, `X:12`: the name goes.
+fn strip_name(word: &str) -> &str {
+    let rest = word.strip_prefix(['x', 'y', 'z', 'X', 'Y', 'Z']);
+    match rest {
+        Some(rest) => rest.trim_start_matches(['=', ':']),
+        None => word.trim_matches(['=', ':']),
+    }
+}
+
+fn short(text: &str) -> String {
+    let text: String = crate::session::printable(text.trim()).chars().take(40).collect();
+    text
+}
+
+/// Why a reading is no measurement at all.
+pub(super) fn gate(point: &Point3<f64>, previous: Option<&Point3<f64>>) -> Option<String> {
+    if !point.coords.iter().all(|value| value.is_finite()) {
+        return Some("the reading is not a number".to_owned());
+    }
+    if point.coords.amax() <= f64::EPSILON {
+        return Some("the reading is 0, 0, 0: the instrument has no target".to_owned());
+    }
+    if point.coords.norm() > FARTHEST {
+        return Some(format!("the reading is {:.0} m away: no instrument measures that far", point.coords.norm()));
+    }
+    if previous.is_some_and(|previous| previous == point) {
+        return Some(
+            "the reading is the same to the last digit as the one before: the instrument has not measured again".to_owned(),
+        );
+    }
+    None
+}
+
+/// Largest scatter (m) of the shots of a robot at rest, for an instrument with `sigma` (m) per coordinate.
+pub(super) fn scatter_limit(sigma: Option<f64>) -> f64 {
+    sigma.map_or(SCATTER_ALWAYS, |sigma| (SCATTER_FACTOR * 3.0_f64.sqrt() * sigma).max(SCATTER_ALWAYS))
+}
+
+/// What to say about shots that scatter too much.
+pub(super) fn scatter_message(scatter: f64, limit: f64) -> String {
+    format!(
+        "the shots scatter by {:.3} mm, {:.3} mm is usual: the robot still moved, or something shakes",
+        to_mm(scatter),
+        to_mm(limit)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mm(text: &str) -> Result<[f64; 3], String> {
+        let point = parse(text, CoordinateUnit::Millimetre)?;
+        Ok([point.x, point.y, point.z].map(|value| (value * 1e9).round() / 1e6))
+    }
+
+    #[test]
+    fn points_are_read_as_people_write_them() {
+        let wanted = Ok([1234.567, -20.1, 88.0]);
+        for text in [
+            "1234.567 -20.1 88",
+            "1234.567, -20.1, 88",
+            "1234.567,-20.1,88",
+            "1234,567 -20,1 88,0",
+            "1234,567; -20,1; 88",
+            "1234.567\t-20.1\t88\r\n",
+            "[1234.567, -20.1, 88.0]",
+            "x=1234.567 y=-20.1 z=88",
+            "X: 1234.567 Y: -20.1 Z: 88",
+            "1234.567mm -20.1mm 88mm",
+            "1234.567 mm −20.1 mm 88 mm",
+            "1.234567e3 -2.01e1 88",
+        ] {
+            assert_eq!(mm(text), wanted, "{text}");
+        }
+        assert_eq!(parse("1 2 3", CoordinateUnit::Metre), Ok(Point3::new(1.0, 2.0, 3.0)));
+    }
+
+    #[test]
+    fn what_is_no_point_is_refused_with_a_reason() {
+        for (text, part) in [
+            ("", "found 0 numbers"),
+            ("1 2", "found 2 numbers"),
+            ("1 2 3 4", "found 4 numbers"),
+            ("1 2 x", "found 2 numbers"),
+            ("one two three", "is not a point"),
+            ("nan 1 2", "is not a point"),
+            ("1,2,3", "several ways"),
+            ("1,234.5; 2,0; 3", "several ways"),
+            ("1 2 3 in", "was chosen in the instrument step"),
+        ] {
+            let error = mm(text).unwrap_err();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn gates_hold_back_what_is_no_measurement() {
+        let point = Point3::new(1.0, 2.0, 3.0);
+        assert_eq!(gate(&point, None), None);
+        assert_eq!(gate(&point, Some(&Point3::new(1.0, 2.0, 3.000_001))), None);
+        for (point, previous, part) in [
+            (Point3::new(f64::NAN, 0.0, 1.0), None, "not a number"),
+            (Point3::origin(), None, "0, 0, 0"),
+            (Point3::new(5000.0, 0.0, 0.0), None, "5000 m away"),
+            (point, Some(&point), "last digit"),
+        ] {
+            assert!(gate(&point, previous).unwrap().contains(part));
+        }
+    }
+}

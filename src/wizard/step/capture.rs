@@ -1,0 +1,379 @@
+//! Capture: pose by pose, every point checked against all earlier ones.
+
+mod checks;
+mod prediction;
+mod show;
+
+use super::plan::{plan_request, plan_text};
+use super::{Action, Cx, StepMachine};
+use crate::session::journal::{Correction, Decision, Entry, FindingText, MeasuredText, to_edge, to_xyz_mm};
+use crate::session::plan::PoseKind;
+use crate::session::reading::{MeasureRequest, Reading};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
+use crate::session::state::{Sample, SampleState, Session};
+use crate::units::{from_mm, to_mm};
+use crate::wizard::effect::{Answer, Request};
+use crate::wizard::intent::{Danger, Intent, IntentInfo, PlanSettings};
+use crate::wizard::notice::{Notice, Problem};
+use crate::wizard::reading;
+use crate::wizard::view::Content;
+use prediction::Prediction;
+
+/// Wait before the first shot (s), as in the method paper.
+const SETTLE: f64 = 2.0;
+/// Shots per pose.
+const SHOTS: u32 = 3;
+/// Poses that are proposed at a time.
+const SUGGESTED: usize = 5;
+
+/// The capture step.
+#[derive(Clone, Debug)]
+pub(in crate::wizard) struct CaptureStep {
+    /// Row of the plan that is shown.
+    row: Option<usize>,
+    /// A reading that the gates hold back.
+    held: Option<Held>,
+    /// The sample that the operator has to look at.
+    question: Option<u64>,
+    /// What the samples so far let expect.
+    prediction: Prediction,
+}
+
+/// A reading that is good enough only if the operator says so.
+#[derive(Clone, Debug)]
+struct Held {
+    noted: MeasuredText,
+    reason: String,
+}
+
+/// Why there are too few identification samples to identify from.
+pub(super) fn too_few(session: &Session) -> Option<String> {
+    let robot = session.robot.as_ref()?;
+    let free = robot.profile.free_parameters(crate::profile::Level::Geometric).len();
+    let fewest = (free + 6).div_ceil(3);
+    let measured = session.counted_of(PoseKind::Identification).count();
+    (measured < fewest).then(|| format!("{measured} of at least {fewest} identification poses are measured"))
+}
+
+impl CaptureStep {
+    /// Begins at the first row that waits to be measured.
+    pub(super) fn enter(session: &Session) -> Self {
+        let question = session.doubts().map(|(sample, _)| sample.noted.number).last();
+        let asked = question.and_then(|number| session.sample(number)).map(|sample| sample.row);
+        Self {
+            row: asked.or_else(|| session.open_rows().next()),
+            held: None,
+            question,
+            prediction: Prediction::of(session),
+        }
+    }
+
+    /// The row after the one shown that waits to be measured, or the first one.
+    fn following(&self, session: &Session) -> Option<usize> {
+        let after = self.row.map_or(0, |row| row + 1);
+        session.open_rows().find(|row| *row >= after).or_else(|| session.open_rows().find(|row| Some(*row) != self.row))
+    }
+
+    fn advance(&mut self, session: &Session) {
+        self.row = self.following(session).or_else(|| session.open_rows().next());
+    }
+
+    fn measure(&self, cx: &Cx<'_>, row: usize) -> Vec<Action> {
+        let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
+        let following = self.following(cx.session).and_then(|row| cx.session.rows.get(row));
+        vec![Action::Ask(Request::Measure(MeasureRequest {
+            number: cx.session.measurements + 1,
+            pose: shown.planned.pose.clone(),
+            target: 0,
+            configuration: shown.planned.configuration.clone(),
+            following: following.map(|row| row.planned.configuration.clone()),
+            settle: SETTLE,
+            shots: SHOTS,
+        }))]
+    }
+
+    /// A reading of the row shown: held back, refused, or written.
+    fn take(&mut self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
+        let (Some(row), Some(robot)) = (self.row, cx.robot()) else { return Vec::new() };
+        let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
+        let number = cx.session.measurements + 1;
+        let planned = &shown.planned;
+        let reported = reading.configuration.as_deref().map(|values| to_edge(values, &robot.joint_types));
+        let noted = MeasuredText {
+            number,
+            row,
+            pose: planned.pose.clone(),
+            kind: planned.kind,
+            target: 0,
+            joints: to_edge(&planned.configuration, &robot.joint_types),
+            reported_joints: reported,
+            xyz_mm: to_xyz_mm(&reading.point, 6),
+            sigma_mm: reading.sigma.map(to_mm),
+            scatter_mm: reading.scatter.map(|scatter| (to_mm(scatter) * 1e6).round() / 1e6),
+            shots: reading.shots,
+            temperature_degc: reading.temperature,
+            seconds: reading.seconds,
+            findings: Vec::new(),
+        };
+        let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
+        let previous = previous.map(crate::session::journal::from_xyz_mm);
+        if let Some(reason) = reading::gate(&crate::session::journal::from_xyz_mm(noted.xyz_mm), previous.as_ref()) {
+            let notice = Notice::attention(format!("pose {}: {reason}", noted.pose)).hint("measure again");
+            return vec![Action::Write(vec![refused(&noted, reason)]), Action::Say(notice)];
+        }
+        let sigma = noted.sigma_mm.map(from_mm).or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
+        let limit = reading::scatter_limit(sigma);
+        if let Some(scatter) = reading.scatter
+            && scatter > limit
+        {
+            let reason = reading::scatter_message(scatter, limit);
+            self.held = Some(Held { noted, reason: reason.clone() });
+            let notice = Notice::attention(reason).hint("wait until it is at rest and measure again; or take the reading as it is");
+            return vec![Action::Say(notice)];
+        }
+        self.write(noted, cx)
+    }
+
+    /// Writes a sample with what the checks say about it.
+    fn write(&mut self, mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
+        let earlier = noted.findings.clone();
+        noted.findings = checks::findings(cx, &noted);
+        noted.findings.extend(earlier);
+        vec![Action::Write(vec![Entry::Sample(noted)])]
+    }
+
+    /// The sample in question with what was found about it.
+    fn asked<'a>(&self, session: &'a Session) -> Option<(&'a Sample, &'a FindingText)> {
+        let number = self.question?;
+        session.doubts().filter(|(sample, _)| sample.noted.number == number).last()
+    }
+
+    fn decide(&self, decision: Decision) -> Vec<Action> {
+        self.question.map(|sample| Action::Write(vec![Entry::Decision { sample, decision }])).into_iter().collect()
+    }
+
+    /// Shows a row by the name of its pose: one that waits, else one that is skipped, else one that is done.
+    fn go_to(&mut self, pose: &str, session: &Session) -> Vec<Action> {
+        let named = |row: &usize| session.rows.get(*row).is_some_and(|row| row.planned.pose == pose && row.planned.kind.is_measured());
+        let rows: Vec<usize> = (0..session.rows.len()).filter(named).collect();
+        let found = rows.iter().find(|row| session.is_open(**row)).or_else(|| rows.last()).copied();
+        let Some(row) = found else {
+            let pose = crate::session::printable(pose);
+            return vec![Action::Say(Notice::attention(format!("there is no pose '{pose}' in the plan")))];
+        };
+        self.row = Some(row);
+        self.held = None;
+        let is_skipped = session.rows.get(row).is_some_and(|row| row.skipped);
+        is_skipped.then(|| Action::Write(vec![Entry::Skipped { row, skipped: false }])).into_iter().collect()
+    }
+
+    fn manual_unit(cx: &Cx<'_>) -> Option<CoordinateUnit> {
+        match cx.session.instrument {
+            Some(InstrumentChoice::Manual { unit }) => Some(unit),
+            _ => None,
+        }
+    }
+}
+
+/// A reading that is no sample.
+fn refused(noted: &MeasuredText, reason: String) -> Entry {
+    let xyz_mm = [noted.xyz_mm.0, noted.xyz_mm.1, noted.xyz_mm.2].iter().all(|value| value.is_finite()).then_some(noted.xyz_mm);
+    Entry::Refused { number: noted.number, pose: noted.pose.clone(), reason, xyz_mm }
+}
+
+impl StepMachine for CaptureStep {
+    fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
+        let session = cx.session;
+        let no_row = self.row.is_none().then(|| "all poses of the plan are measured".to_owned());
+        let manual = Self::manual_unit(cx).is_some();
+        let by_hand = manual.then(|| "the coordinates are typed in".to_owned());
+        let not_by_hand = (!manual).then(|| "the instrument measures by itself".to_owned());
+        let no_instrument =
+            cx.connection.is_none().then(|| "the instrument does not answer; go back to the instrument step".to_owned());
+        let asked = self.asked(session);
+        let no_question = asked.is_none().then(|| "no sample is in question".to_owned());
+        let question = asked
+            .is_some()
+            .then(|| "decide first about the sample in question: keep it, measure again, or leave it out".to_owned());
+        let no_remedy = asked
+            .and_then(|(_, finding)| finding.remedy.as_ref())
+            .is_none()
+            .then(|| "there is no correction to propose".to_owned());
+        let not_held = self.held.is_none().then(|| "no reading is held back".to_owned());
+        let no_sample = session.counted().next().is_none().then(|| "nothing is measured yet".to_owned());
+        let blocked = no_row.clone().or_else(|| no_instrument.clone());
+        let pose = self.row.and_then(|row| session.rows.get(row)).map_or_else(String::new, |row| row.planned.pose.clone());
+        let has_more = session.open_rows().next().is_some();
+        let measure = IntentInfo::new(Intent::Measure, "measure").unless(blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()));
+        let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates").unless(not_by_hand.or_else(|| blocked.clone()).or(question));
+        let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone());
+        let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session));
+        let mut intents = vec![
+            if has_more && !manual { measure.default_action() } else { measure },
+            if has_more && manual { type_in.default_action() } else { type_in },
+            IntentInfo::new(Intent::AcceptReading, "take the reading as it is").unless(not_held),
+            IntentInfo::new(Intent::MeasureAgain, "measure again").unless(again_blocked).default_action(),
+            IntentInfo::new(Intent::Keep, "keep the sample").unless(no_question.clone()),
+            IntentInfo::new(Intent::LeaveOut, "leave the sample out").unless(no_question).with_danger(Danger::DropsData),
+            IntentInfo::new(Intent::ApplyRemedy, "correct it as proposed").unless(no_remedy),
+            IntentInfo::new(Intent::Skip, "skip this pose").unless(no_row.clone()),
+            IntentInfo::new(Intent::Undo, "take the last sample back").unless(no_sample.clone()).with_danger(Danger::DropsData),
+            IntentInfo::new(Intent::GoToPose(pose), "show another pose")
+                .unless(session.rows.is_empty().then(|| "there is no plan".to_owned())),
+            IntentInfo::new(Intent::Note(String::new()), "write a note"),
+            IntentInfo::new(Intent::SuggestPoses(SUGGESTED), "add the next best poses").unless(no_sample),
+        ];
+        intents.push(if has_more { next } else { next.default_action() });
+        intents
+    }
+
+    fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
+        let session = cx.session;
+        match intent {
+            Intent::Measure => {
+                self.held = None;
+                self.row.map_or_else(Vec::new, |row| self.measure(cx, row))
+            }
+            Intent::TypeReading(text) => match reading::parse(&text, Self::manual_unit(cx).unwrap_or_default()) {
+                Ok(point) => {
+                    let reading = Reading {
+                        point,
+                        sigma: None,
+                        scatter: None,
+                        shots: 1,
+                        temperature: None,
+                        configuration: None,
+                        seconds: 0.0,
+                    };
+                    self.take(&reading, cx)
+                }
+                Err(message) => vec![Action::Say(Notice::attention(message))],
+            },
+            Intent::AcceptReading => {
+                let Some(Held { mut noted, reason }) = self.held.take() else { return Vec::new() };
+                noted.number = session.measurements + 1;
+                noted.findings.push(FindingText {
+                    about: noted.number,
+                    cause: "not_at_rest".to_owned(),
+                    ratio: 0.0,
+                    message: reason,
+                    remedy: None,
+                });
+                self.write(noted, cx)
+            }
+            Intent::MeasureAgain => {
+                let row = self.question.and_then(|number| session.sample(number)).map(|sample| sample.row);
+                self.row = row.or(self.row);
+                self.row.map_or_else(Vec::new, |row| self.measure(cx, row))
+            }
+            Intent::Keep => self.decide(Decision::Keep),
+            Intent::LeaveOut => self.decide(Decision::LeaveOut),
+            Intent::ApplyRemedy => {
+                let remedy = self.asked(session).and_then(|(_, finding)| finding.remedy.clone());
+                remedy.map(|remedy| Action::Write(vec![Entry::Correction(remedy)])).into_iter().collect()
+            }
+            Intent::Skip => {
+                self.held = None;
+                self.row.map(|row| Action::Write(vec![Entry::Skipped { row, skipped: true }])).into_iter().collect()
+            }
+            Intent::Undo => {
+                let last = session.samples.iter().rev().find(|sample| sample.state == SampleState::Counts);
+                let entry = last.map(|sample| Entry::Decision { sample: sample.noted.number, decision: Decision::Undo });
+                entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+            }
+            Intent::GoToPose(pose) => self.go_to(&pose, session),
+            Intent::Note(text) => {
+                let text = crate::session::printable(text.trim());
+                let pose = self.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.pose.clone());
+                let entry = (!text.is_empty()).then_some(Entry::Note { pose, text });
+                entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+            }
+            Intent::SuggestPoses(poses) => {
+                let settings = PlanSettings { poses, verification: 0, drift_every: 0, ..PlanSettings::default() };
+                plan_request(cx, &settings).map(Action::Ask).into_iter().collect()
+            }
+            Intent::Next => vec![Action::go(Step::Identify)],
+            _ => Vec::new(),
+        }
+    }
+
+    fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
+        match answer {
+            Answer::Measured(reading) => self.take(&reading, cx),
+            Answer::Planned { summary, rows, .. } => {
+                let new: Vec<_> = rows.into_iter().filter(|row| row.kind != PoseKind::Home).collect();
+                let origin = format!("{} next best poses", new.iter().filter(|row| row.kind.is_measured()).count());
+                vec![Action::Write(vec![Entry::PlanExtended(plan_text(cx, summary.as_deref(), &new, origin))])]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn on_failure(&mut self, problem: Problem, cx: &Cx<'_>) -> Vec<Action> {
+        let row = self.row.and_then(|row| cx.session.rows.get(row));
+        let Some(row) = row else { return vec![Action::Say(problem.into())] };
+        let pose = row.planned.pose.clone();
+        let number = cx.session.measurements + 1;
+        let entry = Entry::Refused { number, pose, reason: problem.message.clone(), xyz_mm: None };
+        vec![Action::Write(vec![entry]), Action::Say(problem.into())]
+    }
+
+    fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
+        let session = cx.session;
+        match entry {
+            Entry::Sample(noted) => {
+                self.held = None;
+                self.prediction = Prediction::of(session);
+                let doubt = session.doubts().filter(|(_, finding)| noted.findings.contains(finding)).last();
+                self.question = doubt.map(|(about, _)| about.noted.number);
+                match noted.findings.first() {
+                    Some(finding) if self.question.is_some() => {
+                        return vec![Action::Say(Notice::attention(finding.message.clone()))];
+                    }
+                    _ => self.advance(session),
+                }
+            }
+            Entry::Decision { sample, decision } => {
+                self.prediction = Prediction::of(session);
+                if self.question == Some(*sample) {
+                    self.question = None;
+                }
+                match decision {
+                    Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
+                    Decision::Keep | Decision::LeaveOut => self.advance(session),
+                }
+            }
+            Entry::Correction(correction) => {
+                self.prediction = Prediction::of(session);
+                self.question = None;
+                self.row = session.open_rows().next();
+                return vec![Action::Say(Notice::info(corrected(correction)))];
+            }
+            Entry::Skipped { skipped: true, .. } => {
+                self.question = None;
+                self.advance(session);
+            }
+            Entry::PlanExtended(_) | Entry::Plan(_) => {
+                self.prediction = Prediction::of(session);
+                self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());
+            }
+            _ => {}
+        }
+        Vec::new()
+    }
+
+    fn content(&self, cx: &Cx<'_>) -> Content {
+        Content::Capture(Box::new(show::view(self, cx)))
+    }
+}
+
+fn corrected(correction: &Correction) -> String {
+    match correction {
+        Correction::Scale { since, factor } => {
+            format!("coordinates from measurement {since} on count {factor} times; what was noted stays in the journal")
+        }
+        Correction::Swap { first, second } => format!("measurements {first} and {second} changed places"),
+        Correction::Row { sample, .. } => format!("measurement {sample} counts for the pose where the robot stood"),
+        Correction::Joints { sample, .. } => format!("measurement {sample} counts with the corrected joint values"),
+    }
+}

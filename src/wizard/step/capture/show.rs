@@ -1,0 +1,162 @@
+//! What the capture step shows.
+
+use super::{CaptureStep, too_few};
+use crate::session::plan::PoseKind;
+use crate::session::state::{Sample, SampleState, Session};
+use crate::units::to_mm;
+use crate::wizard::step::Cx;
+use crate::wizard::view::{CaptureView, DriftView, FindingView, JointShown, PredictionView, RowState, RowView, SampleView};
+
+/// The view of a capture step.
+pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
+    let session = cx.session;
+    let rows: Vec<RowView> = (0..session.rows.len()).filter_map(|row| row_view(session, row)).collect();
+    let count = |kind| session.counted_of(kind).count();
+    let open = session.open_rows().count();
+    let measured = session.counted().count();
+    CaptureView {
+        row: step.row,
+        pose: step.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.pose.clone()),
+        kind: step.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.kind),
+        joints: joints(step, cx),
+        on_the_way: on_the_way(step, session),
+        predicted_point_in_base_mm: step
+            .row
+            .and_then(|row| session.rows.get(row)?.planned.point_in_base)
+            .map(|point| [to_mm(point.x), to_mm(point.y), to_mm(point.z)]),
+        measured,
+        open,
+        skipped: session.rows.iter().filter(|row| row.active && row.skipped).count(),
+        identification: count(PoseKind::Identification),
+        verification: count(PoseKind::Verification),
+        minutes_left: minutes_left(session, open),
+        last: session.samples.last().map(|sample| sample_view(session, sample)),
+        held: step.held.as_ref().map(|held| held.reason.clone()),
+        finding: step.asked(session).map(|(about, finding)| FindingView {
+            pose: session.pose_of(about).to_owned(),
+            measurement: about.noted.number,
+            cause: finding.cause.clone(),
+            message: finding.message.clone(),
+            has_remedy: finding.remedy.is_some(),
+        }),
+        drift: drift(session),
+        prediction: prediction(step, session),
+        too_few: too_few(session),
+        rows,
+        notes: session.notes.iter().map(|note| (note.pose.clone(), note.text.clone())).collect(),
+        refused: session.refused.iter().map(|refused| (refused.pose.clone(), refused.reason.clone())).collect(),
+    }
+}
+
+/// The configuration to go to, with the joint that moves most.
+fn joints(step: &CaptureStep, cx: &Cx<'_>) -> Vec<JointShown> {
+    let (Some(row), Some(robot)) = (step.row.and_then(|row| cx.session.rows.get(row)), cx.robot()) else {
+        return Vec::new();
+    };
+    let from = cx.session.samples.last().map(|sample| cx.session.configuration_of(sample));
+    let moves: Vec<f64> = row
+        .planned
+        .configuration
+        .iter()
+        .enumerate()
+        .map(|(index, value)| {
+            from.as_ref().and_then(|from| from.get(index)).map_or(0.0, |from| (value - from).abs())
+        })
+        .collect();
+    let most = moves.iter().copied().fold(0.0, f64::max);
+    robot
+        .profile
+        .chain()
+        .joints()
+        .iter()
+        .zip(&row.planned.configuration)
+        .zip(&moves)
+        .map(|((joint, value), moved)| {
+            let quantity = joint.joint_type.quantity();
+            JointShown {
+                name: joint.name.clone(),
+                value: quantity.to_edge(*value),
+                unit: quantity.unit().to_owned(),
+                moves: quantity.to_edge(*moved),
+                moves_most: most > 0.0 && moved.to_bits() == most.to_bits(),
+            }
+        })
+        .collect()
+}
+
+/// Names of the rows to pass through before the one shown.
+fn on_the_way(step: &CaptureStep, session: &Session) -> Vec<String> {
+    let Some(row) = step.row else { return Vec::new() };
+    let before = session.rows.get(..row).unwrap_or_default();
+    let passed = before.iter().rev().take_while(|row| row.active && !row.planned.kind.is_measured());
+    let mut names: Vec<String> = passed.map(|row| row.planned.pose.clone()).collect();
+    names.reverse();
+    names
+}
+
+fn row_view(session: &Session, index: usize) -> Option<RowView> {
+    let row = session.rows.get(index)?;
+    if !row.planned.kind.is_measured() {
+        return None;
+    }
+    let sample = session.sample_of_row(index);
+    let left_out = session.samples.iter().any(|sample| sample.row == index && sample.state == SampleState::LeftOut);
+    let state = match sample {
+        Some(_) => RowState::Measured,
+        None if left_out => RowState::LeftOut,
+        None if row.skipped => RowState::Skipped,
+        None if !row.active => return None,
+        None => RowState::Open,
+    };
+    Some(RowView { row: index, pose: row.planned.pose.clone(), kind: row.planned.kind, state })
+}
+
+fn sample_view(session: &Session, sample: &Sample) -> SampleView {
+    let point = session.point_of(sample);
+    SampleView {
+        measurement: sample.noted.number,
+        pose: session.pose_of(sample).to_owned(),
+        xyz_mm: [to_mm(point.x), to_mm(point.y), to_mm(point.z)],
+        scatter_mm: sample.noted.scatter_mm,
+        counts: sample.state == SampleState::Counts,
+    }
+}
+
+/// How far the pose that is measured again and again has moved since its first measurement.
+fn drift(session: &Session) -> Vec<DriftView> {
+    let mut found = Vec::new();
+    for sample in session.counted_of(PoseKind::Drift) {
+        let pose = session.pose_of(sample);
+        let first = session.counted().find(|first| session.kind_of(first) != PoseKind::Drift && session.pose_of(first) == pose);
+        if let Some(first) = first {
+            let moved = (session.point_of(sample) - session.point_of(first)).norm();
+            found.push(DriftView { pose: pose.to_owned(), measurement: sample.noted.number, moved_mm: to_mm(moved) });
+        }
+    }
+    found
+}
+
+fn prediction(step: &CaptureStep, session: &Session) -> Option<PredictionView> {
+    let prediction = &step.prediction;
+    let profile = &session.robot.as_ref()?.profile;
+    let distance = profile.tracker().position_in_base.coords.norm();
+    let sigma = profile.instrument().map(|instrument| instrument.sigma_at(distance));
+    let mm = |error: f64| sigma.map(|sigma| to_mm(error * sigma));
+    Some(PredictionView {
+        curve_sigma: prediction.curve.clone(),
+        now_sigma: prediction.now()?,
+        now_mm: prediction.now().and_then(mm),
+        with_all_sigma: prediction.with_all,
+        with_all_mm: prediction.with_all.and_then(mm),
+        is_enough: prediction.is_enough(),
+    })
+}
+
+/// Minutes for the rest, at the pace so far: the median time from sample to sample.
+fn minutes_left(session: &Session, open: usize) -> Option<f64> {
+    let times: Vec<f64> = session.samples.iter().map(|sample| sample.time.as_millisecond() as f64 / 60_000.0).collect();
+    // Clocks jump: a step back, or a lunch break, is not the pace.
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).map(|step| step * open as f64)
+}

@@ -1,0 +1,148 @@
+//! Identify and Verify: from samples to a result, and what it is worth on points that it never saw.
+
+use super::{Action, Cx, StepMachine};
+use crate::identification::{PointSample, TargetAt};
+use crate::procedure::identify::{IdentifyRequest, NamedSample};
+use crate::session::journal::{Entry, IdentifiedText};
+use crate::session::plan::PoseKind;
+use crate::session::set_up::Step;
+use crate::session::state::Session;
+use crate::session::summary::VerificationMode;
+use crate::wizard::effect::{Answer, Request};
+use crate::wizard::intent::{Intent, IntentInfo};
+use crate::wizard::notice::Notice;
+use crate::wizard::view::{Content, IdentifyView, VerifyView};
+
+/// Fewer verification samples than this say nothing.
+const FEWEST_VERIFICATION: usize = 3;
+
+/// The identify step.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::wizard) struct IdentifyStep;
+
+/// The verify step.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::wizard) struct VerifyStep;
+
+/// The samples of a kind that count, as the maths takes them.
+pub(super) fn samples(session: &Session, kind: PoseKind) -> Vec<NamedSample> {
+    session
+        .counted_of(kind)
+        .map(|sample| NamedSample {
+            pose: session.pose_of(sample).to_owned(),
+            line: usize::try_from(sample.noted.number).unwrap_or(usize::MAX),
+            sample: PointSample {
+                at: TargetAt { configuration: session.configuration_of(sample), target: sample.noted.target },
+                station: 0,
+                point: session.point_of(sample),
+                sigma: Session::sigma_of(sample),
+            },
+        })
+        .collect()
+}
+
+fn request(cx: &Cx<'_>) -> Option<Request> {
+    let robot = cx.robot()?;
+    let verification = samples(cx.session, PoseKind::Verification);
+    let mode = if verification.is_empty() { VerificationMode::None } else { VerificationMode::Session };
+    let mut request = IdentifyRequest::new(cx.profile()?, robot.text.clone());
+    request.identification = samples(cx.session, PoseKind::Identification);
+    request.verification = verification;
+    request.verification_mode = mode;
+    request.basis = "the verification poses of this session".to_owned();
+    request.created = cx.now.to_string();
+    Some(Request::Identify(Box::new(request)))
+}
+
+fn result(cx: &Cx<'_>) -> Option<&IdentifiedText> {
+    cx.session.identified.as_deref()
+}
+
+impl StepMachine for IdentifyStep {
+    fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
+        let few = super::capture::too_few(cx.session);
+        let is_current = cx.session.is_current();
+        let stale = match result(cx) {
+            None => Some("identify first".to_owned()),
+            Some(_) if !is_current => Some("the samples have changed since: identify again".to_owned()),
+            Some(result) if result.calibration.is_none() => {
+                Some("there is no usable solution: see the warnings, go back and measure what is wrong".to_owned())
+            }
+            Some(_) => None,
+        };
+        let identify = IntentInfo::new(Intent::Identify, "identify the arm").unless(few);
+        let next = IntentInfo::new(Intent::Next, "go on to verify").unless(stale);
+        if is_current {
+            vec![next.default_action(), identify]
+        } else {
+            vec![identify.default_action(), next]
+        }
+    }
+
+    fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
+        match intent {
+            Intent::Identify => request(cx).map(Action::Ask).into_iter().collect(),
+            Intent::Next => vec![Action::go(Step::Verify)],
+            _ => Vec::new(),
+        }
+    }
+
+    fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
+        let Answer::Identified(identified) = answer else { return Vec::new() };
+        let blocking = identified.summary.warnings.iter().find(|warning| warning.blocks_acceptance);
+        let notice = blocking.map(|warning| Notice::attention(warning.message.clone()));
+        let text = IdentifiedText {
+            samples: cx.session.basis(),
+            summary: identified.summary,
+            calibration: identified.calibration,
+        };
+        let write = Action::Write(vec![Entry::Identified(Box::new(text))]);
+        std::iter::once(write).chain(notice.map(Action::Say)).collect()
+    }
+
+    fn content(&self, cx: &Cx<'_>) -> Content {
+        Content::Identify(IdentifyView {
+            samples: cx.session.counted_of(PoseKind::Identification).count(),
+            is_current: cx.session.is_current(),
+            // What the verification says is for the next step.
+            summary: result(cx).map(|result| {
+                let mut summary = result.summary.clone();
+                summary.verification = None;
+                Box::new(summary)
+            }),
+            is_usable: result(cx).is_some_and(|result| result.calibration.is_some()),
+        })
+    }
+}
+
+impl StepMachine for VerifyStep {
+    fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
+        let stale = match result(cx) {
+            None => Some("identify first".to_owned()),
+            Some(_) if !cx.session.is_current() => Some("the samples have changed since: go back and identify again".to_owned()),
+            Some(_) => None,
+        };
+        vec![IntentInfo::new(Intent::Next, "go on to deliver").unless(stale).default_action()]
+    }
+
+    fn on_intent(&mut self, intent: Intent, _cx: &Cx<'_>) -> Vec<Action> {
+        match intent {
+            Intent::Next => vec![Action::go(Step::Deliver)],
+            _ => Vec::new(),
+        }
+    }
+
+    fn content(&self, cx: &Cx<'_>) -> Content {
+        let samples = cx.session.counted_of(PoseKind::Verification).count();
+        Content::Verify(VerifyView {
+            samples,
+            is_current: cx.session.is_current(),
+            too_few: (samples < FEWEST_VERIFICATION).then(|| {
+                "there are no or too few verification poses: nothing can be said about accuracy; go back to measure some".to_owned()
+            }),
+            verification: result(cx).and_then(|result| result.summary.verification.clone()).map(Box::new),
+            verdict: result(cx).map(|result| Box::new(result.summary.verdict.clone())),
+            warnings: result(cx).map(|result| result.summary.warnings.clone()).unwrap_or_default(),
+        })
+    }
+}

@@ -1,0 +1,192 @@
+//! Plan: which poses to measure.
+
+use super::{Action, Cx, StepMachine};
+use crate::procedure::plan::PlanRequest;
+use crate::session::journal::{Entry, PlanText, PlannedText};
+use crate::session::plan::{PlannedPose, PoseKind};
+use crate::session::plan_summary::PlanSummary;
+use crate::session::set_up::Step;
+use crate::wizard::effect::{Answer, Request};
+use crate::wizard::intent::{Intent, IntentInfo, PlanSettings};
+use crate::wizard::notice::Notice;
+use crate::wizard::view::{Content, PlanFigures, PlanView};
+
+/// The plan step: a proposal that is not accepted yet.
+#[derive(Clone, Debug, Default)]
+pub(in crate::wizard) struct PlanStep {
+    settings: PlanSettings,
+    proposal: Option<Proposal>,
+}
+
+#[derive(Clone, Debug)]
+struct Proposal {
+    summary: Option<Box<PlanSummary>>,
+    rows: Vec<PlannedPose>,
+    origin: String,
+}
+
+impl Proposal {
+    fn text(&self, cx: &Cx<'_>) -> PlanText {
+        plan_text(cx, self.summary.as_deref(), &self.rows, self.origin.clone())
+    }
+}
+
+/// A plan as the journal has it.
+pub(super) fn plan_text(cx: &Cx<'_>, summary: Option<&PlanSummary>, rows: &[PlannedPose], origin: String) -> PlanText {
+    let joint_types = cx.robot().map_or(&[][..], |robot| &robot.joint_types);
+    PlanText {
+        origin,
+        condition_number: summary.and_then(PlanSummary::condition_number_if_known),
+        predicted_error_sigma: summary.map(|summary| summary.predicted_error_sigma),
+        minutes: summary.and_then(|summary| summary.time.as_ref()).map(|time| time.total_min),
+        rows: rows.iter().map(|row| PlannedText::new(row, joint_types)).collect(),
+    }
+}
+
+/// Poses that are measured and count, for a plan that goes on from them.
+pub(super) fn measured_poses(cx: &Cx<'_>) -> Vec<PlannedPose> {
+    let session = cx.session;
+    session
+        .counted_of(PoseKind::Identification)
+        .map(|sample| PlannedPose {
+            pose: session.pose_of(sample).to_owned(),
+            kind: PoseKind::Identification,
+            configuration: session.configuration_of(sample),
+            point_in_base: None,
+        })
+        .collect()
+}
+
+/// The request for a plan with these settings.
+pub(super) fn plan_request(cx: &Cx<'_>, settings: &PlanSettings) -> Option<Request> {
+    let robot = cx.robot()?;
+    let request = PlanRequest {
+        poses: settings.poses,
+        verification: settings.verification,
+        candidates: settings.candidates,
+        seed: settings.seed,
+        drift_every: settings.drift_every,
+        included: measured_poses(cx),
+        first_number: highest_pose_number(cx) + 1,
+        ..PlanRequest::default()
+    };
+    Some(Request::Plan {
+        profile: Box::new(cx.profile()?),
+        profile_text: robot.text.clone(),
+        request: Box::new(request),
+    })
+}
+
+/// The highest number that a pose of any plan has as its name: new poses go on from there.
+fn highest_pose_number(cx: &Cx<'_>) -> u64 {
+    cx.session.rows.iter().filter_map(|row| row.planned.pose.parse().ok()).max().unwrap_or(0)
+}
+
+impl StepMachine for PlanStep {
+    fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
+        let no_proposal = self.proposal.is_none().then(|| "there is no new plan to accept".to_owned());
+        let no_plan = (!cx.session.rows.iter().any(|row| row.active)).then(|| "accept a plan first".to_owned());
+        let not_recorded = cx
+            .connection
+            .is_none_or(|connection| connection.recorded.is_empty())
+            .then(|| "the instrument plays no recorded measurements".to_owned());
+        let has_proposal = self.proposal.is_some();
+        let has_plan = no_plan.is_none();
+        let mut intents = vec![
+            IntentInfo::new(Intent::AcceptPlan, "measure this plan").unless(no_proposal),
+            IntentInfo::new(Intent::MakePlan(self.settings), "choose poses"),
+            IntentInfo::new(Intent::LoadPlan("plan.csv".to_owned()), "take the poses of a file"),
+            IntentInfo::new(Intent::PlanFromRecording, "take the recorded poses").unless(not_recorded),
+            IntentInfo::new(Intent::Next, "go on to measuring").unless(no_plan),
+        ];
+        let default = match (has_proposal, has_plan) {
+            (true, _) => 0,
+            (false, true) => 4,
+            (false, false) => 1,
+        };
+        if let Some(info) = intents.get_mut(default) {
+            info.is_default = info.is_enabled();
+        }
+        intents
+    }
+
+    fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
+        match intent {
+            Intent::MakePlan(settings) => {
+                self.settings = settings;
+                plan_request(cx, &settings).map(Action::Ask).into_iter().collect()
+            }
+            Intent::LoadPlan(file) => {
+                let Some(profile) = cx.profile() else { return Vec::new() };
+                vec![Action::Ask(Request::LoadPlan { file, profile: Box::new(profile) })]
+            }
+            Intent::PlanFromRecording => {
+                let Some(connection) = cx.connection else { return Vec::new() };
+                let origin = "the poses of the recorded measurements".to_owned();
+                self.proposal = Some(Proposal { summary: None, rows: connection.recorded.clone(), origin });
+                Vec::new()
+            }
+            Intent::AcceptPlan => {
+                let Some(proposal) = &self.proposal else { return Vec::new() };
+                let plan = proposal.text(cx);
+                self.proposal = None;
+                vec![Action::Write(vec![Entry::Plan(plan), Entry::Step(Step::Capture)])]
+            }
+            Intent::Next => vec![Action::go(Step::Capture)],
+            _ => Vec::new(),
+        }
+    }
+
+    fn on_answer(&mut self, answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
+        let Answer::Planned { summary, rows, origin } = answer else { return Vec::new() };
+        let warnings: Vec<String> = summary
+            .as_deref()
+            .map(|summary| summary.warnings.iter().map(|warning| warning.message.clone()).collect())
+            .unwrap_or_default();
+        self.proposal = Some(Proposal { summary, rows, origin });
+        match warnings.split_first() {
+            None => Vec::new(),
+            Some((first, rest)) => {
+                let notice = rest.iter().fold(Notice::attention(first.clone()), |notice, more| notice.hint(more.clone()));
+                vec![Action::Say(notice)]
+            }
+        }
+    }
+
+    fn content(&self, cx: &Cx<'_>) -> Content {
+        let accepted = cx.session.plan.as_ref().map(|plan| PlanFigures {
+            origin: plan.origin.clone(),
+            identification: count(cx, PoseKind::Identification),
+            verification: count(cx, PoseKind::Verification),
+            condition_number: plan.condition_number,
+            predicted_error_sigma: plan.predicted_error_sigma,
+            minutes: plan.minutes,
+        });
+        let proposal = self.proposal.as_ref().map(|proposal| {
+            let count = |kind| proposal.rows.iter().filter(|row| row.kind == kind).count();
+            let text = proposal.text(cx);
+            PlanFigures {
+                origin: text.origin,
+                identification: count(PoseKind::Identification),
+                verification: count(PoseKind::Verification),
+                condition_number: text.condition_number,
+                predicted_error_sigma: text.predicted_error_sigma,
+                minutes: text.minutes,
+            }
+        });
+        let summary = self.proposal.as_ref().and_then(|proposal| proposal.summary.clone());
+        Content::Plan(PlanView {
+            settings: self.settings,
+            proposal,
+            summary,
+            accepted,
+            left: cx.session.open_rows().count(),
+            measured: cx.session.counted().count(),
+        })
+    }
+}
+
+/// Rows of the present plan of a kind.
+fn count(cx: &Cx<'_>, kind: PoseKind) -> usize {
+    cx.session.rows.iter().filter(|row| row.active && row.planned.kind == kind).count()
+}

@@ -1,0 +1,114 @@
+//! Profile: which robot.
+
+use super::{Action, Cx, StepMachine};
+use crate::profile::{Profile, builtin_names};
+use crate::session::journal::Entry;
+use crate::session::set_up::Step;
+use crate::session::sha256;
+use crate::wizard::effect::{Answer, Request};
+use crate::wizard::intent::{Intent, IntentInfo};
+use crate::wizard::notice::Notice;
+use crate::wizard::view::{Content, ProfileCard, ProfileView};
+
+/// The profile step: a profile that is looked at and not yet taken.
+#[derive(Clone, Debug, Default)]
+pub(in crate::wizard) struct ProfileStep {
+    chosen: Option<Chosen>,
+    name: Option<String>,
+}
+
+#[derive(Clone, Debug)]
+struct Chosen {
+    source: String,
+    text: String,
+    profile: Profile,
+    warnings: Vec<String>,
+}
+
+impl ProfileStep {
+    /// Name of the session: the operator's, or robot and date.
+    fn session_name(&self, cx: &Cx<'_>) -> Option<String> {
+        let chosen = self.chosen.as_ref()?;
+        Some(self.name.clone().unwrap_or_else(|| {
+            // `2026-03-01T09:15:02Z` becomes `20260301-0915`.
+            let digits: String = cx.now.to_string().chars().filter(char::is_ascii_digit).take(12).collect();
+            let (date, time) = digits.split_at_checked(8).unwrap_or((&digits, ""));
+            format!("{}-{date}-{time}", chosen.profile.name())
+        }))
+    }
+}
+
+impl StepMachine for ProfileStep {
+    fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
+        let fixed = cx
+            .session
+            .has_measurements()
+            .then(|| "something is measured already: a session has one robot; start another session".to_owned());
+        let none = (self.chosen.is_none() && cx.robot().is_none()).then(|| "choose a robot first".to_owned());
+        let named = cx.session.opened.is_some().then(|| "the session has its name".to_owned());
+        let first = builtin_names().next().unwrap_or_default().to_owned();
+        let proposal = self.session_name(cx).unwrap_or_default();
+        vec![
+            IntentInfo::new(Intent::Next, "take this robot").unless(none).default_action(),
+            IntentInfo::new(Intent::ChooseProfile(first), "choose a robot").unless(fixed),
+            IntentInfo::new(Intent::NameSession(proposal), "name the session").unless(named),
+        ]
+    }
+
+    fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
+        match intent {
+            Intent::ChooseProfile(source) => vec![Action::Ask(Request::LoadProfile { source })],
+            Intent::NameSession(name) => {
+                let usable = !name.is_empty()
+                    && name.len() <= 64
+                    && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.'))
+                    && !name.starts_with(['.', '-']);
+                if usable {
+                    self.name = Some(name);
+                    return Vec::new();
+                }
+                let name = crate::session::printable(&name);
+                vec![Action::Say(Notice::attention(format!("'{name}' cannot be the name of a session")).hint(
+                    "use up to 64 letters, digits, '-', '_' and '.', beginning with a letter or digit",
+                ))]
+            }
+            Intent::Next => {
+                let Some(chosen) = &self.chosen else { return vec![Action::go(Step::Instrument)] };
+                let sha256 = sha256(chosen.text.as_bytes());
+                let profile = Entry::Profile { source: chosen.source.clone(), sha256, text: chosen.text.clone() };
+                let entries = vec![profile, Entry::Step(Step::Instrument)];
+                match (cx.session.opened, self.session_name(cx)) {
+                    (None, Some(name)) => vec![Action::Create { name, entries }],
+                    _ => vec![Action::Write(entries)],
+                }
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn on_answer(&mut self, answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
+        let Answer::Profile { source, text } = answer else { return Vec::new() };
+        match Profile::parse(&text, &source) {
+            Ok((profile, warnings)) => {
+                let warnings = warnings.iter().map(ToString::to_string).collect();
+                self.chosen = Some(Chosen { source, text, profile, warnings });
+                Vec::new()
+            }
+            Err(errors) => {
+                let what = format!("profile '{source}' cannot be used\n{errors}");
+                vec![Action::Say(Notice::attention(what).hint("mend the file, then choose it again"))]
+            }
+        }
+    }
+
+    fn content(&self, cx: &Cx<'_>) -> Content {
+        let shown = self.chosen.as_ref().map(|chosen| (&chosen.profile, chosen.warnings.clone()));
+        let shown = shown.or_else(|| cx.robot().map(|robot| (&robot.profile, Vec::new())));
+        Content::Profile(ProfileView {
+            profiles: builtin_names().map(str::to_owned).collect(),
+            chosen: shown.map(|(profile, warnings)| ProfileCard::new(profile, warnings)),
+            session: self.session_name(cx).unwrap_or_else(|| cx.session.name.clone()),
+            is_fixed: cx.session.has_measurements(),
+        })
+    }
+}
