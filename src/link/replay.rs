@@ -144,7 +144,7 @@ impl Link for Replay {
 mod tests {
     use super::*;
     use crate::profile::builtin;
-    use crate::units::from_deg;
+    use crate::units::{from_deg, to_mm};
 
     const TABLE: &str = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,sigma_mm,temperature_degc
 a,0,0,0,0,10,0,1000,0,0,0.01,20.5
@@ -169,12 +169,12 @@ a,0,0,0,0,10,0,1000.02,0,0,0.02,21.5
         assert!(replay.connect().unwrap().contains("table.csv"));
         let plan: Vec<(String, bool)> = replay.rows().iter().map(|row| (row.pose.clone(), row.repeats)).collect();
         assert_eq!(plan, [("a", false), ("b", false), ("c", false), ("a", true)].map(|(a, b)| (a.to_owned(), b)));
-        let x = |reading: Reading| (reading.point.x * 1e5).round();
-        assert_eq!(x(replay.measure(&request(1, "a", 0.0), &|| true).unwrap()), 100_000.0);
-        assert_eq!(x(replay.measure(&request(3, "a", 0.0), &|| true).unwrap()), 100_000.0);
+        let x = |reading: Reading| format!("{:.2}", to_mm(reading.point.x));
+        assert_eq!(x(replay.measure(&request(1, "a", 0.0), &|| true).unwrap()), "1000.00");
+        assert_eq!(x(replay.measure(&request(3, "a", 0.0), &|| true).unwrap()), "1000.00");
         let last = replay.measure(&request(4, "a", 0.0), &|| true).unwrap();
         assert_eq!((last.sigma, last.temperature, last.seconds), (Some(2e-5), Some(21.5), 5.0));
-        assert_eq!(x(last), 100_002.0);
+        assert_eq!(x(last), "1000.02");
     }
 
     #[test]
