@@ -10,6 +10,7 @@
 //!
 //! - [`units`], [`geometry`], [`kinematics`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
+//! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
 //! - [`cli`], [`app`], [`error`]: what was typed, what is done about it, and how it ends.
 //!

@@ -6,7 +6,13 @@
 
 #![warn(missing_docs)]
 
+mod replay;
+mod simulated;
+
 use thiserror::Error;
+
+pub use replay::{Replay, ReplayRow};
+pub use simulated::{HiddenArm, SimulatedCell};
 
 use crate::session::reading::{MeasureRequest, Reading};
 

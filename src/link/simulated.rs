@@ -1,0 +1,333 @@
+//! The simulated cell: a robot, a tracker and an operator that exist in the program only.
+//!
+//! Readings are fixed by the seed, the number of the measurement and what was asked; not by what this object has measured before,
+//! so that a session that was interrupted sees the same values when it goes on. One fault needs memory: for swapped rows the
+//! operator has to know the pose before. Where the program was started again between the two, he stands right at the second.
+//!
+//! - **Arm.** Nominal plus the hidden deviations ([`HiddenArm`]); free targets sit within a few millimetres of their nominal
+//!   place, whatever uncertainty the profile leaves them.
+//! - **Tracker.** Within about 0.1 m of the place in the profile, turned anyhow: nobody may rely on its frame.
+//! - **Noise.** Normal and independent per coordinate and shot; the σ that is stated is that of the mean of the shots.
+//! - **Time.** Virtual. A measurement takes its settling, 1 s per shot, and the move to the pose that is shown next, at a
+//!   tenth of the joint speeds: the way onward, because the way here is not part of the request.
+//! - **Drift.** Grows by 15 s per measurement, the time that one usually takes, for the same reason. It stays after its last
+//!   measurement but grows no more.
+
+mod random;
+mod truth;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+pub use truth::HiddenArm;
+
+use super::{Link, LinkError};
+use crate::kinematics::{ForwardKinematics, JointType};
+use crate::profile::{Instrument, JointRange, Profile};
+use crate::session::reading::{MeasureRequest, Reading};
+use crate::session::simulation::{Fault, FaultKind, Simulation};
+use crate::units::{DEGREE, INCH, MILLIMETRE, from_mm, to_mm};
+use random::{Random, Use};
+
+/// Standard deviation of a coordinate where neither simulation nor profile has one (m).
+const DEFAULT_NOISE: f64 = 0.01 * MILLIMETRE;
+/// Standard deviation of the place of the tracker, per coordinate (m).
+const TRACKER_SPREAD: f64 = 0.1;
+/// Part of the joint speeds that the operator uses.
+const SPEED: f64 = 0.1;
+/// Time that a move takes longer than at constant speed (s).
+const RAMP: f64 = 1.0;
+/// Time of one shot (s).
+const SHOT: f64 = 1.0;
+/// Time of a whole measurement as drift counts it (s).
+const USUAL_TIME: f64 = 15.0;
+/// Speeds of joints of which none is known (rad/s) and (m/s).
+const DEFAULT_SPEEDS: (f64, f64) = (60.0 * DEGREE, 0.25);
+/// Where a joint without limits may stand by mistake, to both sides of zero (rad) and (m).
+const DEFAULT_REACH: (f64, f64) = (90.0 * DEGREE, 0.1);
+
+/// A cell that is simulated in this process. It reports no joint values of its own.
+#[derive(Clone, Debug)]
+pub struct SimulatedCell {
+    title: String,
+    seed: u64,
+    truth: HiddenArm,
+    tracker_from_base: Isometry3<f64>,
+    joints: Vec<JointRange>,
+    noise: Noise,
+    faults: Vec<Fault>,
+    /// Number and configuration of the measurement before.
+    before: Option<(u64, Vec<f64>)>,
+}
+
+/// How the instrument scatters.
+#[derive(Clone, Debug)]
+enum Noise {
+    /// The same everywhere (m).
+    Constant(f64),
+    /// By distance.
+    Instrument(Instrument),
+}
+
+impl SimulatedCell {
+    /// The cell of a profile.
+    ///
+    /// # Errors
+    /// [`LinkError::SetUp`]: a noise that is not a number, a fault of a joint that the arm does not have or that has another
+    /// unit, or the paper's deviations for another arm than the paper's.
+    pub fn new(profile: &Profile, simulation: &Simulation) -> Result<Self, LinkError> {
+        let noise = match (simulation.noise_mm, profile.instrument()) {
+            (Some(noise), _) if !(noise.is_finite() && noise >= 0.0) => {
+                return Err(LinkError::SetUp(format!("the noise is {noise} mm; it must be a number from 0 on")));
+            }
+            (Some(noise), _) => Noise::Constant(from_mm(noise)),
+            (None, Some(instrument)) => Noise::Instrument(instrument.clone()),
+            (None, None) => Noise::Constant(DEFAULT_NOISE),
+        };
+        for fault in &simulation.faults {
+            check_fault(fault, profile)?;
+        }
+        let seed = simulation.seed;
+        let place = profile.tracker().position_in_base;
+        let base_from_tracker = Random::new(seed, Use::Tracker).frame_near(&place, TRACKER_SPREAD);
+        Ok(Self {
+            title: profile.title().to_owned(),
+            seed,
+            truth: truth::hidden_arm(profile, simulation.truth, seed, base_from_tracker)?,
+            tracker_from_base: base_from_tracker.inverse(),
+            joints: profile.joints().to_vec(),
+            noise,
+            faults: simulation.faults.clone(),
+            before: None,
+        })
+    }
+
+    /// What the identification should find.
+    pub const fn truth(&self) -> &HiddenArm {
+        &self.truth
+    }
+
+    /// Kinds of the faults that measurement `number` has, each with the number that its random values belong to.
+    fn faults(&self, number: u64) -> impl Iterator<Item = (FaultKind, u64)> {
+        self.faults.iter().filter(move |fault| fault.affects(number)).map(move |fault| {
+            // What stays is drawn once, what happens again is drawn again.
+            (fault.kind, if fault.kind.lasts() { fault.first } else { number })
+        })
+    }
+
+    /// Where the robot really stands, in its own joint values.
+    fn standing(&self, request: &MeasureRequest) -> Vec<f64> {
+        let mut here = request.configuration.clone();
+        for fault in &self.faults {
+            let is_second = fault.first.checked_add(1) == Some(request.number);
+            if fault.kind == FaultKind::SwappedRows
+                && is_second
+                && let Some((before, configuration)) = &self.before
+                && *before == fault.first
+            {
+                here.clone_from(configuration);
+            }
+        }
+        for (kind, number) in self.faults(request.number) {
+            match kind {
+                FaultKind::SwappedRows => here = request.following.clone().unwrap_or(here),
+                FaultKind::WrongPose => {
+                    here = request.following.clone().unwrap_or_else(|| self.elsewhere(Use::Fault(kind, number)));
+                }
+                _ => {}
+            }
+        }
+        // What is wrong with a joint is wrong wherever he stands.
+        for (kind, _) in self.faults(request.number) {
+            match kind {
+                FaultKind::MistypedJoint { joint, by, quantity } => {
+                    if let Some(value) = here.get_mut(joint) {
+                        *value += quantity.from_edge(by);
+                    }
+                }
+                FaultKind::JointSign { joint } => {
+                    if let Some(value) = here.get_mut(joint) {
+                        *value = -*value;
+                    }
+                }
+                _ => {}
+            }
+        }
+        here
+    }
+
+    /// A configuration by seed, inside the limits.
+    fn elsewhere(&self, of: Use) -> Vec<f64> {
+        let mut random = Random::new(self.seed, of);
+        let joints = self.truth.chain.joints().iter().zip(&self.joints);
+        joints
+            .map(|(joint, range)| {
+                let reach = of_type(joint.joint_type, DEFAULT_REACH);
+                let (low, high) = range.planning_limits.or(range.limits).unwrap_or((-reach, reach));
+                random.between(low, high)
+            })
+            .collect()
+    }
+
+    /// The SMR in the tracker frame (m), without noise.
+    fn true_point(&self, request: &MeasureRequest) -> Option<Point3<f64>> {
+        let mut target = *self.truth.targets.get(request.target)?;
+        for (kind, number) in self.faults(request.number) {
+            if let FaultKind::TargetBumped { by_mm } = kind {
+                target += self.direction(kind, number) * from_mm(by_mm);
+            }
+        }
+        let arm = ForwardKinematics::new(&self.truth.chain);
+        Some(self.tracker_from_base * arm.point_in_base(&self.standing(request), &target))
+    }
+
+    /// The direction of a fault.
+    fn direction(&self, kind: FaultKind, number: u64) -> Vector3<f64> {
+        Random::new(self.seed, Use::Fault(kind, number)).direction()
+    }
+
+    /// What all shots are off by (m), and what their places along one line differ by, root mean square (m).
+    fn errors(&self, number: u64) -> (Vector3<f64>, Vector3<f64>) {
+        let (mut offset, mut motion) = (Vector3::zeros(), Vector3::zeros());
+        for (kind, drawn_for) in self.faults(number) {
+            let by = |millimetres| self.direction(kind, drawn_for) * from_mm(millimetres);
+            match kind {
+                FaultKind::Outlier { by_mm } => offset += by(by_mm),
+                FaultKind::NotAtRest { by_mm } => {
+                    offset += by(by_mm);
+                    motion += by(by_mm);
+                }
+                _ => {}
+            }
+        }
+        // Drift stays where it is after its last measurement.
+        for fault in self.faults.iter().filter(|fault| fault.first < number) {
+            if let FaultKind::Drift { mm_per_hour } = fault.kind {
+                let measurements = number.min(fault.last.unwrap_or(number)).saturating_sub(fault.first);
+                let hours = measurements as f64 * USUAL_TIME / 3600.0;
+                offset += self.direction(fault.kind, fault.first) * from_mm(mm_per_hour * hours);
+            }
+        }
+        (offset, motion)
+    }
+
+    /// What the instrument's numbers are multiplied by when they are taken for millimetres.
+    fn unit_factor(&self, number: u64) -> f64 {
+        self.faults(number).fold(1.0, |factor, (kind, _)| match kind {
+            FaultKind::Inch => factor * MILLIMETRE / INCH,
+            FaultKind::Metre => factor * MILLIMETRE,
+            _ => factor,
+        })
+    }
+
+    /// Time of a measurement and of the move onward (s).
+    fn time(&self, request: &MeasureRequest, shots: u32) -> f64 {
+        let onward = request.following.as_deref().unwrap_or(&request.configuration);
+        let joints = self.truth.chain.joints().iter().zip(&self.joints);
+        let slowest = joints.zip(request.configuration.iter().zip(onward)).fold(
+            0.0_f64,
+            |slowest, ((joint, range), (from, to))| {
+                let speed = range.max_speed.unwrap_or_else(|| of_type(joint.joint_type, DEFAULT_SPEEDS));
+                slowest.max((to - from).abs() / (speed * SPEED))
+            },
+        );
+        let moving = if slowest > 0.0 { slowest + RAMP } else { 0.0 };
+        moving + request.settle + f64::from(shots) * SHOT
+    }
+
+    fn check(&self, request: &MeasureRequest) -> Result<(), LinkError> {
+        let joints = self.truth.chain.dof();
+        let poses = [Some(&request.configuration), request.following.as_ref()];
+        for configuration in poses.into_iter().flatten() {
+            if configuration.len() != joints || !configuration.iter().all(|value| value.is_finite()) {
+                return Err(LinkError::SetUp(format!(
+                    "pose {} is not a configuration of the simulated arm: it has {joints} joints",
+                    request.pose
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The value for this type of joint: turning or sliding.
+const fn of_type(joint_type: JointType, (turning, sliding): (f64, f64)) -> f64 {
+    match joint_type {
+        JointType::Revolute => turning,
+        JointType::Prismatic => sliding,
+    }
+}
+
+/// Whether the arm has the joint of a fault.
+fn check_fault(fault: &Fault, profile: &Profile) -> Result<(), LinkError> {
+    let (joint, quantity) = match fault.kind {
+        FaultKind::JointSign { joint } => (joint, None),
+        FaultKind::MistypedJoint { joint, quantity, .. } => (joint, Some(quantity)),
+        _ => return Ok(()),
+    };
+    let joints = profile.chain().joints();
+    let Some(found) = joints.get(joint) else {
+        return Err(LinkError::SetUp(format!("fault '{fault}': '{}' has {} joints", profile.name(), joints.len())));
+    };
+    let needed = found.joint_type.quantity();
+    if quantity.is_some_and(|quantity| quantity != needed) {
+        return Err(LinkError::SetUp(format!("fault '{fault}': joint {} is counted in {}", found.name, needed.unit())));
+    }
+    Ok(())
+}
+
+impl Link for SimulatedCell {
+    fn connect(&mut self) -> Result<String, LinkError> {
+        let noise = match &self.noise {
+            Noise::Constant(sigma) => format!("noise {} mm", to_mm(*sigma)),
+            Noise::Instrument(instrument) => format!("{}, {}", instrument.name, instrument.sigma_text()),
+        };
+        Ok(format!("simulated cell: {}, {noise}, seed {}", self.title, self.seed))
+    }
+
+    fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
+        self.check(request)?;
+        if !keep_going() {
+            return Err(LinkError::Cancelled);
+        }
+        let true_point = self.true_point(request);
+        self.before = Some((request.number, request.configuration.clone()));
+        let Some(true_point) = true_point else {
+            return Err(LinkError::SetUp(format!("the simulated arm has no target {}", request.target + 1)));
+        };
+        if self.faults(request.number).any(|(kind, _)| kind == FaultKind::BeamBreak) {
+            return Err(LinkError::BeamBroken);
+        }
+        let sigma = match &self.noise {
+            Noise::Constant(sigma) => *sigma,
+            Noise::Instrument(instrument) => instrument.sigma_at(true_point.coords.norm()),
+        };
+        let (offset, motion) = self.errors(request.number);
+        let count = request.shots.max(1);
+        let mut random = Random::new(self.seed, Use::Noise(request.number));
+        let shots: Vec<Vector3<f64>> = along_line(count)
+            .map(|place| true_point.coords + offset + motion * place + random.normals() * sigma)
+            .collect();
+        let factor = self.unit_factor(request.number);
+        let mean = shots.iter().sum::<Vector3<f64>>() / f64::from(count);
+        let square = shots.iter().map(|shot| (shot - mean).norm_squared()).sum::<f64>() / f64::from(count);
+        Ok(Reading {
+            point: Point3::from(mean * factor),
+            sigma: (sigma > 0.0).then(|| factor * sigma / f64::from(count).sqrt()),
+            scatter: (count > 1).then(|| factor * square.sqrt()),
+            shots: count,
+            temperature: None,
+            configuration: None,
+            seconds: self.time(request, count),
+        })
+    }
+}
+
+/// Evenly spaced places with mean 0 and mean square 1 (a single one is 0).
+fn along_line(count: u32) -> impl Iterator<Item = f64> {
+    let n = f64::from(count);
+    let step = if count > 1 { (12.0 / (n * n - 1.0)).sqrt() } else { 0.0 };
+    (0..count).map(move |index| (f64::from(index) - (n - 1.0) / 2.0) * step)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! The arm that hides in a simulated cell.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::random::{Random, Use};
+use crate::kinematics::{Convention, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::link::LinkError;
+use crate::profile::{Level, Profile};
+use crate::session::simulation::Truth;
+use crate::units::{MILLIMETRE, from_deg, from_mm, to_mm};
+
+/// A drawn target is not farther than this from its nominal place, one standard deviation per coordinate (m). The uncertainty
+/// of a profile may cover a whole flange; a technician's ruler is better than that.
+const TARGET_SPREAD: f64 = 2.0 * MILLIMETRE;
+
+/// A geometry is the paper's if no constant differs by more (m) or (rad).
+const SAME_GEOMETRY: f64 = 1e-6;
+
+/// Table I of the method paper: α (deg), a (mm), d (mm), θ (deg) per joint.
+const TABLE_I: [[f64; 4]; 6] = [
+    [-90.0, 170.0, 504.0, 0.0],
+    [0.0, 780.0, 0.0, -90.0],
+    [-90.0, 140.0, 0.0, 0.0],
+    [90.0, 0.0, 760.0, 0.0],
+    [-90.0, 0.0, 0.0, 0.0],
+    [0.0, 0.0, 125.0, 0.0],
+];
+
+/// Table II: Δα (deg), Δa (mm), Δd (mm), Δθ (deg) per joint.
+const TABLE_II: [[f64; 4]; 6] = [
+    [-0.0516, -3.885, 0.0, 0.0],
+    [-0.0459, 1.2834, 1.3308, -0.671],
+    [0.086, 1.1404, 1.3308, 0.0975],
+    [0.0057, -0.1408, -0.3557, -1.04],
+    [0.143, 1.6238, -1.4628, 1.77],
+    [-0.0115, 0.0199, -0.9708, -0.0287],
+];
+
+/// Table II: Δβ of joint 2 (deg).
+const TABLE_II_BETA_2: f64 = 0.155;
+
+/// The constants of a row of the tables, in its order.
+const COLUMNS: [LinkParameter; 4] = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
+
+/// What a simulated cell is really like, and what an identification should find.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HiddenArm {
+    /// The arm.
+    pub chain: KinematicChain,
+    /// Target coordinates in the flange frame (m), before any bump.
+    pub targets: Vec<Point3<f64>>,
+    /// Where the tracker stands.
+    pub base_from_tracker: Isometry3<f64>,
+}
+
+/// Deviations from nominal ((m) or (rad)), target coordinates among them.
+pub(super) fn deviations(profile: &Profile, truth: Truth, seed: u64) -> Result<Vec<(ParameterId, f64)>, LinkError> {
+    match truth {
+        Truth::Nominal => Ok(Vec::new()),
+        Truth::Drawn => {
+            let mut random = Random::new(seed, Use::Arm);
+            let spread = |id, expected: f64| match id {
+                ParameterId::Target { .. } => expected.min(TARGET_SPREAD),
+                ParameterId::Link { .. } => expected,
+            };
+            let free = profile.free_parameters(Level::Geometric);
+            Ok(free.iter().map(|free| (free.id, spread(free.id, free.expected) * random.normal())).collect())
+        }
+        Truth::Paper => {
+            is_paper_arm(profile.chain())
+                .map_err(|difference| {
+                    LinkError::SetUp(format!(
+                        "the true deviations of the method paper belong to its arm (profile 'soochow'), not to '{}': {difference}; take drawn or nominal ones",
+                        profile.name()
+                    ))
+                })
+                .map(|()| paper_deviations())
+        }
+    }
+}
+
+/// Table II in metres and radians.
+fn paper_deviations() -> Vec<(ParameterId, f64)> {
+    let rows = TABLE_II.into_iter().enumerate().flat_map(|(joint, row)| {
+        let edge = COLUMNS.into_iter().zip(row);
+        edge.map(move |(parameter, value)| {
+            (ParameterId::Link { joint, parameter }, parameter.quantity().from_edge(value))
+        })
+    });
+    let beta = ParameterId::Link { joint: 1, parameter: LinkParameter::Beta };
+    rows.chain([(beta, from_deg(TABLE_II_BETA_2))]).collect()
+}
+
+/// Whether a chain is that of table I; the first difference if not.
+fn is_paper_arm(chain: &KinematicChain) -> Result<(), String> {
+    if chain.convention() != Convention::Standard || chain.dof() != TABLE_I.len() {
+        return Err("that one has six joints in the standard convention".to_owned());
+    }
+    for (index, (joint, row)) in chain.joints().iter().zip(TABLE_I).enumerate() {
+        let is_plain = joint.joint_type == JointType::Revolute
+            && joint.direction > 0.0
+            && joint.coupling.iter().all(|coupling| coupling.abs() <= 0.0);
+        if !is_plain {
+            return Err(format!("there joint {} turns by its pendant value, without a coupling", joint.name));
+        }
+        for (parameter, value) in COLUMNS.into_iter().zip(row) {
+            let id = ParameterId::Link { joint: index, parameter };
+            let here = chain.parameter(id).unwrap_or(f64::NAN);
+            let quantity = parameter.quantity();
+            let excess = (here - quantity.from_edge(value)).abs();
+            if excess.is_nan() || excess > SAME_GEOMETRY {
+                return Err(format!("there {id} is {value} {}, here {}", quantity.unit(), quantity.to_edge(here)));
+            }
+        }
+        if joint.link.beta.abs() > SAME_GEOMETRY {
+            return Err(format!("there beta{} is zero", index + 1));
+        }
+    }
+    // Fixed frames around the arm change no distance, but a target would sit elsewhere.
+    let offset = chain.flange().translation.vector.norm();
+    if offset > from_mm(SAME_GEOMETRY) || chain.flange().rotation.angle() > SAME_GEOMETRY {
+        return Err(format!("there the flange is the last link frame, here it is {} mm from it", to_mm(offset)));
+    }
+    Ok(())
+}
+
+/// The true arm and targets of a profile.
+pub(super) fn hidden_arm(
+    profile: &Profile,
+    truth: Truth,
+    seed: u64,
+    base_from_tracker: Isometry3<f64>,
+) -> Result<HiddenArm, LinkError> {
+    let deviations = deviations(profile, truth, seed)?;
+    let chain = profile
+        .chain()
+        .with_deviations(deviations.iter().copied())
+        .map_err(|error| LinkError::SetUp(error.to_string()))?;
+    let mut targets: Vec<Point3<f64>> = profile.targets().iter().map(|target| target.position_in_flange).collect();
+    for (id, deviation) in deviations {
+        if let ParameterId::Target { target, axis } = id
+            && let Some(point) = targets.get_mut(target)
+        {
+            point.coords[axis.index()] += deviation;
+        }
+    }
+    Ok(HiddenArm { chain, targets, base_from_tracker })
+}
