@@ -1,24 +1,22 @@
-//! Runs a command: loads its files, calls the maths, writes the results.
+//! Runs a command: loads its files, has the procedure done, writes the results.
 
-mod assess;
-mod cell;
-mod checks;
 mod constraints;
-mod estimate;
 mod identify;
 mod load;
 mod plan;
 mod profile;
 mod program;
 mod progress;
-mod result;
 mod verify;
 
 use std::io::{self, Write};
 
-use crate::cli::{Cli, Command};
+use crate::cli::{Cli, Command, EstimationArgs};
 use crate::error::{ExitStatus, Failure};
+use crate::identification::Weighting;
+use crate::procedure::EstimationSettings;
 use crate::session::printable;
+use crate::units::from_mm;
 
 /// Where a command prints: data to `out`, everything else to `err`.
 #[derive(Debug)]
@@ -62,9 +60,38 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
     }
 }
 
+/// How to identify, as the command line asks for it.
+fn estimation_settings(args: &EstimationArgs, weighting: Weighting) -> EstimationSettings {
+    EstimationSettings {
+        level: args.level.into(),
+        weighting,
+        prior: args.prior.into(),
+        estimator: args.estimator.into(),
+        iterations: args.iterations,
+        sigma: args.sigma_mm.map(from_mm),
+        expected_deviation: args.expected_deviation,
+        filter: args.filter.clone(),
+    }
+}
+
 /// A JSON object as printed: indented, with a line break at the end.
 fn to_json<T: serde::Serialize>(value: &T) -> Result<String, Failure> {
     let text =
         serde_json::to_string_pretty(value).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     Ok(text + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+
+    #[test]
+    fn without_options_the_command_identifies_by_default() {
+        let words = ["trupose", "identify", "--profile", "soochow", "--measurements", "points.csv"];
+        let Command::Identify(args) = Cli::parse_from(words).command else { panic!("not the command") };
+        let asked = estimation_settings(&args.estimation, args.weighting.into());
+        assert_eq!(asked, EstimationSettings::default());
+    }
 }

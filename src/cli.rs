@@ -4,10 +4,14 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use nalgebra::Point3;
 
+use crate::identification::{Estimator, Prior, Weighting};
+use crate::planning::{BoxInBase, Objective};
+use crate::profile::{ExpectedDeviation, Level};
 use crate::program::{DEFAULT_DWELL, Dialect, MAX_SPEED};
 use crate::session::measurements::Layout;
-use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, MILLIRADIAN};
+use crate::units::from_mm;
 
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
 #[derive(Debug, Parser)]
@@ -284,6 +288,22 @@ pub enum ObjectiveArg {
     O5,
 }
 
+impl From<ObjectiveArg> for Objective {
+    fn from(argument: ObjectiveArg) -> Self {
+        match argument {
+            ObjectiveArg::Balanced => Self::Balanced,
+            ObjectiveArg::Condition => Self::Condition,
+            ObjectiveArg::Prediction => Self::Prediction,
+            ObjectiveArg::D => Self::D,
+            ObjectiveArg::O1 => Self::O1,
+            ObjectiveArg::O2 => Self::O2,
+            ObjectiveArg::O3 => Self::O3,
+            ObjectiveArg::O4 => Self::O4,
+            ObjectiveArg::O5 => Self::O5,
+        }
+    }
+}
+
 /// `--limit`: a joint by name or number with a range in degrees or mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimit {
@@ -318,6 +338,16 @@ impl FromStr for JointLimit {
 pub struct BoxMm {
     /// Lower and upper end per axis (mm).
     pub ranges: [(f64, f64); 3],
+}
+
+impl From<BoxMm> for BoxInBase {
+    fn from(space: BoxMm) -> Self {
+        let [x, y, z] = space.ranges;
+        Self {
+            min: Point3::new(from_mm(x.0), from_mm(y.0), from_mm(z.0)),
+            max: Point3::new(from_mm(x.1), from_mm(y.1), from_mm(z.1)),
+        }
+    }
 }
 
 impl FromStr for BoxMm {
@@ -356,6 +386,15 @@ pub enum EstimatorArg {
     LeastSquares,
 }
 
+impl From<EstimatorArg> for Estimator {
+    fn from(argument: EstimatorArg) -> Self {
+        match argument {
+            EstimatorArg::Robust => Self::Robust,
+            EstimatorArg::LeastSquares => Self::LeastSquares,
+        }
+    }
+}
+
 /// `--prior`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum PriorArg {
@@ -364,6 +403,15 @@ pub enum PriorArg {
     Expected,
     /// Nothing; badly determined parameters may run away
     None,
+}
+
+impl From<PriorArg> for Prior {
+    fn from(argument: PriorArg) -> Self {
+        match argument {
+            PriorArg::Expected => Self::Expected,
+            PriorArg::None => Self::None,
+        }
+    }
 }
 
 /// `--level`.
@@ -376,6 +424,15 @@ pub enum LevelArg {
     Geometric,
 }
 
+impl From<LevelArg> for Level {
+    fn from(argument: LevelArg) -> Self {
+        match argument {
+            LevelArg::Offsets => Self::Offsets,
+            LevelArg::Geometric => Self::Geometric,
+        }
+    }
+}
+
 /// `--weighting`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum WeightingArg {
@@ -384,6 +441,15 @@ pub enum WeightingArg {
     Covariance,
     /// All pairs alike, as in the paper
     Uniform,
+}
+
+impl From<WeightingArg> for Weighting {
+    fn from(argument: WeightingArg) -> Self {
+        match argument {
+            WeightingArg::Covariance => Self::Covariance,
+            WeightingArg::Uniform => Self::Uniform,
+        }
+    }
 }
 
 /// `--refit`.
@@ -397,37 +463,6 @@ pub enum RefitArg {
     /// The tracker was moved and the SMR mounted anew
     #[value(name = "frame+target")]
     FrameAndTarget,
-}
-
-/// Expected deviation of all lengths (m) and all angles (rad).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ExpectedDeviation {
-    /// Of every length (m).
-    pub length: f64,
-    /// Of every angle (rad).
-    pub angle: f64,
-}
-
-impl FromStr for ExpectedDeviation {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        const LENGTHS: [(&str, f64); 3] = [("mm", MILLIMETRE), ("um", MICROMETRE), ("m", 1.0)];
-        const ANGLES: [(&str, f64); 3] = [("deg", DEGREE), ("mrad", MILLIRADIAN), ("rad", 1.0)];
-        let expected =
-            || format!("'{text}' is not a length and an angle; write for example '1mm,0.1deg' (mm, um; deg, mrad)");
-        let quantity = |text: &str, units: &[(&str, f64)]| {
-            units.iter().find_map(|(unit, size)| {
-                let number: f64 = text.trim().strip_suffix(unit)?.trim().parse().ok()?;
-                (number.is_finite() && number > 0.0).then_some(number * size)
-            })
-        };
-        let (length, angle) = text.split_once(',').ok_or_else(expected)?;
-        match (quantity(length, &LENGTHS), quantity(angle, &ANGLES)) {
-            (Some(length), Some(angle)) => Ok(Self { length, angle }),
-            _ => Err(expected()),
-        }
-    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -459,17 +494,6 @@ mod tests {
         }
         for wrong in ["1..2,3..4", "1..2,3..4,6..5", "a..b,1..2,3..4"] {
             assert!(wrong.parse::<BoxMm>().is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn expected_deviations_have_units() {
-        let parsed: ExpectedDeviation = "1mm,0.1deg".parse().unwrap();
-        assert_eq!(parsed, ExpectedDeviation { length: MILLIMETRE, angle: 0.1 * DEGREE });
-        let parsed: ExpectedDeviation = "500 um, 5mrad".parse().unwrap();
-        assert_eq!(parsed, ExpectedDeviation { length: 500.0 * MICROMETRE, angle: 5.0 * MILLIRADIAN });
-        for wrong in ["1,0.1", "1mm", "1deg,1mm", "-1mm,1deg", "nanmm,1deg", "1mm,0deg"] {
-            assert!(wrong.parse::<ExpectedDeviation>().is_err(), "{wrong}");
         }
     }
 }

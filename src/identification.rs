@@ -29,6 +29,8 @@ mod settings;
 mod solver;
 pub mod verification;
 
+use std::ops::ControlFlow;
+
 use nalgebra::{DMatrix, DVector, Point3};
 
 pub use error::IdentificationError;
@@ -66,6 +68,21 @@ pub fn identify(
     settings: &Settings,
     progress: &mut dyn FnMut(&Iteration),
 ) -> Result<Identification, IdentificationError> {
+    identify_while(problem, settings, &mut |iteration| {
+        progress(iteration);
+        ControlFlow::Continue(())
+    })
+}
+
+/// As [`identify`], but `progress` may ask to stop after any step.
+///
+/// # Errors
+/// As [`identify`]; [`IdentificationError::Cancelled`] once `progress` has asked to stop.
+pub fn identify_while(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+) -> Result<Identification, IdentificationError> {
     problem.check()?;
     if problem.parameters.is_empty() {
         return Err(IdentificationError::NoParameters);
@@ -88,7 +105,7 @@ pub fn identify(
         let predicted = nominal.points_in_base(problem.observations.places());
         fit.weights.trust = robust::gross_trust(problem, &predicted);
     }
-    let mut at = fit.solve(zero.clone());
+    let mut at = fit.solve(zero.clone())?;
     if settings.estimator == Estimator::Robust {
         // Where σ was stated, a sample within it is never an outlier, however good the others are.
         let floor = if settings.sigma.is_some() || has_own_sigmas(problem) { 1.0 } else { 1e-3 };
@@ -98,7 +115,7 @@ pub fn identify(
             // From the start: the steps on record are those that lead to the result.
             fit.weights = trusted;
             fit.iterations.clear();
-            at = fit.solve(zero);
+            at = fit.solve(zero)?;
         }
     }
     let (at, termination) = at;
@@ -123,12 +140,12 @@ struct Fit<'a, 'p> {
     basis: &'a Basis,
     weights: Weights,
     iterations: Vec<Iteration>,
-    progress: &'a mut dyn FnMut(&Iteration),
+    progress: &'a mut dyn FnMut(&Iteration) -> ControlFlow<()>,
 }
 
 impl Fit<'_, '_> {
     /// Solves with the weights as they are; where σ is estimated, repeats with the σ of the residuals until both agree.
-    fn solve(&mut self, start: DVector<f64>) -> (Linearised, TerminationReason) {
+    fn solve(&mut self, start: DVector<f64>) -> Result<(Linearised, TerminationReason), IdentificationError> {
         let mut z = start;
         let mut rounds = 0;
         loop {
@@ -141,23 +158,29 @@ impl Fit<'_, '_> {
             let before = self.iterations.len();
             let left = self.settings.iterations.saturating_sub(before).max(usize::from(before == 0));
             let (iterations, progress) = (&mut self.iterations, &mut *self.progress);
+            let mut cancelled = false;
             let mut record = |iteration| {
-                progress(&iteration);
+                let flow = progress(&iteration);
+                cancelled |= flow.is_break();
                 iterations.push(iteration);
+                flow
             };
             let (at, termination) = solve.run(z, left, &mut record);
+            if cancelled {
+                return Err(IdentificationError::Cancelled);
+            }
             rounds += 1;
             let stop = termination != TerminationReason::Converged || rounds >= SIGMA_ROUNDS;
             let estimated = self.settings.sigma.is_none().then(|| residual_sigma(&solve, &at)).flatten();
             let Some(sigma) = estimated.map(|scatter| scatter.absolute.max(SMALLEST_SIGMA)) else {
-                return (at, termination);
+                return Ok((at, termination));
             };
             // Without a prior σ only scales the cost: the solution is the same.
             let settled =
                 (sigma / self.weights.sigma - 1.0).abs() < SIGMA_TOLERANCE || self.settings.prior == Prior::None;
             self.weights.sigma = sigma;
             if settled || stop {
-                return (solve_with(self, at.z), termination);
+                return Ok((solve_with(self, at.z), termination));
             }
             z = at.z;
         }

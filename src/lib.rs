@@ -12,6 +12,7 @@
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
+//! - [`procedure`]: the calibration itself on data in memory, the same for commands and wizard. No files, no clock.
 //! - [`cli`], [`app`], [`error`]: what was typed, what is done about it, and how it ends.
 //!
 //! Reference: "A distance error based industrial robot kinematic calibration method", Industrial Robot 41/5 (2014) 439–446,
@@ -25,6 +26,7 @@ pub mod identification;
 pub mod kinematics;
 pub mod link;
 pub mod planning;
+pub mod procedure;
 pub mod profile;
 pub mod program;
 pub mod report;

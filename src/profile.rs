@@ -21,7 +21,7 @@ use nalgebra::{Point3, Unit, Vector3};
 pub use builtin::{builtin, builtin_names};
 pub use cell::{Capsule, Instrument, KeepOut, Tracker};
 pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
-pub use expected::ExpectedDeviations;
+pub use expected::{ExpectedDeviation, ExpectedDeviations};
 pub use text::{check_text, list_text, show_text};
 
 use crate::kinematics::{Axis, FreeParameter, KinematicChain, LinkParameter, ParameterId};
@@ -103,11 +103,12 @@ pub struct Acceptance {
 }
 
 /// Which parameters are identified.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// Level 1: joint offsets (θ of revolute, d of prismatic joints).
     Offsets,
     /// Level 2: all link constants, with β where the profile has it.
+    #[default]
     Geometric,
 }
 

@@ -20,7 +20,22 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "profile", "session"]),
     ("error", &["session"]),
-    ("cli", &["units", "session", "program"]),
+    (
+        "procedure",
+        &[
+            "units",
+            "geometry",
+            "kinematics",
+            "identification",
+            "planning",
+            "profile",
+            "session",
+            "runtime",
+            "report",
+            "error",
+        ],
+    ),
+    ("cli", &["units", "identification", "planning", "profile", "session", "program"]),
     (
         "app",
         &[
@@ -30,10 +45,10 @@ const LAYERS: &[(&str, &[&str])] = &[
             "identification",
             "kinematics",
             "planning",
+            "procedure",
             "profile",
             "program",
             "report",
-            "runtime",
             "session",
             "store",
             "units",
@@ -43,7 +58,7 @@ const LAYERS: &[(&str, &[&str])] = &[
 
 /// Modules that read no file, no clock, no environment and print nothing.
 const PURE: &[&str] =
-    &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "program"];
+    &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "program", "procedure"];
 
 /// What a pure module must not name.
 const IMPURE: &[&str] = &[

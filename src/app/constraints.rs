@@ -3,20 +3,26 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use super::Console;
-use super::assess::{direct_summary, joint_summaries};
-use super::checks;
-use super::estimate::{self, Finished, SampleName, Special, identification_failure, nominal_targets, warning};
-use super::identify::{calibration, deliver};
+use super::identify::deliver;
 use super::load::{self, LoadedProfile};
-use super::result::{self, Context};
+use super::progress::Progress;
+use super::{Console, estimation_settings};
 use crate::cli::ConstraintsArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{DirectErrors, FittedSetup, fit_setup};
 use crate::identification::{
     ArmModel, Identification, Length, LengthEnd, Observations, Problem, Settings, SharedPoint, TargetAt, Weighting,
+    identify,
 };
 use crate::kinematics::FreeParameter;
+use crate::procedure::assess::{direct_summary, joint_summaries};
+use crate::procedure::identify::calibration;
+use crate::procedure::result::{self, Context};
+use crate::procedure::summary::{Finished, SampleName, Special};
+use crate::procedure::{
+    EstimationSettings, checks, identification_failure, input_file, joint_types, nominal_targets, target_parameters,
+    warning,
+};
 use crate::session::constraints::{Constraints, SharedPoints, read_constraints_bytes};
 use crate::session::filter::Filter;
 use crate::session::summary::{ModelSummary, VerificationMode, VerificationSummary};
@@ -43,7 +49,7 @@ pub(super) fn run<O: Write, E: Write>(
     }
     let bytes = store::read(&args.measurements).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = args.measurements.display().to_string();
-    let table = read_constraints_bytes(&bytes, &file, &load::joint_types(&loaded.profile))
+    let table = read_constraints_bytes(&bytes, &file, &joint_types(&loaded.profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     let (columns, table_warnings) = match &table {
         Constraints::SharedPoints(shared) => (&shared.columns, &shared.warnings),
@@ -88,7 +94,7 @@ pub(super) fn run<O: Write, E: Write>(
     let setup = Setup::new(args, &loaded);
     let found = setup.identify(&identification.observations, console)?;
     let problem = setup.problem(&identification.observations);
-    let context = Context { level: estimation.level, expected: None };
+    let context = Context { level: setup.estimation.level, expected: None };
     warnings.extend(result::result_warnings(&problem, &found, &setup.settings, context));
     let of_identification = warnings.clone();
     let mut verification = if args.verify_rest {
@@ -116,10 +122,11 @@ pub(super) fn run<O: Write, E: Write>(
     let special = special(args);
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let finished = Finished {
-        args: estimation,
-        loaded: &loaded,
-        inputs: vec![load::input_file("identification", file, &bytes)],
-        settings: &setup.settings,
+        profile: &loaded.profile,
+        profile_text: &loaded.text,
+        created: load::now(),
+        inputs: vec![input_file("identification", file, &bytes)],
+        settings: &setup.estimation,
         special,
         found: &found,
         names: &identification.names,
@@ -228,6 +235,7 @@ fn shared_points(
 /// What stays the same over all identifications of one command.
 struct Setup<'a> {
     loaded: &'a LoadedProfile,
+    estimation: EstimationSettings,
     parameters: Vec<FreeParameter>,
     targets: Vec<nalgebra::Point3<f64>>,
     settings: Settings,
@@ -235,11 +243,13 @@ struct Setup<'a> {
 
 impl<'a> Setup<'a> {
     fn new(args: &ConstraintsArgs, loaded: &'a LoadedProfile) -> Self {
+        let estimation = estimation_settings(&args.estimation, Weighting::Covariance);
         Self {
             loaded,
-            parameters: estimate::parameters(&args.estimation, &loaded.profile),
+            parameters: estimation.parameters(&loaded.profile),
             targets: nominal_targets(&loaded.profile),
-            settings: estimate::settings(&args.estimation, Weighting::Covariance, &loaded.profile, None),
+            settings: estimation.solver(&loaded.profile, None),
+            estimation,
         }
     }
 
@@ -257,13 +267,15 @@ impl<'a> Setup<'a> {
         observations: &Observations,
         console: &mut Console<O, E>,
     ) -> Result<Identification, Failure> {
-        estimate::solve(&self.problem(observations), &self.settings, console)
+        let mut progress = Progress::new(&mut console.err);
+        identify(&self.problem(observations), &self.settings, &mut |iteration| progress.step(iteration))
+            .map_err(|error| identification_failure(&error))
     }
 
     /// The nominal arm with its target fitted.
     fn nominal(&self, observations: &Observations) -> Result<FittedSetup, Failure> {
         let model = ArmModel { chain: self.loaded.profile.chain().clone(), targets: self.targets.clone() };
-        fit_setup(&model, &estimate::target_parameters(&self.parameters), observations)
+        fit_setup(&model, &target_parameters(&self.parameters), observations)
             .map_err(|error| identification_failure(&error))
     }
 

@@ -1,23 +1,23 @@
 //! `trupose identify`.
 
 use std::io::Write;
+use std::ops::ControlFlow;
 use std::path::Path;
 
-use super::assess::point_verification;
-use super::estimate::{self, Finished, SampleName, Special, nominal_targets};
-use super::result::{self, Context};
-use super::{Console, checks, load, to_json};
-use crate::cli::{EstimationArgs, IdentifyArgs, WeightingArg};
+use super::load::now;
+use super::progress::Progress;
+use super::{Console, estimation_settings, load, to_json};
+use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
-use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{ArmModel, Identification, Observations, PointSample, Problem, TargetAt, Weighting};
-use crate::profile::{Level, Profile};
+use crate::procedure::checks;
+use crate::procedure::identify::{IdentifyRequest, NamedSample, SampleSet, identify};
+use crate::profile::Profile;
 use crate::report;
-use crate::session::calibration::{self, Calibration, SampleText};
+use crate::session::TableProblem;
+use crate::session::calibration::Calibration;
 use crate::session::measurements::Row;
-use crate::session::summary::{IdentificationSummary, VerdictStatus, VerificationMode, VerificationSummary, Warning};
+use crate::session::summary::{IdentificationSummary, VerdictStatus, VerificationMode};
 use crate::store;
-use crate::units::to_mm;
 
 pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let estimation = &args.estimation;
@@ -31,157 +31,60 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     let (rows, rest) = load::split(&identification.table, filter.as_ref())?;
     let verification =
         args.verify.as_ref().map(|path| load::measurements(path, args.layout, profile, "verification")).transpose()?;
-    let (verification_rows, basis) = match &verification {
-        Some(loaded) => (load::split(&loaded.table, None)?.0, format!("'{}', same set-up", loaded.input.file)),
-        None if args.verify_rest => (rest, "the rows that '--use' leaves out".to_owned()),
-        None => (Vec::new(), String::new()),
+    let (verification_rows, basis, verification_mode) = match &verification {
+        Some(loaded) => {
+            let basis = format!("'{}', same set-up", loaded.input.file);
+            (load::split(&loaded.table, None)?.0, basis, VerificationMode::File)
+        }
+        None if args.verify_rest => (rest, "the rows that '--use' leaves out".to_owned(), VerificationMode::Rest),
+        None => (Vec::new(), String::new(), VerificationMode::None),
     };
-    if (args.verify_rest || verification.is_some()) && verification_rows.is_empty() {
+    if verification_mode != VerificationMode::None && verification_rows.is_empty() {
         return Err(Failure::new(ExitStatus::Usage, "no row is left for the verification")
             .hint("'--use' must leave some rows out"));
     }
 
-    let samples = load::samples(&rows, profile)?;
-    let verification_samples = load::samples(&verification_rows, profile)?;
-    let names: Vec<SampleName> = rows.iter().map(|row| SampleName { pose: row.pose.clone(), line: row.line }).collect();
-    let parameters = estimate::parameters(estimation, profile);
-    let targets = nominal_targets(profile);
-    let observations = Observations { points: samples, ..Observations::default() };
-    let problem =
-        Problem { chain: profile.chain(), targets: &targets, parameters: &parameters, observations: &observations };
-
     // With two files in play, what is said about rows names the file.
     let file = verification.as_ref().map(|_| identification.input.file.as_str());
-    let mut warnings = checks::table_warnings(file, &identification.table.warnings);
-    warnings.extend(checks::limit_warning(profile, file, configurations(&rows)));
-    let expected = estimate::parameters_of(Level::Geometric, estimation, profile);
-    let compared = checks::check_plausibility(&Problem { parameters: &expected, ..problem })?;
-    warnings.extend(compared.warning);
-
-    let distance = observations.points.iter().map(|sample| sample.point.coords.norm()).sum::<f64>()
-        / observations.points.len().max(1) as f64;
-    let weighting = match args.weighting {
-        WeightingArg::Covariance => Weighting::Covariance,
-        WeightingArg::Uniform => Weighting::Uniform,
-    };
-    let settings = estimate::settings(estimation, weighting, profile, Some(distance));
-    let found = estimate::solve(&problem, &settings, console)?;
-    let context = Context { level: estimation.level, expected: Some(compared.expected) };
-    warnings.extend(result::result_warnings(&problem, &found, &settings, context));
-
-    let nominal = nominal_setup(&problem, &found)?;
-    let of_identification = warnings.clone();
+    let set = sample_set(&rows, profile, file, &identification.table.warnings)?;
     let file = verification.as_ref().map(|loaded| loaded.input.file.as_str());
-    if let Some(loaded) = &verification {
-        warnings.extend(checks::table_warnings(file, &loaded.table.warnings));
-    }
-    warnings.extend(checks::limit_warning(profile, file, configurations(&verification_rows)));
-    let mut checked = verify(profile, &nominal, &found, &verification_samples, basis);
-    if let Some(checked) = &mut checked {
-        let places = |samples: &[PointSample]| samples.iter().map(|sample| sample.at.clone()).collect::<Vec<_>>();
-        let (known, tested) = (places(&observations.points), places(&verification_samples));
-        let doubts = checks::set_warnings(profile.chain().joints(), &known, &tested);
-        checked.independent = checks::is_independent(&doubts);
-        warnings.extend(doubts);
-        warnings.extend(checks::few_warning(checked.samples));
-    }
-    warnings.sort_by_key(|warning| !warning.blocks_acceptance);
-    let unusable = result::is_unusable(&warnings, &found, &settings);
-    let special = Special {
-        layout: Some(args.layout.to_string()),
-        verification: match (&verification, args.verify_rest) {
-            (Some(_), _) => VerificationMode::File,
-            (None, true) => VerificationMode::Rest,
-            (None, false) => VerificationMode::None,
-        },
-        ..Special::default()
-    };
+    let odd = verification.as_ref().map_or(&[][..], |loaded| &loaded.table.warnings);
+    let verification_set = sample_set(&verification_rows, profile, file, odd)?;
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
-    let finished = Finished {
-        args: estimation,
-        loaded: &loaded,
+    let request = IdentifyRequest {
+        profile: loaded.profile,
+        profile_text: loaded.text,
+        created: now(),
         inputs,
-        settings: &settings,
-        special,
-        found: &found,
-        names: &names,
-        warnings,
-        verification: checked,
+        settings: estimation_settings(estimation, args.weighting.into()),
+        identification: set,
+        verification: verification_set,
+        basis,
+        verification_mode,
+        layout: Some(args.layout.to_string()),
     };
-    let summary = finished.summary();
-    let calibration =
-        (!unusable).then(|| calibration(&summary, &loaded.text, &nominal, &problem, of_identification, Some(&found)));
-    deliver(summary, calibration.as_ref(), estimation, console)
+    let mut progress = Progress::new(&mut console.err);
+    let identified = identify(&request, &mut |iteration| {
+        progress.step(iteration);
+        ControlFlow::Continue(())
+    })?;
+    deliver(identified.summary, identified.calibration.as_ref(), estimation, console)
 }
 
-/// Line and configuration of rows.
-pub(super) fn configurations<'a>(rows: &[&'a Row]) -> impl Iterator<Item = (usize, &'a [f64])> {
-    rows.iter().map(|row| (row.line, row.configuration.as_slice()))
-}
-
-/// The nominal arm with frame and free target fitted to the accepted identification samples.
-fn nominal_setup(problem: &Problem<'_>, found: &Identification) -> Result<FittedSetup, Failure> {
-    let points: Vec<PointSample> = problem
-        .observations
-        .points
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| !found.is_rejected(*index))
-        .map(|(_, sample)| sample.clone())
-        .collect();
-    let accepted = Observations { points, ..problem.observations.clone() };
-    let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
-    fit_setup(&model, &estimate::target_parameters(problem.parameters), &accepted)
-        .map_err(|error| estimate::identification_failure(&error))
-}
-
-fn verify(
+/// The samples of rows with their names; `file` is named where there are several.
+fn sample_set(
+    rows: &[&Row],
     profile: &Profile,
-    nominal: &FittedSetup,
-    found: &Identification,
-    samples: &[PointSample],
-    basis: String,
-) -> Option<VerificationSummary> {
-    let nominal = ModelErrors::new(&nominal.model, &nominal.base_from_station, samples)?;
-    let identified = ModelErrors::new(&found.model, &found.base_from_station, samples)?;
-    Some(point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, "none"))
-}
-
-/// The calibration file of a result; `warnings` are those about the identification itself.
-pub(super) fn calibration(
-    summary: &IdentificationSummary,
-    profile_text: &str,
-    nominal: &FittedSetup,
-    problem: &Problem<'_>,
-    warnings: Vec<Warning>,
-    found: Option<&Identification>,
-) -> Calibration {
-    let station = found.and_then(|found| found.base_from_station.first());
-    let joints = problem.chain.joints();
-    let sample = |at: &TargetAt| {
-        let values = at.configuration.iter().zip(joints);
-        SampleText::new(at.target, values.map(|(value, joint)| joint.joint_type.quantity().to_edge(*value)))
-    };
-    Calibration {
-        schema: calibration::SCHEMA,
-        provenance: summary.provenance.clone(),
-        settings: summary.settings.clone(),
-        sigma: summary.sigma.clone(),
-        verdict: summary.verdict.clone(),
-        warnings,
-        rank: summary.rank,
-        parameters: summary.parameters.clone(),
-        base_from_station: station.map(Into::into),
-        nominal_base_from_station: nominal.base_from_station.first().map(Into::into),
-        nominal_targets_mm: nominal
-            .model
-            .targets
-            .iter()
-            .map(|point| (to_mm(point.x), to_mm(point.y), to_mm(point.z)))
-            .collect(),
-        samples: problem.observations.places().map(sample).collect(),
-        profile: profile_text.to_owned(),
-    }
+    file: Option<&str>,
+    odd: &[TableProblem],
+) -> Result<SampleSet, Failure> {
+    let samples = load::samples(rows, profile)?;
+    let named = |(row, sample): (&&Row, _)| NamedSample { pose: row.pose.clone(), line: row.line, sample };
+    Ok(SampleSet {
+        samples: rows.iter().zip(samples).map(named).collect(),
+        file: file.map(str::to_owned),
+        warnings: checks::table_warnings(file, odd),
+    })
 }
 
 /// Writes the result files and prints the summary: also where writing fails, so that the numbers are not lost. Without a

@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
-use sha2::{Digest as _, Sha256};
-
 use crate::error::{ExitStatus, Failure};
 use crate::identification::{PointSample, TargetAt};
-use crate::kinematics::JointType;
+use crate::procedure::{input_file, joint_types};
 use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, Measurements, Row, read_bytes_as};
@@ -19,11 +17,6 @@ pub(super) struct LoadedProfile {
     pub(super) profile: Profile,
     pub(super) text: String,
     pub(super) warnings: Vec<Diagnostic>,
-}
-
-/// SHA-256 in hexadecimal.
-pub(super) fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
 }
 
 /// The text of a file.
@@ -77,16 +70,6 @@ pub(super) fn measurements(path: &Path, layout: Layout, profile: &Profile, role:
     let table = read_bytes_as(layout, &bytes, &file, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     Ok(LoadedTable { table, input: input_file(role, file, &bytes) })
-}
-
-/// The record of an input file.
-pub(super) fn input_file(role: &str, file: String, bytes: &[u8]) -> InputFile {
-    InputFile { role: role.to_owned(), file, sha256: sha256(bytes) }
-}
-
-/// The joint types of a profile's arm.
-pub(super) fn joint_types(profile: &Profile) -> Vec<JointType> {
-    profile.chain().joints().iter().map(|joint| joint.joint_type).collect()
 }
 
 /// A filter and whether it fits the columns of a table.

@@ -3,13 +3,14 @@
 use std::f64::consts::PI;
 use std::io::Write;
 
-use super::cell::cell;
 use super::{Console, load};
 use crate::cli::ProgramArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::kinematics::{Joint, JointType};
 use crate::planning::CellError;
 use crate::planning::collision::ArmShape;
+use crate::procedure::cell::cell;
+use crate::procedure::joint_types;
 use crate::profile::Profile;
 use crate::program::{Options, Pause, Robot, write};
 use crate::session::plan::{self, PlannedPose};
@@ -20,7 +21,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
     let profile = &loaded.profile;
     let bytes = store::read(&args.plan).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = args.plan.display().to_string();
-    let listed = plan::read_bytes(&bytes, &file, &load::joint_types(profile))
+    let listed = plan::read_bytes(&bytes, &file, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     for problem in &listed.warnings {
         console.remark(&format!("note: {problem}"));
@@ -97,7 +98,7 @@ fn dangers(profile: &Profile, rows: &[PlannedPose]) -> Result<Vec<String>, Failu
     };
     let joints = profile.chain().joints().iter().zip(profile.joints());
     let limits = joints.map(|(joint, range)| wide(joint, range.limits)).collect();
-    let cell = cell(profile, limits, None, false)?;
+    let cell = cell(profile, limits, None, true)?;
     let shape = ArmShape::new(profile.chain(), &cell, 0.0).map_err(|error| usage(&error))?;
     let poses = rows.iter().filter_map(|row| {
         let obstruction = shape.check(&row.configuration).err()?;

@@ -4,16 +4,16 @@ use std::io::Write;
 
 use nalgebra::{Isometry3, Point3};
 
-use super::assess::{point_verification, verdict};
-use super::checks::{self, Compared};
-use super::estimate::{identification_failure, nominal_targets, provenance, warning};
-use super::identify::{configurations, exit_status};
+use super::identify::exit_status;
 use super::{Console, load, to_json};
 use crate::cli::{RefitArg, VerifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{ArmModel, Observations, PointSample, Problem, TargetAt};
 use crate::kinematics::{FreeParameter, ParameterId};
+use crate::procedure::assess::{point_verification, verdict};
+use crate::procedure::checks::{self, Compared};
+use crate::procedure::{identification_failure, input_file, nominal_targets, provenance, warning};
 use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
@@ -51,7 +51,8 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     };
     let (nominal_errors, identified_errors) = (errors(&nominal)?, errors(&identified)?);
     let mut warnings = checks::table_warnings(None, &measured.table.warnings);
-    warnings.extend(checks::limit_warning(profile, None, configurations(&rows)));
+    let configurations = rows.iter().map(|row| (row.line, row.configuration.as_slice()));
+    warnings.extend(checks::limit_warning(profile, None, configurations));
     warnings.extend(carried_over(&calibration));
     warnings.extend(plausible.and_then(|compared| compared.warning));
     let (refit, basis, fitted) = match args.refit {
@@ -83,10 +84,10 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         refit,
     );
     verification.independent = checks::is_independent(&warnings);
-    let inputs = vec![load::input_file("calibration", file, text.as_bytes()), measured.input];
+    let inputs = vec![input_file("calibration", file, text.as_bytes()), measured.input];
     let report = VerificationReport {
         schema: SCHEMA,
-        provenance: provenance(profile, &calibration.profile, inputs),
+        provenance: provenance(profile, &calibration.profile, load::now(), inputs),
         verdict: verdict(profile.acceptance(), Some(&verification), &warnings),
         warnings,
         verification,

@@ -86,4 +86,7 @@ pub enum IdentificationError {
     /// The solver ran into numbers that are not finite.
     #[error("the solver ran into numbers that are not finite; the data do not describe this robot")]
     Diverged,
+    /// Whoever watched the progress asked to stop.
+    #[error("the identification was cancelled")]
+    Cancelled,
 }

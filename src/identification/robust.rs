@@ -9,6 +9,8 @@
 //! otherwise hardly moves has all the say about its own parameters: its plain residual is zero, its studentised one is not,
 //! because the expected deviations disagree.
 
+use std::ops::ControlFlow;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, SymmetricEigen, Vector3};
 
 use super::linearise::{Evaluation, Weights, point_residuals, project};
@@ -261,7 +263,8 @@ fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Weights, floor: f64, ref
     let mut at = from;
     let mut seen: Vec<Weights> = Vec::new();
     let mut scatter = floor;
-    let fit = |weights: &Weights, z| Solve { weights, ..*solve }.run(z, SEARCH_STEPS, &mut |_| {}).0;
+    let fit =
+        |weights: &Weights, z| Solve { weights, ..*solve }.run(z, SEARCH_STEPS, &mut |_| ControlFlow::Continue(())).0;
     for round in 0..ROUNDS {
         if round > 0 || refit {
             at = fit(&weights, at.z);

@@ -4,6 +4,8 @@
 //! the maximum a posteriori estimate. Without it, `T` spans the directions that the nominal model can see, in rad and mm, so
 //! that the result is the deviation without any part in a blind direction: the paper's minimum-norm solution, iterated.
 
+use std::ops::ControlFlow;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::linearise::length_rows;
@@ -190,12 +192,12 @@ impl Solve<'_, '_> {
         Err(if at.cost.is_finite() { TerminationReason::NoImprovement } else { TerminationReason::NonFinite })
     }
 
-    /// Steps until converged or `limit` steps were taken; `record` sees each as it is taken.
+    /// Steps until converged or `limit` steps were taken; `record` sees each as it is taken and may ask to stop there.
     pub(crate) fn run(
         &self,
         start: DVector<f64>,
         limit: usize,
-        record: &mut dyn FnMut(Iteration),
+        record: &mut dyn FnMut(Iteration) -> ControlFlow<()>,
     ) -> (Linearised, TerminationReason) {
         let mut at = self.linearise(start);
         let mut last_step = 0.0;
@@ -207,9 +209,12 @@ impl Solve<'_, '_> {
                     let left = step.step * (step.step / last_step).min(1.0);
                     let converged = step.damping == 0.0 && left <= STEP_TOLERANCE || step.negligible;
                     last_step = step.step;
-                    record(step);
+                    let flow = record(step);
                     if converged {
                         return (at, TerminationReason::Converged);
+                    }
+                    if flow.is_break() {
+                        break;
                     }
                 }
                 Err(reason) => return (at, reason),

@@ -1,10 +1,11 @@
 //! How large the deviations of an arm are expected to be: the prior, and the scale between metres and radians.
 
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
 use super::Target;
-use crate::kinematics::{JointType, KinematicChain, LinkParameter, ParameterId};
-use crate::units::{MILLIMETRE, MILLIRADIAN};
+use crate::kinematics::{FreeParameter, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, MILLIRADIAN, Quantity};
 
 /// Standard deviations of the zero-mean prior (m) and (rad), each above zero.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +52,66 @@ impl ExpectedDeviations {
                     (LinkParameter::Alpha | LinkParameter::Theta | LinkParameter::Beta, _) => self.angle,
                 }
             }
+        }
+    }
+}
+
+/// Expected deviation of all lengths (m) and all angles (rad) of the links, given by the operator instead of the profile's. Its
+/// text reads like `1mm,0.1deg`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExpectedDeviation {
+    /// Of every length (m).
+    pub length: f64,
+    /// Of every angle (rad).
+    pub angle: f64,
+}
+
+impl ExpectedDeviation {
+    /// Replaces the expected deviations of the link constants among `parameters`; targets keep theirs.
+    pub fn replace_in(self, parameters: &mut [FreeParameter]) {
+        for parameter in parameters.iter_mut().filter(|parameter| matches!(parameter.id, ParameterId::Link { .. })) {
+            parameter.expected = match parameter.id.quantity() {
+                Quantity::Length => self.length,
+                Quantity::Angle => self.angle,
+            };
+        }
+    }
+}
+
+impl FromStr for ExpectedDeviation {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        const LENGTHS: [(&str, f64); 3] = [("mm", MILLIMETRE), ("um", MICROMETRE), ("m", 1.0)];
+        const ANGLES: [(&str, f64); 3] = [("deg", DEGREE), ("mrad", MILLIRADIAN), ("rad", 1.0)];
+        let expected =
+            || format!("'{text}' is not a length and an angle; write for example '1mm,0.1deg' (mm, um; deg, mrad)");
+        let quantity = |text: &str, units: &[(&str, f64)]| {
+            units.iter().find_map(|(unit, size)| {
+                let number: f64 = text.trim().strip_suffix(unit)?.trim().parse().ok()?;
+                (number.is_finite() && number > 0.0).then_some(number * size)
+            })
+        };
+        let (length, angle) = text.split_once(',').ok_or_else(expected)?;
+        match (quantity(length, &LENGTHS), quantity(angle, &ANGLES)) {
+            (Some(length), Some(angle)) => Ok(Self { length, angle }),
+            _ => Err(expected()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn expected_deviations_have_units() {
+        let parsed: ExpectedDeviation = "1mm,0.1deg".parse().unwrap();
+        assert_eq!(parsed, ExpectedDeviation { length: MILLIMETRE, angle: 0.1 * DEGREE });
+        let parsed: ExpectedDeviation = "500 um, 5mrad".parse().unwrap();
+        assert_eq!(parsed, ExpectedDeviation { length: 500.0 * MICROMETRE, angle: 5.0 * MILLIRADIAN });
+        for wrong in ["1,0.1", "1mm", "1deg,1mm", "-1mm,1deg", "nanmm,1deg", "1mm,0deg"] {
+            assert!(wrong.parse::<ExpectedDeviation>().is_err(), "{wrong}");
         }
     }
 }

@@ -8,6 +8,11 @@ use std::thread;
 
 use crate::planning::{Chosen, PlanningError, Progress, Search, Stage};
 
+/// Threads that the machine can run at once: one per core, as far as is known.
+pub fn available_threads() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}
+
 /// Runs a search on up to `threads` threads named `search-0`, `search-1`, …; the calling thread waits.
 ///
 /// `keep_going` is asked before every exchange and may come from any thread; once it says no, the best set so far is returned.

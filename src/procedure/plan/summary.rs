@@ -1,7 +1,7 @@
 //! The numbers of a planned or checked set: its score, what it is compared with, what stays weak.
 
+use super::super::{provenance, warning};
 use super::{Planner, RANDOM_SETS, SIZES, planning_failure};
-use crate::app::estimate::{provenance, warning};
 use crate::error::Failure;
 use crate::planning::candidates::Rejections;
 use crate::planning::{DesignBound, Information, PlanningError, Score, Spread, TradeOff, Yardstick, trade_off};
@@ -25,10 +25,10 @@ impl Planner<'_> {
         let score = Score::new(information, set).map_err(failure)?;
         let measured: Vec<usize> = (0..required).collect();
         let mut warnings = Vec::new();
-        let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.args.seed).map_err(failure)?;
+        let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.request.seed).map_err(failure)?;
         let bound = DesignBound::new(information, &|| true);
         let d_efficiency = bound.efficiency(information, set).map_err(failure)?;
-        let sizes = trade_off(information, &measured, &SIZES, self.args.seed, &|| true).map_err(failure)?;
+        let sizes = trade_off(information, &measured, &SIZES, self.request.seed, &|| true).map_err(failure)?;
         let sigma = self.sigma();
         if sigma.is_none() {
             let text = "the sigma of the instrument is not known, so nothing is said in mm and about weak parameters: give '--sigma-mm', or 'instrument' in the profile";
@@ -44,7 +44,7 @@ impl Planner<'_> {
         }
         Ok(PlanSummary {
             schema: SCHEMA,
-            provenance: provenance(self.profile(), &self.loaded.text, Vec::new()),
+            provenance: provenance(self.profile, self.profile_text, self.request.created.clone(), Vec::new()),
             objective: None,
             warnings,
             identification_poses: set.len(),

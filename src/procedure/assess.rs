@@ -11,12 +11,12 @@ use crate::session::summary::{
 };
 use crate::units::to_mm;
 
-pub(super) fn statistics(statistics: &ErrorStatistics) -> StatisticsSummary {
+pub(crate) fn statistics(statistics: &ErrorStatistics) -> StatisticsSummary {
     let ErrorStatistics { count, mean, rms, p95, max } = *statistics;
     StatisticsSummary { count, mean: to_mm(mean), rms: to_mm(rms), p95: to_mm(p95), max: to_mm(max) }
 }
 
-pub(super) fn model_summary(errors: &ModelErrors) -> ModelSummary {
+pub(crate) fn model_summary(errors: &ModelErrors) -> ModelSummary {
     ModelSummary {
         position_mm: Some(statistics(&errors.position)),
         axis_mm: Some(AxisSummary { mean: errors.axis_mean.map(to_mm), max: errors.axis_max.map(to_mm) }),
@@ -25,7 +25,7 @@ pub(super) fn model_summary(errors: &ModelErrors) -> ModelSummary {
     }
 }
 
-pub(super) fn direct_summary(errors: &DirectErrors) -> ModelSummary {
+pub(crate) fn direct_summary(errors: &DirectErrors) -> ModelSummary {
     ModelSummary {
         position_mm: None,
         axis_mm: None,
@@ -35,7 +35,7 @@ pub(super) fn direct_summary(errors: &DirectErrors) -> ModelSummary {
 }
 
 /// Errors of the identified model against each joint.
-pub(super) fn joint_summaries(
+pub(crate) fn joint_summaries(
     joints: &[Joint],
     configurations: &[&[f64]],
     vectors: &[nalgebra::Vector3<f64>],
@@ -65,7 +65,7 @@ pub(super) fn joint_summaries(
 }
 
 /// A verification by points.
-pub(super) fn point_verification(
+pub(crate) fn point_verification(
     joints: &[Joint],
     samples: &[PointSample],
     nominal: &ModelErrors,
@@ -86,7 +86,7 @@ pub(super) fn point_verification(
 }
 
 /// Compares a verification with the acceptance limits of the profile.
-pub(super) fn verdict(
+pub(crate) fn verdict(
     acceptance: &Acceptance,
     verification: Option<&VerificationSummary>,
     warnings: &[Warning],
@@ -167,7 +167,7 @@ fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck
 
 #[cfg(test)]
 mod tests {
-    use super::super::estimate::warning;
+    use super::super::warning;
     use super::*;
 
     fn of(distance_mm: Option<f64>) -> VerificationSummary {

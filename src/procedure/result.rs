@@ -1,9 +1,9 @@
 //! What the result of an identification itself gives reason to warn about, and when it is of no use.
 
-use super::estimate::warning;
-use crate::cli::LevelArg;
+use super::warning;
 use crate::identification::plausibility::weaknesses;
 use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason};
+use crate::profile::Level;
 use crate::report::number;
 use crate::session::summary::Warning;
 use crate::units::{MILLIMETRE, to_mm};
@@ -26,15 +26,15 @@ const MANY_REJECTED: f64 = 0.2;
 
 /// What is known about a problem besides its data.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Context {
+pub(crate) struct Context {
     /// What is identified.
-    pub(super) level: LevelArg,
+    pub(crate) level: Level,
     /// Root mean square residual (m) that the expected deviations of all link constants explain, where points tell.
-    pub(super) expected: Option<f64>,
+    pub(crate) expected: Option<f64>,
 }
 
 /// What the result itself gives reason to warn about.
-pub(super) fn result_warnings(
+pub(crate) fn result_warnings(
     problem: &Problem<'_>,
     found: &Identification,
     settings: &Settings,
@@ -50,7 +50,7 @@ pub(super) fn result_warnings(
         .collect();
     let residual = found.sigma.from_residuals.unwrap_or(0.0);
     let explained = context.expected.map_or(0.0, |expected| FIXED_CONSTANTS * expected / 3.0_f64.sqrt());
-    if residual > NONSENSE_RESIDUAL && context.level == LevelArg::Offsets && residual <= explained {
+    if residual > NONSENSE_RESIDUAL && context.level == Level::Offsets && residual <= explained {
         let message = format!(
             "joint offsets alone leave {} mm per coordinate, as much as the other link constants are expected to cause; '--level geometric' identifies those too",
             number(to_mm(residual), 3)
@@ -137,7 +137,7 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
 }
 
 /// Whether `found` with its warnings is of no use; a limit on the steps that the operator asked for is no defect.
-pub(super) fn is_unusable(warnings: &[Warning], found: &Identification, settings: &Settings) -> bool {
+pub(crate) fn is_unusable(warnings: &[Warning], found: &Identification, settings: &Settings) -> bool {
     let as_asked =
         found.termination == TerminationReason::IterationLimit && settings.iterations < Settings::default().iterations;
     warnings

@@ -1,7 +1,7 @@
 //! What `identify`, `verify` and `constraints` check about their data in the same way: odd rows, joint limits, mistakes in a
 //! whole table, and whether the verification samples are independent, enough, and where the identification samples are.
 
-use super::estimate::{identification_failure, warning};
+use super::{identification_failure, warning};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::plausibility::compare_with_nominal;
 use crate::identification::verification::{CoverageGap, coverage_gaps};
@@ -14,7 +14,7 @@ use crate::session::summary::Warning;
 use crate::units::{Quantity, to_mm};
 
 /// Verification samples that were also identification samples.
-pub(super) const NOT_INDEPENDENT: &str = "not_independent";
+pub(crate) const NOT_INDEPENDENT: &str = "not_independent";
 /// Fewer verification samples than this rule acceptance out.
 const TOO_FEW_SAMPLES: usize = 5;
 /// Fewer verification samples than this say little about the largest error.
@@ -25,13 +25,13 @@ const SAME_JOINT_VALUE: f64 = 0.01;
 const SHOWN: usize = 3;
 
 /// What the reader of a table found odd; `file` names it where there are several.
-pub(super) fn table_warnings(file: Option<&str>, problems: &[TableProblem]) -> Vec<Warning> {
+pub(crate) fn table_warnings(file: Option<&str>, problems: &[TableProblem]) -> Vec<Warning> {
     let place = file.map_or_else(String::new, |file| format!("'{file}', "));
     problems.iter().map(|problem| warning("table", format!("{place}{problem}"), false)).collect()
 }
 
 /// Rows, as line and configuration, whose joints are outside the limits of the profile.
-pub(super) fn limit_warning<'a>(
+pub(crate) fn limit_warning<'a>(
     profile: &Profile,
     file: Option<&str>,
     rows: impl IntoIterator<Item = (usize, &'a [f64])>,
@@ -67,15 +67,15 @@ pub(super) fn limit_warning<'a>(
 
 /// What a comparison with the nominal robot says.
 #[derive(Debug)]
-pub(super) struct Compared {
+pub(crate) struct Compared {
     /// Root mean square residual that the expected deviations explain (m).
-    pub(super) expected: f64,
-    pub(super) warning: Option<Warning>,
+    pub(crate) expected: f64,
+    pub(crate) warning: Option<Warning>,
 }
 
 /// Refuses points that a known mistake explains better than this robot does. `problem` frees all that the robot may deviate in,
 /// whatever is to be identified.
-pub(super) fn check_plausibility(problem: &Problem<'_>) -> Result<Compared, Failure> {
+pub(crate) fn check_plausibility(problem: &Problem<'_>) -> Result<Compared, Failure> {
     let plausibility = compare_with_nominal(problem).map_err(|error| identification_failure(&error))?;
     let expected = plausibility.expected;
     if plausibility.is_plausible() {
@@ -97,7 +97,7 @@ pub(super) fn check_plausibility(problem: &Problem<'_>) -> Result<Compared, Fail
 }
 
 /// What is doubtful about a pair of identification and verification sets.
-pub(super) fn set_warnings(joints: &[Joint], known: &[TargetAt], tested: &[TargetAt]) -> Vec<Warning> {
+pub(crate) fn set_warnings(joints: &[Joint], known: &[TargetAt], tested: &[TargetAt]) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let shared = shared_samples(joints, known, tested);
     if shared > 0 {
@@ -115,12 +115,12 @@ pub(super) fn set_warnings(joints: &[Joint], known: &[TargetAt], tested: &[Targe
 }
 
 /// Whether `warnings` say that the verification samples are not independent.
-pub(super) fn is_independent(warnings: &[Warning]) -> bool {
+pub(crate) fn is_independent(warnings: &[Warning]) -> bool {
     warnings.iter().all(|warning| warning.code != NOT_INDEPENDENT)
 }
 
 /// Too few verification samples.
-pub(super) fn few_warning(samples: usize) -> Option<Warning> {
+pub(crate) fn few_warning(samples: usize) -> Option<Warning> {
     (samples < FEW_SAMPLES).then(|| {
         let message = format!("only {}: the largest error is hardly known", counted(samples));
         warning("few_verification_samples", message, samples < TOO_FEW_SAMPLES)

@@ -1,0 +1,67 @@
+//! The cell of a profile as planning sees it.
+
+use crate::error::{ExitStatus, Failure};
+use crate::planning::{Body, BoxInBase, Cell, KeepOutBox, MountedTarget, TrackerStand};
+use crate::profile::Profile;
+
+/// The ranges of the joints (rad or m) that the profile plans in.
+///
+/// # Errors
+/// A joint without limits.
+pub(crate) fn planning_limits(profile: &Profile) -> Result<Vec<(f64, f64)>, Failure> {
+    let joints = profile.chain().joints().iter().zip(profile.joints());
+    joints
+        .map(|(joint, range)| {
+            range.planning_limits.or(range.limits).ok_or_else(|| {
+                Failure::new(
+                    ExitStatus::Usage,
+                    format!("joint '{}' has no limits in profile '{}'", joint.name, profile.name()),
+                )
+                .hint("poses are drawn from the joint ranges: give 'limits_deg' (or 'limits_mm') in the profile")
+            })
+        })
+        .collect()
+}
+
+/// The cell of a profile with these joint limits; without filters an empty one.
+pub(crate) fn cell(
+    profile: &Profile,
+    limits: Vec<(f64, f64)>,
+    region: Option<BoxInBase>,
+    filters: bool,
+) -> Result<Cell, Failure> {
+    let target =
+        profile.targets().first().ok_or_else(|| Failure::new(ExitStatus::Usage, "the profile has no target"))?;
+    let target = MountedTarget { position_in_flange: target.position_in_flange, axis_in_flange: target.axis_in_flange };
+    if !filters {
+        return Ok(Cell {
+            limits,
+            bodies: Vec::new(),
+            floor: None,
+            keep_out: Vec::new(),
+            tracker: None,
+            target,
+            region,
+        });
+    }
+    let body =
+        |body: &crate::profile::Capsule| Body { link: body.link, from: body.from, to: body.to, radius: body.radius };
+    let zone = |zone: &crate::profile::KeepOut| KeepOutBox {
+        name: zone.name.clone(),
+        space: BoxInBase { min: zone.min, max: zone.max },
+    };
+    let tracker = profile.tracker();
+    Ok(Cell {
+        limits,
+        bodies: profile.bodies().iter().map(body).collect(),
+        floor: profile.floor(),
+        keep_out: profile.keep_out().iter().map(zone).collect(),
+        tracker: Some(TrackerStand {
+            position_in_base: tracker.position_in_base,
+            acceptance_angle: tracker.acceptance_angle,
+            range: tracker.range,
+        }),
+        target,
+        region,
+    })
+}

@@ -1,0 +1,501 @@
+//! Which poses to measure, in which order, and how good a list of poses is.
+
+mod request;
+mod summary;
+
+use super::cell::{cell, planning_limits};
+use super::{joint_types, warning};
+use crate::error::{ExitStatus, Failure};
+use crate::identification::{ArmModel, TargetAt};
+use crate::kinematics::{FreeParameter, JointType, ParameterId};
+use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
+use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
+use crate::planning::{
+    Chosen, Information, JointBox, Objective, PlanningError, Score, Search, SearchSettings, low_discrepancy, random,
+    verification_set,
+};
+use crate::profile::Profile;
+use crate::runtime::search::{available_threads, plan_in_parallel};
+use crate::session::plan::{PlannedPose, PoseKind};
+use crate::session::plan_summary::{PlanSummary, PoseSummary, TimeSummary};
+use crate::session::summary::Warning;
+use crate::units::{from_mm, to_mm};
+pub use request::{PlanRequest, Progress};
+
+/// Configurations tried per candidate asked for: with ±30° of acceptance about one in twenty faces the tracker.
+const TRIES_PER_CANDIDATE: usize = 200;
+/// Fresh poses over which a prediction is averaged.
+const FRESH_POSES: usize = 1000;
+/// Random sets of equal size to compare with.
+const RANDOM_SETS: usize = 500;
+/// Sizes of the trade-off table.
+const SIZES: [usize; 9] = [20, 30, 40, 50, 60, 70, 80, 90, 100];
+/// Rounds of leaving out poses that cannot be reached and choosing again.
+const ROUNDS: usize = 8;
+/// Candidates offered as intermediate stops where a direct move is blocked.
+const VIAS: usize = 30;
+
+/// Chooses poses, orders and scores them. With [`PlanRequest::included`] these are the next best poses after those.
+///
+/// `keep_going` is asked during the search from any thread; once it says no, the plan is made of the best set so far and says
+/// that it was interrupted. `progress` is called from any thread too. The time it took is left to the caller.
+///
+/// # Errors
+/// The profile does not tell what planning needs, or no such plan exists.
+pub fn plan(
+    profile: &Profile,
+    profile_text: &str,
+    request: &PlanRequest,
+    keep_going: &(dyn Fn() -> bool + Sync),
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<PlanSummary, Failure> {
+    Planner::new(profile, profile_text, request)?.choose(keep_going, progress)
+}
+
+/// Scores the poses of a list, which is called `name` in messages. Of the request, how many poses to choose and what for does
+/// not matter.
+///
+/// # Errors
+/// As [`plan`]; no row of the list is to identify from.
+pub fn check(
+    profile: &Profile,
+    profile_text: &str,
+    request: &PlanRequest,
+    listed: &[PlannedPose],
+    name: &str,
+) -> Result<PlanSummary, Failure> {
+    Planner::new(profile, profile_text, request)?.check(listed, name)
+}
+
+/// Whether the profile tells what planning needs and the limits, region and clearance of the request make sense: what [`plan`]
+/// and [`check`] look at first.
+///
+/// # Errors
+/// It does not.
+pub fn check_request(profile: &Profile, request: &PlanRequest) -> Result<(), Failure> {
+    Planner::new(profile, "", request).map(drop)
+}
+
+/// The ranges of the joints (rad, sliding joints m) that are planned in where a request does not narrow them.
+///
+/// # Errors
+/// A joint has no limits in the profile.
+pub fn limits(profile: &Profile) -> Result<Vec<(f64, f64)>, Failure> {
+    planning_limits(profile)
+}
+
+/// The rows of a plan file, from the summary.
+pub fn rows(summary: &PlanSummary, joint_types: &[JointType]) -> Vec<PlannedPose> {
+    summary
+        .poses
+        .iter()
+        .map(|row| PlannedPose {
+            pose: row.pose.clone(),
+            kind: row.kind.parse().unwrap_or(PoseKind::Via),
+            configuration: joint_types
+                .iter()
+                .zip(&row.configuration)
+                .map(|(joint_type, value)| joint_type.quantity().from_edge(*value))
+                .collect(),
+            point_in_base: row
+                .point_in_base_mm
+                .map(|[x, y, z]| nalgebra::Point3::new(from_mm(x), from_mm(y), from_mm(z))),
+        })
+        .collect()
+}
+
+/// What stays the same over all ways of planning.
+struct Planner<'a> {
+    profile: &'a Profile,
+    profile_text: &'a str,
+    request: &'a PlanRequest,
+    model: ArmModel,
+    parameters: Vec<FreeParameter>,
+    joint_types: Vec<JointType>,
+    limits: Vec<(f64, f64)>,
+    filter: CandidateFilter<'a>,
+}
+
+/// A chosen set with its order.
+struct Ordered {
+    chosen: Chosen,
+    /// Poses to measure with their kinds, in the order of `Stops::poses`.
+    stops: Vec<(PoseKind, Candidate)>,
+    route: Route,
+}
+
+impl<'a> Planner<'a> {
+    fn new(profile: &'a Profile, profile_text: &'a str, request: &'a PlanRequest) -> Result<Self, Failure> {
+        let limits = request.limits.clone().map_or_else(|| planning_limits(profile), Ok)?;
+        let cell = cell(profile, limits.clone(), request.region, request.filters)?;
+        let filter = CandidateFilter::new(profile.chain(), &cell, request.clearance)
+            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        // The poses are for the first target: coordinates of others cannot be seen with it.
+        let is_seen = |parameter: &FreeParameter| match parameter.id {
+            ParameterId::Target { target, .. } => target == 0,
+            ParameterId::Link { .. } => true,
+        };
+        let mut parameters = profile.free_parameters(request.level);
+        parameters.retain(is_seen);
+        if let Some(expected) = request.expected_deviation {
+            expected.replace_in(&mut parameters);
+        }
+        Ok(Self {
+            profile,
+            profile_text,
+            request,
+            model: ArmModel { chain: profile.chain().clone(), targets: super::nominal_targets(profile) },
+            parameters,
+            joint_types: joint_types(profile),
+            limits,
+            filter,
+        })
+    }
+
+    /// Standard deviation of a coordinate (m) that predictions are for.
+    fn sigma(&self) -> Option<f64> {
+        let distance = self.profile.tracker().position_in_base.coords.norm();
+        let instrument = || self.profile.instrument().map(|instrument| instrument.sigma_at(distance));
+        self.request.sigma.or_else(instrument)
+    }
+
+    /// How fast the program will be.
+    fn pace(&self) -> Pace {
+        let max_speeds = self.profile.joints().iter().map(|joint| joint.max_speed).collect();
+        Pace { max_speeds, ..self.request.pace.clone() }
+    }
+
+    fn joint_box(&self) -> Result<JointBox, Failure> {
+        JointBox::new(self.limits.clone()).map_err(|error| planning_failure(&error))
+    }
+
+    fn information(&self, pool: &[Candidate]) -> Result<Information, Failure> {
+        let at = |configuration: Vec<f64>| TargetAt { configuration, target: 0 };
+        let candidates: Vec<TargetAt> = pool.iter().map(|candidate| at(candidate.configuration.clone())).collect();
+        let fresh: Vec<TargetAt> = random(&self.joint_box()?, !self.request.seed).take(FRESH_POSES).map(at).collect();
+        Information::new(&self.model, &self.parameters, &candidates, &fresh).map_err(|error| planning_failure(&error))
+    }
+
+    /// Candidates, those that must be in first.
+    fn candidates(&self, needed: usize, included: &[PlannedPose]) -> Result<Candidates, Failure> {
+        let count = self.request.candidates;
+        let joint_box = self.joint_box()?;
+        let stream = low_discrepancy(&joint_box, self.request.seed).take(count.saturating_mul(TRIES_PER_CANDIDATE));
+        let mut candidates = self
+            .filter
+            .collect_at_least(stream, count, needed)
+            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        let mut kept: Vec<Candidate> = included.iter().map(|row| self.candidate(&row.configuration)).collect();
+        kept.append(&mut candidates.kept);
+        candidates.kept = kept;
+        Ok(candidates)
+    }
+
+    /// What to say about the poses that are already measured.
+    fn included_warning(&self) -> Option<Warning> {
+        let included = self.request.included.iter();
+        let outside: Vec<String> =
+            included.filter(|row| self.is_outside(&row.configuration)).map(|row| row.pose.clone()).collect();
+        let text = || format!("measured poses outside the joint limits of the profile: {}", shortened(&outside));
+        (!outside.is_empty()).then(|| warning("joint_limits", text(), false))
+    }
+
+    /// Whether a configuration is outside the limits that the arm itself has.
+    fn is_outside(&self, configuration: &[f64]) -> bool {
+        let ranges = self.profile.joints().iter().zip(configuration);
+        ranges
+            .filter_map(|(range, value)| Some((range.limits?, value)))
+            .any(|((low, high), value)| !(low - 1e-9..=high + 1e-9).contains(value))
+    }
+
+    /// What makes a plan unfit to be run as it is.
+    fn safety_warnings(&self) -> Vec<Warning> {
+        if !self.request.filters {
+            let text = "no check of collisions and sight was made ('--no-filters'): such a plan is for comparison, do not run it on a robot";
+            return vec![warning("not_checked", text.to_owned(), false)];
+        }
+        if self.profile.bodies().is_empty() {
+            let text = "the profile has no bodies, so the arm was not checked against itself, the floor or keep-out boxes: add 'bodies', or check every move by hand";
+            return vec![warning("not_checked", text.to_owned(), false)];
+        }
+        Vec::new()
+    }
+
+    fn candidate(&self, configuration: &[f64]) -> Candidate {
+        let at = TargetAt { configuration: configuration.to_vec(), target: 0 };
+        Candidate { point_in_base: self.model.point_in_base(&at), configuration: at.configuration }
+    }
+
+    /// Chooses, orders and scores a new plan.
+    fn choose(
+        &self,
+        keep_going: &(dyn Fn() -> bool + Sync),
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<PlanSummary, Failure> {
+        let request = self.request;
+        let required = request.included.len();
+        let mut candidates = self.candidates(request.poses + request.verification, &request.included)?;
+        let mut round = 0;
+        let (information, ordered) = loop {
+            round += 1;
+            let information = self.information(&candidates.kept)?;
+            let chosen = self.search(&information, required, keep_going, progress)?;
+            match self.order(&candidates.kept, required, chosen)? {
+                Ok(ordered) => break (information, ordered),
+                Err(unreachable) if round < ROUNDS => {
+                    progress(Progress::Unreachable { poses: unreachable.len() });
+                    let mut index = 0;
+                    candidates.kept.retain(|_| {
+                        index += 1;
+                        !unreachable.contains(&(index - 1))
+                    });
+                }
+                Err(_) => {
+                    return Err(Failure::new(ExitStatus::Usage, "the poses cannot be visited without a collision")
+                        .hint(
+                            "narrow the joint ranges with '--limit' to one side of the cell, or lower '--clearance-mm'",
+                        ));
+                }
+            }
+        };
+        let set = &ordered.chosen.set;
+        let mut summary = self.summary(&information, set, required, &candidates.rejections)?;
+        let mut warnings: Vec<Warning> = self.included_warning().into_iter().collect();
+        warnings.extend(self.safety_warnings());
+        warnings.append(&mut summary.warnings);
+        summary.warnings = warnings;
+        summary.predicted_verification_rms_mm = self.predicted_verification(&candidates.kept, set, &ordered)?;
+        summary.objective = Some(objective_name(request.objective).to_owned());
+        summary.interrupted = ordered.chosen.interrupted;
+        let minutes = |seconds: f64| seconds / 60.0;
+        let Route { moving_time, measuring_time, .. } = ordered.route;
+        let total = ordered.route.time();
+        summary.time = Some(TimeSummary {
+            total_min: minutes(total),
+            moving_min: minutes(moving_time),
+            measuring_min: minutes(measuring_time),
+        });
+        let stops = ordered.stops.len().max(1);
+        let extra = ordered.stops.len().saturating_sub(set.len() - required);
+        for size in &mut summary.trade_off {
+            size.time_min = Some(minutes(total) * (size.poses + extra) as f64 / stops as f64);
+        }
+        summary.verification_poses = extra;
+        summary.poses = self.route_rows(&ordered, &request.included);
+        Ok(summary)
+    }
+
+    fn search(
+        &self,
+        information: &Information,
+        required: usize,
+        keep_going: &(dyn Fn() -> bool + Sync),
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Chosen, Failure> {
+        let settings = SearchSettings {
+            poses: self.request.poses + required,
+            required: (0..required).collect(),
+            objective: self.request.objective,
+            seed: self.request.seed,
+            ..SearchSettings::default()
+        };
+        let starts = settings.starts;
+        let search = Search::new(information, settings).map_err(|error| planning_failure(&error))?;
+        let threads = self.request.threads.unwrap_or_else(available_threads);
+        let told = |found: &crate::planning::Progress| {
+            let sweeps = search.settings().sweeps_of(found.stage);
+            progress(Progress::Sweep { found: *found, sweeps, starts });
+        };
+        progress(Progress::Searching);
+        plan_in_parallel(&search, threads, keep_going, &told).map_err(|error| planning_failure(&error))
+    }
+
+    /// Orders the chosen poses that are not measured yet and the verification poses; the inner error names candidates
+    /// that cannot be reached.
+    fn order(
+        &self,
+        pool: &[Candidate],
+        required: usize,
+        chosen: Chosen,
+    ) -> Result<Result<Ordered, Vec<usize>>, Failure> {
+        let verification = verification_set::choose(pool, &chosen.set, &self.limits, self.request.verification);
+        let new = chosen.set.iter().copied().filter(|index| *index >= required);
+        let stops: Vec<(PoseKind, usize)> = new
+            .map(|index| (PoseKind::Identification, index))
+            .chain(verification.iter().map(|&index| (PoseKind::Verification, index)))
+            .collect();
+        let poses: Vec<Vec<f64>> = stops.iter().map(|(_, index)| pool[*index].configuration.clone()).collect();
+        let shape = self.filter.shape();
+        let Some(home) = home_pose(shape, pool.iter().map(|candidate| candidate.configuration.as_slice())) else {
+            return Err(Failure::new(ExitStatus::Usage, "the arm cannot stand anywhere in its planning limits"));
+        };
+        let spread = (pool.len() / VIAS).max(1);
+        let vias: Vec<Vec<f64>> =
+            pool.iter().step_by(spread).map(|candidate| candidate.configuration.clone()).collect();
+        let request = Stops { home: &home, poses: &poses, vias: &vias, drift_every: Some(self.request.drift_every) };
+        match order(shape, &request, &self.pace()) {
+            Ok(route) => {
+                let stops = stops.iter().map(|(kind, index)| (*kind, pool[*index].clone())).collect();
+                Ok(Ok(Ordered { chosen, stops, route }))
+            }
+            Err(OrderError::Unreachable { poses }) => Ok(Err(poses.iter().map(|order| stops[*order].1).collect())),
+            Err(error) => Err(Failure::from_error(ExitStatus::Usage, &error)),
+        }
+    }
+
+    /// The rows of a plan. Measured poses are numbered as they are visited, after those that are measured already; a drift pose
+    /// has the number of the pose that it repeats.
+    fn route_rows(&self, ordered: &Ordered, included: &[PlannedPose]) -> Vec<PoseSummary> {
+        let mut last = included.iter().filter_map(|row| row.pose.parse::<u64>().ok()).max().unwrap_or(0);
+        let mut numbers = vec![String::new(); ordered.stops.len()];
+        let mut vias = 0;
+        let mut rows = Vec::with_capacity(ordered.route.steps.len());
+        for step in &ordered.route.steps {
+            let stop = step.pose.and_then(|pose| Some((pose, ordered.stops.get(pose)?)));
+            let (kind, pose) = match (step.kind, stop) {
+                (StepKind::Measure, Some((index, (kind, _)))) => {
+                    last += 1;
+                    numbers[index] = last.to_string();
+                    (*kind, numbers[index].clone())
+                }
+                (StepKind::Drift, Some((index, _))) => (PoseKind::Drift, numbers[index].clone()),
+                (StepKind::Home, _) => (PoseKind::Home, "home".to_owned()),
+                _ => {
+                    vias += 1;
+                    (PoseKind::Via, format!("via{vias}"))
+                }
+            };
+            rows.push(self.row(kind, pose, &step.configuration, Vec::new()));
+        }
+        rows
+    }
+
+    /// Root mean square (mm) that the verification poses of the plan will show, tracker noise included.
+    fn predicted_verification(
+        &self,
+        pool: &[Candidate],
+        set: &[usize],
+        ordered: &Ordered,
+    ) -> Result<Option<f64>, Failure> {
+        const FEWEST: usize = 3;
+        let verification: Vec<TargetAt> = ordered
+            .stops
+            .iter()
+            .filter(|(kind, _)| *kind == PoseKind::Verification)
+            .map(|(_, candidate)| TargetAt { configuration: candidate.configuration.clone(), target: 0 })
+            .collect();
+        let Some(sigma) = self.sigma().filter(|_| verification.len() >= FEWEST) else { return Ok(None) };
+        let chosen: Vec<TargetAt> = set
+            .iter()
+            .filter_map(|index| pool.get(*index))
+            .map(|candidate| TargetAt { configuration: candidate.configuration.clone(), target: 0 })
+            .collect();
+        let information = Information::new(&self.model, &self.parameters, &chosen, &verification)
+            .map_err(|error| planning_failure(&error))?;
+        let all: Vec<usize> = (0..chosen.len()).collect();
+        let score = Score::new(&information, &all).map_err(|error| planning_failure(&error))?;
+        // Three coordinates of a reading scatter by σ each on top of what the robot misses.
+        Ok(Some(to_mm(sigma * (score.predicted_error.powi(2) + 3.0).sqrt())))
+    }
+
+    fn row(&self, kind: PoseKind, pose: String, configuration: &[f64], problems: Vec<String>) -> PoseSummary {
+        let edge = |(joint_type, value): (&JointType, &f64)| joint_type.quantity().to_edge(*value);
+        let point = self.candidate(configuration).point_in_base;
+        PoseSummary {
+            pose,
+            kind: kind.name().to_owned(),
+            configuration: self.joint_types.iter().zip(configuration).map(edge).collect(),
+            point_in_base_mm: Some([to_mm(point.x), to_mm(point.y), to_mm(point.z)]),
+            problems,
+        }
+    }
+
+    /// Scores the poses of the list `name`.
+    fn check(&self, rows: &[PlannedPose], name: &str) -> Result<PlanSummary, Failure> {
+        let scored: Vec<&PlannedPose> = rows.iter().filter(|row| row.kind == PoseKind::Identification).collect();
+        let count = scored.len();
+        if count == 0 {
+            return Err(Failure::new(
+                ExitStatus::Usage,
+                format!("none of the {} rows of '{name}' is of kind 'identification'", rows.len()),
+            )
+            .hint("a plain list needs no 'kind' column: all its rows are then scored"));
+        }
+        let mut candidates = self.candidates(count, &[])?;
+        let mut pool: Vec<Candidate> = scored.iter().map(|row| self.candidate(&row.configuration)).collect();
+        pool.append(&mut candidates.kept);
+        let information = self.information(&pool)?;
+        let set: Vec<usize> = (0..count).collect();
+        let mut summary = self.summary(&information, &set, 0, &candidates.rejections)?;
+        let mut warnings = self.safety_warnings();
+        summary.poses = rows
+            .iter()
+            .map(|row| {
+                let problems = match row.kind {
+                    PoseKind::Home | PoseKind::Via => {
+                        let outside =
+                            self.is_outside(&row.configuration).then(|| "outside the joint limits".to_owned());
+                        let shape = self.filter.shape();
+                        let obstructions = shape.obstructions(&row.configuration);
+                        outside.into_iter().chain(obstructions.iter().map(ToString::to_string)).collect()
+                    }
+                    _ => self.filter.reasons(&row.configuration),
+                };
+                self.row(row.kind, row.pose.clone(), &row.configuration, problems)
+            })
+            .collect();
+        let bad: Vec<String> = summary
+            .poses
+            .iter()
+            .filter(|pose| !pose.problems.is_empty())
+            .map(|pose| format!("pose {}: {}", pose.pose, pose.problems.join(", ")))
+            .collect();
+        if !bad.is_empty() {
+            warnings.push(warning("not_measurable", shortened(&bad), true));
+        }
+        let blocked: Vec<String> = rows
+            .windows(2)
+            .filter_map(|pair| {
+                let obstruction =
+                    self.filter.shape().check_move(&pair[0].configuration, &pair[1].configuration).err()?;
+                Some(format!("from {} to {}: {obstruction}", pair[0].pose, pair[1].pose))
+            })
+            .collect();
+        if !blocked.is_empty() {
+            let text =
+                format!("moves that are not free (joint moves in the order of the file): {}", shortened(&blocked));
+            warnings.push(warning("blocked_move", text, true));
+        }
+        summary.verification_poses = rows.iter().filter(|row| row.kind == PoseKind::Verification).count();
+        warnings.append(&mut summary.warnings);
+        summary.warnings = warnings;
+        Ok(summary)
+    }
+}
+
+/// The first few of many findings.
+fn shortened(findings: &[String]) -> String {
+    const SHOWN: usize = 5;
+    let more = findings.len().saturating_sub(SHOWN);
+    let list = findings.iter().take(SHOWN).cloned().collect::<Vec<_>>().join("; ");
+    if more > 0 { format!("{list}; and {more} more") } else { list }
+}
+
+fn planning_failure(error: &PlanningError) -> Failure {
+    Failure::from_error(ExitStatus::Usage, error)
+}
+
+/// As on the command line.
+const fn objective_name(objective: Objective) -> &'static str {
+    match objective {
+        Objective::Balanced => "balanced",
+        Objective::Condition => "condition",
+        Objective::Prediction => "prediction",
+        Objective::D => "d",
+        Objective::O1 => "o1",
+        Objective::O2 => "o2",
+        Objective::O3 => "o3",
+        Objective::O4 => "o4",
+        Objective::O5 => "o5",
+    }
+}

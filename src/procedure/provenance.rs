@@ -1,0 +1,28 @@
+//! Where results come from: program, profile and inputs with their hashes.
+
+use sha2::{Digest as _, Sha256};
+
+use crate::profile::Profile;
+use crate::session::summary::{InputFile, Provenance};
+
+/// The record of an input that was read from `file` in the role of `identification`, `verification`, `calibration` or `plan`.
+pub fn input_file(role: &str, file: String, bytes: &[u8]) -> InputFile {
+    InputFile { role: role.to_owned(), file, sha256: sha256(bytes) }
+}
+
+/// Provenance of results made at `created` (RFC 3339, UTC).
+pub(crate) fn provenance(profile: &Profile, profile_text: &str, created: String, inputs: Vec<InputFile>) -> Provenance {
+    Provenance {
+        program: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+        created,
+        profile: profile.name().to_owned(),
+        robot: profile.title().to_owned(),
+        profile_sha256: sha256(profile_text.as_bytes()),
+        inputs,
+    }
+}
+
+/// SHA-256 in hexadecimal.
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
+}

@@ -1,0 +1,87 @@
+//! How to identify, as the operator asks for it, and what that means to the solver.
+
+use nalgebra::Point3;
+
+use crate::identification::{Estimator, Prior, Settings, SigmaSource, Weighting};
+use crate::kinematics::{FreeParameter, ParameterId};
+use crate::profile::{ExpectedDeviation, Level, Profile};
+
+/// How to identify. The default is what `trupose identify` does without options.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EstimationSettings {
+    /// What is identified.
+    pub level: Level,
+    /// How distances are weighted.
+    pub weighting: Weighting,
+    /// What is assumed about deviations.
+    pub prior: Prior,
+    /// How samples are trusted.
+    pub estimator: Estimator,
+    /// Largest number of solver steps; 1 is the paper's single linear step.
+    pub iterations: usize,
+    /// Standard deviation of a measured coordinate (m) that the operator states; `None`: of the readings, else of the profile's
+    /// instrument, else estimated.
+    pub sigma: Option<f64>,
+    /// Expected deviation of every length (m) and angle (rad) of the links instead of the profile's.
+    pub expected_deviation: Option<ExpectedDeviation>,
+    /// The condition that picked the identification samples, for the summary only.
+    pub filter: Option<String>,
+}
+
+impl Default for EstimationSettings {
+    fn default() -> Self {
+        let Settings { weighting, prior, estimator, iterations, .. } = Settings::default();
+        Self {
+            level: Level::default(),
+            weighting,
+            prior,
+            estimator,
+            iterations,
+            sigma: None,
+            expected_deviation: None,
+            filter: None,
+        }
+    }
+}
+
+impl EstimationSettings {
+    /// The free parameters that are asked for.
+    pub(crate) fn parameters(&self, profile: &Profile) -> Vec<FreeParameter> {
+        self.parameters_of(self.level, profile)
+    }
+
+    /// The free parameters of a level with the expected deviations that are asked for.
+    pub(crate) fn parameters_of(&self, level: Level, profile: &Profile) -> Vec<FreeParameter> {
+        let mut parameters = profile.free_parameters(level);
+        if let Some(expected) = self.expected_deviation {
+            expected.replace_in(&mut parameters);
+        }
+        parameters
+    }
+
+    /// Settings of the solver; `distance` is the typical distance from the instrument (m), if there is one.
+    pub(crate) fn solver(&self, profile: &Profile, distance: Option<f64>) -> Settings {
+        let option = self.sigma.map(|sigma| (sigma, SigmaSource::Option));
+        let instrument = || {
+            let instrument = profile.instrument()?;
+            Some((instrument.sigma_at(distance?), SigmaSource::Instrument))
+        };
+        Settings {
+            weighting: self.weighting,
+            prior: self.prior,
+            estimator: self.estimator,
+            iterations: self.iterations,
+            sigma: option.or_else(instrument),
+        }
+    }
+}
+
+/// The target coordinates among `parameters`.
+pub(crate) fn target_parameters(parameters: &[FreeParameter]) -> Vec<FreeParameter> {
+    parameters.iter().filter(|parameter| matches!(parameter.id, ParameterId::Target { .. })).copied().collect()
+}
+
+/// Nominal target coordinates (m).
+pub(crate) fn nominal_targets(profile: &Profile) -> Vec<Point3<f64>> {
+    profile.targets().iter().map(|target| target.position_in_flange).collect()
+}

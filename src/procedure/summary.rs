@@ -1,0 +1,209 @@
+//! The summary of an identification: its numbers in mm and degree, with names and the verdict.
+
+use super::{EstimationSettings, assess, provenance};
+use crate::identification::{
+    Estimator, Identification, Observability, Prior, RejectionReason, SampleIndex, SigmaSource, TerminationReason,
+    Weighting,
+};
+use crate::profile::{Level, Profile};
+use crate::session::summary::{
+    BlindGroupSummary, CorrelationSummary, EstimatorName, IdentificationSettings, IdentificationSummary, InputFile,
+    IterationSummary, ParameterSummary, RejectedSummary, SCHEMA, SigmaOrigin, SigmaSummary, Termination, Verdict,
+    VerificationMode, VerificationSummary, Warning,
+};
+use crate::units::{to_deg, to_mm};
+
+/// Correlations beyond this are listed.
+const STRONG_CORRELATION: f64 = 0.9;
+
+/// Where the samples of an identification were written down.
+#[derive(Clone, Debug)]
+pub(crate) struct SampleName {
+    pub(crate) pose: String,
+    pub(crate) line: usize,
+}
+
+impl SampleName {
+    /// As it reads in a message.
+    pub(crate) fn text(&self) -> String {
+        format!("pose {} (line {})", self.pose, self.line)
+    }
+}
+
+/// The rejected samples with their names.
+fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary> {
+    let name =
+        |place: usize| names.get(place).cloned().unwrap_or_else(|| SampleName { pose: place.to_string(), line: 0 });
+    found
+        .rejected
+        .iter()
+        .map(|rejected| {
+            let SampleName { pose, line } = match rejected.sample {
+                SampleIndex::Place(place) => name(place),
+                // Rows of a table of lengths name both ends; a known distance between sockets has no row.
+                SampleIndex::Length(length) => {
+                    let line = names.get(2 * length).filter(|name| name.pose == "from").map_or(0, |name| name.line);
+                    SampleName { pose: format!("length {}", length + 1), line }
+                }
+            };
+            let reason = match rejected.reason {
+                RejectionReason::Outlier => format!("{:.0} times the scatter of the others", rejected.ratio),
+                RejectionReason::SwappedWith(other) => format!("looks swapped with {}", name(other).text()),
+            };
+            RejectedSummary { pose, line, residual_mm: to_mm(rejected.residual), ratio: rejected.ratio, reason }
+        })
+        .collect()
+}
+
+/// The identified parameters in edge units.
+fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSummary> {
+    found
+        .estimates
+        .iter()
+        .map(|estimate| {
+            let quantity = estimate.id.quantity();
+            ParameterSummary {
+                name: estimate.id.to_string(),
+                unit: quantity.unit().to_owned(),
+                nominal: quantity.to_edge(estimate.nominal),
+                deviation: quantity.to_edge(estimate.deviation),
+                sigma: (estimate.identifiable || prior == Prior::Expected).then(|| quantity.to_edge(estimate.sigma)),
+                expected: quantity.to_edge(estimate.expected),
+                identifiable: estimate.identifiable,
+            }
+        })
+        .collect()
+}
+
+fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
+    let mut strong = Vec::new();
+    for (i, first) in found.estimates.iter().enumerate() {
+        for (j, second) in found.estimates.iter().enumerate().skip(i + 1) {
+            let correlation = found.correlation(i, j);
+            if first.identifiable && second.identifiable && correlation.abs() > STRONG_CORRELATION {
+                strong.push(CorrelationSummary {
+                    parameters: [first.id.to_string(), second.id.to_string()],
+                    correlation,
+                });
+            }
+        }
+    }
+    strong
+}
+
+fn sigma_summary(found: &Identification) -> SigmaSummary {
+    let source = match found.sigma.source {
+        SigmaSource::Readings => SigmaOrigin::Readings,
+        SigmaSource::Option => SigmaOrigin::Option,
+        SigmaSource::Instrument => SigmaOrigin::Instrument,
+        SigmaSource::Residuals => SigmaOrigin::Residuals,
+        SigmaSource::Assumed => SigmaOrigin::Assumed,
+    };
+    SigmaSummary { used_mm: to_mm(found.sigma.used), source, from_residuals_mm: found.sigma.from_residuals.map(to_mm) }
+}
+
+fn settings_summary(asked: &EstimationSettings, special: Special) -> IdentificationSettings {
+    let Special { layout, socket_distance_mm, socket_distance_sigma_mm, verification } = special;
+    let name = |text: &str| text.to_owned();
+    IdentificationSettings {
+        level: name(match asked.level {
+            Level::Offsets => "offsets",
+            Level::Geometric => "geometric",
+        }),
+        weighting: name(match asked.weighting {
+            Weighting::Covariance => "covariance",
+            Weighting::Uniform => "uniform",
+        }),
+        prior: name(match asked.prior {
+            Prior::Expected => "expected",
+            Prior::None => "none",
+        }),
+        estimator: match asked.estimator {
+            Estimator::Robust => EstimatorName::Robust,
+            Estimator::LeastSquares => EstimatorName::LeastSquares,
+        },
+        iterations: asked.iterations,
+        filter: asked.filter.clone(),
+        expected_length_mm: asked.expected_deviation.map(|expected| to_mm(expected.length)),
+        expected_angle_deg: asked.expected_deviation.map(|expected| to_deg(expected.angle)),
+        layout,
+        socket_distance_mm,
+        socket_distance_sigma_mm,
+        verification,
+    }
+}
+
+/// Settings that only one command has.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Special {
+    pub(crate) layout: Option<String>,
+    pub(crate) socket_distance_mm: Option<f64>,
+    pub(crate) socket_distance_sigma_mm: Option<f64>,
+    pub(crate) verification: VerificationMode,
+}
+
+/// A finished identification, ready to be summed up.
+pub(crate) struct Finished<'a> {
+    pub(crate) profile: &'a Profile,
+    pub(crate) profile_text: &'a str,
+    /// RFC 3339, UTC.
+    pub(crate) created: String,
+    pub(crate) inputs: Vec<InputFile>,
+    pub(crate) settings: &'a EstimationSettings,
+    pub(crate) special: Special,
+    pub(crate) found: &'a Identification,
+    pub(crate) names: &'a [SampleName],
+    pub(crate) warnings: Vec<Warning>,
+    pub(crate) verification: Option<VerificationSummary>,
+}
+
+impl Finished<'_> {
+    /// The summary with its verdict.
+    pub(crate) fn summary(self) -> IdentificationSummary {
+        let Self { profile, profile_text, created, inputs, settings, special, found, names, warnings, verification } =
+            self;
+        let Observability { rank, gap, condition_number, condition_number_raw, scored_points, groups, .. } =
+            &found.observability;
+        let verdict: Verdict = assess::verdict(profile.acceptance(), verification.as_ref(), &warnings);
+        let termination = match found.termination {
+            TerminationReason::Converged => Termination::Converged,
+            TerminationReason::IterationLimit => Termination::IterationLimit,
+            TerminationReason::NoImprovement => Termination::NoImprovement,
+            TerminationReason::NonFinite => Termination::NonFinite,
+        };
+        IdentificationSummary {
+            schema: SCHEMA,
+            provenance: provenance(profile, profile_text, created, inputs),
+            settings: settings_summary(settings, special),
+            warnings,
+            verdict,
+            verification,
+            samples: names.len(),
+            parameter_count: found.estimates.len(),
+            rank: *rank,
+            singular_value_gap: *gap,
+            condition_number: *condition_number,
+            condition_number_mm_rad: *condition_number_raw,
+            condition_number_points: *scored_points,
+            sigma: sigma_summary(found),
+            parameters: parameter_summaries(found, settings.prior),
+            blind_groups: groups
+                .iter()
+                .map(|group| BlindGroupSummary {
+                    parameters: group.parameters.iter().map(ToString::to_string).collect(),
+                    blind: group.blind,
+                    description: group.description.clone(),
+                })
+                .collect(),
+            correlations: correlations(found),
+            rejected: rejected(found, names),
+            termination,
+            iterations: found
+                .iterations
+                .iter()
+                .map(|iteration| IterationSummary { cost: iteration.cost, step: iteration.step })
+                .collect(),
+            written: Vec::new(),
+        }
+    }
+}
