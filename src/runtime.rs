@@ -1,3 +1,21 @@
-//! Work on named threads, for the parts of the program that are pure themselves.
+//! Turns the wizard's effects into work on named threads, and answers into events.
+//!
+//! ```text
+//!  driver (script, tui) ── Intent ──► Engine: Wizard::update ── Effect ──► store thread   (journal, files)
+//!                                        ▲                         ├─────► link thread    (instrument)
+//!                                        └────── Event ◄───────────┴─────► job threads    (plan, identify, read)
+//! ```
+//!
+//! All channels are bounded. A progress report that nobody has room for is dropped; an answer never is. Every request can be
+//! cancelled: its flag is asked by whoever works on it. A panic on a job thread is an answer that says so.
 
+mod clock;
+mod engine;
+mod jobs;
+mod links;
 pub mod search;
+pub mod signals;
+mod store_thread;
+
+pub use clock::Clock;
+pub use engine::{Engine, Happening, Options};

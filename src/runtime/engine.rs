@@ -1,0 +1,238 @@
+//! The wizard with its threads: what both drivers, script and terminal, run.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::time::Duration;
+
+use super::clock::Clock;
+use super::jobs;
+use super::links::LinkThread;
+use super::store_thread::{Command, StoreThread};
+use crate::session::journal::Line;
+use crate::session::state::Session;
+use crate::store::session::SessionFolder;
+use crate::wizard::{Answer, Effect, Event, Intent, Notice, Request, RequestId, StoreEvent, Wizard};
+
+/// Events that wait; answers wait at their thread when it is full, progress reports are dropped.
+const WAITING: usize = 256;
+
+/// How an engine is set up.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Folder in which sessions are made.
+    pub sessions: PathBuf,
+    /// What time it is.
+    pub clock: Clock,
+}
+
+/// Where threads send what has happened.
+#[derive(Clone, Debug)]
+pub struct Events(SyncSender<Event>);
+
+impl Events {
+    /// Sends; waits for room. `false` if the engine is gone.
+    pub fn send(&self, event: Event) -> bool {
+        self.0.send(event).is_ok()
+    }
+
+    /// Sends if there is room.
+    pub(super) fn offer(&self, event: Event) {
+        match self.0.try_send(event) {
+            // The next report says more than this one.
+            Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
+        }
+    }
+}
+
+/// What a driver may want to show.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Happening {
+    /// Lines of the journal are on disk.
+    Written(Vec<Line>),
+    /// There is a message to the operator.
+    Told(Notice),
+}
+
+/// The wizard with its threads.
+#[derive(Debug)]
+pub struct Engine {
+    wizard: Wizard,
+    clock: Clock,
+    sender: Events,
+    events: Receiver<Event>,
+    store: StoreThread,
+    link: LinkThread,
+    /// Flags of the requests under way.
+    cancelled: BTreeMap<RequestId, Arc<AtomicBool>>,
+    /// Lines that the store works on.
+    writing: BTreeMap<RequestId, Vec<Line>>,
+    happenings: VecDeque<Happening>,
+    told: Option<Notice>,
+    has_exited: bool,
+}
+
+impl Engine {
+    /// A new calibration.
+    ///
+    /// # Errors
+    /// The system refuses a thread.
+    pub fn new(options: Options) -> io::Result<Self> {
+        let wizard = Wizard::new(options.clock.now());
+        Self::with(wizard, None, options)
+    }
+
+    /// Goes on with a session.
+    ///
+    /// # Errors
+    /// The system refuses a thread.
+    pub fn resume(folder: SessionFolder, session: Session, torn_bytes: usize, options: Options) -> io::Result<Self> {
+        if let (Clock::Virtual(_), Some(latest)) = (&options.clock, session.latest) {
+            let seconds = latest.duration_since(options.clock.now()).as_secs_f64();
+            options.clock.pass(seconds);
+        }
+        let path = folder.path().display().to_string();
+        let (wizard, effects) = Wizard::resume(session, path, torn_bytes, options.clock.now());
+        let mut engine = Self::with(wizard, Some(folder), options)?;
+        engine.perform(effects);
+        Ok(engine)
+    }
+
+    fn with(wizard: Wizard, folder: Option<SessionFolder>, options: Options) -> io::Result<Self> {
+        let (sender, events) = sync_channel(WAITING);
+        let sender = Events(sender);
+        Ok(Self {
+            wizard,
+            clock: options.clock,
+            store: StoreThread::start(options.sessions, folder, sender.clone())?,
+            link: LinkThread::start(sender.clone())?,
+            sender,
+            events,
+            cancelled: BTreeMap::new(),
+            writing: BTreeMap::new(),
+            happenings: VecDeque::new(),
+            told: None,
+            has_exited: false,
+        })
+    }
+
+    /// The wizard.
+    pub const fn wizard(&self) -> &Wizard {
+        &self.wizard
+    }
+
+    /// Where other threads (keys, signals) send events.
+    pub fn sender(&self) -> Events {
+        self.sender.clone()
+    }
+
+    /// Whether the wizard has ended and the program may go.
+    pub const fn has_exited(&self) -> bool {
+        self.has_exited
+    }
+
+    /// The operator wants something.
+    pub fn intend(&mut self, intent: Intent) {
+        self.take(Event::Intent(intent));
+    }
+
+    /// Waits for an event and takes it; `false` after `timeout` without one.
+    pub fn wait(&mut self, timeout: Duration) -> bool {
+        match self.events.recv_timeout(timeout) {
+            Ok(event) => {
+                self.take(event);
+                true
+            }
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => false,
+        }
+    }
+
+    /// What has happened since it was asked last.
+    pub fn happenings(&mut self) -> impl Iterator<Item = Happening> + '_ {
+        self.happenings.drain(..)
+    }
+
+    /// An event goes in, its effects are done.
+    fn take(&mut self, event: Event) {
+        let mut written = None;
+        match &event {
+            Event::Store(StoreEvent::Written { id } | StoreEvent::Failed { id, .. }) => {
+                let lines = self.writing.remove(id);
+                if matches!(event, Event::Store(StoreEvent::Written { .. })) {
+                    written = lines;
+                }
+            }
+            Event::Answer { id, answer } => {
+                self.cancelled.remove(id);
+                if let Answer::Measured(reading) = answer {
+                    self.clock.pass(reading.seconds);
+                }
+            }
+            _ => {}
+        }
+        let mut effects = self.wizard.update(Event::Tick(self.clock.now()));
+        effects.extend(self.wizard.update(event));
+        if let Some(lines) = written {
+            self.happenings.push_back(Happening::Written(lines));
+        }
+        let notice = self.wizard.notice();
+        if notice != self.told.as_ref() {
+            self.told = notice.cloned();
+            self.happenings.extend(notice.cloned().map(Happening::Told));
+        }
+        self.perform(effects);
+    }
+
+    fn perform(&mut self, effects: Vec<Effect>) {
+        for effect in effects {
+            match effect {
+                Effect::Create { id, name } => {
+                    self.store.ask(Command::Create { id, name });
+                }
+                Effect::Append { id, lines } => {
+                    self.writing.insert(id, lines.clone());
+                    self.store.ask(Command::Append { id, lines });
+                }
+                Effect::Start { id, request } => self.start(id, request),
+                Effect::Cancel(id) => {
+                    if let Some(flag) = self.cancelled.get(&id) {
+                        flag.store(true, Ordering::Relaxed);
+                    }
+                }
+                Effect::Exit => self.has_exited = true,
+            }
+        }
+    }
+
+    fn start(&mut self, id: RequestId, request: Request) {
+        let flag = Arc::new(AtomicBool::new(false));
+        self.cancelled.insert(id, Arc::clone(&flag));
+        let is_started = match request {
+            Request::Connect { instrument, profile } => self.link.connect(id, instrument, profile),
+            Request::Measure(request) => self.link.measure(id, request, flag),
+            Request::Deliver { files } => self.store.ask(Command::Replace { id, files }),
+            request => jobs::start(id, request, flag, self.sender.clone()),
+        };
+        if !is_started {
+            let answer = Answer::Failed(crate::wizard::Problem {
+                message: "the program cannot start a thread".to_owned(),
+                hints: vec!["the system may be out of memory or processes".to_owned()],
+            });
+            self.sender.offer(Event::Answer { id, answer });
+        }
+    }
+}
+
+/// Whoever works for the engine is told to stop.
+impl Drop for Engine {
+    fn drop(&mut self) {
+        for flag in self.cancelled.values() {
+            flag.store(true, Ordering::Relaxed);
+        }
+        // Room for threads that still want to answer.
+        while self.events.try_recv().is_ok() {}
+    }
+}

@@ -1,0 +1,125 @@
+//! Work that takes time, each on a thread of its own.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use super::engine::Events;
+use crate::error::Failure;
+use crate::procedure;
+use crate::profile::{Profile, builtin, builtin_names};
+use crate::session::plan;
+use crate::store;
+use crate::wizard::{Answer, CircleConfigurations, Event, Problem, Progress, Request, RequestId};
+
+/// Starts a request; `false` if the system refuses a thread.
+pub(super) fn start(id: RequestId, request: Request, cancelled: Arc<AtomicBool>, events: Events) -> bool {
+    let name = match &request {
+        Request::Plan { .. } => "plan",
+        Request::Identify(_) => "identify",
+        _ => "read",
+    };
+    let work = move || {
+        let job = Job { id, cancelled, events: events.clone() };
+        let answer = catch_unwind(AssertUnwindSafe(|| job.run(request))).unwrap_or_else(|_panic| {
+            Answer::Failed(Problem {
+                message: "a defect of this program has stopped the work; the session is intact".to_owned(),
+                hints: vec!["please report it with the files of the session".to_owned()],
+            })
+        });
+        events.send(Event::Answer { id, answer });
+    };
+    thread::Builder::new().name(name.to_owned()).spawn(work).is_ok()
+}
+
+struct Job {
+    id: RequestId,
+    cancelled: Arc<AtomicBool>,
+    events: Events,
+}
+
+impl Job {
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn run(&self, request: Request) -> Answer {
+        let answer = match request {
+            Request::LoadProfile { source } => load_profile(source),
+            Request::Plan { profile, profile_text, request } => self.plan(&profile, &profile_text, &request),
+            Request::LoadPlan { file, profile } => load_plan(&file, &profile),
+            Request::PlanCircles { profile } => circles(&profile),
+            Request::Identify(request) => self.identify(&request),
+            // These have threads of their own.
+            Request::Connect { .. } | Request::Measure(_) | Request::Deliver { .. } => Ok(Answer::Cancelled),
+        };
+        match answer {
+            _ if self.is_cancelled() => Answer::Cancelled,
+            Ok(answer) => answer,
+            Err(problem) => Answer::Failed(problem),
+        }
+    }
+
+    fn plan(&self, profile: &Profile, text: &str, request: &procedure::plan::PlanRequest) -> Result<Answer, Problem> {
+        let keep_going = || !self.is_cancelled();
+        let told = |progress: &crate::planning::Progress| {
+            self.events.offer(Event::Progress { id: self.id, progress: Progress::Search(*progress) });
+        };
+        let summary = procedure::plan::plan(profile, text, request, &keep_going, &told).map_err(problem)?;
+        let rows = procedure::plan::rows(&summary, &procedure::joint_types(profile));
+        let origin = format!("chosen from {} candidates, seed {}", request.candidates, request.seed);
+        Ok(Answer::Planned { summary: Some(Box::new(summary)), rows, origin })
+    }
+
+    fn identify(&self, request: &procedure::identify::IdentifyRequest) -> Result<Answer, Problem> {
+        let identified = procedure::identify::identify(request, &mut |iteration| {
+            self.events.offer(Event::Progress { id: self.id, progress: Progress::Solver(*iteration) });
+            if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        Ok(Answer::Identified(Box::new(identified.map_err(problem)?)))
+    }
+}
+
+fn problem(failure: Failure) -> Problem {
+    Problem { message: failure.message, hints: failure.hints }
+}
+
+/// The text of a file.
+fn read(path: &Path) -> Result<String, Problem> {
+    let bytes = store::read(path).map_err(|error| problem(Failure::from_error(crate::error::ExitStatus::Usage, &error)))?;
+    String::from_utf8(bytes).map_err(|_error| Problem {
+        message: format!("'{}' is not UTF-8 text", path.display()),
+        hints: vec!["save it as UTF-8".to_owned()],
+    })
+}
+
+fn load_profile(source: String) -> Result<Answer, Problem> {
+    let text = match builtin(&source) {
+        Some(text) => text.to_owned(),
+        None if Path::new(&source).is_file() => read(Path::new(&source))?,
+        None => {
+            let names: Vec<&str> = builtin_names().collect();
+            return Err(Problem {
+                message: format!("there is no profile or file '{source}'"),
+                hints: vec![format!("shipped profiles: {}", names.join(", "))],
+            });
+        }
+    };
+    Ok(Answer::Profile { source, text })
+}
+
+fn load_plan(file: &str, profile: &Profile) -> Result<Answer, Problem> {
+    let text = read(Path::new(file))?;
+    let listed = plan::read(&text, file, &procedure::joint_types(profile))
+        .map_err(|errors| Problem { message: errors.to_string(), hints: Vec::new() })?;
+    Ok(Answer::Planned { summary: None, rows: listed.rows, origin: format!("the poses of '{file}'") })
+}
+
+fn circles(profile: &Profile) -> Result<Answer, Problem> {
+    let circles = procedure::circles::plan(profile).map_err(problem)?;
+    let configurations = |(joint, configurations)| CircleConfigurations { joint, configurations };
+    Ok(Answer::CirclesPlanned(circles.into_iter().map(configurations).collect()))
+}

@@ -1,0 +1,202 @@
+//! The thread that talks to the instrument.
+
+use std::collections::BTreeSet;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use super::engine::Events;
+use crate::link::replay::Replay;
+use crate::link::simulated::SimulatedCell;
+use crate::link::{Link, LinkError};
+use crate::profile::Profile;
+use crate::session::filter::Filter;
+use crate::session::measurements::{Layout, read_bytes_as};
+use crate::session::plan::PlannedPose;
+use crate::session::reading::{MeasureRequest, Reading};
+use crate::session::set_up::{InstrumentChoice, RecordedSet};
+use crate::store;
+use crate::wizard::{Answer, Event, Problem, RequestId};
+
+/// Commands that wait; the wizard never has more than one under way.
+const WAITING: usize = 4;
+
+enum Command {
+    Connect { id: RequestId, instrument: InstrumentChoice, profile: Box<Profile> },
+    Measure { id: RequestId, request: MeasureRequest, cancelled: Arc<AtomicBool> },
+}
+
+/// The thread's channel. The thread ends with it; nobody waits for an instrument that does not answer.
+#[derive(Debug)]
+pub(super) struct LinkThread {
+    commands: SyncSender<Command>,
+}
+
+impl LinkThread {
+    pub(super) fn start(events: Events) -> io::Result<Self> {
+        let (commands, received) = sync_channel(WAITING);
+        thread::Builder::new().name("link".to_owned()).spawn(move || work(&received, &events))?;
+        Ok(Self { commands })
+    }
+
+    pub(super) fn connect(&self, id: RequestId, instrument: InstrumentChoice, profile: Box<Profile>) -> bool {
+        self.commands.try_send(Command::Connect { id, instrument, profile }).is_ok()
+    }
+
+    pub(super) fn measure(&self, id: RequestId, request: MeasureRequest, cancelled: Arc<AtomicBool>) -> bool {
+        self.commands.try_send(Command::Measure { id, request, cancelled }).is_ok()
+    }
+}
+
+fn work(commands: &Receiver<Command>, events: &Events) {
+    let mut link: Option<Box<dyn Link>> = None;
+    while let Ok(command) = commands.recv() {
+        let (id, answer) = match command {
+            Command::Connect { id, instrument, profile } => {
+                link = None;
+                match connect(&instrument, &profile) {
+                    Ok((connected, identity, recorded)) => {
+                        link = connected;
+                        (id, Answer::Connected { identity, recorded })
+                    }
+                    Err(error) => (id, failed(&error)),
+                }
+            }
+            Command::Measure { id, request, cancelled } => {
+                let keep_going = || !cancelled.load(Ordering::Relaxed);
+                let measured = link.as_mut().map(|link| link.measure(&request, &keep_going));
+                let answer = match measured {
+                    Some(Ok(reading)) => Answer::Measured(reading),
+                    Some(Err(LinkError::Cancelled)) => Answer::Cancelled,
+                    Some(Err(error)) => failed(&error),
+                    None => failed(&LinkError::SetUp("no instrument is connected".to_owned())),
+                };
+                (id, answer)
+            }
+        };
+        if !events.send(Event::Answer { id, answer }) {
+            break;
+        }
+    }
+}
+
+/// What an error of a link means to the operator.
+fn failed(error: &LinkError) -> Answer {
+    let hints = match error {
+        LinkError::BeamBroken => vec!["return the SMR to the nest until the tracker has it again, then measure again".to_owned()],
+        LinkError::NoReading { .. } => vec!["skip the pose, or take the poses of the recording as plan".to_owned()],
+        _ => Vec::new(),
+    };
+    Answer::Failed(Problem { message: error.to_string(), hints })
+}
+
+type Connected = (Option<Box<dyn Link>>, String, Vec<PlannedPose>);
+
+fn connect(instrument: &InstrumentChoice, profile: &Profile) -> Result<Connected, LinkError> {
+    match instrument {
+        InstrumentChoice::Manual { unit } => {
+            Ok((None, format!("coordinates typed in, in {}", unit.sign()), Vec::new()))
+        }
+        InstrumentChoice::Simulated(simulation) => {
+            let mut cell = SimulatedCell::new(profile, simulation)?;
+            let identity = cell.connect()?;
+            Ok((Some(Box::new(cell)), identity, Vec::new()))
+        }
+        InstrumentChoice::Replay { sets } => {
+            let mut recordings = Recordings::new(profile, sets)?;
+            let (identity, poses) = (recordings.connect()?, recordings.poses());
+            Ok((Some(Box::new(recordings)), identity, poses))
+        }
+    }
+}
+
+/// Several tables played as one instrument. Where a pose of a later table has the name of an earlier one, the name of its table
+/// is put before it.
+struct Recordings {
+    played: Vec<(Replay, Vec<PlannedPose>)>,
+}
+
+impl Recordings {
+    fn new(profile: &Profile, sets: &[RecordedSet]) -> Result<Self, LinkError> {
+        if sets.is_empty() {
+            return Err(LinkError::SetUp("no table of recorded measurements is named".to_owned()));
+        }
+        let mut taken = BTreeSet::new();
+        let played = sets.iter().map(|set| recording(profile, set, &mut taken)).collect::<Result<_, _>>()?;
+        Ok(Self { played })
+    }
+
+    fn poses(&self) -> Vec<PlannedPose> {
+        self.played.iter().flat_map(|(_, poses)| poses.iter().cloned()).collect()
+    }
+}
+
+fn recording(profile: &Profile, set: &RecordedSet, taken: &mut BTreeSet<String>) -> Result<(Replay, Vec<PlannedPose>), LinkError> {
+    let set_up = |message: String| LinkError::SetUp(message);
+    let path = Path::new(&set.file);
+    let bytes = store::read(path).map_err(|error| {
+        let cause = std::error::Error::source(&error).map(|cause| format!(": {cause}")).unwrap_or_default();
+        set_up(format!("{error}{cause}"))
+    })?;
+    let layout: Layout = set.layout.parse().map_err(|error| set_up(format!("'{}': {error}", set.layout)))?;
+    let joints = profile.chain().joints().iter().map(|joint| joint.joint_type).collect::<Vec<_>>();
+    let mut table = read_bytes_as(layout, &bytes, &set.file, &joints).map_err(|errors| set_up(errors.to_string()))?;
+    let distinct = table.distinct_rows().cloned().collect();
+    (table.rows, table.duplicates) = (distinct, Vec::new());
+    if let Some(condition) = &set.rows {
+        let wrong = |error: &dyn std::fmt::Display| set_up(format!("rows '{condition}' of '{}': {error}", set.file));
+        let filter = Filter::parse(condition).map_err(|error| wrong(&error))?;
+        filter.check(&table.columns).map_err(|error| wrong(&error))?;
+        let mut kept = Vec::new();
+        for row in &table.rows {
+            if filter.matches(&table.columns, &row.fields, row.line).map_err(|error| wrong(&error))? {
+                kept.push(row.clone());
+            }
+        }
+        table.rows = kept;
+    }
+    if table.rows.is_empty() {
+        return Err(set_up(format!("no row of '{}' is left to play", set.file)));
+    }
+    let stem = path.file_stem().map_or_else(|| "set".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let clashes = table.rows.iter().any(|row| taken.contains(&row.pose));
+    if clashes {
+        for row in &mut table.rows {
+            row.pose = format!("{stem}-{}", row.pose);
+        }
+    }
+    taken.extend(table.rows.iter().map(|row| row.pose.clone()));
+    let replay = Replay::of_table(profile, &table, &set.file)?;
+    let poses = replay
+        .rows()
+        .iter()
+        .filter(|row| !row.repeats)
+        .map(|row| PlannedPose {
+            pose: row.pose.clone(),
+            kind: set.kind,
+            configuration: row.configuration.clone(),
+            point_in_base: None,
+        })
+        .collect();
+    Ok((replay, poses))
+}
+
+impl Link for Recordings {
+    fn connect(&mut self) -> Result<String, LinkError> {
+        let identities: Result<Vec<String>, LinkError> = self.played.iter_mut().map(|(replay, _)| replay.connect()).collect();
+        Ok(identities?.join("; "))
+    }
+
+    fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
+        let has_pose = |poses: &[PlannedPose]| poses.iter().any(|pose| pose.pose == request.pose);
+        let of_pose = self.played.iter().position(|(_, poses)| has_pose(poses));
+        let (replay, _) = self
+            .played
+            .get_mut(of_pose.unwrap_or(0))
+            .ok_or_else(|| LinkError::SetUp("no table of recorded measurements is named".to_owned()))?;
+        replay.measure(request, keep_going)
+    }
+}

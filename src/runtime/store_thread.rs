@@ -1,0 +1,106 @@
+//! The thread that writes: the only one that touches the session's folder.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use super::engine::Events;
+use crate::session::journal::Line;
+use crate::store::session::{SessionError, SessionFolder};
+use crate::wizard::{Answer, Event, Problem, RequestId, StoreEvent};
+
+/// Commands that wait; the wizard never has more than one under way.
+const WAITING: usize = 4;
+
+/// What the thread is asked for.
+#[derive(Debug)]
+pub(super) enum Command {
+    Create { id: RequestId, name: String },
+    Append { id: RequestId, lines: Vec<Line> },
+    Replace { id: RequestId, files: Vec<(String, String)> },
+}
+
+/// The thread with its channel.
+#[derive(Debug)]
+pub(super) struct StoreThread {
+    commands: Option<SyncSender<Command>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl StoreThread {
+    /// Begins with a folder that is held already, or makes one below `root` when asked.
+    pub(super) fn start(root: PathBuf, folder: Option<SessionFolder>, events: Events) -> io::Result<Self> {
+        let (commands, received) = sync_channel(WAITING);
+        let thread = thread::Builder::new()
+            .name("store".to_owned())
+            .spawn(move || work(&root, folder, &received, &events))?;
+        Ok(Self { commands: Some(commands), thread: Some(thread) })
+    }
+
+    /// Asks; `false` if the thread is gone.
+    pub(super) fn ask(&self, command: Command) -> bool {
+        self.commands.as_ref().is_some_and(|commands| commands.send(command).is_ok())
+    }
+}
+
+/// What was asked for before is still done.
+impl Drop for StoreThread {
+    fn drop(&mut self) {
+        self.commands = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic there was reported when it happened.
+            drop(thread.join());
+        }
+    }
+}
+
+fn work(root: &PathBuf, mut held: Option<SessionFolder>, commands: &Receiver<Command>, events: &Events) {
+    while let Ok(command) = commands.recv() {
+        let event = match command {
+            Command::Create { id, name } => Event::Store(match SessionFolder::create(root, &name) {
+                Ok(folder) => {
+                    let path = folder.path().display().to_string();
+                    let name = folder.path().file_name().map_or(name, |name| name.to_string_lossy().into_owned());
+                    held = Some(folder);
+                    StoreEvent::Created { id, folder: path, name }
+                }
+                Err(error) => StoreEvent::Failed { id, message: chain(&error) },
+            }),
+            Command::Append { id, lines } => Event::Store(match held.as_mut().map(|folder| folder.append(&lines)) {
+                Some(Ok(())) => StoreEvent::Written { id },
+                Some(Err(error)) => StoreEvent::Failed { id, message: chain(&SessionError::from(error)) },
+                None => StoreEvent::Failed { id, message: "the session has no folder".to_owned() },
+            }),
+            Command::Replace { id, files } => {
+                Event::Answer { id, answer: replace(held.as_ref(), &files) }
+            }
+        };
+        if !events.send(event) {
+            break;
+        }
+    }
+}
+
+fn replace(held: Option<&SessionFolder>, files: &[(String, String)]) -> Answer {
+    let Some(folder) = held else {
+        return Answer::Failed(Problem { message: "the session has no folder".to_owned(), hints: Vec::new() });
+    };
+    for (name, text) in files {
+        if let Err(error) = folder.replace(name, text) {
+            return Answer::Failed(Problem { message: chain(&error), hints: Vec::new() });
+        }
+    }
+    Answer::Delivered(files.iter().map(|(name, _)| name.clone()).collect())
+}
+
+/// An error with its causes.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text = format!("{text}: {cause}");
+        source = cause.source();
+    }
+    text
+}
