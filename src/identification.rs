@@ -17,6 +17,7 @@
 
 #![warn(missing_docs)]
 
+pub mod circle_point;
 mod error;
 mod linearise;
 mod observability;

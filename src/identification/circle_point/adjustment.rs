@@ -1,0 +1,173 @@
+//! One least-squares adjustment of all points of both circles: the frame of the arm and the target.
+
+use nalgebra::{
+    DMatrix, DVector, Isometry3, Matrix3, Matrix3xX, Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3,
+};
+
+use super::{CircleFit, CirclePointError, CircleSeries, TargetLocation};
+use crate::kinematics::{Axis, ForwardKinematics, FreeParameter, IdentificationJacobian, KinematicChain, ParameterId};
+
+/// Unknowns: translation, rotation, target.
+const UNKNOWNS: usize = 9;
+/// Steps, and the step that ends them (m) and (rad).
+const STEPS: usize = 50;
+const SMALLEST_STEP: f64 = 1e-13;
+/// Eigenvalues of the normal equations in this ratio determine nothing.
+const SINGULAR: f64 = 1e-12;
+
+type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+type Unknowns = SVector<f64, UNKNOWNS>;
+
+/// The problem, and how far it is solved.
+struct Adjustment<'a> {
+    arm: ForwardKinematics<'a>,
+    series: [&'a CircleSeries<'a>; 2],
+    tracker_from_base: Isometry3<f64>,
+    target: Point3<f64>,
+    /// Turning is about the middle of the points: it then has little to do with shifting.
+    pivot: Vector3<f64>,
+}
+
+/// A point with its derivatives: by the unknowns, and by the parameters of the last two links.
+struct PointRows {
+    residual: Vector3<f64>,
+    by_unknowns: SMatrix<f64, 3, UNKNOWNS>,
+    by_links: Matrix3xX<f64>,
+}
+
+impl<'a> Adjustment<'a> {
+    fn samples(&self) -> impl Iterator<Item = (&'a Vec<f64>, &'a Point3<f64>)> + use<'a> {
+        let [a, b] = self.series;
+        let of = |series: &'a CircleSeries<'a>| series.configurations.iter().zip(series.points);
+        of(a).chain(of(b))
+    }
+
+    /// All points; `links` are the parameters to differentiate by.
+    fn rows(&self, links: &[ParameterId]) -> Vec<PointRows> {
+        let target = Axis::ALL.map(|axis| ParameterId::Target { target: 0, axis });
+        let parameters: Vec<ParameterId> = target.iter().chain(links).copied().collect();
+        let n = parameters.len();
+        let mut jacobian = IdentificationJacobian::new(&parameters);
+        let turn = *self.tracker_from_base.rotation.to_rotation_matrix().matrix();
+        let mut numbers = vec![0.0; 3 * n];
+        self.samples()
+            .map(|(q, measured)| {
+                let in_base = jacobian.evaluate(&self.arm, q, 0, &self.target, &mut numbers);
+                let predicted = self.tracker_from_base * in_base;
+                let by_parameters = turn * Matrix3xX::from_row_slice(&numbers);
+                let mut by_unknowns = SMatrix::<f64, 3, UNKNOWNS>::zeros();
+                by_unknowns.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+                let arm = predicted.coords - self.pivot;
+                by_unknowns.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
+                by_unknowns.fixed_view_mut::<3, 3>(0, 6).copy_from(&by_parameters.columns(0, 3));
+                let by_links = by_parameters.columns(3, n - 3).into_owned();
+                PointRows { residual: measured - predicted, by_unknowns, by_links }
+            })
+            .collect()
+    }
+
+    fn step(&mut self, step: &Unknowns) {
+        let shift: Vector3<f64> = step.fixed_rows::<3>(0).into();
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(step.fixed_rows::<3>(3)));
+        let about = Isometry3::from_parts(Translation3::from(self.pivot + shift - turn * self.pivot), turn);
+        self.tracker_from_base = about * self.tracker_from_base;
+        self.target += Vector3::from(step.fixed_rows::<3>(6));
+    }
+}
+
+fn normal_equations(rows: &[PointRows]) -> (Normal, Unknowns) {
+    rows.iter().fold((Normal::zeros(), Unknowns::zeros()), |(gram, gradient), point| {
+        let transposed = point.by_unknowns.transpose();
+        (gram + transposed * point.by_unknowns, gradient + transposed * point.residual)
+    })
+}
+
+/// Adjusts from a start of the frame.
+pub(super) fn adjust(
+    chain: &KinematicChain,
+    series: [&CircleSeries<'_>; 2],
+    circles: [CircleFit; 2],
+    start: Isometry3<f64>,
+    sigma: Option<f64>,
+    expected: &[FreeParameter],
+) -> Result<TargetLocation, CirclePointError> {
+    let arm = ForwardKinematics::new(chain);
+    let mut fit =
+        Adjustment { arm, series, tracker_from_base: start, target: Point3::origin(), pivot: Vector3::zeros() };
+    let count = fit.samples().count() as f64;
+    fit.pivot = fit.samples().map(|(_, point)| point.coords).sum::<Vector3<f64>>() / count;
+    let seen = fit.samples().map(|(q, point)| {
+        let tracker_from_flange = start * fit.arm.base_from_flange(q);
+        tracker_from_flange.inverse_transform_point(point).coords
+    });
+    fit.target = Point3::from(seen.sum::<Vector3<f64>>() / count);
+
+    let mut converged = false;
+    for _ in 0..STEPS {
+        let (gram, gradient) = normal_equations(&fit.rows(&[]));
+        let step = gram.cholesky().ok_or(CirclePointError::NoFit)?.solve(&gradient);
+        fit.step(&step);
+        converged = step.amax() < SMALLEST_STEP;
+        if converged || !step.iter().all(|value| value.is_finite()) {
+            break;
+        }
+        // At the limit of the numbers the steps stay small without ending.
+        converged = step.amax() < SMALLEST_STEP.sqrt();
+    }
+    if !converged {
+        return Err(CirclePointError::NoFit);
+    }
+    summarise(&fit, circles, sigma, expected)
+}
+
+fn summarise(
+    fit: &Adjustment<'_>,
+    circles: [CircleFit; 2],
+    sigma: Option<f64>,
+    expected: &[FreeParameter],
+) -> Result<TargetLocation, CirclePointError> {
+    let first_moving = fit.arm.chain().dof().saturating_sub(2);
+    let (links, sizes): (Vec<ParameterId>, Vec<f64>) = expected
+        .iter()
+        .filter(|free| matches!(free.id, ParameterId::Link { joint, .. } if joint >= first_moving))
+        .map(|free| (free.id, free.expected))
+        .unzip();
+    let rows = fit.rows(&links);
+    let (gram, _) = normal_equations(&rows);
+    let eigenvalues = gram.symmetric_eigenvalues();
+    if eigenvalues.min() < SINGULAR * eigenvalues.max() {
+        return Err(CirclePointError::NoFit);
+    }
+    let inverse = gram.cholesky().ok_or(CirclePointError::NoFit)?.inverse();
+    let residuals: Vec<f64> = rows.iter().map(|point| point.residual.norm()).collect();
+    let square: f64 = residuals.iter().map(|residual| residual * residual).sum();
+    let freedom = (3 * rows.len()).saturating_sub(UNKNOWNS).max(1) as f64;
+    let reading_sigma = sigma.unwrap_or_else(|| (square / freedom).sqrt());
+
+    // How the unknowns and the residuals answer to an expected deviation of each link parameter.
+    let scale = DMatrix::from_diagonal(&DVector::from_vec(sizes));
+    let mut cross = DMatrix::zeros(UNKNOWNS, links.len());
+    for point in &rows {
+        cross += point.by_unknowns.transpose() * &point.by_links;
+    }
+    let answer = inverse * cross * scale.clone();
+    let explained: f64 =
+        rows.iter().map(|point| (&point.by_links * &scale - point.by_unknowns * &answer).norm_squared()).sum();
+    let target_answer = answer.rows(6, 3);
+    let by_links: Matrix3<f64> = (target_answer * target_answer.transpose()).fixed_view::<3, 3>(0, 0).into_owned();
+    let measured: Matrix3<f64> = inverse.fixed_view::<3, 3>(6, 6) * (reading_sigma * reading_sigma);
+    let points = rows.len() as f64;
+    let [a, _] = fit.series;
+    let (of_a, of_b) = residuals.split_at(a.points.len().min(residuals.len()));
+    Ok(TargetLocation {
+        point_in_flange: fit.target,
+        covariance: measured + by_links,
+        measured,
+        reading_sigma,
+        residuals: [of_a.to_vec(), of_b.to_vec()],
+        rms: (square / points).sqrt(),
+        expected_rms: ((reading_sigma * reading_sigma * freedom + explained) / points).sqrt(),
+        circles,
+        tracker_from_base: fit.tracker_from_base,
+    })
+}
