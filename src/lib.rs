@@ -31,6 +31,8 @@ pub mod profile;
 pub mod program;
 pub mod report;
 pub mod runtime;
+pub mod script;
 pub mod session;
 pub mod store;
 pub mod units;
+pub mod wizard;

@@ -9,6 +9,7 @@
 pub(crate) mod assess;
 pub(crate) mod cell;
 pub(crate) mod checks;
+pub mod circles;
 pub mod identify;
 pub mod plan;
 mod provenance;

@@ -197,6 +197,16 @@ impl Profile {
         &self.tracker
     }
 
+    /// The same robot with another target in the place `index`; unchanged if there is none.
+    #[must_use]
+    pub fn with_target(&self, index: usize, target: Target) -> Self {
+        let mut changed = self.clone();
+        if let Some(place) = changed.targets.get_mut(index) {
+            *place = target;
+        }
+        changed
+    }
+
     /// The parameters to identify, in the order of equation (19) of the method paper: α, a, d, θ joint by joint, then the
     /// β's, then the coordinates of targets that are not taken as exact.
     pub fn free_parameters(&self, level: Level) -> Vec<FreeParameter> {

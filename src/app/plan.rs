@@ -88,6 +88,7 @@ fn request(args: &PlanArgs, profile: &Profile) -> Result<PlanRequest, Failure> {
         limits,
         region: args.region.map(Into::into),
         included: Vec::new(),
+        numbered_after: 0,
         filters: !args.no_filters,
         clearance: from_mm(args.clearance_mm),
         expected_deviation: args.expected_deviation,

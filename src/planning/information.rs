@@ -119,6 +119,16 @@ impl Information {
         &self.points[candidate]
     }
 
+    /// Predicted RMS position error at fresh poses per unit of σ with the candidates `set`, prior not counted; `None` if they
+    /// do not determine what the pool can. The same as [`Score::predicted_error`](super::Score), and much cheaper.
+    pub fn predicted_error(&self, set: &[usize]) -> Option<f64> {
+        if set.len() < self.fewest_poses() || set.iter().any(|candidate| *candidate >= self.len()) {
+            return None;
+        }
+        let covariance = self.sum(set).cholesky()?.inverse();
+        Some(covariance.dot(&self.fresh).max(0.0).sqrt()).filter(|error| error.is_finite())
+    }
+
     /// Numbers per row of G.
     pub(super) fn width(&self) -> usize {
         self.rank() + FRAME

@@ -346,7 +346,8 @@ impl<'a> Planner<'a> {
     /// The rows of a plan. Measured poses are numbered as they are visited, after those that are measured already; a drift pose
     /// has the number of the pose that it repeats.
     fn route_rows(&self, ordered: &Ordered, included: &[PlannedPose]) -> Vec<PoseSummary> {
-        let mut last = included.iter().filter_map(|row| row.pose.parse::<u64>().ok()).max().unwrap_or(0);
+        let highest = included.iter().filter_map(|row| row.pose.parse::<u64>().ok()).max().unwrap_or(0);
+        let mut last = highest.max(self.request.numbered_after);
         let mut numbers = vec![String::new(); ordered.stops.len()];
         let mut vias = 0;
         let mut rows = Vec::with_capacity(ordered.route.steps.len());

@@ -150,6 +150,11 @@ impl Engine {
         }
     }
 
+    /// Gives the session's folder back, with everything written that was asked for.
+    pub fn release(&mut self) {
+        self.store.finish();
+    }
+
     /// What has happened since it was asked last.
     pub fn happenings(&mut self) -> impl Iterator<Item = Happening> + '_ {
         self.happenings.drain(..)

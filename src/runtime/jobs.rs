@@ -47,6 +47,8 @@ impl Job {
     }
 
     fn run(&self, request: Request) -> Answer {
+        // A search that is stopped has a plan all the same: the best so far.
+        let is_search = matches!(request, Request::Plan { .. });
         let answer = match request {
             Request::LoadProfile { source } => load_profile(source),
             Request::Plan { profile, profile_text, request } => self.plan(&profile, &profile_text, &request),
@@ -57,6 +59,7 @@ impl Job {
             Request::Connect { .. } | Request::Measure(_) | Request::Deliver { .. } => Ok(Answer::Cancelled),
         };
         match answer {
+            Ok(answer) if is_search || !self.is_cancelled() => answer,
             _ if self.is_cancelled() => Answer::Cancelled,
             Ok(answer) => answer,
             Err(problem) => Answer::Failed(problem),
@@ -65,8 +68,8 @@ impl Job {
 
     fn plan(&self, profile: &Profile, text: &str, request: &procedure::plan::PlanRequest) -> Result<Answer, Problem> {
         let keep_going = || !self.is_cancelled();
-        let told = |progress: &crate::planning::Progress| {
-            self.events.offer(Event::Progress { id: self.id, progress: Progress::Search(*progress) });
+        let told = |progress: procedure::plan::Progress| {
+            self.events.offer(Event::Progress { id: self.id, progress: Progress::Search(progress) });
         };
         let summary = procedure::plan::plan(profile, text, request, &keep_going, &told).map_err(problem)?;
         let rows = procedure::plan::rows(&summary, &procedure::joint_types(profile));

@@ -9,9 +9,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use super::engine::Events;
-use crate::link::replay::Replay;
-use crate::link::simulated::SimulatedCell;
-use crate::link::{Link, LinkError};
+use crate::link::{Link, LinkError, Replay, SimulatedCell};
 use crate::profile::Profile;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, read_bytes_as};

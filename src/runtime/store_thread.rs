@@ -44,14 +44,20 @@ impl StoreThread {
     }
 }
 
-/// What was asked for before is still done.
-impl Drop for StoreThread {
-    fn drop(&mut self) {
+impl StoreThread {
+    /// Does what was asked for before, gives the folder back and ends.
+    pub(super) fn finish(&mut self) {
         self.commands = None;
         if let Some(thread) = self.thread.take() {
             // A panic there was reported when it happened.
             drop(thread.join());
         }
+    }
+}
+
+impl Drop for StoreThread {
+    fn drop(&mut self) {
+        self.finish();
     }
 }
 

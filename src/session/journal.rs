@@ -13,6 +13,7 @@
 //! The layout has a version, [`SCHEMA`], in the first entry. A later version that changes the meaning of an entry gets a new
 //! number, and [`read`] is the place where older ones are brought up to date; fields that are merely added have a default.
 
+mod describe;
 mod entry;
 
 use std::str::FromStr as _;
@@ -21,6 +22,7 @@ use jiff::Timestamp;
 use sha2::{Digest as _, Sha256};
 use thiserror::Error;
 
+pub use describe::{instrument_text, target_text};
 pub use entry::{
     CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, MeasuredText, PlanText, PlannedText,
     from_edge, from_xyz_mm, to_edge, to_xyz_mm,

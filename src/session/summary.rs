@@ -79,6 +79,8 @@ pub enum VerificationMode {
     Rest,
     /// Each position of the plate in turn.
     LeaveOneOut,
+    /// The verification poses of a guided session.
+    Session,
 }
 
 /// How samples were trusted.

@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use super::intent::Intent;
 use super::notice::Problem;
 use crate::identification::Iteration;
-use crate::planning;
+use crate::procedure;
 use crate::procedure::identify::{Identified, IdentifyRequest};
 use crate::procedure::plan::PlanRequest;
 use crate::profile::Profile;
@@ -128,7 +128,7 @@ pub struct CircleConfigurations {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
     /// A pose search.
-    Search(planning::Progress),
+    Search(procedure::plan::Progress),
     /// An identification.
     Solver(Iteration),
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 
+use crate::session::reading::Reading;
 use crate::session::set_up::CoordinateUnit;
 use crate::units::{MILLIMETRE, to_mm};
 
@@ -98,6 +99,11 @@ fn strip_name(word: &str) -> &str {
 fn short(text: &str) -> String {
     let text: String = crate::session::printable(text.trim()).chars().take(40).collect();
     text
+}
+
+/// A reading that was typed in.
+pub(super) const fn typed(point: Point3<f64>) -> Reading {
+    Reading { point, sigma: None, scatter: None, shots: 1, temperature: None, configuration: None, seconds: 0.0 }
 }
 
 /// Why a reading is no measurement at all.

@@ -8,6 +8,7 @@ use super::intent::{IntentInfo, PlanSettings};
 use super::notice::{Notice, Severity};
 use super::{Progress, Wizard};
 use crate::planning::Stage;
+use crate::procedure::plan;
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
@@ -472,7 +473,7 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
         busy: wizard.busy.as_ref().map(|busy| BusyView {
             what: busy.what,
             progress: busy.progress.as_ref().map(progress_text),
-            part: None,
+            part: busy.progress.as_ref().and_then(part_done),
             is_cancelled: busy.cancelled,
         }),
         notice: wizard.notice.clone(),
@@ -496,22 +497,36 @@ const fn purpose(step: Step) -> &'static str {
 
 fn progress_text(progress: &Progress) -> String {
     match progress {
-        Progress::Search(progress) => {
-            let stage = match progress.stage {
+        Progress::Search(plan::Progress::Searching) => "the candidates are known".to_owned(),
+        Progress::Search(plan::Progress::Unreachable { poses }) => {
+            format!("{poses} poses cannot be reached without a collision: choosing again")
+        }
+        Progress::Search(plan::Progress::Sweep { found, starts, .. }) => {
+            let stage = match found.stage {
                 Stage::Prediction => "predicting",
                 Stage::Objective { .. } => "choosing",
             };
             format!(
-                "{stage}, start {}, sweep {}: condition {:.1}, predicted error {:.3} sigma",
-                progress.start + 1,
-                progress.sweep,
-                progress.condition_number,
-                progress.predicted_error
+                "{stage}, start {} of {starts}: condition {:.1}, predicted error {:.3} sigma",
+                found.start + 1,
+                found.condition_number,
+                found.predicted_error
             )
         }
         Progress::Solver(iteration) => {
             format!("cost {:.6e}, largest change {:.1e} expected deviations", iteration.cost, iteration.step)
         }
+    }
+}
+
+/// Part of the stage of a search that is done.
+fn part_done(progress: &Progress) -> Option<f64> {
+    match progress {
+        Progress::Search(plan::Progress::Sweep { found, sweeps, starts }) => {
+            let of_start = found.sweep as f64 / (*sweeps).max(1) as f64;
+            Some(((found.start as f64 + of_start) / (*starts).max(1) as f64).min(1.0))
+        }
+        Progress::Search(plan::Progress::Searching | plan::Progress::Unreachable { .. }) | Progress::Solver(_) => None,
     }
 }
 

@@ -27,6 +27,8 @@ pub struct PlanRequest {
     pub region: Option<BoxInBase>,
     /// Poses that are already measured for the identification (rad, sliding joints m).
     pub included: Vec<PlannedPose>,
+    /// New poses are numbered from the number after this one, or after the highest of `included`.
+    pub numbered_after: u64,
     /// Whether collisions and sight are checked, not only joint limits.
     pub filters: bool,
     /// Clearance to keep from everything (m).
@@ -57,6 +59,7 @@ impl Default for PlanRequest {
             limits: None,
             region: None,
             included: Vec::new(),
+            numbered_after: 0,
             filters: true,
             clearance: 10.0 * MILLIMETRE,
             expected_deviation: None,

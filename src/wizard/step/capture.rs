@@ -235,18 +235,7 @@ impl StepMachine for CaptureStep {
                 self.row.map_or_else(Vec::new, |row| self.measure(cx, row))
             }
             Intent::TypeReading(text) => match reading::parse(&text, Self::manual_unit(cx).unwrap_or_default()) {
-                Ok(point) => {
-                    let reading = Reading {
-                        point,
-                        sigma: None,
-                        scatter: None,
-                        shots: 1,
-                        temperature: None,
-                        configuration: None,
-                        seconds: 0.0,
-                    };
-                    self.take(&reading, cx)
-                }
+                Ok(point) => self.take(&reading::typed(point), cx),
                 Err(message) => vec![Action::Say(Notice::attention(message))],
             },
             Intent::AcceptReading => {

@@ -2,6 +2,7 @@
 
 use super::{Action, Cx, StepMachine};
 use crate::identification::{PointSample, TargetAt};
+use crate::procedure::EstimationSettings;
 use crate::procedure::identify::{IdentifyRequest, NamedSample};
 use crate::session::journal::{Entry, IdentifiedText};
 use crate::session::plan::PoseKind;
@@ -45,16 +46,21 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
     let robot = cx.robot()?;
     let verification = samples(cx.session, PoseKind::Verification);
     let mode = if verification.is_empty() { VerificationMode::None } else { VerificationMode::Session };
-    let mut request = IdentifyRequest::new(cx.profile()?, robot.text.clone());
-    request.identification = samples(cx.session, PoseKind::Identification);
-    request.verification = verification;
-    request.verification_mode = mode;
-    request.basis = "the verification poses of this session".to_owned();
-    request.created = cx.now.to_string();
-    Some(Request::Identify(Box::new(request)))
+    Some(Request::Identify(Box::new(IdentifyRequest {
+        profile: cx.profile()?,
+        profile_text: robot.text.clone(),
+        created: cx.now.to_string(),
+        inputs: Vec::new(),
+        settings: EstimationSettings::default(),
+        identification: samples(cx.session, PoseKind::Identification).into(),
+        verification: verification.into(),
+        basis: "the verification poses of this session, same set-up".to_owned(),
+        verification_mode: mode,
+        layout: None,
+    })))
 }
 
-fn result(cx: &Cx<'_>) -> Option<&IdentifiedText> {
+fn result<'a>(cx: &Cx<'a>) -> Option<&'a IdentifiedText> {
     cx.session.identified.as_deref()
 }
 

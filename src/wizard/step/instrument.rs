@@ -1,12 +1,10 @@
 //! Instrument: what measures.
 
 use super::{Action, Cx, StepMachine};
-use crate::session::journal::Entry;
+use crate::session::journal::{Entry, instrument_text};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
-use crate::session::simulation::Simulation;
-use crate::wizard::effect::{Answer, Request};
+use crate::wizard::effect::Request;
 use crate::wizard::intent::{Intent, IntentInfo};
-use crate::wizard::notice::Problem;
 use crate::wizard::view::{Content, InstrumentView};
 
 /// The instrument step. What it waits for is in the session: a choice without a connection.
@@ -17,22 +15,6 @@ pub(in crate::wizard) struct InstrumentStep;
 fn connect(cx: &Cx<'_>) -> Vec<Action> {
     let (Some(instrument), Some(robot)) = (&cx.session.instrument, cx.robot()) else { return Vec::new() };
     vec![Action::Ask(Request::Connect { instrument: instrument.clone(), profile: Box::new(robot.profile.clone()) })]
-}
-
-/// In one line.
-pub(in crate::wizard) fn describe(instrument: &InstrumentChoice) -> String {
-    match instrument {
-        InstrumentChoice::Manual { unit } => format!("typed in by hand, in {}", unit.sign()),
-        InstrumentChoice::Simulated(Simulation { seed, faults, .. }) => {
-            let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
-            let faults = if faults.is_empty() { String::new() } else { format!(", with {}", faults.join(", ")) };
-            format!("simulated cell, seed {seed}{faults}")
-        }
-        InstrumentChoice::Replay { sets, .. } => {
-            let files: Vec<&str> = sets.iter().map(|set| set.file.as_str()).collect();
-            format!("recorded measurements: {}", files.join(", "))
-        }
-    }
 }
 
 impl StepMachine for InstrumentStep {
@@ -69,14 +51,6 @@ impl StepMachine for InstrumentStep {
         }
     }
 
-    fn on_answer(&mut self, _answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
-        Vec::new()
-    }
-
-    fn on_failure(&mut self, problem: Problem, _cx: &Cx<'_>) -> Vec<Action> {
-        vec![Action::Say(problem.into())]
-    }
-
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
         if matches!(entry, Entry::Instrument(_)) { connect(cx) } else { Vec::new() }
     }
@@ -84,7 +58,7 @@ impl StepMachine for InstrumentStep {
     fn content(&self, cx: &Cx<'_>) -> Content {
         let profile = cx.robot().map(|robot| &robot.profile);
         Content::Instrument(InstrumentView {
-            choice: cx.session.instrument.as_ref().map(describe),
+            choice: cx.session.instrument.as_ref().map(instrument_text),
             identity: cx.connection.map(|connection| connection.identity.clone()),
             recorded_poses: cx.connection.map_or(0, |connection| connection.recorded.len()),
             stated_sigma: profile.and_then(|profile| profile.instrument()).map(|instrument| {

@@ -36,7 +36,7 @@ pub(super) fn plan_text(cx: &Cx<'_>, summary: Option<&PlanSummary>, rows: &[Plan
     let joint_types = cx.robot().map_or(&[][..], |robot| &robot.joint_types);
     PlanText {
         origin,
-        condition_number: summary.and_then(PlanSummary::condition_number_if_known),
+        condition_number: summary.map(|summary| summary.condition_number),
         predicted_error_sigma: summary.map(|summary| summary.predicted_error_sigma),
         minutes: summary.and_then(|summary| summary.time.as_ref()).map(|time| time.total_min),
         rows: rows.iter().map(|row| PlannedText::new(row, joint_types)).collect(),
@@ -67,7 +67,8 @@ pub(super) fn plan_request(cx: &Cx<'_>, settings: &PlanSettings) -> Option<Reque
         seed: settings.seed,
         drift_every: settings.drift_every,
         included: measured_poses(cx),
-        first_number: highest_pose_number(cx) + 1,
+        numbered_after: highest_pose_number(cx),
+        created: cx.now.to_string(),
         ..PlanRequest::default()
     };
     Some(Request::Plan {

@@ -1,0 +1,78 @@
+//! Where to stand for a circle-point analysis: a configuration from which the last two joints can turn far without touching
+//! anything.
+
+use super::cell::{cell, planning_limits};
+use crate::error::{ExitStatus, Failure};
+use crate::identification::circle_point::circle_plan;
+use crate::planning::collision::ArmShape;
+use crate::planning::{JointBox, low_discrepancy};
+use crate::profile::Profile;
+use crate::units::MILLIMETRE;
+
+/// Points per circle.
+const POINTS: usize = 8;
+/// Clearance to keep from everything (m).
+const CLEARANCE: f64 = 10.0 * MILLIMETRE;
+/// Base configurations that are tried.
+const TRIES: usize = 2000;
+/// Seed of the base configurations.
+const SEED: u64 = 1;
+
+/// Configurations per joint: the last joint, then the one before it. The arm can go from each to the next.
+///
+/// # Errors
+/// The arm cannot turn its last two joints freely anywhere, or they do not turn at all.
+pub fn plan(profile: &Profile) -> Result<Vec<(usize, Vec<Vec<f64>>)>, Failure> {
+    let limits = planning_limits(profile)?;
+    let usage = |error: &dyn std::error::Error| Failure::from_error(ExitStatus::Usage, error);
+    let cell = cell(profile, limits.clone(), None, true)?;
+    let shape = ArmShape::new(profile.chain(), &cell, CLEARANCE).map_err(|error| usage(&error))?;
+    let joints = profile.chain().dof();
+    let turned = [joints.saturating_sub(1), joints.saturating_sub(2)];
+    let joint_box = JointBox::new(limits.clone()).map_err(|error| usage(&error))?;
+    // The middle of the limits first: nobody wants to measure in a corner.
+    let middle: Vec<f64> = limits.iter().map(|(low, high)| f64::midpoint(*low, *high)).collect();
+    for base in std::iter::once(middle).chain(low_discrepancy(&joint_box, SEED).take(TRIES)) {
+        let circle = |joint: usize| circle_plan(profile.chain(), &limits, joint, &base, POINTS).map(|plan| (joint, plan));
+        let circles = turned.iter().map(|joint| circle(*joint)).collect::<Result<Vec<_>, _>>().map_err(|error| {
+            usage(&error).hint("say where the SMR is, or leave it free: it is then identified with the arm")
+        })?;
+        let visited: Vec<&Vec<f64>> = circles.iter().flat_map(|(_, plan)| plan).collect();
+        let is_free = visited.iter().all(|q| shape.check(q).is_ok())
+            && visited.windows(2).all(|pair| shape.check_move(pair[0], pair[1]).is_ok());
+        if is_free {
+            return Ok(circles);
+        }
+    }
+    Err(Failure::new(ExitStatus::Usage, "the arm cannot turn its last two joints far enough anywhere in its cell without touching something")
+        .hint("say where the SMR is, or leave it free: it is then identified with the arm"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::builtin;
+
+    #[test]
+    fn the_last_two_joints_are_turned_and_nothing_else() {
+        for name in ["soochow", "ur5", "franka_panda"] {
+            let (profile, _) = Profile::parse(builtin(name).unwrap(), name).unwrap();
+            let joints = profile.chain().dof();
+            let circles = plan(&profile).unwrap();
+            assert_eq!(circles.iter().map(|(joint, _)| *joint).collect::<Vec<_>>(), [joints - 1, joints - 2], "{name}");
+            for (joint, plan) in &circles {
+                assert_eq!(plan.len(), POINTS);
+                let still = (0..joints).filter(|other| other != joint);
+                for other in still {
+                    assert!(plan.iter().all(|q| (q[other] - plan[0][other]).abs() < 1e-12), "{name}: {other}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn parallel_last_axes_have_no_circles_to_offer() {
+        let (profile, _) = Profile::parse(builtin("epson_ls3_b401s").unwrap(), "scara").unwrap();
+        assert!(plan(&profile).is_err());
+    }
+}

@@ -1,0 +1,337 @@
+//! Runs a script with the wizard and its threads.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use super::expectation::Check;
+use super::grammar::{OnFinding, Script, ScriptStep};
+use super::transcript::Transcript;
+use crate::runtime::{Engine, Happening};
+use crate::session::state::Session;
+use crate::session::summary::IdentificationSummary;
+use crate::wizard::{Intent, IntentInfo, ViewModel};
+
+/// Longest real time in which nothing at all happens while something is under way; a search reports far more often.
+const PATIENCE: Duration = Duration::from_secs(300);
+/// A measurement that fails is tried again so often.
+const TRIES: usize = 3;
+/// Characters of an intent in the transcript.
+const LONGEST_INTENT: usize = 120;
+
+/// How a script ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// All steps were done and all expectations met.
+    Done,
+    /// A step could not be done, or an expectation was not met.
+    Failed {
+        /// Number of the step, from 1.
+        step: usize,
+        /// What was expected and what was seen.
+        message: String,
+    },
+    /// The program was told to end, by a signal or by `Quit`.
+    Ended {
+        /// Why.
+        cause: String,
+    },
+}
+
+/// Opens the session of a folder again, for [`ScriptStep::Restart`].
+pub type Reopen<'a> = &'a dyn Fn(&str) -> Result<Engine, String>;
+
+/// Why a step ends the script.
+enum Stop {
+    Failed(String),
+    Ended(String),
+    Output(io::Error),
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+/// A script under way.
+pub struct Runner<'a, W: Write> {
+    engine: Engine,
+    transcript: Transcript<'a, W>,
+    reopen: Reopen<'a>,
+    done: Vec<Intent>,
+}
+
+impl<'a, W: Write> std::fmt::Debug for Runner<'a, W> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Runner").field("engine", &self.engine).finish_non_exhaustive()
+    }
+}
+
+impl<'a, W: Write> Runner<'a, W> {
+    /// A runner for an engine.
+    pub fn new(engine: Engine, transcript: Transcript<'a, W>, reopen: Reopen<'a>) -> Self {
+        Self { engine, transcript, reopen, done: Vec::new() }
+    }
+
+    /// The session.
+    pub fn session(&self) -> &Session {
+        self.engine.wizard().session()
+    }
+
+    /// Where the session is on disk.
+    pub fn folder(&self) -> Option<&str> {
+        self.engine.wizard().folder()
+    }
+
+    /// The last result.
+    pub fn summary(&self) -> Option<&IdentificationSummary> {
+        self.session().identified.as_ref().map(|result| &result.summary)
+    }
+
+    /// Runs the steps, then closes the session in good order.
+    ///
+    /// # Errors
+    /// The transcript cannot be written.
+    pub fn run(&mut self, script: &Script) -> io::Result<Outcome> {
+        self.transcript.event("script", &script.title)?;
+        let mut outcome = Outcome::Done;
+        for (index, step) in std::iter::once(None).chain(script.steps.iter().map(Some)).enumerate() {
+            let result = match step {
+                // What resuming has set in motion comes first.
+                None => self.settle(),
+                Some(step) => self.step(step),
+            };
+            outcome = match result {
+                Ok(()) => continue,
+                Err(Stop::Output(error)) => return Err(error),
+                Err(Stop::Ended(cause)) => Outcome::Ended { cause },
+                Err(Stop::Failed(message)) => {
+                    let text = step.map_or_else(String::new, |step| format!(" ({})", short(&format!("{step:?}"))));
+                    self.transcript.event("failed", &format!("step {index}{text}: {message}"))?;
+                    Outcome::Failed { step: index, message }
+                }
+            };
+            break;
+        }
+        self.close()?;
+        Ok(outcome)
+    }
+
+    /// A table for people, after the last line.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn print_table(&mut self, text: &str) -> io::Result<()> {
+        self.transcript.table(text)
+    }
+
+    /// A line of the transcript.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn print(&mut self, event: &str, text: &str) -> io::Result<()> {
+        self.transcript.event(event, text)
+    }
+
+    /// Ends the wizard and waits until its last entry is on disk.
+    fn close(&mut self) -> io::Result<()> {
+        if self.engine.wizard().ended().is_none() {
+            self.engine.intend(Intent::Quit);
+        }
+        while !self.engine.has_exited() && self.engine.wait(PATIENCE) {}
+        self.report()
+    }
+
+    fn step(&mut self, step: &ScriptStep) -> Result<(), Stop> {
+        match step {
+            ScriptStep::Do(intent) => self.perform(intent),
+            ScriptStep::Blocked(intent, reason) => self.check_blocked(intent, reason),
+            ScriptStep::Expect(path, check) => self.expect(path, check),
+            ScriptStep::CaptureAll(on_finding) => self.capture(usize::MAX, *on_finding),
+            ScriptStep::Capture(count, on_finding) => self.capture(*count, *on_finding),
+            ScriptStep::CaptureCircles => self.capture_circles(),
+            ScriptStep::Restart => self.restart(),
+            ScriptStep::Say(text) => Ok(self.transcript.event("say", text)?),
+        }
+    }
+
+    /// What the wizard offers for an intent.
+    fn offer(&self, intent: &Intent) -> Option<IntentInfo> {
+        self.engine.wizard().intents().into_iter().find(|info| info.intent.name() == intent.name())
+    }
+
+    /// Does an intent, which must be possible, and waits until nothing is under way.
+    fn perform(&mut self, intent: &Intent) -> Result<(), Stop> {
+        match self.offer(intent) {
+            None => return Err(Stop::Failed(format!("{} is not offered here; offered: {}", intent.name(), self.offered()))),
+            Some(IntentInfo { blocked: Some(reason), .. }) => {
+                return Err(Stop::Failed(format!("{} is not possible now: {reason}", intent.name())));
+            }
+            Some(_) => {}
+        }
+        let text = ron::to_string(intent).unwrap_or_else(|_error| intent.name().to_owned());
+        self.transcript.event("do", &short(&text))?;
+        self.act(intent)
+    }
+
+    /// As [`Self::perform`], without a line of its own.
+    fn act(&mut self, intent: &Intent) -> Result<(), Stop> {
+        self.done.push(intent.clone());
+        self.engine.intend(intent.clone());
+        self.settle()
+    }
+
+    fn offered(&self) -> String {
+        let infos = self.engine.wizard().intents();
+        infos.iter().filter(|info| info.is_enabled()).map(|info| info.intent.name()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Waits until nothing is under way, printing what happens.
+    fn settle(&mut self) -> Result<(), Stop> {
+        loop {
+            self.report()?;
+            if let Some(cause) = self.engine.wizard().ended() {
+                return Err(Stop::Ended(cause.to_owned()));
+            }
+            if self.engine.wizard().is_idle() {
+                return Ok(());
+            }
+            if self.view().is_stopped() {
+                let notice = self.engine.wizard().notice().map_or_else(String::new, |notice| notice.what.clone());
+                return Err(Stop::Failed(notice));
+            }
+            if !self.engine.wait(PATIENCE) {
+                return Err(Stop::Failed(format!("nothing happened for {} s", PATIENCE.as_secs())));
+            }
+        }
+    }
+
+    fn report(&mut self) -> io::Result<()> {
+        let happenings: Vec<Happening> = self.engine.happenings().collect();
+        for happening in happenings {
+            match happening {
+                Happening::Written(lines) => {
+                    for line in lines {
+                        self.transcript.entry(line.number, line.time, &line.entry.describe())?;
+                    }
+                }
+                Happening::Told(notice) => {
+                    let hints: Vec<String> = notice.hints.iter().map(|hint| format!(" | hint: {hint}")).collect();
+                    self.transcript.event("notice", &format!("{}{}", notice.what, hints.concat()))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn view(&self) -> ViewModel {
+        self.engine.wizard().view()
+    }
+
+    fn expect(&mut self, path: &str, check: &Check) -> Result<(), Stop> {
+        check.test(&self.view(), path).map_err(Stop::Failed)?;
+        Ok(self.transcript.event("expect", &format!("{path}: {check:?}"))?)
+    }
+
+    fn check_blocked(&mut self, intent: &Intent, reason: &str) -> Result<(), Stop> {
+        let seen = match self.offer(intent) {
+            Some(IntentInfo { blocked: Some(blocked), .. }) if blocked.contains(reason) => {
+                return Ok(self.transcript.event("expect", &format!("{} is blocked: {blocked}", intent.name()))?);
+            }
+            Some(IntentInfo { blocked: Some(blocked), .. }) => format!("it is not, because: {blocked}"),
+            Some(_) => "it is possible".to_owned(),
+            None => "it is not offered at all".to_owned(),
+        };
+        Err(Stop::Failed(format!("expected {} not to be possible because '{reason}'; {seen}", intent.name())))
+    }
+
+    /// Measures poses that wait, up to `count`.
+    fn capture(&mut self, count: usize, on_finding: OnFinding) -> Result<(), Stop> {
+        let mut taken = 0;
+        let mut failed = 0;
+        while taken < count && self.session().open_rows().next().is_some() {
+            let before = self.session().samples.len();
+            let next = match self.offer(&Intent::Measure) {
+                Some(info) if info.is_enabled() => Intent::Measure,
+                info => {
+                    let reason = info.and_then(|info| info.blocked).unwrap_or_else(|| "it is not offered here".to_owned());
+                    return Err(Stop::Failed(format!("cannot measure: {reason}")));
+                }
+            };
+            self.act(&next)?;
+            if self.session().samples.len() == before {
+                failed += 1;
+                if failed >= TRIES {
+                    let what = self.engine.wizard().notice().map_or_else(String::new, |notice| notice.what.clone());
+                    return Err(Stop::Failed(format!("no sample after {TRIES} tries: {what}")));
+                }
+                continue;
+            }
+            failed = 0;
+            taken += 1;
+            if !self.resolve(on_finding)? {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Decides about samples in question; `false`: capturing is to stop.
+    fn resolve(&mut self, on_finding: OnFinding) -> Result<bool, Stop> {
+        let mut again = 0;
+        while let Some(info) = self.offer(&Intent::Keep).filter(IntentInfo::is_enabled) {
+            let has_remedy = self.offer(&Intent::ApplyRemedy).is_some_and(|info| info.is_enabled());
+            let intent = match on_finding {
+                OnFinding::Stop => return Ok(false),
+                OnFinding::Fail => {
+                    let what = self.engine.wizard().notice().map_or_else(String::new, |notice| notice.what.clone());
+                    return Err(Stop::Failed(format!("a check found something: {what}")));
+                }
+                OnFinding::Keep => info.intent,
+                OnFinding::LeaveOut => Intent::LeaveOut,
+                OnFinding::Remedy if has_remedy => Intent::ApplyRemedy,
+                OnFinding::MeasureAgain | OnFinding::Remedy if again < TRIES => {
+                    again += 1;
+                    Intent::MeasureAgain
+                }
+                OnFinding::MeasureAgain | OnFinding::Remedy => {
+                    return Err(Stop::Failed(format!("still in question after {TRIES} more measurements")));
+                }
+            };
+            self.perform(&intent)?;
+        }
+        Ok(true)
+    }
+
+    fn capture_circles(&mut self) -> Result<(), Stop> {
+        let mut failed = 0;
+        while self.offer(&Intent::Measure).is_some_and(|info| info.is_enabled()) {
+            let before = self.session().circle_points.len();
+            self.act(&Intent::Measure)?;
+            failed = if self.session().circle_points.len() == before { failed + 1 } else { 0 };
+            if failed >= TRIES {
+                return Err(Stop::Failed(format!("no point after {TRIES} tries")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the program and resumes from disk.
+    fn restart(&mut self) -> Result<(), Stop> {
+        let folder = self.folder().ok_or_else(|| Stop::Failed("there is no session to resume yet".to_owned()))?.to_owned();
+        self.close()?;
+        self.transcript.event("restart", "the program ends and resumes the session")?;
+        // The lock must be free before it is taken again.
+        self.engine.release();
+        self.engine = (self.reopen)(&folder).map_err(Stop::Failed)?;
+        self.settle()
+    }
+}
+
+fn short(text: &str) -> String {
+    let mut short: String = text.chars().take(LONGEST_INTENT).collect();
+    if text.chars().count() > LONGEST_INTENT {
+        short.push('…');
+    }
+    short
+}

@@ -1,0 +1,152 @@
+//! Entries in one line each, for transcripts and lists. Stable: scripts and people compare them.
+
+use super::entry::{Correction, Decision, Entry, MeasuredText, PlanText};
+use crate::session::plan::PoseKind;
+use crate::session::set_up::{InstrumentChoice, TargetChoice};
+use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictStatus};
+
+impl Entry {
+    /// What happened, in one line without a full stop.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Opened { program, name, .. } => format!("session '{name}' opened by {program}"),
+            Self::Profile { source, sha256, .. } => {
+                format!("profile '{source}' (sha256 {}…)", sha256.chars().take(12).collect::<String>())
+            }
+            Self::Step(step) => format!("step {} of 8: {step}", step.number()),
+            Self::Instrument(instrument) => format!("instrument: {}", instrument_text(instrument)),
+            Self::Target(target) => format!("SMR: {}", target_text(target)),
+            Self::CirclePoint(point) => {
+                format!("measurement {}: joint {} turned, at {}", point.number, point.joint + 1, xyz(point.xyz_mm))
+            }
+            Self::CirclesDiscarded => "circles discarded".to_owned(),
+            Self::Plan(plan) => format!("plan: {}", plan_text(plan)),
+            Self::PlanExtended(plan) => format!("more poses: {}", plan_text(plan)),
+            Self::Sample(sample) => sample_text(sample),
+            Self::Refused { number, pose, reason, .. } => format!("measurement {number}: pose {pose}: no sample: {reason}"),
+            Self::Decision { sample, decision } => {
+                let decision = match decision {
+                    Decision::Keep => "kept",
+                    Decision::LeaveOut => "left out",
+                    Decision::Undo => "taken back",
+                };
+                format!("measurement {sample}: {decision}")
+            }
+            Self::Correction(correction) => correction_text(correction),
+            Self::Skipped { row, skipped: true } => format!("row {} of the plan skipped", row + 1),
+            Self::Skipped { row, skipped: false } => format!("row {} of the plan is to be measured after all", row + 1),
+            Self::Note { pose: Some(pose), text } => format!("note to pose {pose}: {text}"),
+            Self::Note { pose: None, text } => format!("note: {text}"),
+            Self::Identified(result) => result_text(&result.summary, result.calibration.is_some()),
+            Self::Delivered { files } => format!("written: {}", files.join(", ")),
+            Self::Resumed { program, torn_bytes: 0 } => format!("resumed by {program}"),
+            Self::Resumed { program, torn_bytes } => {
+                format!("resumed by {program}; {torn_bytes} bytes of an incomplete last entry dropped")
+            }
+            Self::Closed { reason } => format!("closed: {reason}"),
+        }
+    }
+}
+
+fn xyz((x, y, z): (f64, f64, f64)) -> String {
+    format!("({x:.4}, {y:.4}, {z:.4}) mm")
+}
+
+fn sample_text(sample: &MeasuredText) -> String {
+    let MeasuredText { number, pose, kind, xyz_mm, scatter_mm, findings, .. } = sample;
+    let kind = match kind {
+        PoseKind::Identification => "",
+        PoseKind::Verification => " (verification)",
+        PoseKind::Drift => " (drift)",
+        PoseKind::Home | PoseKind::Via => " (on the way)",
+    };
+    let scatter = scatter_mm.map_or_else(String::new, |scatter| format!(", scatter {scatter:.4} mm"));
+    let findings: Vec<String> = findings.iter().map(|finding| format!("; CHECK {}: {}", finding.cause, finding.message)).collect();
+    format!("measurement {number}: pose {pose}{kind} at {}{scatter}{}", xyz(*xyz_mm), findings.concat())
+}
+
+fn plan_text(plan: &PlanText) -> String {
+    let count = |kind: PoseKind| plan.rows.iter().filter(|row| row.kind == kind).count();
+    let mut text = format!(
+        "{} identification and {} verification poses, {}",
+        count(PoseKind::Identification),
+        count(PoseKind::Verification),
+        plan.origin
+    );
+    if let Some(condition) = plan.condition_number {
+        text += &format!(", condition number {condition:.1}");
+    }
+    if let Some(error) = plan.predicted_error_sigma {
+        text += &format!(", predicted error {error:.3} sigma");
+    }
+    text
+}
+
+fn correction_text(correction: &Correction) -> String {
+    match correction {
+        Correction::Scale { since, factor } => format!("corrected: coordinates from measurement {since} on times {factor}"),
+        Correction::Swap { first, second } => format!("corrected: measurements {first} and {second} change places"),
+        Correction::Row { sample, row } => format!("corrected: measurement {sample} belongs to row {} of the plan", row + 1),
+        Correction::Joints { sample, joints } => {
+            let joints: Vec<String> = joints.iter().map(|value| format!("{value:.3}")).collect();
+            format!("corrected: at measurement {sample} the robot stood at ({})", joints.join(", "))
+        }
+    }
+}
+
+fn result_text(summary: &IdentificationSummary, is_usable: bool) -> String {
+    if !is_usable {
+        return format!("identified from {} samples: no usable solution", summary.samples);
+    }
+    let rank = summary.rank.map_or_else(|| "unclear".to_owned(), |rank| rank.to_string());
+    let mut text = format!(
+        "identified from {} samples: {} parameters, rank {rank}, {} rejected",
+        summary.samples,
+        summary.parameter_count,
+        summary.rejected.len()
+    );
+    let Some(verification) = &summary.verification else { return text + "; not verified" };
+    let position = |statistics: &Option<StatisticsSummary>| {
+        statistics.map_or_else(|| "-".to_owned(), |position| format!("{:.3}", position.mean))
+    };
+    text += &format!(
+        "; verified on {} samples: mean position error {} mm nominal, {} mm identified",
+        verification.samples,
+        position(&verification.nominal.position_mm),
+        position(&verification.identified.position_mm)
+    );
+    let verdict = match summary.verdict.status {
+        VerdictStatus::Accepted => "accepted",
+        VerdictStatus::NotAccepted => "NOT accepted",
+        VerdictStatus::NotEvaluated => "not evaluated",
+    };
+    format!("{text}; {verdict}")
+}
+
+/// An instrument in one line.
+pub fn instrument_text(instrument: &InstrumentChoice) -> String {
+    match instrument {
+        InstrumentChoice::Manual { unit } => format!("typed in by hand, in {}", unit.sign()),
+        InstrumentChoice::Simulated(simulation) => {
+            let faults: Vec<String> = simulation.faults.iter().map(ToString::to_string).collect();
+            let faults = if faults.is_empty() { String::new() } else { format!(", with {}", faults.join(", ")) };
+            format!("simulated cell, seed {}{faults}", simulation.seed)
+        }
+        InstrumentChoice::Replay { sets } => {
+            let files: Vec<&str> = sets.iter().map(|set| set.file.as_str()).collect();
+            format!("recorded measurements: {}", files.join(", "))
+        }
+    }
+}
+
+/// Where the SMR is said to be, in one line.
+pub fn target_text(choice: &TargetChoice) -> String {
+    let at = |(x, y, z): (f64, f64, f64)| format!("({x:.3}, {y:.3}, {z:.3}) mm in the flange");
+    match *choice {
+        TargetChoice::Profile => "as the profile says".to_owned(),
+        TargetChoice::Known { xyz_mm, sigma_mm } if sigma_mm <= 0.0 => format!("{}, exact", at(xyz_mm)),
+        TargetChoice::Known { xyz_mm, sigma_mm } => format!("{}, to {sigma_mm} mm", at(xyz_mm)),
+        TargetChoice::Free { sigma_mm } => format!("free, within {sigma_mm} mm of the place in the profile"),
+        TargetChoice::Circles { xyz_mm, sigma_mm } => format!("{}, to {sigma_mm:.3} mm, from circles", at(xyz_mm)),
+    }
+}
