@@ -110,6 +110,9 @@ fn what_is_not_a_circle_is_said() {
     ");
 }
 
+/// Points of both series.
+type Series = [Vec<Point3<f64>>; 2];
+
 /// A cell in which the last two joints are turned: the readings of both series are exact.
 struct Case {
     profile: Profile,
@@ -135,7 +138,7 @@ impl Case {
         Self { truth, target: Point3::new(0.045, -0.03, 0.062), configurations, profile }
     }
 
-    fn points(&self) -> [Vec<Point3<f64>>; 2] {
+    fn points(&self) -> Series {
         let tracker_from_base = Isometry3::from_parts(
             Translation3::new(2.9, -1.1, 0.6),
             UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.2, 2.1)),
@@ -153,7 +156,7 @@ impl Case {
 
     fn locate(
         &self,
-        points: &[Vec<Point3<f64>>; 2],
+        points: &Series,
         sigma: Option<f64>,
         expected: &[FreeParameter],
     ) -> Result<TargetLocation, CirclePointError> {
@@ -277,8 +280,7 @@ fn gross_errors_are_seen_in_the_residual() {
 
 #[test]
 fn a_wrong_sense_shows_in_the_residual_or_on_the_other_side_of_the_flange() {
-    let mirror =
-        |points: [Vec<Point3<f64>>; 2]| points.map(|p| p.iter().map(|p| Point3::new(-p.x, p.y, p.z)).collect());
+    let mirror = |points: Series| points.map(|p| p.iter().map(|p| Point3::new(-p.x, p.y, p.z)).collect());
     for (name, wrist_behind_flange) in [("soochow", Some(0.125)), ("ur5", Some(0.0823)), ("franka_panda", None)] {
         let mut case = Case::new(name);
         let (points, expected) = (case.points(), case.expected());
@@ -303,7 +305,7 @@ fn a_wrong_sense_shows_in_the_residual_or_on_the_other_side_of_the_flange() {
 fn series_that_do_not_tell_the_place_are_refused() {
     let case = Case::new("ur5e");
     let points = case.points();
-    let error = |change: &dyn Fn(&mut Case, &mut [Vec<Point3<f64>>; 2])| {
+    let error = |change: &dyn Fn(&mut Case, &mut Series)| {
         let mut case = Case::new("ur5e");
         let mut points = points.clone();
         change(&mut case, &mut points);
