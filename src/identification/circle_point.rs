@@ -9,6 +9,10 @@
 //! offset of the last joint turns the result about its axis, an error of its d moves it along. [`TargetLocation::measured`] is
 //! what the readings alone would give.
 //!
+//! Where the last two axes meet at right angles, as in a spherical wrist, the circles of a mirrored frame, or of a joint that
+//! counts the other way, are those of a right arm with the SMR on the other side of the wrist: the residual stays small, and the
+//! result is behind the wrist centre. Compare it with where the SMR is mounted.
+//!
 //! Points in the tracker frame (m), configurations pendant values (rad, sliding joints m).
 
 mod adjustment;
@@ -35,7 +39,8 @@ const STILL: (f64, f64) = (0.02 * DEGREE, 10.0 * MICROMETRE);
 pub enum CircleError {
     /// Too few places.
     #[error(
-        "{given} points in {distinct} different places do not fix a circle: at least 3 are needed, and 4 to see an error; if the joint did turn, the SMR sits on its axis: mount it beside the axis"
+        "{given} points ({distinct} different) do not fix a circle: at least 3 different ones are needed, and 4 to see an error{}",
+        if *given >= 3 { "; if the joint did turn, the SMR sits on its axis: mount it beside the axis" } else { "" }
     )]
     TooFewPoints {
         /// Different places.
@@ -105,7 +110,9 @@ pub enum CirclePointError {
         moves: String,
     },
     /// A configuration with the wrong number of joints, or not one per point.
-    #[error("joint {joint}: {configurations} configurations for {points} points, each needs {joints} joint values")]
+    #[error(
+        "joint {joint}: {configurations} configurations and {points} points; each point needs a configuration of {joints} joint values"
+    )]
     Counts {
         /// Name of the joint.
         joint: String,

@@ -36,8 +36,8 @@ fn an_exact_circle_is_found_exactly() {
         assert!((fit.centre - centre).norm() < 1e-11 && (fit.radius - 0.08).abs() < 1e-11, "{count} {arc_deg}");
         assert!((fit.normal.into_inner() - axis).norm() < 1e-10, "{count} {arc_deg}");
         assert!(fit.max < 1e-12 && fit.rms <= fit.max);
-        let gap = if count == 3 { (360.0 - arc_deg).max(arc_deg / 2.0) } else { 0.0 };
-        let arc = if count == 3 { 360.0 - gap } else { arc_deg };
+        // The largest gap is the open end, or a step.
+        let arc = 360.0 - (360.0 - arc_deg).max(arc_deg / (count - 1) as f64);
         assert!((to_deg(fit.arc) - arc).abs() < 1e-6, "{} {arc}", to_deg(fit.arc));
         let backwards: Vec<_> = points.iter().rev().copied().collect();
         let reversed = fit_circle(&backwards, None).unwrap();
@@ -100,8 +100,18 @@ fn what_is_not_a_circle_is_said() {
         fit_circle(&circle(12, 15.0).2, None).unwrap_err(),
         fit_circle(&[points[0], points[1], points[2], Point3::new(f64::NAN, 0.0, 0.0)], None).unwrap_err(),
     ];
-    insta::assert_snapshot!(messages.map(|error| error.to_string()).join("\n"), @"");
+    insta::assert_snapshot!(messages.map(|error| error.to_string()).join("\n"), @r"
+    2 points (2 different) do not fix a circle: at least 3 different ones are needed, and 4 to see an error
+    12 points (1 different) do not fix a circle: at least 3 different ones are needed, and 4 to see an error; if the joint did turn, the SMR sits on its axis: mount it beside the axis
+    the points lie on a line: turn the joint further
+    the circle has a radius of 2.400 mm: the SMR sits too near to the axis; mount it at least 5 mm beside it, better 50 mm
+    the points cover only 15.0 deg of the circle: from 20 deg on it is usable, 90 deg or more are good
+    a point has a number that is not finite
+    ");
 }
+
+/// Points of both series.
+type Series = [Vec<Point3<f64>>; 2];
 
 /// A cell in which the last two joints are turned: the readings of both series are exact.
 struct Case {
@@ -128,7 +138,7 @@ impl Case {
         Self { truth, target: Point3::new(0.045, -0.03, 0.062), configurations, profile }
     }
 
-    fn points(&self) -> [Vec<Point3<f64>>; 2] {
+    fn points(&self) -> Series {
         let tracker_from_base = Isometry3::from_parts(
             Translation3::new(2.9, -1.1, 0.6),
             UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.2, 2.1)),
@@ -146,7 +156,7 @@ impl Case {
 
     fn locate(
         &self,
-        points: &[Vec<Point3<f64>>; 2],
+        points: &Series,
         sigma: Option<f64>,
         expected: &[FreeParameter],
     ) -> Result<TargetLocation, CirclePointError> {
@@ -266,25 +276,36 @@ fn gross_errors_are_seen_in_the_residual() {
     assert!(found.rms > 5.0 * found.expected_rms, "{} {}", found.rms, found.expected_rms);
     let worst = found.residuals[0].iter().copied().fold(0.0, f64::max);
     assert!((worst - found.residuals[0][4]).abs() < 1e-15 && (worst - found.max()).abs() < 1e-15);
+}
 
-    // A mirrored frame, and joint values that count the other way.
-    let mirrored = case.points().map(|series| series.iter().map(|p| Point3::new(-p.x, p.y, p.z)).collect());
-    let seen = case.locate(&mirrored, Some(NOISE), &expected);
-    assert!(seen.is_err() || seen.is_ok_and(|found| found.rms > 5.0 * found.expected_rms));
-    let mut reversed = Case::new("soochow");
-    let points = reversed.points();
-    for q in &mut reversed.configurations[0] {
-        q[5] = -q[5];
+#[test]
+fn a_wrong_sense_shows_in_the_residual_or_on_the_other_side_of_the_flange() {
+    let mirror = |points: Series| points.map(|p| p.iter().map(|p| Point3::new(-p.x, p.y, p.z)).collect());
+    for (name, wrist_behind_flange) in [("soochow", Some(0.125)), ("ur5", Some(0.0823)), ("franka_panda", None)] {
+        let mut case = Case::new(name);
+        let (points, expected) = (case.points(), case.expected());
+        let last = case.truth.dof() - 1;
+        let mirrored = case.locate(&mirror(points.clone()), Some(NOISE), &expected).unwrap();
+        for q in case.configurations.iter_mut().flatten() {
+            q[last] = -q[last];
+        }
+        let reversed = case.locate(&points, Some(NOISE), &expected).unwrap();
+        for found in [mirrored, reversed] {
+            if let Some(behind) = wrist_behind_flange {
+                let reflected = -case.target.z - 2.0 * behind;
+                assert!((found.point_in_flange.z - reflected).abs() < 1e-9 && found.max() < 1e-9, "{name}");
+            } else {
+                assert!(found.rms > 5.0 * found.expected_rms, "{name}: {} {}", found.rms, found.expected_rms);
+            }
+        }
     }
-    let seen = reversed.locate(&points, Some(NOISE), &expected);
-    assert!(seen.is_err() || seen.is_ok_and(|found| found.rms > 5.0 * found.expected_rms));
 }
 
 #[test]
 fn series_that_do_not_tell_the_place_are_refused() {
     let case = Case::new("ur5e");
     let points = case.points();
-    let error = |change: &dyn Fn(&mut Case, &mut [Vec<Point3<f64>>; 2])| {
+    let error = |change: &dyn Fn(&mut Case, &mut Series)| {
         let mut case = Case::new("ur5e");
         let mut points = points.clone();
         change(&mut case, &mut points);
@@ -309,7 +330,15 @@ fn series_that_do_not_tell_the_place_are_refused() {
         scara_error(3, 2),
         scara_error(1, 0),
     ];
-    insta::assert_snapshot!(messages.join("\n"), @"");
+    insta::assert_snapshot!(messages.join("\n"), @r"
+    joint J6: 12 configurations and 5 points; each point needs a configuration of 6 joint values
+    joint J5: 2 points (2 different) do not fix a circle: at least 3 different ones are needed, and 4 to see an error
+    joint J3 moved while joint J5 was turned: only the last two joints may move, one after the other
+    joint J1 moved while joint J5 was turned: only the last two joints may move, one after the other
+    joint J6: 12 points (1 different) do not fix a circle: at least 3 different ones are needed, and 4 to see an error; if the joint did turn, the SMR sits on its axis: mount it beside the axis
+    joint J3 slides: it makes no circle; give the place of the SMR, or leave it free
+    circles of the last two joints are needed, one of each; the arm has 4 joints
+    ");
 
     // An arm that ends with two parallel axes.
     let joints = scara.chain().joints()[..2].to_vec();
