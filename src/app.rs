@@ -7,6 +7,8 @@ mod plan;
 mod profile;
 mod program;
 mod progress;
+mod script;
+mod session;
 mod verify;
 
 use std::io::{self, Write};
@@ -50,7 +52,20 @@ impl<O: Write, E: Write> Console<O, E> {
 /// # Errors
 /// The command could not be done.
 pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    match cli.command {
+    let Some(command) = cli.command else {
+        return match &cli.script {
+            Some(file) => script::run(file, &cli.script_args, console),
+            None => Err(Failure::new(ExitStatus::Usage, "nothing to do").hint("see 'trupose --help'")),
+        };
+    };
+    match command {
+        Command::Demo(args) => script::demo(&args, console),
+        Command::Resume(args) => match &args.script {
+            Some(file) => script::resume(&args.folder, file, &args.script_args, console),
+            None => Err(Failure::new(ExitStatus::Usage, "resuming without a terminal needs a script")
+                .hint("give '--script FILE'")),
+        },
+        Command::Session(command) => session::run(&command, console),
         Command::Identify(args) => identify::run(&args, console),
         Command::Verify(args) => verify::run(&args, console),
         Command::Constraints(args) => constraints::run(&args, console),

@@ -15,11 +15,94 @@ use crate::units::from_mm;
 
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
 #[derive(Debug, Parser)]
-#[command(name = "trupose", version, about, max_term_width = 80, arg_required_else_help = true)]
+#[command(name = "trupose", version, about, max_term_width = 80, arg_required_else_help = true, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub command: Option<Command>,
+    /// Run a script through the wizard, without a terminal
+    #[arg(long, value_name = "FILE")]
+    pub script: Option<PathBuf>,
+    /// How to run it.
+    #[command(flatten)]
+    pub script_args: ScriptArgs,
+}
+
+/// How to run a script.
+#[derive(Args, Clone, Debug)]
+pub struct ScriptArgs {
+    /// Value of a placeholder '${name}' of the script; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = name_and_value)]
+    pub values: Vec<(String, String)>,
+    /// Folder in which sessions are made
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    pub sessions: PathBuf,
+    /// Print one JSON object per line
+    #[arg(long)]
+    pub json: bool,
+    /// Write what was done as a script
+    #[arg(long, value_name = "FILE")]
+    pub record_script: Option<PathBuf>,
+}
+
+/// Arguments of `demo`.
+#[derive(Args, Clone, Debug)]
+pub struct DemoArgs {
+    /// Seed of the simulated cell: the same seed gives the same transcript
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// How to run it.
+    #[command(flatten)]
+    pub script: ScriptArgs,
+}
+
+/// Arguments of `resume`.
+#[derive(Args, Clone, Debug)]
+pub struct ResumeArgs {
+    /// Folder of the session
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Go on by a script, without a terminal
+    #[arg(long, value_name = "FILE")]
+    pub script: Option<PathBuf>,
+    /// How to run it.
+    #[command(flatten)]
+    pub script_args: ScriptArgs,
+}
+
+/// What to do with sessions.
+#[derive(Debug, Subcommand)]
+pub enum SessionCommand {
+    /// List the sessions of a folder
+    List {
+        /// Folder in which they are
+        #[arg(value_name = "DIR", default_value = "sessions")]
+        sessions: PathBuf,
+    },
+    /// Show what a session has: robot, samples, result
+    Show {
+        /// Folder of the session
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// All entries of the journal as well
+        #[arg(long)]
+        journal: bool,
+        /// All entries as one JSON array
+        #[arg(long, conflicts_with = "journal")]
+        json: bool,
+    },
+    /// Write the tables of a session
+    Export {
+        /// Folder of the session
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// Measurements (and, with '--out', the plan) as CSV
+        #[arg(long, required = true)]
+        csv: bool,
+        /// Folder for the files [default: print the measurements]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
 }
 
 /// The commands.
@@ -35,6 +118,13 @@ pub enum Command {
     Plan(PlanArgs),
     /// Write a robot program that visits the poses of a plan
     Program(ProgramArgs),
+    /// Calibrate a simulated robot from profile to result, without a terminal
+    Demo(DemoArgs),
+    /// Go on with a session where it ended
+    Resume(ResumeArgs),
+    /// List, show or export sessions
+    #[command(subcommand)]
+    Session(SessionCommand),
     /// List, show or check robot profiles
     #[command(subcommand)]
     Profile(ProfileCommand),
@@ -367,6 +457,13 @@ fn parse_range(text: &str) -> Option<(f64, f64)> {
     let (low, high) = text.split_once("..")?;
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
     Some((number(low)?, number(high)?))
+}
+
+fn name_and_value(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.to_owned())),
+        _ => Err(format!("'{text}' is not a value; write NAME=VALUE")),
+    }
 }
 
 fn speed_percent(text: &str) -> Result<f64, String> {

@@ -21,10 +21,12 @@ pub enum ExitStatus {
     Store,
     /// A defect of this program.
     Internal,
+    /// Ended by a signal with this number, in good order.
+    Signal(i32),
 }
 
 impl ExitStatus {
-    /// The exit code: 0, 1, 2, 4, 5 or 70 (3 is for instruments).
+    /// The exit code: 0, 1, 2, 4, 5 or 70 (3 is for instruments), 128 + number for a signal.
     pub const fn code(self) -> u8 {
         match self {
             Self::Accepted => 0,
@@ -33,6 +35,7 @@ impl ExitStatus {
             Self::Numerical => 4,
             Self::Store => 5,
             Self::Internal => 70,
+            Self::Signal(number) => 128_u8.saturating_add(number.to_le_bytes()[0]),
         }
     }
 }

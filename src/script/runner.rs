@@ -37,9 +37,6 @@ pub enum Outcome {
     },
 }
 
-/// Opens the session of a folder again, for [`ScriptStep::Restart`].
-pub type Reopen<'a> = &'a dyn Fn(&str) -> Result<Engine, String>;
-
 /// Why a step ends the script.
 enum Stop {
     Failed(String),
@@ -57,7 +54,7 @@ impl From<io::Error> for Stop {
 pub struct Runner<'a, W: Write> {
     engine: Engine,
     transcript: Transcript<'a, W>,
-    reopen: Reopen<'a>,
+    reopen: &'a dyn Fn(&str) -> Result<Engine, String>,
     done: Vec<Intent>,
 }
 
@@ -69,7 +66,11 @@ impl<'a, W: Write> std::fmt::Debug for Runner<'a, W> {
 
 impl<'a, W: Write> Runner<'a, W> {
     /// A runner for an engine.
-    pub fn new(engine: Engine, transcript: Transcript<'a, W>, reopen: Reopen<'a>) -> Self {
+    pub fn new(
+        engine: Engine,
+        transcript: Transcript<'a, W>,
+        reopen: &'a dyn Fn(&str) -> Result<Engine, String>,
+    ) -> Self {
         Self { engine, transcript, reopen, done: Vec::new() }
     }
 
@@ -81,6 +82,11 @@ impl<'a, W: Write> Runner<'a, W> {
     /// Where the session is on disk.
     pub fn folder(&self) -> Option<&str> {
         self.engine.wizard().folder()
+    }
+
+    /// What was done, in order.
+    pub fn done(&self) -> &[Intent] {
+        &self.done
     }
 
     /// The last result.

@@ -1,0 +1,135 @@
+//! `trupose --script`, `trupose demo` and `trupose resume DIR --script`: the wizard without a terminal.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+use jiff::Timestamp;
+
+use super::{Console, load};
+use crate::cli::{DemoArgs, ScriptArgs};
+use crate::error::{ExitStatus, Failure};
+use crate::report;
+use crate::runtime::{Clock, Engine, Options, signals};
+use crate::script::{Format, Outcome, Runner, Script, ScriptStep, Transcript};
+use crate::session::state::Session;
+use crate::store;
+use crate::store::session::{SessionError, SessionFolder};
+
+/// The script of `trupose demo`.
+const DEMO: &str = include_str!("../../sessions/demo.script.ron");
+
+/// Runs the script of a file.
+pub(super) fn run<O: Write, E: Write>(file: &Path, args: &ScriptArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let text = load::text(file)?;
+    let script = parse(&text, &file.display().to_string(), args)?;
+    let engine = Engine::new(options(&script, args)).map_err(|error| internal(&error))?;
+    play(engine, &script, args, console)
+}
+
+/// Runs the demo: the paper's robot, simulated.
+pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let mut script_args = args.script.clone();
+    if let Some(seed) = args.seed {
+        script_args.values.push(("seed".to_owned(), seed.to_string()));
+    }
+    let script = parse(DEMO, "demo", &script_args)?;
+    let engine = Engine::new(options(&script, &script_args)).map_err(|error| internal(&error))?;
+    play(engine, &script, &script_args, console)
+}
+
+/// Goes on with a session by a script.
+pub(super) fn resume<O: Write, E: Write>(
+    folder: &Path,
+    file: &Path,
+    args: &ScriptArgs,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let text = load::text(file)?;
+    let script = parse(&text, &file.display().to_string(), args)?;
+    let engine = open(folder, options(&script, args))?;
+    play(engine, &script, args, console)
+}
+
+fn parse(text: &str, file: &str, args: &ScriptArgs) -> Result<Script, Failure> {
+    let values: BTreeMap<String, String> = args.values.iter().cloned().collect();
+    Script::parse(text, &values).map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))
+}
+
+fn options(script: &Script, args: &ScriptArgs) -> Options {
+    let start = script.clock.as_deref().and_then(|clock| clock.parse::<Timestamp>().ok());
+    Options { sessions: args.sessions.clone(), clock: start.map_or(Clock::System, Clock::starting_at) }
+}
+
+/// Opens a session to go on with it.
+pub(super) fn open(folder: &Path, options: Options) -> Result<Engine, Failure> {
+    let (held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
+    let session = Session::of(&journal).map_err(|error| {
+        Failure::new(ExitStatus::Store, format!("session '{}': {error}", folder.display()))
+    })?;
+    Engine::resume(held, session, journal.torn_bytes, options).map_err(|error| internal(&error))
+}
+
+/// What a session error means to the operator.
+pub(super) fn session_failure(error: &SessionError) -> Failure {
+    let failure = Failure::from_error(ExitStatus::Store, error);
+    match error {
+        SessionError::Locked { .. } => failure.hint("end the other program first, or go on there"),
+        SessionError::NotASession { .. } => failure.hint("'trupose session list' shows the sessions of a folder"),
+        SessionError::Journal { .. } => {
+            failure.hint("nothing was changed; copy the folder, then cut the journal before the damaged line to save what is before it")
+        }
+        SessionError::Store(_) => failure,
+    }
+}
+
+fn internal(error: &dyn std::error::Error) -> Failure {
+    Failure::from_error(ExitStatus::Internal, error)
+}
+
+fn play<O: Write, E: Write>(
+    engine: Engine,
+    script: &Script,
+    args: &ScriptArgs,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let received = signals::watch(engine.sender()).map_err(|error| internal(&error))?;
+    let format = if args.json { Format::Json } else { Format::Text };
+    let transcript = Transcript::new(&mut console.out, format, script.clock.is_some());
+    let reopen = |folder: &str| {
+        let engine = open(Path::new(folder), options(script, args)).map_err(|failure| failure.message)?;
+        Ok(engine)
+    };
+    let mut runner = Runner::new(engine, transcript, &reopen);
+    let output = |error: std::io::Error| match error.kind() {
+        // A reader that went away has seen enough; the session is safe all the same.
+        std::io::ErrorKind::BrokenPipe => Failure::new(ExitStatus::Store, "the reader of the transcript went away"),
+        _ => Failure::new(ExitStatus::Store, format!("cannot write the transcript: {error}")),
+    };
+    let outcome = runner.run(script).map_err(output)?;
+    if let Some(file) = &args.record_script {
+        let steps = runner.done().iter().cloned().map(ScriptStep::Do).collect();
+        let recorded = Script { title: format!("recorded: {}", script.title), clock: script.clock.clone(), steps };
+        let text = recorded.to_text().map_err(|error| internal(&error))?;
+        store::replace(file, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+    }
+    if outcome == Outcome::Done
+        && let Some(summary) = runner.summary()
+    {
+        let text = report::identification_text(summary);
+        runner.print_table(&text).map_err(output)?;
+    }
+    if let Some(folder) = runner.folder().map(str::to_owned) {
+        runner.print("session", &folder).map_err(output)?;
+    }
+    match outcome {
+        Outcome::Done => Ok(ExitStatus::Accepted),
+        Outcome::Failed { step, message } => {
+            Err(Failure::new(ExitStatus::NotAccepted, format!("script step {step}: {message}")))
+        }
+        Outcome::Ended { cause } => match received.signal() {
+            Some(signal) => Err(Failure::new(ExitStatus::Signal(signal), format!("{cause}; the session is saved"))),
+            None => Ok(ExitStatus::Accepted),
+        },
+    }
+}

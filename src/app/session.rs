@@ -1,0 +1,155 @@
+//! `trupose session list | show | export`: sessions on disk, without holding them.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::script::session_failure;
+use super::{Console, to_json};
+use crate::cli::SessionCommand;
+use crate::error::{ExitStatus, Failure};
+use crate::session::export;
+use crate::session::journal::{Journal, instrument_text, target_text};
+use crate::session::plan::PoseKind;
+use crate::session::printable;
+use crate::session::state::{SampleState, Session};
+use crate::store;
+use crate::store::session::{folders, read_journal};
+
+pub(super) fn run<O: Write, E: Write>(command: &SessionCommand, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    match command {
+        SessionCommand::List { sessions } => list(sessions, console),
+        SessionCommand::Show { folder, journal, json } => show(folder, *journal, *json, console),
+        SessionCommand::Export { folder, csv, out } => export_tables(folder, *csv, out.as_deref(), console),
+    }
+}
+
+/// The session of a folder with its journal.
+pub(super) fn load(folder: &Path) -> Result<(Journal, Session), Failure> {
+    let journal = read_journal(folder).map_err(|error| session_failure(&error))?;
+    let session = Session::of(&journal)
+        .map_err(|error| Failure::new(ExitStatus::Store, format!("session '{}': {error}", folder.display())))?;
+    Ok((journal, session))
+}
+
+fn list<O: Write, E: Write>(root: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let found = folders(root).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    if found.is_empty() {
+        console.remark(&format!("no session in '{}'", root.display()));
+        return Ok(ExitStatus::Accepted);
+    }
+    let mut text = format!("{:<32} {:<20} {:<10} {:>7}  {}\n", "session", "robot", "step", "samples", "last entry (UTC)");
+    for folder in found {
+        let name = folder.file_name().map_or_else(String::new, |name| printable(&name.to_string_lossy()));
+        match load(&folder) {
+            Ok((_, session)) => {
+                let robot = session.robot.as_ref().map_or("-", |robot| robot.profile.name());
+                let latest = session.latest.map_or_else(String::new, |time| time.to_string());
+                let step = session.step.to_string();
+                text += &format!("{name:<32} {robot:<20} {step:<10} {:>7}  {latest}\n", session.counted().count());
+            }
+            Err(failure) => {
+                text += &format!("{name:<32} cannot be read\n");
+                console.remark(&failure.to_string());
+            }
+        }
+    }
+    console.print(&text)?;
+    Ok(ExitStatus::Accepted)
+}
+
+fn show<O: Write, E: Write>(
+    folder: &Path,
+    with_journal: bool,
+    json: bool,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let (journal, session) = load(folder)?;
+    if json {
+        let entries: Vec<_> = journal
+            .lines
+            .iter()
+            .map(|line| serde_json::json!({ "number": line.number, "time": line.time.to_string(), "text": line.entry.describe() }))
+            .collect();
+        console.print(&to_json(&entries)?)?;
+        return Ok(ExitStatus::Accepted);
+    }
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| text += &format!("{name:<14} {value}\n");
+    line("session", session.name.clone());
+    line("opened", session.opened.map_or_else(|| "-".to_owned(), |time| format!("{time} by {}", session.program)));
+    line("robot", session.robot.as_ref().map_or_else(|| "-".to_owned(), |robot| format!("{} ({})", robot.profile.title(), robot.profile.name())));
+    line("instrument", session.instrument.as_ref().map_or_else(|| "-".to_owned(), instrument_text));
+    line("SMR", session.target.as_ref().map_or_else(|| "-".to_owned(), target_text));
+    line("step", format!("{} of 8: {}", session.step.number(), session.step));
+    let count = |kind| session.counted_of(kind).count();
+    line(
+        "samples",
+        format!(
+            "{} identification, {} verification, {} drift; {} poses wait",
+            count(PoseKind::Identification),
+            count(PoseKind::Verification),
+            count(PoseKind::Drift),
+            session.open_rows().count()
+        ),
+    );
+    let in_state = |state| session.samples.iter().filter(|sample| sample.state == state).count();
+    line(
+        "not counted",
+        format!(
+            "{} left out, {} measured again, {} taken back, {} without a reading",
+            in_state(SampleState::LeftOut),
+            in_state(SampleState::Superseded),
+            in_state(SampleState::Undone),
+            session.refused.len()
+        ),
+    );
+    let result = match &session.identified {
+        None => "not identified yet".to_owned(),
+        Some(_) if !session.is_current() => "out of date: samples have changed since".to_owned(),
+        Some(result) => result.summary.verdict.reasons.first().cloned().unwrap_or_else(|| "accepted".to_owned()),
+    };
+    line("result", result);
+    line("ended", if session.closed { "in good order".to_owned() } else { "not closed: open in a program, or interrupted".to_owned() });
+    if journal.torn_bytes > 0 {
+        line("note", format!("{} bytes of an incomplete last entry will be dropped when it is resumed", journal.torn_bytes));
+    }
+    for note in &session.notes {
+        line("note", note.pose.as_ref().map_or_else(|| note.text.clone(), |pose| format!("pose {pose}: {}", note.text)));
+    }
+    if with_journal {
+        text += "\n";
+        for entry in &journal.lines {
+            text += &format!("{:>5} {} {}\n", entry.number, entry.time, printable(&entry.entry.describe()));
+        }
+    }
+    console.print(&text)?;
+    Ok(ExitStatus::Accepted)
+}
+
+fn export_tables<O: Write, E: Write>(
+    folder: &Path,
+    csv: bool,
+    out: Option<&Path>,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let (_, session) = load(folder)?;
+    let robot = session
+        .robot
+        .as_ref()
+        .ok_or_else(|| Failure::new(ExitStatus::Usage, format!("session '{}' has no robot yet", folder.display())))?;
+    if !csv {
+        return Err(Failure::new(ExitStatus::Usage, "nothing to export was named").hint("give '--csv'"));
+    }
+    let Some(out) = out else {
+        console.print(&export::measurements_csv(&session, robot))?;
+        return Ok(ExitStatus::Accepted);
+    };
+    let failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
+    store::create_folder(out).map_err(failure)?;
+    for (name, text) in [("plan.csv", export::plan_csv(&session, robot)), ("measurements.csv", export::measurements_csv(&session, robot))] {
+        let file = out.join(name);
+        store::replace(&file, &text).map_err(failure)?;
+        console.print(&format!("written: {}\n", file.display()))?;
+    }
+    Ok(ExitStatus::Accepted)
+}
