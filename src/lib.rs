@@ -11,8 +11,9 @@
 //! - [`units`], [`geometry`], [`kinematics`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
+//! - [`runtime`], [`error`]: threads for what is pure itself; how a command ends and what the operator is told.
 //! - [`procedure`]: the calibration itself on data in memory, the same for commands and wizard. No files, no clock.
-//! - [`cli`], [`app`], [`error`]: what was typed, what is done about it, and how it ends.
+//! - [`cli`], [`app`]: what was typed, and what is done about it.
 //!
 //! Reference: "A distance error based industrial robot kinematic calibration method", Industrial Robot 41/5 (2014) 439–446,
 //! called *the method paper* throughout.
