@@ -12,8 +12,9 @@
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
+//! - [`runtime`], [`error`]: threads for what is pure itself; how a command ends and what the operator is told.
 //! - [`procedure`]: the calibration itself on data in memory, the same for commands and wizard. No files, no clock.
-//! - [`cli`], [`app`], [`error`]: what was typed, what is done about it, and how it ends.
+//! - [`cli`], [`app`]: what was typed, and what is done about it.
 //!
 //! Reference: "A distance error based industrial robot kinematic calibration method", Industrial Robot 41/5 (2014) 439–446,
 //! called *the method paper* throughout.

@@ -4,11 +4,11 @@ use crate::error::{ExitStatus, Failure};
 use crate::planning::{Body, BoxInBase, Cell, KeepOutBox, MountedTarget, TrackerStand};
 use crate::profile::Profile;
 
-/// The ranges of the joints (rad or m) that the profile plans in.
+/// The ranges of the joints (rad, sliding joints m) that the profile plans in where a request does not narrow them.
 ///
 /// # Errors
 /// A joint without limits.
-pub(crate) fn planning_limits(profile: &Profile) -> Result<Vec<(f64, f64)>, Failure> {
+pub fn planning_limits(profile: &Profile) -> Result<Vec<(f64, f64)>, Failure> {
     let joints = profile.chain().joints().iter().zip(profile.joints());
     joints
         .map(|(joint, range)| {

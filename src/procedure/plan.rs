@@ -3,7 +3,7 @@
 mod request;
 mod summary;
 
-use super::cell::{cell, planning_limits};
+use super::cell::cell;
 use super::{joint_types, warning};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::{ArmModel, TargetAt};
@@ -20,6 +20,8 @@ use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::{PlanSummary, PoseSummary, TimeSummary};
 use crate::session::summary::Warning;
 use crate::units::{from_mm, to_mm};
+
+pub use super::cell::planning_limits as limits;
 pub use request::{PlanRequest, Progress};
 
 /// Configurations tried per candidate asked for: with ±30° of acceptance about one in twenty faces the tracker.
@@ -76,14 +78,6 @@ pub fn check_request(profile: &Profile, request: &PlanRequest) -> Result<(), Fai
     Planner::new(profile, "", request).map(drop)
 }
 
-/// The ranges of the joints (rad, sliding joints m) that are planned in where a request does not narrow them.
-///
-/// # Errors
-/// A joint has no limits in the profile.
-pub fn limits(profile: &Profile) -> Result<Vec<(f64, f64)>, Failure> {
-    planning_limits(profile)
-}
-
 /// The rows of a plan file, from the summary.
 pub fn rows(summary: &PlanSummary, joint_types: &[JointType]) -> Vec<PlannedPose> {
     summary
@@ -126,7 +120,7 @@ struct Ordered {
 
 impl<'a> Planner<'a> {
     fn new(profile: &'a Profile, profile_text: &'a str, request: &'a PlanRequest) -> Result<Self, Failure> {
-        let limits = request.limits.clone().map_or_else(|| planning_limits(profile), Ok)?;
+        let limits = request.limits.clone().map_or_else(|| limits(profile), Ok)?;
         let cell = cell(profile, limits.clone(), request.region, request.filters)?;
         let filter = CandidateFilter::new(profile.chain(), &cell, request.clearance)
             .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
