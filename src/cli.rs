@@ -15,7 +15,14 @@ use crate::units::from_mm;
 
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
 #[derive(Debug, Parser)]
-#[command(name = "trupose", version, about, max_term_width = 80, arg_required_else_help = true, args_conflicts_with_subcommands = true)]
+#[command(
+    name = "trupose",
+    version,
+    about,
+    max_term_width = 80,
+    arg_required_else_help = true,
+    args_conflicts_with_subcommands = true
+)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]

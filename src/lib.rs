@@ -33,6 +33,7 @@ pub mod program;
 pub mod report;
 pub mod runtime;
 pub mod script;
+pub mod search;
 pub mod session;
 pub mod store;
 pub mod units;

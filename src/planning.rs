@@ -26,7 +26,7 @@
 //! A bound from approximate design ([`DesignBound`]) says how much a better set could still gain.
 //!
 //! Lengths in metres, angles in radians, configurations in pendant values. Nothing here reads a file or a clock or starts a
-//! thread; randomness comes only from a passed seed, time limits only as a callback. [`crate::runtime::search`] runs the
+//! thread; randomness comes only from a passed seed, time limits only as a callback. [`crate::search`] runs the
 //! starts of a search in parallel.
 //!
 //! Literature: Sun & Hollerbach, "Observability index selection for robot calibration", ICRA 2008 (O1–O5); Fedorov, "Theory of

@@ -13,7 +13,6 @@ mod clock;
 mod engine;
 mod jobs;
 mod links;
-pub mod search;
 pub mod signals;
 mod store_thread;
 

@@ -15,7 +15,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("profile", &["units", "geometry", "kinematics"]),
     ("session", &["units", "geometry", "kinematics", "profile"]),
     ("program", &["units", "kinematics", "session"]),
-    ("runtime", &["planning"]),
+    ("search", &["planning"]),
     ("link", &["units", "geometry", "kinematics", "profile", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "profile", "session"]),
@@ -30,11 +30,14 @@ const LAYERS: &[(&str, &[&str])] = &[
             "planning",
             "profile",
             "session",
-            "runtime",
+            "search",
             "report",
             "error",
         ],
     ),
+    ("wizard", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "procedure"]),
+    ("runtime", &["profile", "session", "procedure", "error", "link", "store", "wizard"]),
+    ("script", &["session", "wizard", "runtime"]),
     ("cli", &["units", "identification", "planning", "profile", "session", "program"]),
     (
         "app",
@@ -49,6 +52,8 @@ const LAYERS: &[(&str, &[&str])] = &[
             "profile",
             "program",
             "report",
+            "runtime",
+            "script",
             "session",
             "store",
             "units",
@@ -57,8 +62,18 @@ const LAYERS: &[(&str, &[&str])] = &[
 ];
 
 /// Modules that read no file, no clock, no environment and print nothing.
-const PURE: &[&str] =
-    &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "program", "procedure"];
+const PURE: &[&str] = &[
+    "units",
+    "geometry",
+    "kinematics",
+    "identification",
+    "planning",
+    "profile",
+    "session",
+    "program",
+    "procedure",
+    "wizard",
+];
 
 /// What a pure module must not name.
 const IMPURE: &[&str] = &[

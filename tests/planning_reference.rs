@@ -28,7 +28,7 @@ use trupose::planning::{
     Chosen, DesignBound, Information, Objective, PlanningError, Score, Search, SearchSettings, TradeOff, Yardstick,
     trade_off,
 };
-use trupose::runtime::search::plan_in_parallel;
+use trupose::search::plan_in_parallel;
 use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE, Quantity};
 
 const CANDIDATES: usize = 1500;

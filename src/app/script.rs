@@ -20,7 +20,11 @@ use crate::store::session::{SessionError, SessionFolder};
 const DEMO: &str = include_str!("../../sessions/demo.script.ron");
 
 /// Runs the script of a file.
-pub(super) fn run<O: Write, E: Write>(file: &Path, args: &ScriptArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+pub(super) fn run<O: Write, E: Write>(
+    file: &Path,
+    args: &ScriptArgs,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
     let engine = Engine::new(options(&script, args)).map_err(|error| internal(&error))?;
@@ -64,9 +68,8 @@ fn options(script: &Script, args: &ScriptArgs) -> Options {
 /// Opens a session to go on with it.
 pub(super) fn open(folder: &Path, options: Options) -> Result<Engine, Failure> {
     let (held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
-    let session = Session::of(&journal).map_err(|error| {
-        Failure::new(ExitStatus::Store, format!("session '{}': {error}", folder.display()))
-    })?;
+    let session = Session::of(&journal)
+        .map_err(|error| Failure::new(ExitStatus::Store, format!("session '{}': {error}", folder.display())))?;
     Engine::resume(held, session, journal.torn_bytes, options).map_err(|error| internal(&error))
 }
 

@@ -15,7 +15,10 @@ use crate::session::state::{SampleState, Session};
 use crate::store;
 use crate::store::session::{folders, read_journal};
 
-pub(super) fn run<O: Write, E: Write>(command: &SessionCommand, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+pub(super) fn run<O: Write, E: Write>(
+    command: &SessionCommand,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
     match command {
         SessionCommand::List { sessions } => list(sessions, console),
         SessionCommand::Show { folder, journal, json } => show(folder, *journal, *json, console),
@@ -37,7 +40,8 @@ fn list<O: Write, E: Write>(root: &Path, console: &mut Console<O, E>) -> Result<
         console.remark(&format!("no session in '{}'", root.display()));
         return Ok(ExitStatus::Accepted);
     }
-    let mut text = format!("{:<32} {:<20} {:<10} {:>7}  {}\n", "session", "robot", "step", "samples", "last entry (UTC)");
+    let mut text =
+        format!("{:<32} {:<20} {:<10} {:>7}  {}\n", "session", "robot", "step", "samples", "last entry (UTC)");
     for folder in found {
         let name = folder.file_name().map_or_else(String::new, |name| printable(&name.to_string_lossy()));
         match load(&folder) {
@@ -77,7 +81,13 @@ fn show<O: Write, E: Write>(
     let mut line = |name: &str, value: String| text += &format!("{name:<14} {value}\n");
     line("session", session.name.clone());
     line("opened", session.opened.map_or_else(|| "-".to_owned(), |time| format!("{time} by {}", session.program)));
-    line("robot", session.robot.as_ref().map_or_else(|| "-".to_owned(), |robot| format!("{} ({})", robot.profile.title(), robot.profile.name())));
+    line(
+        "robot",
+        session
+            .robot
+            .as_ref()
+            .map_or_else(|| "-".to_owned(), |robot| format!("{} ({})", robot.profile.title(), robot.profile.name())),
+    );
     line("instrument", session.instrument.as_ref().map_or_else(|| "-".to_owned(), instrument_text));
     line("SMR", session.target.as_ref().map_or_else(|| "-".to_owned(), target_text));
     line("step", format!("{} of 8: {}", session.step.number(), session.step));
@@ -109,12 +119,25 @@ fn show<O: Write, E: Write>(
         Some(result) => result.summary.verdict.reasons.first().cloned().unwrap_or_else(|| "accepted".to_owned()),
     };
     line("result", result);
-    line("ended", if session.closed { "in good order".to_owned() } else { "not closed: open in a program, or interrupted".to_owned() });
+    line(
+        "ended",
+        if session.closed {
+            "in good order".to_owned()
+        } else {
+            "not closed: open in a program, or interrupted".to_owned()
+        },
+    );
     if journal.torn_bytes > 0 {
-        line("note", format!("{} bytes of an incomplete last entry will be dropped when it is resumed", journal.torn_bytes));
+        line(
+            "note",
+            format!("{} bytes of an incomplete last entry will be dropped when it is resumed", journal.torn_bytes),
+        );
     }
     for note in &session.notes {
-        line("note", note.pose.as_ref().map_or_else(|| note.text.clone(), |pose| format!("pose {pose}: {}", note.text)));
+        line(
+            "note",
+            note.pose.as_ref().map_or_else(|| note.text.clone(), |pose| format!("pose {pose}: {}", note.text)),
+        );
     }
     if with_journal {
         text += "\n";
@@ -146,7 +169,10 @@ fn export_tables<O: Write, E: Write>(
     };
     let failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
     store::create_folder(out).map_err(failure)?;
-    for (name, text) in [("plan.csv", export::plan_csv(&session, robot)), ("measurements.csv", export::measurements_csv(&session, robot))] {
+    for (name, text) in [
+        ("plan.csv", export::plan_csv(&session, robot)),
+        ("measurements.csv", export::measurements_csv(&session, robot)),
+    ] {
         let file = out.join(name);
         store::replace(&file, &text).map_err(failure)?;
         console.print(&format!("written: {}\n", file.display()))?;

@@ -33,7 +33,8 @@ pub fn plan(profile: &Profile) -> Result<Vec<(usize, Vec<Vec<f64>>)>, Failure> {
     // The middle of the limits first: nobody wants to measure in a corner.
     let middle: Vec<f64> = limits.iter().map(|(low, high)| f64::midpoint(*low, *high)).collect();
     for base in std::iter::once(middle).chain(low_discrepancy(&joint_box, SEED).take(TRIES)) {
-        let circle = |joint: usize| circle_plan(profile.chain(), &limits, joint, &base, POINTS).map(|plan| (joint, plan));
+        let circle =
+            |joint: usize| circle_plan(profile.chain(), &limits, joint, &base, POINTS).map(|plan| (joint, plan));
         let circles = turned.iter().map(|joint| circle(*joint)).collect::<Result<Vec<_>, _>>().map_err(|error| {
             usage(&error).hint("say where the SMR is, or leave it free: it is then identified with the arm")
         })?;
@@ -44,8 +45,11 @@ pub fn plan(profile: &Profile) -> Result<Vec<(usize, Vec<Vec<f64>>)>, Failure> {
             return Ok(circles);
         }
     }
-    Err(Failure::new(ExitStatus::Usage, "the arm cannot turn its last two joints far enough anywhere in its cell without touching something")
-        .hint("say where the SMR is, or leave it free: it is then identified with the arm"))
+    Err(Failure::new(
+        ExitStatus::Usage,
+        "the arm cannot turn its last two joints far enough anywhere in its cell without touching something",
+    )
+    .hint("say where the SMR is, or leave it free: it is then identified with the arm"))
 }
 
 #[cfg(test)]

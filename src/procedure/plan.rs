@@ -15,7 +15,7 @@ use crate::planning::{
     verification_set,
 };
 use crate::profile::Profile;
-use crate::runtime::search::{available_threads, plan_in_parallel};
+use crate::search::{available_threads, plan_in_parallel};
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::{PlanSummary, PoseSummary, TimeSummary};
 use crate::session::summary::Warning;

@@ -92,7 +92,8 @@ fn problem(failure: Failure) -> Problem {
 
 /// The text of a file.
 fn read(path: &Path) -> Result<String, Problem> {
-    let bytes = store::read(path).map_err(|error| problem(Failure::from_error(crate::error::ExitStatus::Usage, &error)))?;
+    let bytes =
+        store::read(path).map_err(|error| problem(Failure::from_error(crate::error::ExitStatus::Usage, &error)))?;
     String::from_utf8(bytes).map_err(|_error| Problem {
         message: format!("'{}' is not UTF-8 text", path.display()),
         hints: vec!["save it as UTF-8".to_owned()],

@@ -84,7 +84,9 @@ fn work(commands: &Receiver<Command>, events: &Events) {
 /// What an error of a link means to the operator.
 fn failed(error: &LinkError) -> Answer {
     let hints = match error {
-        LinkError::BeamBroken => vec!["return the SMR to the nest until the tracker has it again, then measure again".to_owned()],
+        LinkError::BeamBroken => {
+            vec!["return the SMR to the nest until the tracker has it again, then measure again".to_owned()]
+        }
         LinkError::NoReading { .. } => vec!["skip the pose, or take the poses of the recording as plan".to_owned()],
         _ => Vec::new(),
     };
@@ -132,7 +134,11 @@ impl Recordings {
     }
 }
 
-fn recording(profile: &Profile, set: &RecordedSet, taken: &mut BTreeSet<String>) -> Result<(Replay, Vec<PlannedPose>), LinkError> {
+fn recording(
+    profile: &Profile,
+    set: &RecordedSet,
+    taken: &mut BTreeSet<String>,
+) -> Result<(Replay, Vec<PlannedPose>), LinkError> {
     let set_up = |message: String| LinkError::SetUp(message);
     let path = Path::new(&set.file);
     let bytes = store::read(path).map_err(|error| {
@@ -184,7 +190,8 @@ fn recording(profile: &Profile, set: &RecordedSet, taken: &mut BTreeSet<String>)
 
 impl Link for Recordings {
     fn connect(&mut self) -> Result<String, LinkError> {
-        let identities: Result<Vec<String>, LinkError> = self.played.iter_mut().map(|(replay, _)| replay.connect()).collect();
+        let identities: Result<Vec<String>, LinkError> =
+            self.played.iter_mut().map(|(replay, _)| replay.connect()).collect();
         Ok(identities?.join("; "))
     }
 

@@ -32,9 +32,8 @@ impl StoreThread {
     /// Begins with a folder that is held already, or makes one below `root` when asked.
     pub(super) fn start(root: PathBuf, folder: Option<SessionFolder>, events: Events) -> io::Result<Self> {
         let (commands, received) = sync_channel(WAITING);
-        let thread = thread::Builder::new()
-            .name("store".to_owned())
-            .spawn(move || work(&root, folder, &received, &events))?;
+        let thread =
+            thread::Builder::new().name("store".to_owned()).spawn(move || work(&root, folder, &received, &events))?;
         Ok(Self { commands: Some(commands), thread: Some(thread) })
     }
 
@@ -78,9 +77,7 @@ fn work(root: &PathBuf, mut held: Option<SessionFolder>, commands: &Receiver<Com
                 Some(Err(error)) => StoreEvent::Failed { id, message: chain(&SessionError::from(error)) },
                 None => StoreEvent::Failed { id, message: "the session has no folder".to_owned() },
             }),
-            Command::Replace { id, files } => {
-                Event::Answer { id, answer: replace(held.as_ref(), &files) }
-            }
+            Command::Replace { id, files } => Event::Answer { id, answer: replace(held.as_ref(), &files) },
         };
         if !events.send(event) {
             break;

@@ -169,7 +169,9 @@ impl<'a, W: Write> Runner<'a, W> {
     /// Does an intent, which must be possible, and waits until nothing is under way.
     fn perform(&mut self, intent: &Intent) -> Result<(), Stop> {
         match self.offer(intent) {
-            None => return Err(Stop::Failed(format!("{} is not offered here; offered: {}", intent.name(), self.offered()))),
+            None => {
+                return Err(Stop::Failed(format!("{} is not offered here; offered: {}", intent.name(), self.offered())));
+            }
             Some(IntentInfo { blocked: Some(reason), .. }) => {
                 return Err(Stop::Failed(format!("{} is not possible now: {reason}", intent.name())));
             }
@@ -260,7 +262,8 @@ impl<'a, W: Write> Runner<'a, W> {
             let next = match self.offer(&Intent::Measure) {
                 Some(info) if info.is_enabled() => Intent::Measure,
                 info => {
-                    let reason = info.and_then(|info| info.blocked).unwrap_or_else(|| "it is not offered here".to_owned());
+                    let reason =
+                        info.and_then(|info| info.blocked).unwrap_or_else(|| "it is not offered here".to_owned());
                     return Err(Stop::Failed(format!("cannot measure: {reason}")));
                 }
             };
@@ -324,7 +327,8 @@ impl<'a, W: Write> Runner<'a, W> {
 
     /// Ends the program and resumes from disk.
     fn restart(&mut self) -> Result<(), Stop> {
-        let folder = self.folder().ok_or_else(|| Stop::Failed("there is no session to resume yet".to_owned()))?.to_owned();
+        let folder =
+            self.folder().ok_or_else(|| Stop::Failed("there is no session to resume yet".to_owned()))?.to_owned();
         self.close()?;
         self.transcript.event("restart", "the program ends and resumes the session")?;
         // The lock must be free before it is taken again.

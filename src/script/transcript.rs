@@ -77,7 +77,9 @@ impl<'a, W: Write> Transcript<'a, W> {
                 });
                 format!("{number}{clock}{event:<7} {text}")
             }
-            Format::Json => serde_json::to_string(&Record { event, time, entry, text: &text }).map_err(io::Error::other)?,
+            Format::Json => {
+                serde_json::to_string(&Record { event, time, entry, text: &text }).map_err(io::Error::other)?
+            }
         };
         writeln!(self.out, "{line}")?;
         self.out.flush()

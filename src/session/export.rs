@@ -7,7 +7,9 @@ use super::state::{Robot, Session};
 
 /// The present plan as `plan.csv` has it; rows of earlier plans only where they were measured.
 pub fn plan_csv(session: &Session, robot: &Robot) -> String {
-    let is_in = |index: &usize| session.rows.get(*index).is_some_and(|row| row.active) || session.sample_of_row(*index).is_some();
+    let is_in = |index: &usize| {
+        session.rows.get(*index).is_some_and(|row| row.active) || session.sample_of_row(*index).is_some()
+    };
     let rows = (0..session.rows.len()).filter(is_in);
     let rows: Vec<_> = rows.filter_map(|index| session.rows.get(index)).map(|row| row.planned.clone()).collect();
     plan::write(&rows, &robot.joint_types)

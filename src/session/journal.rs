@@ -70,7 +70,9 @@ pub struct Journal {
 #[non_exhaustive]
 pub enum JournalError {
     /// A line in the middle is damaged.
-    #[error("line {line} of the journal is damaged ({what}); lines before it are intact, those after it cannot be trusted")]
+    #[error(
+        "line {line} of the journal is damaged ({what}); lines before it are intact, those after it cannot be trusted"
+    )]
     Damaged {
         /// Line, from 1.
         line: usize,
@@ -181,7 +183,8 @@ fn decode(bytes: &[u8], before: &Sum) -> Result<(Line, Sum), LineError> {
         let (time, entry) = after.split_once("\", ")?;
         Some((sum, rest, number.parse().ok()?, Timestamp::from_str(time).ok()?, entry.strip_suffix(')')?))
     };
-    let (sum, rest, number, time, entry) = parts().ok_or(LineError::Text("it does not read like a line of a journal"))?;
+    let (sum, rest, number, time, entry) =
+        parts().ok_or(LineError::Text("it does not read like a line of a journal"))?;
     let expected = before.next(rest);
     if sum != expected.0 {
         return Err(LineError::Text("its check sum does not fit"));
@@ -189,7 +192,9 @@ fn decode(bytes: &[u8], before: &Sum) -> Result<(Line, Sum), LineError> {
     match ron::from_str(entry) {
         Ok(entry) => Ok((Line { number, time, entry }, expected)),
         // The check sum fits, so a newer program has written something that this one does not know.
-        Err(error) => Err(newer_schema(entry).unwrap_or_else(|| LineError::Entry(format!("unknown entry: {}", error.code)))),
+        Err(error) => {
+            Err(newer_schema(entry).unwrap_or_else(|| LineError::Entry(format!("unknown entry: {}", error.code))))
+        }
     }
 }
 
@@ -198,7 +203,8 @@ fn newer_schema(entry: &str) -> Option<LineError> {
     let after = entry.strip_prefix("Opened(schema:")?;
     let digits: String = after.chars().take_while(char::is_ascii_digit).collect();
     let schema = digits.parse().ok().filter(|schema| *schema > SCHEMA)?;
-    let program = after.split_once("program:\"").and_then(|(_, text)| text.split_once('"')).map_or("?", |(name, _)| name);
+    let program =
+        after.split_once("program:\"").and_then(|(_, text)| text.split_once('"')).map_or("?", |(name, _)| name);
     Some(LineError::Opening { schema, program: program.to_owned() })
 }
 

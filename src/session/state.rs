@@ -293,9 +293,10 @@ impl Session {
     /// Whether a row still waits to be measured.
     pub fn is_open(&self, index: usize) -> bool {
         self.rows.get(index).is_some_and(|row| row.active && !row.skipped && row.planned.kind.is_measured())
-            && !self.samples.iter().any(|sample| {
-                sample.row == index && matches!(sample.state, SampleState::Counts | SampleState::LeftOut)
-            })
+            && !self
+                .samples
+                .iter()
+                .any(|sample| sample.row == index && matches!(sample.state, SampleState::Counts | SampleState::LeftOut))
     }
 
     /// Rows that still wait to be measured, in order.

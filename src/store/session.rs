@@ -209,9 +209,7 @@ impl SessionFolder {
     /// # Errors
     /// None of the lines counts.
     pub fn append(&mut self, lines: &[Line]) -> Result<(), StoreError> {
-        self.writer
-            .append(lines)
-            .map_err(|source| StoreError::Write { path: self.folder.join(FILE_NAME), source })
+        self.writer.append(lines).map_err(|source| StoreError::Write { path: self.folder.join(FILE_NAME), source })
     }
 
     /// Replaces a result file.

@@ -19,7 +19,9 @@ const FARTHEST: f64 = 1000.0;
 /// # Errors
 /// What is wrong, and how it should read.
 pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
-    let expected = || format!("'{}' is not a point; type three numbers in {}, such as '1234.567 -20.1 88'", short(text), unit.sign());
+    let expected = || {
+        format!("'{}' is not a point; type three numbers in {}, such as '1234.567 -20.1 88'", short(text), unit.sign())
+    };
     let cleaned: String = text
         .chars()
         .map(|c| match c {
@@ -37,7 +39,11 @@ pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
         let word = strip_name(&word);
         if let Some(other) = CoordinateUnit::ALL.iter().find(|other| other.sign() == word) {
             if *other != unit {
-                return Err(format!("the reading is in {}, but {} was chosen in the instrument step", other.sign(), unit.sign()));
+                return Err(format!(
+                    "the reading is in {}, but {} was chosen in the instrument step",
+                    other.sign(),
+                    unit.sign()
+                ));
             }
             continue;
         }
@@ -119,7 +125,8 @@ pub(super) fn gate(point: &Point3<f64>, previous: Option<&Point3<f64>>) -> Optio
     }
     if previous.is_some_and(|previous| previous == point) {
         return Some(
-            "the reading is the same to the last digit as the one before: the instrument has not measured again".to_owned(),
+            "the reading is the same to the last digit as the one before: the instrument has not measured again"
+                .to_owned(),
         );
     }
     None

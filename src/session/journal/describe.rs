@@ -23,7 +23,9 @@ impl Entry {
             Self::Plan(plan) => format!("plan: {}", plan_text(plan)),
             Self::PlanExtended(plan) => format!("more poses: {}", plan_text(plan)),
             Self::Sample(sample) => sample_text(sample),
-            Self::Refused { number, pose, reason, .. } => format!("measurement {number}: pose {pose}: no sample: {reason}"),
+            Self::Refused { number, pose, reason, .. } => {
+                format!("measurement {number}: pose {pose}: no sample: {reason}")
+            }
             Self::Decision { sample, decision } => {
                 let decision = match decision {
                     Decision::Keep => "kept",
@@ -61,7 +63,8 @@ fn sample_text(sample: &MeasuredText) -> String {
         PoseKind::Home | PoseKind::Via => " (on the way)",
     };
     let scatter = scatter_mm.map_or_else(String::new, |scatter| format!(", scatter {scatter:.4} mm"));
-    let findings: Vec<String> = findings.iter().map(|finding| format!("; CHECK {}: {}", finding.cause, finding.message)).collect();
+    let findings: Vec<String> =
+        findings.iter().map(|finding| format!("; CHECK {}: {}", finding.cause, finding.message)).collect();
     format!("measurement {number}: pose {pose}{kind} at {}{scatter}{}", xyz(*xyz_mm), findings.concat())
 }
 
@@ -84,9 +87,13 @@ fn plan_text(plan: &PlanText) -> String {
 
 fn correction_text(correction: &Correction) -> String {
     match correction {
-        Correction::Scale { since, factor } => format!("corrected: coordinates from measurement {since} on times {factor}"),
+        Correction::Scale { since, factor } => {
+            format!("corrected: coordinates from measurement {since} on times {factor}")
+        }
         Correction::Swap { first, second } => format!("corrected: measurements {first} and {second} change places"),
-        Correction::Row { sample, row } => format!("corrected: measurement {sample} belongs to row {} of the plan", row + 1),
+        Correction::Row { sample, row } => {
+            format!("corrected: measurement {sample} belongs to row {} of the plan", row + 1)
+        }
         Correction::Joints { sample, joints } => {
             let joints: Vec<String> = joints.iter().map(|value| format!("{value:.3}")).collect();
             format!("corrected: at measurement {sample} the robot stood at ({})", joints.join(", "))

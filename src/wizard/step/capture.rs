@@ -121,14 +121,16 @@ impl CaptureStep {
             let notice = Notice::attention(format!("pose {}: {reason}", noted.pose)).hint("measure again");
             return vec![Action::Write(vec![refused(&noted, reason)]), Action::Say(notice)];
         }
-        let sigma = noted.sigma_mm.map(from_mm).or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
+        let sigma =
+            noted.sigma_mm.map(from_mm).or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
         let limit = reading::scatter_limit(sigma);
         if let Some(scatter) = reading.scatter
             && scatter > limit
         {
             let reason = reading::scatter_message(scatter, limit);
             self.held = Some(Held { noted, reason: reason.clone() });
-            let notice = Notice::attention(reason).hint("wait until it is at rest and measure again; or take the reading as it is");
+            let notice = Notice::attention(reason)
+                .hint("wait until it is at rest and measure again; or take the reading as it is");
             return vec![Action::Say(notice)];
         }
         self.write(noted, cx)
@@ -154,7 +156,9 @@ impl CaptureStep {
 
     /// Shows a row by the name of its pose: one that waits, else one that is skipped, else one that is done.
     fn go_to(&mut self, pose: &str, session: &Session) -> Vec<Action> {
-        let named = |row: &usize| session.rows.get(*row).is_some_and(|row| row.planned.pose == pose && row.planned.kind.is_measured());
+        let named = |row: &usize| {
+            session.rows.get(*row).is_some_and(|row| row.planned.pose == pose && row.planned.kind.is_measured())
+        };
         let rows: Vec<usize> = (0..session.rows.len()).filter(named).collect();
         let found = rows.iter().find(|row| session.is_open(**row)).or_else(|| rows.last()).copied();
         let Some(row) = found else {
@@ -177,7 +181,8 @@ impl CaptureStep {
 
 /// A reading that is no sample.
 fn refused(noted: &MeasuredText, reason: String) -> Entry {
-    let xyz_mm = [noted.xyz_mm.0, noted.xyz_mm.1, noted.xyz_mm.2].iter().all(|value| value.is_finite()).then_some(noted.xyz_mm);
+    let xyz_mm =
+        [noted.xyz_mm.0, noted.xyz_mm.1, noted.xyz_mm.2].iter().all(|value| value.is_finite()).then_some(noted.xyz_mm);
     Entry::Refused { number: noted.number, pose: noted.pose.clone(), reason, xyz_mm }
 }
 
@@ -188,8 +193,10 @@ impl StepMachine for CaptureStep {
         let manual = Self::manual_unit(cx).is_some();
         let by_hand = manual.then(|| "the coordinates are typed in".to_owned());
         let not_by_hand = (!manual).then(|| "the instrument measures by itself".to_owned());
-        let no_instrument =
-            cx.connection.is_none().then(|| "the instrument does not answer; go back to the instrument step".to_owned());
+        let no_instrument = cx
+            .connection
+            .is_none()
+            .then(|| "the instrument does not answer; go back to the instrument step".to_owned());
         let asked = self.asked(session);
         let no_question = asked.is_none().then(|| "no sample is in question".to_owned());
         let question = asked
@@ -202,10 +209,13 @@ impl StepMachine for CaptureStep {
         let not_held = self.held.is_none().then(|| "no reading is held back".to_owned());
         let no_sample = session.counted().next().is_none().then(|| "nothing is measured yet".to_owned());
         let blocked = no_row.clone().or_else(|| no_instrument.clone());
-        let pose = self.row.and_then(|row| session.rows.get(row)).map_or_else(String::new, |row| row.planned.pose.clone());
+        let pose =
+            self.row.and_then(|row| session.rows.get(row)).map_or_else(String::new, |row| row.planned.pose.clone());
         let has_more = session.open_rows().next().is_some();
-        let measure = IntentInfo::new(Intent::Measure, "measure").unless(blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()));
-        let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates").unless(not_by_hand.or_else(|| blocked.clone()).or(question));
+        let measure = IntentInfo::new(Intent::Measure, "measure")
+            .unless(blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()));
+        let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
+            .unless(not_by_hand.or_else(|| blocked.clone()).or(question));
         let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone());
         let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session));
         let mut intents = vec![
@@ -214,10 +224,14 @@ impl StepMachine for CaptureStep {
             IntentInfo::new(Intent::AcceptReading, "take the reading as it is").unless(not_held),
             IntentInfo::new(Intent::MeasureAgain, "measure again").unless(again_blocked).default_action(),
             IntentInfo::new(Intent::Keep, "keep the sample").unless(no_question.clone()),
-            IntentInfo::new(Intent::LeaveOut, "leave the sample out").unless(no_question).with_danger(Danger::DropsData),
+            IntentInfo::new(Intent::LeaveOut, "leave the sample out")
+                .unless(no_question)
+                .with_danger(Danger::DropsData),
             IntentInfo::new(Intent::ApplyRemedy, "correct it as proposed").unless(no_remedy),
             IntentInfo::new(Intent::Skip, "skip this pose").unless(no_row.clone()),
-            IntentInfo::new(Intent::Undo, "take the last sample back").unless(no_sample.clone()).with_danger(Danger::DropsData),
+            IntentInfo::new(Intent::Undo, "take the last sample back")
+                .unless(no_sample.clone())
+                .with_danger(Danger::DropsData),
             IntentInfo::new(Intent::GoToPose(pose), "show another pose")
                 .unless(session.rows.is_empty().then(|| "there is no plan".to_owned())),
             IntentInfo::new(Intent::Note(String::new()), "write a note"),
@@ -267,7 +281,8 @@ impl StepMachine for CaptureStep {
             }
             Intent::Undo => {
                 let last = session.samples.iter().rev().find(|sample| sample.state == SampleState::Counts);
-                let entry = last.map(|sample| Entry::Decision { sample: sample.noted.number, decision: Decision::Undo });
+                let entry =
+                    last.map(|sample| Entry::Decision { sample: sample.noted.number, decision: Decision::Undo });
                 entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
             }
             Intent::GoToPose(pose) => self.go_to(&pose, session),

@@ -56,7 +56,9 @@ impl StepMachine for DeliverStep {
 
     fn on_failure(&mut self, problem: Problem, _cx: &Cx<'_>) -> Vec<Action> {
         let notice: Notice = problem.into();
-        vec![Action::Say(notice.hint("everything measured is safe in the journal; make room and write the files again"))]
+        vec![Action::Say(
+            notice.hint("everything measured is safe in the journal; make room and write the files again"),
+        )]
     }
 
     fn content(&self, cx: &Cx<'_>) -> Content {

@@ -78,11 +78,7 @@ impl StepMachine for IdentifyStep {
         };
         let identify = IntentInfo::new(Intent::Identify, "identify the arm").unless(few);
         let next = IntentInfo::new(Intent::Next, "go on to verify").unless(stale);
-        if is_current {
-            vec![next.default_action(), identify]
-        } else {
-            vec![identify.default_action(), next]
-        }
+        if is_current { vec![next.default_action(), identify] } else { vec![identify.default_action(), next] }
     }
 
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
@@ -125,7 +121,9 @@ impl StepMachine for VerifyStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let stale = match result(cx) {
             None => Some("identify first".to_owned()),
-            Some(_) if !cx.session.is_current() => Some("the samples have changed since: go back and identify again".to_owned()),
+            Some(_) if !cx.session.is_current() => {
+                Some("the samples have changed since: go back and identify again".to_owned())
+            }
             Some(_) => None,
         };
         vec![IntentInfo::new(Intent::Next, "go on to deliver").unless(stale).default_action()]

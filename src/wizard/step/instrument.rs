@@ -28,10 +28,9 @@ impl StepMachine for InstrumentStep {
             (Some(_), None) => None,
             _ => Some("there is nothing to connect again".to_owned()),
         };
-        let fixed = cx
-            .session
-            .has_measurements()
-            .then(|| "points of another instrument cannot be mixed with those measured; start another session".to_owned());
+        let fixed = cx.session.has_measurements().then(|| {
+            "points of another instrument cannot be mixed with those measured; start another session".to_owned()
+        });
         let proposal = InstrumentChoice::Manual { unit: CoordinateUnit::Millimetre };
         vec![
             IntentInfo::new(Intent::Next, "measure with this").unless(none).default_action(),
@@ -61,9 +60,9 @@ impl StepMachine for InstrumentStep {
             choice: cx.session.instrument.as_ref().map(instrument_text),
             identity: cx.connection.map(|connection| connection.identity.clone()),
             recorded_poses: cx.connection.map_or(0, |connection| connection.recorded.len()),
-            stated_sigma: profile.and_then(|profile| profile.instrument()).map(|instrument| {
-                format!("{}: {}", instrument.name, instrument.sigma_text())
-            }),
+            stated_sigma: profile
+                .and_then(|profile| profile.instrument())
+                .map(|instrument| format!("{}: {}", instrument.name, instrument.sigma_text())),
         })
     }
 }

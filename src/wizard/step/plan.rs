@@ -148,7 +148,8 @@ impl StepMachine for PlanStep {
         match warnings.split_first() {
             None => Vec::new(),
             Some((first, rest)) => {
-                let notice = rest.iter().fold(Notice::attention(first.clone()), |notice, more| notice.hint(more.clone()));
+                let notice =
+                    rest.iter().fold(Notice::attention(first.clone()), |notice, more| notice.hint(more.clone()));
                 vec![Action::Say(notice)]
             }
         }

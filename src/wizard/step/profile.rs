@@ -68,9 +68,10 @@ impl StepMachine for ProfileStep {
                     return Vec::new();
                 }
                 let name = crate::session::printable(&name);
-                vec![Action::Say(Notice::attention(format!("'{name}' cannot be the name of a session")).hint(
-                    "use up to 64 letters, digits, '-', '_' and '.', beginning with a letter or digit",
-                ))]
+                vec![Action::Say(
+                    Notice::attention(format!("'{name}' cannot be the name of a session"))
+                        .hint("use up to 64 letters, digits, '-', '_' and '.', beginning with a letter or digit"),
+                )]
             }
             Intent::Next => {
                 let Some(chosen) = &self.chosen else { return vec![Action::go(Step::Instrument)] };

@@ -61,11 +61,15 @@ impl TargetStep {
         let previous = cx.session.circle_points.last().map(|point| crate::session::journal::from_xyz_mm(point.xyz_mm));
         let sigma = reading.sigma.or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
         let limit = reading::scatter_limit(sigma);
-        let shaky = reading.scatter.filter(|scatter| *scatter > limit).map(|scatter| reading::scatter_message(scatter, limit));
+        let shaky =
+            reading.scatter.filter(|scatter| *scatter > limit).map(|scatter| reading::scatter_message(scatter, limit));
         if let Some(reason) = reading::gate(&reading.point, previous.as_ref()).or(shaky) {
             let pose = pose_name(robot, next.joint, next.index);
             let notice = Notice::attention(reason.clone()).hint("measure again");
-            return vec![Action::Write(vec![Entry::Refused { number, pose, reason, xyz_mm: None }]), Action::Say(notice)];
+            return vec![
+                Action::Write(vec![Entry::Refused { number, pose, reason, xyz_mm: None }]),
+                Action::Say(notice),
+            ];
         }
         let joints = reading.configuration.as_deref().unwrap_or(next.configuration);
         vec![Action::Write(vec![Entry::CirclePoint(CirclePointText {
@@ -184,7 +188,8 @@ impl StepMachine for TargetStep {
         match intent {
             Intent::ChooseTarget(choice) if is_sensible(&choice) => vec![Action::Write(vec![Entry::Target(choice)])],
             Intent::ChooseTarget(_) => {
-                let notice = Notice::attention("the SMR cannot be there").hint("give coordinates below 5 m and a standard deviation of 0 to 1000 mm");
+                let notice = Notice::attention("the SMR cannot be there")
+                    .hint("give coordinates below 5 m and a standard deviation of 0 to 1000 mm");
                 vec![Action::Say(notice)]
             }
             Intent::StartCircles => {
@@ -237,7 +242,9 @@ impl StepMachine for TargetStep {
     }
 
     fn on_failure(&mut self, problem: Problem, cx: &Cx<'_>) -> Vec<Action> {
-        let (Some(next), Some(robot)) = (self.next(cx.session), cx.robot()) else { return vec![Action::Say(problem.into())] };
+        let (Some(next), Some(robot)) = (self.next(cx.session), cx.robot()) else {
+            return vec![Action::Say(problem.into())];
+        };
         let pose = pose_name(robot, next.joint, next.index);
         let number = cx.session.measurements + 1;
         let entry = Entry::Refused { number, pose, reason: problem.message.clone(), xyz_mm: None };
@@ -250,7 +257,9 @@ impl StepMachine for TargetStep {
             Entry::CirclePoint(_) if self.next(cx.session).is_none() => match locate(cx.session) {
                 Some(Ok(found)) => vec![Action::Say(verdict(&found))],
                 Some(Err(error)) => {
-                    vec![Action::Say(Notice::attention(error.to_string()).hint("measure the circles anew, or leave the SMR free"))]
+                    vec![Action::Say(
+                        Notice::attention(error.to_string()).hint("measure the circles anew, or leave the SMR free"),
+                    )]
                 }
                 None => Vec::new(),
             },
@@ -283,7 +292,10 @@ fn verdict(found: &TargetLocation) -> Notice {
         ))
         .hint("measure the circles anew");
     }
-    Notice::info(format!("the circles fit to {rms:.3} mm (RMS); the SMR is known to {:.3} mm", to_mm(found.sigma().max())))
+    Notice::info(format!(
+        "the circles fit to {rms:.3} mm (RMS); the SMR is known to {:.3} mm",
+        to_mm(found.sigma().max())
+    ))
 }
 
 impl TargetStep {

@@ -5,7 +5,9 @@ use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, SampleState, Session};
 use crate::units::to_mm;
 use crate::wizard::step::Cx;
-use crate::wizard::view::{CaptureView, DriftView, FindingView, JointShown, PredictionView, RowState, RowView, SampleView};
+use crate::wizard::view::{
+    CaptureView, DriftView, FindingView, JointShown, PredictionView, RowState, RowView, SampleView,
+};
 
 /// The view of a capture step.
 pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
@@ -59,9 +61,7 @@ fn joints(step: &CaptureStep, cx: &Cx<'_>) -> Vec<JointShown> {
         .configuration
         .iter()
         .enumerate()
-        .map(|(index, value)| {
-            from.as_ref().and_then(|from| from.get(index)).map_or(0.0, |from| (value - from).abs())
-        })
+        .map(|(index, value)| from.as_ref().and_then(|from| from.get(index)).map_or(0.0, |from| (value - from).abs()))
         .collect();
     let most = moves.iter().copied().fold(0.0, f64::max);
     robot
@@ -127,7 +127,8 @@ fn drift(session: &Session) -> Vec<DriftView> {
     let mut found = Vec::new();
     for sample in session.counted_of(PoseKind::Drift) {
         let pose = session.pose_of(sample);
-        let first = session.counted().find(|first| session.kind_of(first) != PoseKind::Drift && session.pose_of(first) == pose);
+        let first =
+            session.counted().find(|first| session.kind_of(first) != PoseKind::Drift && session.pose_of(first) == pose);
         if let Some(first) = first {
             let moved = (session.point_of(sample) - session.point_of(first)).norm();
             found.push(DriftView { pose: pose.to_owned(), measurement: sample.noted.number, moved_mm: to_mm(moved) });
