@@ -84,7 +84,7 @@ fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {
 
 impl Session {
     /// `early` puts the fault at the given place instead of a random one.
-    fn simulate(robot: &Robot, fault: Fault, at: Option<usize>, seed: u64) -> Self {
+    fn simulate(robot: &Robot, fault: Fault, at: Option<usize>, seed: u64, poses: usize) -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let deviations: Vec<(ParameterId, f64)> =
             robot.parameters.iter().map(|parameter| (parameter.id, parameter.expected * normal(rng))).collect();
@@ -95,18 +95,18 @@ impl Session {
                 targets[*target][Axis::index(*axis)] += deviation;
             }
         }
-        let planned: Vec<Vec<f64>> = (0..POSES)
+        let planned: Vec<Vec<f64>> = (0..poses)
             .map(|_| robot.ranges.iter().map(|(low, high)| rng.random_range(*low..*high)).collect())
             .collect();
         let place = Vector3::new(rng.random_range(-5.0..5.0), rng.random_range(-5.0..5.0), rng.random_range(0.0..2.0));
         let tracker = Isometry3::new(place, direction(rng) * rng.random_range(0.0..3.0));
-        let k = at.unwrap_or_else(|| rng.random_range(4..POSES - 3));
+        let k = at.unwrap_or_else(|| rng.random_range(4..poses - 3));
         // Joint 1 alone has a say only through the others; any joint may slip at one pose.
         let joint = rng.random_range(0..robot.chain.dof());
         let by = if let Fault::Joint(size) = fault { if rng.random() { size } else { -size } } else { 0.0 };
         let (bump, moved) = (direction(rng), Isometry3::new(direction(rng), direction(rng)));
         let arm = ForwardKinematics::new(&chain);
-        let samples = (0..POSES)
+        let samples = (0..poses)
             .map(|index| {
                 let mut configuration = planned[index].clone();
                 let mut target = targets[0];
@@ -221,7 +221,7 @@ fn on_threads<T: Send>(count: usize, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
 fn measure(robot: &Robot, fault: Fault, at: Option<usize>) -> Row {
     let count = sessions();
     let outcomes = on_threads(count, |seed| {
-        let session = Session::simulate(robot, fault, at, 1000 + seed);
+        let session = Session::simulate(robot, fault, at, 1000 + seed, POSES);
         let first = if matches!(fault, Fault::UnitAll(_) | Fault::SignAll(_)) { 3 } else { session.k };
         let mut seen = [[false; 3]; 3];
         for later in 0..3 {
@@ -253,10 +253,23 @@ fn measure(robot: &Robot, fault: Fault, at: Option<usize>) -> Row {
 }
 
 #[test]
+fn time_it() {
+    let mut robot = Robot::new("ur5");
+    for (fault, n) in [(Fault::None, 99), (Fault::Bump(0.02), 60), (Fault::Outlier(0.02), 98),(Fault::Outlier(0.02), 97), (Fault::Joint(0.1), 98), (Fault::Swapped, 97), (Fault::SignAll(3), 3), (Fault::SignAll(3), 24)] {
+        let count = if matches!(fault, Fault::SignAll(_)) { n + 1 } else { 100 };
+        let session = Session::simulate(&robot, fault, Some(n.min(98)), 5, 100);
+        let start = std::time::Instant::now();
+        let f = session.after(&robot, count);
+        println!("{fault:?} {:?} {:?}", start.elapsed(), f.map(|f| f.cause));
+    }
+    robot.ranges.clear();
+}
+
+#[test]
 fn explore() {
     for robot in [Robot::new("soochow"), Robot::new("ur5")] {
         let false_alarms: usize = on_threads(sessions(), |seed| {
-            let session = Session::simulate(&robot, Fault::None, None, seed);
+            let session = Session::simulate(&robot, Fault::None, None, seed, POSES);
             let first = (4..=POSES).find_map(|count| session.after(&robot, count).map(|f| (count, f)));
             if let Some((count, f)) = &first { println!("seed {seed} count {count} {:?} {} {:?} {}", f.cause, f.ratio, f.alternatives.len(), f.share); }
             usize::from(first.is_some())

@@ -1,13 +1,16 @@
 //! The simulated cell as it is asked for: which robot is hidden in it, how its instrument scatters, and what goes wrong when.
 //!
 //! A fault is written `NAME@FIRST[-LAST][:SIZE]`: `wrong-pose@12`, `target-bumped@20:5mm`, `joint-sign@1:j3`, `beam-break@7-9`.
-//! FIRST and LAST are numbers of measurements in the session, counted from 1. Faults of the operator's set-up (unit, sign, bump)
-//! last from FIRST on unless LAST is given; slips (wrong pose, swapped rows, typing, outlier, motion, beam) happen once.
+//! FIRST and LAST are numbers of measurements in the session, counted from 1. Faults of the set-up (unit, sign, bump, drift) last
+//! from FIRST on unless LAST is given; slips (wrong pose, typing, outlier, motion, beam) happen once, or from FIRST to LAST.
+//! Swapped rows are FIRST and the one after it; they have no LAST.
 
-use std::fmt;
-use std::str::FromStr;
+mod text;
 
 use serde::{Deserialize, Serialize};
+
+use crate::units::Quantity;
+pub use text::FaultError;
 
 /// A robot, an instrument and an operator that exist in the program only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,10 +64,22 @@ pub struct Fault {
     pub last: Option<u64>,
 }
 
+impl Fault {
+    /// Whether measurement `number` has this fault. For swapped rows that is the first of the two.
+    pub const fn affects(&self, number: u64) -> bool {
+        let last = match (self.last, self.kind.lasts()) {
+            (Some(last), _) => last,
+            (None, true) => u64::MAX,
+            (None, false) => self.first,
+        };
+        self.first <= number && number <= last
+    }
+}
+
 /// What can go wrong. Lengths in mm, angles in degrees; joints from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
-    /// The operator has moved to another pose than the one shown: the one that is shown next, or else stayed at the one before.
+    /// The operator has moved to another pose than the one shown: the one that is shown next, or else one drawn by seed.
     WrongPose,
     /// The operator takes this pose and the next one in the wrong order.
     SwappedRows,
@@ -83,6 +98,8 @@ pub enum FaultKind {
         joint: usize,
         /// True less shown value.
         by: f64,
+        /// Whether `by` is an angle (deg) or, for a sliding joint, a length (mm).
+        quantity: Quantity,
     },
     /// The SMR sits elsewhere on the flange from then on, by this much (mm), in a direction drawn by seed.
     TargetBumped {
@@ -106,4 +123,19 @@ pub enum FaultKind {
         /// How fast.
         mm_per_hour: f64,
     },
+}
+
+impl FaultKind {
+    /// Whether the fault stays once it is there; a slip happens once.
+    pub const fn lasts(&self) -> bool {
+        match self {
+            Self::Inch | Self::Metre | Self::JointSign { .. } | Self::TargetBumped { .. } | Self::Drift { .. } => true,
+            Self::WrongPose
+            | Self::SwappedRows
+            | Self::MistypedJoint { .. }
+            | Self::NotAtRest { .. }
+            | Self::Outlier { .. }
+            | Self::BeamBreak => false,
+        }
+    }
 }

@@ -27,11 +27,11 @@ const UNMODELLED: f64 = 0.3 * MILLIMETRE;
 
 /// The fit of all items, if something is wrong with them.
 pub(super) fn raised<'a>(arm: &'a Arm<'a>, items: Vec<Item>) -> Option<Fit<'a>> {
-    let full = Fit::new(arm, items, None)?;
+    let full = Fit::new(arm, items)?;
     let (newest, earlier) = full.gains().split_last().map(|(newest, earlier)| {
         (*newest, earlier.iter().copied().fold(0.0, f64::max))
     })?;
-    let moved = full.moved_gains(SHIFT).iter().skip(1).map(|(gain, _)| *gain).fold(0.0, f64::max);
+    let moved = full.moved_gains(SHIFT).iter().skip(1).copied().fold(0.0, f64::max);
     let values = 3 * full.items.len() - 6;
     let wrong = newest > NEWEST || earlier > EARLIER || moved > MOVED || full.cost > limit_of_sum(values);
     wrong.then_some(full)
@@ -53,7 +53,7 @@ pub(super) fn excess(arm: &Arm<'_>, full: &Fit<'_>) -> f64 {
     if others.len() < ENOUGH {
         return 1.0;
     }
-    let Some(fit) = Fit::new(arm, others, None) else { return 1.0 };
+    let Some(fit) = Fit::new(arm, others) else { return 1.0 };
     let mut gains = fit.gains();
     let middle = gains.len() / 2;
     let (_, median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);

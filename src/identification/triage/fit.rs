@@ -12,7 +12,7 @@ use crate::kinematics::{Axis, ForwardKinematics, FreeParameter, IdentificationJa
 /// Steps of a fit at most: from the nominal arm it takes four or five.
 const STEPS: usize = 12;
 /// A step that is expected to lower the cost by less than this is not worth taking.
-const CONVERGED: f64 = 1e-3;
+const CONVERGED: f64 = 1e-2;
 /// How often a step that makes things worse is halved.
 const HALVINGS: usize = 5;
 /// Eigenvalues of `1 − leverage` are not taken below this.
@@ -39,6 +39,24 @@ impl<'a> Arm<'a> {
     }
 }
 
+/// Something that has moved before some samples, with the standard deviation that it had before the fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Step {
+    /// The target in the flange, per axis (m).
+    Target(f64),
+    /// The instrument, per axis (m) and (rad).
+    Instrument(f64, f64),
+}
+
+impl Step {
+    const fn columns(self) -> usize {
+        match self {
+            Self::Target(_) => 3,
+            Self::Instrument(..) => 6,
+        }
+    }
+}
+
 /// A sample as a hypothesis has it.
 #[derive(Clone, Debug)]
 pub(super) struct Item {
@@ -51,7 +69,7 @@ pub(super) struct Item {
     pub(super) point: Point3<f64>,
     /// Standard deviation of a coordinate (m).
     pub(super) sigma: f64,
-    /// Whether the target has moved before this sample.
+    /// Whether this sample comes after the [`Step`].
     pub(super) moved: bool,
 }
 
@@ -59,8 +77,8 @@ pub(super) struct Item {
 #[derive(Clone)]
 struct State {
     z: DVector<f64>,
-    /// Shift of the target in the flange, in units of its prior.
-    shift: Vector3<f64>,
+    /// The step in units of its prior; a shift, then a turn.
+    step: DVector<f64>,
     base_from_station: Vec<Isometry3<f64>>,
 }
 
@@ -70,8 +88,7 @@ pub(super) struct Fit<'a> {
     chain: KinematicChain,
     targets: Vec<Point3<f64>>,
     state: State,
-    /// Standard deviation (m) of the shift of the target before the fit.
-    shift_prior: Option<f64>,
+    step: Option<Step>,
     centroids: Vec<Point3<f64>>,
     pub(super) items: Vec<Item>,
     /// Square sum of residuals and of deviations in units of what is expected: χ² of `3 M − 6` values if nothing is wrong.
@@ -79,8 +96,8 @@ pub(super) struct Fit<'a> {
     /// −2 ln of the probability density of all measured coordinates.
     pub(super) energy: f64,
     factor: Cholesky<f64, Dyn>,
-    /// `L⁻¹ Jᵀ`, three columns per item.
-    whitened: DMatrix<f64>,
+    /// `Jᵀ`, three columns per item.
+    rows: DMatrix<f64>,
     /// Whitened residuals, three per item.
     residuals: DVector<f64>,
     /// Axes of the flange in the base, per item.
@@ -120,7 +137,17 @@ struct Linear {
 
 impl<'a> Fit<'a> {
     /// Fits `items`; `None` without any, or where the numbers break down.
-    pub(super) fn new(arm: &'a Arm<'a>, items: Vec<Item>, shift_prior: Option<f64>) -> Option<Self> {
+    pub(super) fn new(arm: &'a Arm<'a>, items: Vec<Item>) -> Option<Self> {
+        Self::from(arm, items, None, None)
+    }
+
+    /// Fits `items` with something that has moved, beginning at the estimates of another fit.
+    pub(super) fn from(
+        arm: &'a Arm<'a>,
+        items: Vec<Item>,
+        step: Option<Step>,
+        start: Option<&Self>,
+    ) -> Option<Self> {
         let stations = items.iter().map(|item| item.station + 1).max()?;
         let n = arm.parameters.len();
         let mut fit = Self {
@@ -129,20 +156,27 @@ impl<'a> Fit<'a> {
             targets: arm.targets.to_vec(),
             state: State {
                 z: DVector::zeros(n),
-                shift: Vector3::zeros(),
+                step: DVector::zeros(step.map_or(0, Step::columns)),
                 base_from_station: vec![Isometry3::identity(); stations],
             },
-            shift_prior,
+            step,
             centroids: vec![Point3::origin(); stations],
             items,
             cost: f64::INFINITY,
             energy: f64::INFINITY,
             factor: DMatrix::identity(1, 1).cholesky()?,
-            whitened: DMatrix::zeros(0, 0),
+            rows: DMatrix::zeros(0, 0),
             residuals: DVector::zeros(0),
             axes: Vec::new(),
         };
-        fit.register();
+        match start.filter(|start| start.centroids.len() == stations) {
+            Some(start) => {
+                fit.state.z.clone_from(&start.state.z);
+                fit.state.base_from_station.clone_from(&start.state.base_from_station);
+                fit.centroids.clone_from(&start.centroids);
+            }
+            None => fit.register(),
+        }
         let mut at = fit.linearise();
         for _ in 0..STEPS {
             let (factor, gradient) = fit.system(&at)?;
@@ -174,7 +208,7 @@ impl<'a> Fit<'a> {
     }
 
     fn frame_column(&self, station: usize) -> usize {
-        self.arm.parameters.len() + if self.shift_prior.is_some() { 3 } else { 0 } + 6 * station
+        self.arm.parameters.len() + self.state.step.len() + 6 * station
     }
 
     /// Frames by registration of the nominal predictions.
@@ -221,9 +255,8 @@ impl<'a> Fit<'a> {
         let mut state = from.clone();
         let n = state.z.len();
         state.z += step.rows(0, n) * fraction;
-        if self.shift_prior.is_some() {
-            state.shift += step.fixed_rows::<3>(n) * fraction;
-        }
+        let moved = state.step.len();
+        state.step += step.rows(n, moved) * fraction;
         for (station, frame) in state.base_from_station.iter_mut().enumerate() {
             let column = self.frame_column(station);
             let shift: Vector3<f64> = step.fixed_rows::<3>(column) * fraction;
@@ -249,14 +282,13 @@ impl<'a> Fit<'a> {
     ) -> (Vector3<f64>, Matrix3<f64>) {
         let (n, all, columns) = (self.arm.parameters.len(), self.arm.ids.len(), self.columns());
         let mut target = self.targets[item.target];
-        let shift_prior = self.shift_prior.unwrap_or(0.0);
         if item.moved {
-            target += self.state.shift * shift_prior;
+            target += self.shift();
         }
         let predicted = jacobian.evaluate(arm, &item.configuration, item.target, &target, scratch);
-        let measured = self.state.base_from_station[item.station] * item.point;
         let first_axis = n + 3 * item.target;
         let axes = Matrix3::from_fn(|row, axis| scratch[row * all + first_axis + axis]);
+        let measured = self.measured(item);
         let lever = measured - self.centroids[item.station];
         // A turn ω moves the measured point by ω × lever.
         let turn = -lever.cross_matrix();
@@ -267,10 +299,19 @@ impl<'a> Fit<'a> {
             for (column, parameter) in self.arm.parameters.iter().enumerate() {
                 into[column] = -scratch[row * all + column] * parameter.expected;
             }
-            if item.moved && self.shift_prior.is_some() {
-                for axis in 0..3 {
-                    into[n + axis] = -axes[(row, axis)] * shift_prior;
+            match self.step.filter(|_| item.moved) {
+                Some(Step::Target(prior)) => {
+                    for axis in 0..3 {
+                        into[n + axis] = -axes[(row, axis)] * prior;
+                    }
                 }
+                Some(Step::Instrument(shift, angle)) => {
+                    into[n + row] = shift;
+                    for axis in 0..3 {
+                        into[n + 3 + axis] = turn[(row, axis)] * angle;
+                    }
+                }
+                None => {}
             }
             into[frame + row] = 1.0;
             for axis in 0..3 {
@@ -298,7 +339,7 @@ impl<'a> Fit<'a> {
             residuals.fixed_rows_mut::<3>(3 * index).copy_from(&(residual / item.sigma));
             axes.push(flange);
         }
-        let cost = residuals.norm_squared() + self.state.z.norm_squared() + self.state.shift.norm_squared();
+        let cost = residuals.norm_squared() + self.state.z.norm_squared() + self.state.step.norm_squared();
         Linear { rows, residuals, axes, cost }
     }
 
@@ -311,10 +352,7 @@ impl<'a> Fit<'a> {
         let mut gradient = -(&at.rows * &at.residuals);
         let n = self.state.z.len();
         gradient.rows_mut(0, n).axpy(-1.0, &self.state.z, 1.0);
-        if self.shift_prior.is_some() {
-            let mut rows = gradient.fixed_rows_mut::<3>(n);
-            rows -= self.state.shift;
-        }
+        gradient.rows_mut(n, self.state.step.len()).axpy(-1.0, &self.state.step, 1.0);
         Some((Cholesky::new(information)?, gradient))
     }
 
@@ -326,27 +364,49 @@ impl<'a> Fit<'a> {
             self.items.iter().map(|item| 6.0 * item.sigma.ln() + 3.0 * std::f64::consts::TAU.ln()).sum();
         self.energy = at.cost + log_det + log_noise;
         self.cost = at.cost;
-        let mut whitened = at.rows;
-        if !factor.l_dirty().solve_lower_triangular_mut(&mut whitened) || !self.energy.is_finite() {
-            return None;
-        }
-        self.whitened = whitened;
+        self.rows = at.rows;
         self.residuals = at.residuals;
         self.axes = at.axes;
         self.factor = factor;
-        Some(self)
+        self.energy.is_finite().then_some(self)
+    }
+
+    /// `L⁻¹ Jᵀ`: the leverage of the items.
+    fn whitened(&self) -> DMatrix<f64> {
+        let mut whitened = self.rows.clone();
+        self.factor.l_dirty().solve_lower_triangular_mut(&mut whitened);
+        whitened
     }
 
     /// Shift of the target that was found (m), in the flange.
     pub(super) fn shift(&self) -> Vector3<f64> {
-        self.state.shift * self.shift_prior.unwrap_or(0.0)
+        match self.step {
+            Some(Step::Target(prior)) => self.state.step.fixed_rows::<3>(0) * prior,
+            _ => Vector3::zeros(),
+        }
+    }
+
+    /// The measured point in the base (m).
+    fn measured(&self, item: &Item) -> Point3<f64> {
+        let point = self.state.base_from_station[item.station] * item.point;
+        match self.step {
+            Some(Step::Instrument(shift, angle)) if item.moved => {
+                let centre = self.centroids[item.station];
+                let turn: Vector3<f64> = self.state.step.fixed_rows::<3>(3) * angle;
+                centre
+                    + self.state.step.fixed_rows::<3>(0) * shift
+                    + UnitQuaternion::from_scaled_axis(turn) * (point - centre)
+            }
+            _ => point,
+        }
     }
 
     /// Per item: by how much the cost would fall without it. χ² of three values if nothing is wrong.
     pub(super) fn gains(&self) -> Vec<f64> {
+        let whitened = self.whitened();
         (0..self.items.len())
             .map(|index| {
-                let block = self.whitened.columns(3 * index, 3);
+                let block = whitened.columns(3 * index, 3);
                 let left = Matrix3::identity() - block.transpose() * block;
                 let residual: Vector3<f64> = self.residuals.fixed_rows::<3>(3 * index).into();
                 studentised_square(&left, &residual)
@@ -354,23 +414,23 @@ impl<'a> Fit<'a> {
             .collect()
     }
 
-    /// Per item: by how much the cost would fall if the target (all targets) had moved just before it, by about `prior` (m), and the shift
-    /// that would do it (m) in the flange. χ² of three values.
-    pub(super) fn moved_gains(&self, prior: f64) -> Vec<(f64, Vector3<f64>)> {
-        let columns = self.whitened.nrows();
+    /// Per item: by how much the cost would fall if the target (all targets) had moved just before it, by about `prior` (m). χ² of three
+    /// values.
+    pub(super) fn moved_gains(&self, prior: f64) -> Vec<f64> {
+        let whitened = self.whitened();
+        let columns = whitened.nrows();
         let mut tied = DMatrix::<f64>::zeros(columns, 3);
         let (mut own, mut gradient) = (Matrix3::identity(), Vector3::zeros());
-        let mut found = vec![(0.0, Vector3::zeros()); self.items.len()];
+        let mut found = vec![0.0; self.items.len()];
         for (index, item) in self.items.iter().enumerate().rev() {
             let derivative = self.axes[index] * (-prior / item.sigma);
-            let block = self.whitened.columns(3 * index, 3);
+            let block = whitened.columns(3 * index, 3);
             tied.gemm(1.0, &block, &derivative, 1.0);
             own += derivative.transpose() * derivative;
             gradient -= derivative.transpose() * self.residuals.fixed_rows::<3>(3 * index);
             let left: Matrix3<f64> = own - Matrix3::from_fn(|i, j| tied.column(i).dot(&tied.column(j)));
             if let Some(factor) = left.cholesky() {
-                let shift = factor.solve(&gradient);
-                found[index] = (gradient.dot(&shift), shift * prior);
+                found[index] = gradient.dot(&factor.solve(&gradient));
             }
         }
         found
@@ -378,32 +438,19 @@ impl<'a> Fit<'a> {
 
     /// `item`, not one of those fitted, against its prediction.
     pub(super) fn innovation(&self, item: &Item) -> Innovation {
-        self.innovations(item, std::iter::once(item.configuration.as_slice())).next().map_or_else(
-            || Innovation { error: Vector3::zeros(), covariance: Matrix3::identity() },
-            |innovation| innovation,
-        )
+        self.probe(item).at(&item.configuration)
     }
 
-    /// The same for other configurations of the same point.
-    pub(super) fn innovations<'s, 'c: 's>(
-        &'s self,
-        item: &'s Item,
-        configurations: impl Iterator<Item = &'c [f64]> + 's,
-    ) -> impl Iterator<Item = Innovation> + 's {
-        let arm = ForwardKinematics::new(&self.chain);
-        let mut jacobian = IdentificationJacobian::new(&self.arm.ids);
-        let columns = self.columns();
-        let mut scratch = vec![0.0; 3 * self.arm.ids.len()];
-        let mut rows = DMatrix::zeros(columns, 3);
-        let mut item = item.clone();
-        configurations.map(move |configuration| {
-            item.configuration.clear();
-            item.configuration.extend_from_slice(configuration);
-            let (error, _) = self.block(&mut jacobian, &arm, &item, &mut scratch, rows.as_mut_slice());
-            self.factor.l_dirty().solve_lower_triangular_mut(&mut rows);
-            let known = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
-            Innovation { error, covariance: known + Matrix3::identity() * (item.sigma * item.sigma) }
-        })
+    /// The point of `item`, not one of those fitted, to be compared with predictions for any configuration.
+    pub(super) fn probe<'f>(&'f self, item: &Item) -> Probe<'f, 'a> {
+        Probe {
+            fit: self,
+            arm: ForwardKinematics::new(&self.chain),
+            jacobian: IdentificationJacobian::new(&self.arm.ids),
+            scratch: vec![0.0; 3 * self.arm.ids.len()],
+            rows: DMatrix::zeros(self.columns(), 3),
+            item: item.clone(),
+        }
     }
 
     /// Predicted distance between two items (m), and the standard deviation (m) of the measured one about it.
@@ -416,7 +463,7 @@ impl<'a> Fit<'a> {
         let mut points = [Vector3::zeros(); 2];
         for ((item, rows), point) in [from, to].into_iter().zip(&mut blocks).zip(&mut points) {
             let (error, _) = self.block(&mut jacobian, &arm, item, &mut scratch, rows.as_mut_slice());
-            *point = (self.state.base_from_station[item.station] * item.point).coords - error;
+            *point = self.measured(item).coords - error;
         }
         let difference = points[1] - points[0];
         let predicted = difference.norm();
@@ -427,6 +474,36 @@ impl<'a> Fit<'a> {
         self.factor.l_dirty().solve_lower_triangular_mut(&mut row);
         let variance = row.norm_squared() + from.sigma.powi(2) + to.sigma.powi(2);
         (predicted, variance.sqrt())
+    }
+}
+
+/// See [`Fit::probe`].
+pub(super) struct Probe<'f, 'a> {
+    fit: &'f Fit<'a>,
+    arm: ForwardKinematics<'f>,
+    jacobian: IdentificationJacobian,
+    scratch: Vec<f64>,
+    rows: DMatrix<f64>,
+    item: Item,
+}
+
+impl Probe<'_, '_> {
+    /// The point against its prediction at a configuration.
+    pub(super) fn at(&mut self, configuration: &[f64]) -> Innovation {
+        self.item.configuration.clear();
+        self.item.configuration.extend_from_slice(configuration);
+        let rows = &mut self.rows;
+        let (error, _) =
+            self.fit.block(&mut self.jacobian, &self.arm, &self.item, &mut self.scratch, rows.as_mut_slice());
+        self.fit.factor.l_dirty().solve_lower_triangular_mut(rows);
+        let known = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
+        Innovation { error, covariance: known + Matrix3::identity() * (self.item.sigma * self.item.sigma) }
+    }
+
+    /// Change of the error from one configuration to another (m).
+    pub(super) fn change(&self, from: &[f64], to: &[f64]) -> Vector3<f64> {
+        let target = &self.fit.targets[self.item.target];
+        self.arm.point_in_base(from, target) - self.arm.point_in_base(to, target)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Faults of a single sample: the arm stood at another pose, or one joint elsewhere than shown.
 
-use super::fit::{Fit, Innovation, Item};
+use super::fit::{Fit, Innovation, Item, Probe};
 use crate::kinematics::{JointType, KinematicChain};
 use crate::units::{DEGREE, MILLIMETRE};
 
@@ -13,7 +13,7 @@ const TURN_STEPS: i32 = 18;
 const SLIDE_STEP: f64 = 20.0 * MILLIMETRE;
 const SLIDE_STEPS: i32 = 20;
 /// Steps of refinement, and the change of a joint ((rad) or (m)) that its derivative is taken with.
-const REFINEMENTS: usize = 8;
+const REFINEMENTS: usize = 12;
 const DIFFERENCE: f64 = 1e-6;
 /// Starts that are refined per joint, beside the smallest slip.
 const STARTS: usize = 2;
@@ -44,7 +44,8 @@ pub(super) struct Slip {
 
 /// The best slip of every joint for `item` against the others in `fit`.
 pub(super) fn slips(chain: &KinematicChain, fit: &Fit<'_>, item: &Item) -> Vec<Slip> {
-    (0..chain.dof()).filter_map(|joint| best_slip(chain, fit, item, joint)).collect()
+    let mut probe = fit.probe(item);
+    (0..chain.dof()).filter_map(|joint| best_slip(chain, &mut probe, item, joint)).collect()
 }
 
 fn shifted(item: &Item, joint: usize, by: f64) -> Vec<f64> {
@@ -53,21 +54,16 @@ fn shifted(item: &Item, joint: usize, by: f64) -> Vec<f64> {
     configuration
 }
 
-fn innovations(fit: &Fit<'_>, item: &Item, joint: usize, slips: &[f64]) -> Vec<Innovation> {
-    let configurations: Vec<Vec<f64>> = slips.iter().map(|by| shifted(item, joint, *by)).collect();
-    fit.innovations(item, configurations.iter().map(Vec::as_slice)).collect()
-}
-
-fn best_slip(chain: &KinematicChain, fit: &Fit<'_>, item: &Item, joint: usize) -> Option<Slip> {
+fn best_slip(chain: &KinematicChain, probe: &mut Probe<'_, '_>, item: &Item, joint: usize) -> Option<Slip> {
     let (step, steps) = match chain.joints()[joint].joint_type {
         JointType::Revolute => (TURN_STEP, TURN_STEPS),
         JointType::Prismatic => (SLIDE_STEP, SLIDE_STEPS),
     };
     let grid: Vec<f64> = (-steps..=steps).map(|index| f64::from(index) * step).collect();
-    let squares: Vec<f64> = innovations(fit, item, joint, &grid).iter().map(Innovation::square).collect();
+    let squares: Vec<f64> = grid.iter().map(|&by| probe.at(&shifted(item, joint, by)).square()).collect();
     let lowest = |index: &usize| {
-        let around = |other: Option<usize>| other.and_then(|other| squares.get(other)).is_none_or(|s| *s >= squares[*index]);
-        around(index.checked_sub(1)) && around(Some(index + 1))
+        let not_below = |other: Option<&f64>| other.is_none_or(|other| *other >= squares[*index]);
+        not_below(index.checked_sub(1).and_then(|before| squares.get(before))) && not_below(squares.get(index + 1))
     };
     let mut starts: Vec<usize> = (0..grid.len()).filter(lowest).collect();
     starts.sort_by(|&a, &b| squares[a].total_cmp(&squares[b]));
@@ -76,32 +72,31 @@ fn best_slip(chain: &KinematicChain, fit: &Fit<'_>, item: &Item, joint: usize) -
         .take(STARTS)
         .map(|index| grid[index])
         .chain([0.0])
-        .filter_map(|start| refined(chain.dof(), fit, item, joint, start))
+        .filter_map(|start| refined(chain.dof(), probe, item, joint, start))
         .min_by(|a, b| a.energy.total_cmp(&b.energy))
 }
 
-fn refined(joints: usize, fit: &Fit<'_>, item: &Item, joint: usize, start: f64) -> Option<Slip> {
+fn refined(joints: usize, probe: &mut Probe<'_, '_>, item: &Item, joint: usize, start: f64) -> Option<Slip> {
     let mut by = start;
-    let mut curvature = 0.0;
     for _ in 0..REFINEMENTS {
-        let both = innovations(fit, item, joint, &[by, by + DIFFERENCE]);
-        let factor = both[0].covariance.cholesky()?;
-        let slope = (both[1].error - both[0].error) / DIFFERENCE;
+        let configuration = shifted(item, joint, by);
+        let at = probe.at(&configuration);
+        let factor = at.covariance.cholesky()?;
+        let slope = probe.change(&configuration, &shifted(item, joint, by + DIFFERENCE)) / DIFFERENCE;
         let weighted = factor.solve(&slope);
-        curvature = slope.dot(&weighted);
+        let curvature = slope.dot(&weighted);
         if curvature <= 0.0 {
             return None;
         }
-        let change = -both[0].error.dot(&weighted) / curvature;
-        by += change.clamp(-TURN_STEP, TURN_STEP);
-        if change.abs() < 1e-3 / curvature.sqrt() {
-            break;
+        let change = -at.error.dot(&weighted) / curvature;
+        if change.abs() < 1e-2 / curvature.sqrt() {
+            // The share of all slips that is as good as this one.
+            let density = 1.0 / (2.0 * SIZES * by.abs().max(SMALLEST));
+            let share = (density * (std::f64::consts::TAU / curvature).sqrt()).min(1.0);
+            let price = -2.0 * share.ln() + 2.0 * (joints as f64).ln();
+            return Some(Slip { joint, by, energy: at.energy(0.0) + price, price });
         }
+        by += change.clamp(-TURN_STEP, TURN_STEP);
     }
-    let at = fit.innovations(item, std::iter::once(shifted(item, joint, by).as_slice())).next()?;
-    // The share of all slips that is as good as this one.
-    let density = 1.0 / (2.0 * SIZES * by.abs().max(SMALLEST));
-    let share = (density * (std::f64::consts::TAU / curvature).sqrt()).min(1.0);
-    let price = -2.0 * share.ln() + 2.0 * (joints as f64).ln();
-    Some(Slip { joint, by, energy: at.energy(0.0) + price, price })
+    None
 }
