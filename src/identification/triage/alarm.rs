@@ -47,6 +47,10 @@ fn limit_of_sum(values: usize) -> f64 {
 /// 1 where they do not, where too few points tell, or where no arm is that bad.
 pub(super) fn excess(arm: &Arm<'_>, full: &Fit<'_>) -> f64 {
     let gains = full.gains();
+    // Bad points only make the others look worse: if those look good, no more need be asked.
+    if excess_of(gains.clone()) <= BY_CHANCE {
+        return 1.0;
+    }
     let newest = gains.len() - 1;
     let worst = (0..newest).max_by(|&a, &b| gains[a].total_cmp(&gains[b])).unwrap_or(newest);
     let others: Vec<Item> = (0..newest).filter(|&index| index != worst).map(|index| full.items[index].clone()).collect();
@@ -54,10 +58,14 @@ pub(super) fn excess(arm: &Arm<'_>, full: &Fit<'_>) -> f64 {
         return 1.0;
     }
     let Some(fit) = Fit::new(arm, others) else { return 1.0 };
-    let mut gains = fit.gains();
-    let middle = gains.len() / 2;
-    let (_, median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);
-    let excess = (*median / MEDIAN_CHI_SQUARE_3).sqrt();
+    let excess = excess_of(fit.gains());
     let sigma = fit.items.iter().map(|item| item.sigma).fold(0.0, f64::max);
     if excess > BY_CHANCE && excess * sigma < UNMODELLED { excess } else { 1.0 }
+}
+
+/// How many times worse than stated the typical point is.
+fn excess_of(mut gains: Vec<f64>) -> f64 {
+    let middle = gains.len() / 2;
+    let (_, median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / MEDIAN_CHI_SQUARE_3).sqrt()
 }

@@ -12,7 +12,7 @@ use super::slips::{Slip, outlier_energy, slips};
 use super::{Cause, Explanation, Finding, PairDeviation, Triage};
 use crate::geometry::principal_spread;
 use crate::kinematics::ForwardKinematics;
-use crate::units::{INCH, MILLIMETRE};
+use crate::units::{INCH, MILLIMETRE, MILLIRADIAN};
 
 /// Samples among the earlier ones that may be set aside as bad.
 const SET_ASIDE: usize = 3;
@@ -24,11 +24,11 @@ const SUSPICIOUS: f64 = 9.0;
 /// Samples that are left at least, the newest not counted.
 const FEWEST: usize = 4;
 /// Places where the target may have moved that are worked out, beside those of bad samples.
-const STARTS: usize = 2;
+const STARTS: usize = 3;
 /// Hypotheses that are worked out by a fit of their own.
 const WORKED_OUT: usize = 4;
-/// With so many samples the arm is known well enough that no fit of their own is needed.
-const LINEAR_FROM: usize = 30;
+/// With more samples the arm is known so well that linear predictions do, and a fault of the whole set has long been seen.
+const MANY: usize = 30;
 /// A fault must be this much better than none (energy): faults are rare.
 const RARE: f64 = 6.0;
 /// Prices (energy) of a fault that is as common as any, less common, rare.
@@ -44,12 +44,10 @@ const PAIRS: usize = 3;
 const ABSURD: f64 = 100.0;
 /// An SMR that sits further off (m) has not been bumped.
 const FARTHEST_BUMP: f64 = 60.0 * MILLIMETRE;
-/// Above so many samples a joint sign is looked for only if several stand out.
-const SIGN_UP_TO: usize = 30;
 /// What coordinates may have to be multiplied by.
 const FACTORS: [f64; 6] = [INCH / MILLIMETRE, 1e3, MILLIMETRE / INCH, 1e-3, 1.0 / INCH, INCH];
-/// How far an instrument is displaced that somebody has knocked against, little or much (m) and (rad).
-const KNOCKS: [Step; 2] = [Step::Instrument(1e-3, 0.5e-3), Step::Instrument(15e-3, 10e-3)];
+/// How far an instrument is displaced that somebody has knocked against: (m) and (rad).
+const KNOCK: Step = Step::Instrument(5.0 * MILLIMETRE, 3.0 * MILLIRADIAN);
 
 /// A fault with what it explains.
 struct Hypothesis {
@@ -93,12 +91,13 @@ pub(super) fn explain(triage: &Triage<'_>, arm: &Arm<'_>, items: &[Item], full: 
 /// The fit of the earlier samples that fit together, and the others among the earlier ones: left out before, or bad.
 fn set_aside<'a>(triage: &Triage<'_>, arm: &'a Arm<'a>, items: &[Item]) -> Option<(Fit<'a>, Vec<usize>)> {
     let (_, earlier) = items.split_last()?;
-    let without = |aside: &[usize]| {
-        Fit::new(arm, earlier.iter().filter(|item| !aside.contains(&item.sample)).cloned().collect())
+    let without = |aside: &[usize], start: Option<&Fit<'a>>| {
+        let kept = earlier.iter().filter(|item| !aside.contains(&item.sample)).cloned().collect();
+        Fit::from(arm, kept, None, start)
     };
     let mut aside: Vec<usize> =
         earlier.iter().map(|item| item.sample).filter(|sample| triage.excluded.contains(sample)).collect();
-    let mut base = without(&aside)?;
+    let mut base = without(&aside, None)?;
     for _ in 0..SET_ASIDE {
         if base.items.len() <= FEWEST {
             break;
@@ -106,9 +105,11 @@ fn set_aside<'a>(triage: &Triage<'_>, arm: &'a Arm<'a>, items: &[Item]) -> Optio
         let gains = base.gains();
         let mut worst: Vec<usize> = (0..gains.len()).filter(|&index| gains[index] > EARLIER).collect();
         worst.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
-        let tried = worst.into_iter().take(2).filter_map(|index| {
+        // The worst one need not be the culprit: with few samples it may only be the one with the most to say.
+        let candidates = if base.items.len() > MANY { 1 } else { 2 };
+        let tried = worst.into_iter().take(candidates).filter_map(|index| {
             let samples = [&aside[..], &[base.items[index].sample]].concat();
-            Some((without(&samples)?, samples))
+            Some((without(&samples, Some(&base))?, samples))
         });
         let Some(best) = tried.min_by(|a, b| a.0.cost.total_cmp(&b.0.cost)) else { break };
         (base, aside) = best;
@@ -282,7 +283,7 @@ impl<'a> Case<'a, '_> {
     }
 
     fn joint_signs(&mut self) {
-        if self.items.len() > SIGN_UP_TO && self.aside.len() < 2 {
+        if self.items.len() > MANY && self.aside.len() < 2 {
             return;
         }
         let joints = self.triage.chain.dof();
@@ -305,29 +306,35 @@ impl<'a> Case<'a, '_> {
             .filter(|(gain, sample)| *gain > SUSPICIOUS && (1..self.newest).contains(sample))
             .collect();
         gains.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut starts: Vec<usize> = gains.into_iter().take(STARTS).map(|(_, sample)| sample).collect();
-        starts.extend(self.aside.iter().filter(|&&sample| sample > 0));
+        let tried = if self.items.len() > MANY { 1 } else { STARTS };
+        let mut starts: Vec<usize> = gains.into_iter().take(tried).map(|(_, sample)| sample).collect();
+        starts.extend(self.aside.iter().filter(|&&sample| sample > 0).take(tried));
         starts.sort_unstable();
         starts.dedup();
         for since in starts {
             let without: Vec<usize> = self.aside.iter().copied().filter(|&sample| sample < since).collect();
             let after = |item: &mut Item| item.moved = item.sample >= since;
-            // The size is taken from the data and paid for: half a millimetre is as likely as fifty.
-            let first = self.fit(&without, Some(Step::Target(SHIFT)), after);
-            let by = first.map_or(0.0, |fit| fit.shift().norm());
-            let prior = by.max(0.3 * MILLIMETRE) / 3.0_f64.sqrt();
-            if by < FARTHEST_BUMP
-                && let Some((energy, fit)) = self.energy(&without, Some(Step::Target(prior)), after)
+            if let Some((energy, by)) = self.target_moved(&without, after)
+                && by < FARTHEST_BUMP
             {
-                let by = fit.shift().norm();
                 self.add(self.newest, Cause::TargetMoved { since, by }, energy + UNCOMMON + self.several());
             }
-            // One point after the move says nothing that the six free numbers could not.
-            let knocks = KNOCKS.iter().filter_map(|&knock| self.energy(&without, Some(knock), after));
-            if let Some(least) = knocks.map(|(energy, _)| energy).min_by(f64::total_cmp) {
-                self.add(self.newest, Cause::InstrumentMoved { since }, least + SELDOM + self.several());
+            if let Some((energy, _)) = self.energy(&without, Some(KNOCK), after) {
+                self.add(self.newest, Cause::InstrumentMoved { since }, energy + SELDOM + self.several());
             }
         }
+    }
+
+    /// Energy and size (m) of a shift of the target. Half a millimetre is as likely as fifty: the prior is taken from the data.
+    fn target_moved(&self, without: &[usize], after: impl Fn(&mut Item)) -> Option<(f64, f64)> {
+        let (energy, fit) = self.energy(without, Some(Step::Target(SHIFT)), &after)?;
+        let by = fit.shift().norm();
+        if (0.4..2.5).contains(&(by / SHIFT)) {
+            return Some((energy, by));
+        }
+        let prior = by.max(0.3 * MILLIMETRE) / 3.0_f64.sqrt();
+        let (energy, fit) = self.energy(without, Some(Step::Target(prior)), &after)?;
+        Some((energy, fit.shift().norm()))
     }
 
     /// The points of two samples exchanged.
@@ -361,7 +368,7 @@ impl<'a> Case<'a, '_> {
     /// Fits the best hypotheses about single samples with the sample read as they say.
     fn work_out(&mut self) {
         self.sort();
-        if self.items.len() > LINEAR_FROM {
+        if self.items.len() > MANY {
             return;
         }
         for index in 0..self.found.len().min(WORKED_OUT) {

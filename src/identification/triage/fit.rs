@@ -14,7 +14,7 @@ const STEPS: usize = 12;
 /// A step that is expected to lower the cost by less than this is not worth taking.
 const CONVERGED: f64 = 1e-2;
 /// How often a step that makes things worse is halved.
-const HALVINGS: usize = 5;
+const HALVINGS: i32 = 5;
 /// Eigenvalues of `1 − leverage` are not taken below this.
 const FULL_LEVERAGE: f64 = 1e-9;
 
@@ -178,16 +178,16 @@ impl<'a> Fit<'a> {
             None => fit.register(),
         }
         let mut at = fit.linearise();
+        let mut system = fit.system(&at)?;
         for _ in 0..STEPS {
-            let (factor, gradient) = fit.system(&at)?;
-            let step = factor.solve(&gradient);
-            if gradient.dot(&step) < CONVERGED {
+            let step = system.0.solve(&system.1);
+            if system.1.dot(&step) < CONVERGED {
                 break;
             }
             let from = fit.state.clone();
             let mut better = None;
             for halving in 0..=HALVINGS {
-                fit.move_by(&from, &step, 0.5_f64.powi(i32::try_from(halving).unwrap_or(0)));
+                fit.move_by(&from, &step, 0.5_f64.powi(halving));
                 let there = fit.linearise();
                 if there.cost < at.cost {
                     better = Some(there);
@@ -195,12 +195,13 @@ impl<'a> Fit<'a> {
                 }
             }
             let Some(there) = better else {
-                fit.move_by(&from, &step, 0.0);
+                fit.state = from;
                 break;
             };
             at = there;
+            system = fit.system(&at)?;
         }
-        fit.finish(at)
+        fit.finish(at, system.0)
     }
 
     fn columns(&self) -> usize {
@@ -356,9 +357,8 @@ impl<'a> Fit<'a> {
         Some((Cholesky::new(information)?, gradient))
     }
 
-    fn finish(mut self, at: Linear) -> Option<Self> {
+    fn finish(mut self, at: Linear, factor: Cholesky<f64, Dyn>) -> Option<Self> {
         self.apply();
-        let (factor, _) = self.system(&at)?;
         let log_det = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
         let log_noise: f64 =
             self.items.iter().map(|item| 6.0 * item.sigma.ln() + 3.0 * std::f64::consts::TAU.ln()).sum();
