@@ -4,6 +4,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a failure of a test is a panic; the tables are printed")]
 
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -125,7 +126,8 @@ impl Session {
                     Fault::Bump(by) if index >= k => target += bump * by,
                     Fault::Outlier(by) if index == k => offset = bump * by,
                     Fault::Instrument(by) if index >= k => {
-                        frame = Isometry3::new(moved.translation.vector * by, moved.rotation.scaled_axis() * by) * frame;
+                        frame =
+                            Isometry3::new(moved.translation.vector * by, moved.rotation.scaled_axis() * by) * frame;
                     }
                     _ => {}
                 }
@@ -178,7 +180,10 @@ impl Session {
     /// Whether the finding says the truth, alone or as one of its "or"s.
     fn is_named(&self, fault: Fault, finding: &Finding) -> bool {
         self.is_true(fault, finding.sample, &finding.cause)
-            || finding.alternatives.iter().any(|other| other.share > 0.1 && self.is_true(fault, other.sample, &other.cause))
+            || finding
+                .alternatives
+                .iter()
+                .any(|other| other.share > 0.1 && self.is_true(fault, other.sample, &other.cause))
     }
 }
 
@@ -192,7 +197,8 @@ struct Row {
 }
 
 fn sessions() -> usize {
-    option_env!("TRUPOSE_TRIAGE_SESSIONS").and_then(|text| text.parse().ok()).unwrap_or(200)
+    let given = std::env::var_os("TRUPOSE_TRIAGE_SESSIONS");
+    given.and_then(|text| text.to_str().and_then(|text| text.parse().ok())).unwrap_or(200)
 }
 
 /// Runs `work` for every seed on two threads and gathers the results in the order of seeds.
@@ -225,8 +231,12 @@ fn measure(robot: &Robot, fault: Fault, at: Option<usize>) -> Row {
         let first = if matches!(fault, Fault::UnitAll(_) | Fault::SignAll(_)) { 3 } else { session.k };
         let mut seen = [[false; 3]; 3];
         for later in 0..3 {
-            let finding = session.after(robot, first + 1 + later);
             let so_far = if later > 0 { seen[later - 1] } else { [false; 3] };
+            if so_far == [true; 3] {
+                seen[later] = so_far;
+                continue;
+            }
+            let finding = session.after(robot, first + 1 + later);
             let now = finding.map_or([false; 3], |finding| {
                 [true, session.is_named(fault, &finding), session.is_true(fault, finding.sample, &finding.cause)]
             });
@@ -235,9 +245,7 @@ fn measure(robot: &Robot, fault: Fault, at: Option<usize>) -> Row {
         seen
     });
     let percent = |what: usize| {
-        [0, 1, 2].map(|later| {
-            100.0 * outcomes.iter().filter(|seen| seen[later][what]).count() as f64 / count as f64
-        })
+        [0, 1, 2].map(|later| 100.0 * outcomes.iter().filter(|seen| seen[later][what]).count() as f64 / count as f64)
     };
     let row = Row { detected: percent(0), named: percent(1), first: percent(2) };
     let cells = |values: [f64; 3]| values.map(|value| format!("{value:.1}")).join(" / ");
@@ -252,60 +260,126 @@ fn measure(robot: &Robot, fault: Fault, at: Option<usize>) -> Row {
     row
 }
 
-#[test]
-fn time_it() {
-    let mut robot = Robot::new("ur5");
-    for (fault, n) in [(Fault::None, 99), (Fault::Bump(0.02), 60), (Fault::Outlier(0.02), 98),(Fault::Outlier(0.02), 97), (Fault::Joint(0.1), 98), (Fault::Swapped, 97), (Fault::SignAll(3), 3), (Fault::SignAll(3), 24)] {
-        let count = if matches!(fault, Fault::SignAll(_)) { n + 1 } else { 100 };
-        let session = Session::simulate(&robot, fault, Some(n.min(98)), 5, 100);
-        let best = (0..15).map(|_| { let start = std::time::Instant::now(); session.after(&robot, count); start.elapsed() }).min();
-        let f = session.after(&robot, count);
-        println!("{fault:?} {best:?} {:?}", f.map(|f| f.cause));
-    }
-    robot.ranges.clear();
+/// Faults that must be found and named by the second point after them, on either robot, wherever in the session they happen.
+/// Sizes are those from which on docs/triage.md promises it.
+const PROMISED: [Fault; 14] = [
+    Fault::NextPose,
+    Fault::Stayed,
+    Fault::Swapped,
+    Fault::UnitAll(INCH / MILLIMETRE),
+    Fault::UnitAll(1e3),
+    Fault::UnitSince(INCH / MILLIMETRE),
+    Fault::UnitSince(1e3),
+    Fault::SignAll(0),
+    Fault::SignAll(2),
+    Fault::SignAll(5),
+    Fault::Joint(10.0 * DEGREE),
+    Fault::Bump(10.0 * MILLIMETRE),
+    Fault::Outlier(20.0 * MILLIMETRE),
+    Fault::Instrument(10.0 * MILLIMETRE),
+];
+
+/// Small faults late in the session, when the arm is known well.
+const PROMISED_LATE: [Fault; 3] =
+    [Fault::Joint(DEGREE), Fault::Bump(0.5 * MILLIMETRE), Fault::Outlier(0.5 * MILLIMETRE)];
+const LATE: usize = 19;
+
+fn false_alarms(robot: &Robot, count: usize) -> usize {
+    let alarmed = on_threads(count, |seed| {
+        let session = Session::simulate(robot, Fault::None, None, seed, POSES);
+        (4..=POSES).any(|count| session.after(robot, count).is_some())
+    });
+    let alarms = alarmed.into_iter().filter(|alarmed| *alarmed).count();
+    println!("{}: {alarms} of {count} faultless sessions with a finding", robot.name);
+    alarms
 }
 
 #[test]
-fn explore() {
+fn faultless_sessions_raise_no_alarm() {
+    let alarms: usize = ["soochow", "ur5"].map(|name| false_alarms(&Robot::new(name), 2 * sessions())).iter().sum();
+    assert!(alarms * 100 <= 4 * sessions(), "{alarms} false alarms");
+}
+
+#[test]
+fn faults_are_found_and_named() {
+    let mut missed = Vec::new();
     for robot in [Robot::new("soochow"), Robot::new("ur5")] {
-        let false_alarms: usize = on_threads(sessions(), |seed| {
-            let session = Session::simulate(&robot, Fault::None, None, seed, POSES);
-            let first = (4..=POSES).find_map(|count| session.after(&robot, count).map(|f| (count, f)));
-            if let Some((count, f)) = &first { println!("seed {seed} count {count} {:?} {} {:?} {}", f.cause, f.ratio, f.alternatives.len(), f.share); }
-            usize::from(first.is_some())
-        })
-        .iter()
-        .sum();
-        println!("{} false alarms {false_alarms} of {}", robot.name, sessions());
-        for fault in [
-            Fault::NextPose,
-            Fault::Stayed,
-            Fault::Swapped,
-            Fault::UnitAll(1.0 / 0.0254 * 1e-3 * 1.0),
-            Fault::UnitAll(INCH / MILLIMETRE),
-            Fault::UnitAll(1000.0),
-            Fault::UnitSince(INCH / MILLIMETRE),
-            Fault::UnitSince(1000.0),
-            Fault::SignAll(0),
-            Fault::SignAll(1),
-            Fault::SignAll(2),
-            Fault::SignAll(3),
-            Fault::SignAll(4),
-            Fault::SignAll(5),
-            Fault::Joint(DEGREE),
-            Fault::Joint(3.0 * DEGREE),
-            Fault::Joint(10.0 * DEGREE),
-            Fault::Joint(30.0 * DEGREE),
-            Fault::Bump(0.5 * MILLIMETRE),
-            Fault::Bump(2.0 * MILLIMETRE),
-            Fault::Bump(5.0 * MILLIMETRE),
-            Fault::Outlier(0.5 * MILLIMETRE),
-            Fault::Outlier(2.0 * MILLIMETRE),
-            Fault::Outlier(10.0 * MILLIMETRE),
-            Fault::Outlier(20.0 * MILLIMETRE),
-            Fault::Instrument(2.0 * MILLIMETRE),
-        ] {
-            measure(&robot, fault, None);
+        for (fault, at) in
+            PROMISED.iter().map(|fault| (*fault, None)).chain(PROMISED_LATE.iter().map(|fault| (*fault, Some(LATE))))
+        {
+            let row = measure(&robot, fault, at);
+            if row.detected[2] < 95.0 || row.named[2] < 95.0 {
+                missed.push(format!("{} {fault:?} {at:?}: {row:?}", robot.name));
+            }
+        }
+    }
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// The table of sizes in docs/triage.md.
+#[test]
+#[ignore = "minutes; prints the table of docs/triage.md"]
+fn small_faults_by_size_and_place() {
+    for robot in [Robot::new("soochow"), Robot::new("ur5")] {
+        false_alarms(&robot, 5 * sessions());
+        for joint in [1, 3, 4] {
+            measure(&robot, Fault::SignAll(joint), None);
+        }
+        for at in [5, 9, 14, 19] {
+            for degrees in [1.0, 3.0, 10.0] {
+                measure(&robot, Fault::Joint(degrees * DEGREE), Some(at));
+            }
+            for millimetres in [0.5, 1.0, 2.0, 5.0, 10.0, 20.0] {
+                measure(&robot, Fault::Bump(millimetres * MILLIMETRE), Some(at));
+                measure(&robot, Fault::Outlier(millimetres * MILLIMETRE), Some(at));
+            }
+        }
+    }
+}
+
+/// First columns of joints and coordinates in the table of the measured arm.
+const COLUMN_Q: usize = 1;
+const COLUMN_X: usize = 7;
+
+/// A real arm is less perfect than its tracker; it must not raise an alarm at every point.
+#[test]
+fn a_measured_ur5_is_left_alone() {
+    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let file = folder.join("ur5/grid.csv");
+    let Ok(text) = std::fs::read_to_string(&file) else {
+        println!("SKIPPED: no measured data ({} is not there)", file.display());
+        return;
+    };
+    let robot = Robot::new("ur5");
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.trim().parse().unwrap_or(0.0)).collect())
+        .collect();
+    for sigma in [NOISE, 10.0 * NOISE] {
+        let alarms: Vec<usize> = on_threads(20, |seed| {
+            let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+            let picked: Vec<&Vec<f64>> = (0..POSES).map(|_| &rows[rng.random_range(0..rows.len())]).collect();
+            let planned: Vec<Vec<f64>> =
+                picked.iter().map(|row| row[COLUMN_Q..COLUMN_Q + 6].iter().map(|deg| deg * DEGREE).collect()).collect();
+            let samples = picked
+                .iter()
+                .zip(&planned)
+                .map(|(row, configuration)| PointSample {
+                    at: TargetAt { configuration: configuration.clone(), target: 0 },
+                    station: 0,
+                    point: Point3::new(row[COLUMN_X], row[COLUMN_X + 1], row[COLUMN_X + 2]) * MILLIMETRE,
+                    sigma: Some(sigma),
+                })
+                .collect();
+            let session = Session { planned, samples, k: 0, joint: 0, by: 0.0 };
+            (4..=POSES).filter(|&count| session.after(&robot, count).is_some()).count()
+        });
+        let total: usize = alarms.iter().sum();
+        println!("measured UR5, sigma {sigma:.0e} m: {total} findings in {} checks", alarms.len() * (POSES - 3));
+        if sigma > 5.0 * NOISE {
+            assert_eq!(total, 0, "the profile's sigma is that of the arm");
         }
     }
 }

@@ -174,7 +174,8 @@ pub fn triage(triage: &Triage<'_>) -> Option<Finding> {
         return explain::explain(triage, &arm, &items, &full);
     }
     // The arm itself is not as good as the instrument: judged by what it shows.
-    let widened = |items: Vec<Item>| items.into_iter().map(|item| Item { sigma: item.sigma * excess, ..item }).collect();
+    let widened =
+        |items: Vec<Item>| items.into_iter().map(|item| Item { sigma: item.sigma * excess, ..item }).collect();
     let full = alarm::raised(&arm, widened(active))?;
     explain::explain(triage, &arm, &widened(items), &full)
 }

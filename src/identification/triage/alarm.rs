@@ -28,9 +28,8 @@ const UNMODELLED: f64 = 0.3 * MILLIMETRE;
 /// The fit of all items, if something is wrong with them.
 pub(super) fn raised<'a>(arm: &'a Arm<'a>, items: Vec<Item>) -> Option<Fit<'a>> {
     let full = Fit::new(arm, items)?;
-    let (newest, earlier) = full.gains().split_last().map(|(newest, earlier)| {
-        (*newest, earlier.iter().copied().fold(0.0, f64::max))
-    })?;
+    let (newest, earlier) =
+        full.gains().split_last().map(|(newest, earlier)| (*newest, earlier.iter().copied().fold(0.0, f64::max)))?;
     let moved = full.moved_gains(SHIFT).iter().skip(1).copied().fold(0.0, f64::max);
     let values = 3 * full.items.len() - 6;
     let wrong = newest > NEWEST || earlier > EARLIER || moved > MOVED || full.cost > limit_of_sum(values);
@@ -38,7 +37,7 @@ pub(super) fn raised<'a>(arm: &'a Arm<'a>, items: Vec<Item>) -> Option<Fit<'a>> 
 }
 
 /// χ² of so many values that is hardly ever exceeded (Wilson and Hilferty 1931).
-fn limit_of_sum(values: usize) -> f64 {
+pub(super) fn limit_of_sum(values: usize) -> f64 {
     let spread = 2.0 / (9.0 * values as f64);
     values as f64 * (1.0 - spread + TOGETHER * spread.sqrt()).powi(3)
 }
@@ -53,7 +52,8 @@ pub(super) fn excess(arm: &Arm<'_>, full: &Fit<'_>) -> f64 {
     }
     let newest = gains.len() - 1;
     let worst = (0..newest).max_by(|&a, &b| gains[a].total_cmp(&gains[b])).unwrap_or(newest);
-    let others: Vec<Item> = (0..newest).filter(|&index| index != worst).map(|index| full.items[index].clone()).collect();
+    let others: Vec<Item> =
+        (0..newest).filter(|&index| index != worst).map(|index| full.items[index].clone()).collect();
     if others.len() < ENOUGH {
         return 1.0;
     }

@@ -6,7 +6,7 @@
 
 use nalgebra::Point3;
 
-use super::alarm::{EARLIER, SHIFT};
+use super::alarm::{EARLIER, SHIFT, limit_of_sum};
 use super::fit::{Arm, Fit, Item, Step};
 use super::slips::{Slip, outlier_energy, slips};
 use super::{Cause, Explanation, Finding, PairDeviation, Triage};
@@ -46,8 +46,13 @@ const ABSURD: f64 = 100.0;
 const FARTHEST_BUMP: f64 = 60.0 * MILLIMETRE;
 /// What coordinates may have to be multiplied by.
 const FACTORS: [f64; 6] = [INCH / MILLIMETRE, 1e3, MILLIMETRE / INCH, 1e-3, 1.0 / INCH, INCH];
-/// How far an instrument is displaced that somebody has knocked against: (m) and (rad).
-const KNOCK: Step = Step::Instrument(5.0 * MILLIMETRE, 3.0 * MILLIRADIAN);
+/// How far an instrument is displaced that somebody has knocked against, little or much: (m) and (rad) about the middle of the points.
+const KNOCK: Step = Step::Instrument(5.0 * MILLIMETRE, 2.0 * MILLIRADIAN);
+const BLOW: Step = Step::Instrument(60.0 * MILLIMETRE, 15.0 * MILLIRADIAN);
+/// Size of a displacement in units of [`KNOCK`] that is rather a [`BLOW`].
+const IS_BLOW: f64 = 3.0;
+/// So many earlier samples that fit together rule out a fault from the first one on.
+const SETTLED: usize = 10;
 
 /// A fault with what it explains.
 struct Hypothesis {
@@ -159,6 +164,12 @@ impl<'a> Case<'a, '_> {
         2.0 * (self.items.len() as f64).ln()
     }
 
+    /// Whether the earlier samples fit together so well that nothing is wrong with all of them.
+    fn is_settled(&self) -> bool {
+        let count = self.base.items.len();
+        count >= SETTLED && self.base.cost < limit_of_sum(3 * count - 6)
+    }
+
     fn left_out(&self, sample: usize) -> bool {
         self.triage.excluded.contains(&sample)
     }
@@ -258,7 +269,8 @@ impl<'a> Case<'a, '_> {
         let measured = extent(self.full.items.iter().map(|item| item.point).collect());
         let ratio = extent(self.full.items.iter().map(predicted).collect()) / measured.max(f64::MIN_POSITIVE);
         for factor in FACTORS {
-            if (0.5..2.0).contains(&(ratio / factor))
+            if !self.is_settled()
+                && (0.5..2.0).contains(&(ratio / factor))
                 && let Some(energy) = self.energy_of_all(|item| item.point *= factor)
             {
                 self.add(self.newest, Cause::Unit { factor, since: 0 }, energy + UNCOMMON);
@@ -283,7 +295,7 @@ impl<'a> Case<'a, '_> {
     }
 
     fn joint_signs(&mut self) {
-        if self.items.len() > MANY && self.aside.len() < 2 {
+        if self.is_settled() {
             return;
         }
         let joints = self.triage.chain.dof();
@@ -319,7 +331,11 @@ impl<'a> Case<'a, '_> {
             {
                 self.add(self.newest, Cause::TargetMoved { since, by }, energy + UNCOMMON + self.several());
             }
-            if let Some((energy, _)) = self.energy(&without, Some(KNOCK), after) {
+            let mut displaced = self.energy(&without, Some(KNOCK), after);
+            if displaced.as_ref().is_some_and(|(_, fit)| fit.step_size() > IS_BLOW) {
+                displaced = self.energy(&without, Some(BLOW), after);
+            }
+            if let Some((energy, _)) = displaced {
                 self.add(self.newest, Cause::InstrumentMoved { since }, energy + SELDOM + self.several());
             }
         }

@@ -28,11 +28,7 @@ pub(super) struct Arm<'a> {
 }
 
 impl<'a> Arm<'a> {
-    pub(super) fn new(
-        chain: &'a KinematicChain,
-        targets: &'a [Point3<f64>],
-        parameters: &'a [FreeParameter],
-    ) -> Self {
+    pub(super) fn new(chain: &'a KinematicChain, targets: &'a [Point3<f64>], parameters: &'a [FreeParameter]) -> Self {
         let axes = (0..targets.len()).flat_map(|target| Axis::ALL.map(|axis| ParameterId::Target { target, axis }));
         let ids = parameters.iter().map(|parameter| parameter.id).chain(axes).collect();
         Self { chain, targets, parameters, ids }
@@ -142,12 +138,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Fits `items` with something that has moved, beginning at the estimates of another fit.
-    pub(super) fn from(
-        arm: &'a Arm<'a>,
-        items: Vec<Item>,
-        step: Option<Step>,
-        start: Option<&Self>,
-    ) -> Option<Self> {
+    pub(super) fn from(arm: &'a Arm<'a>, items: Vec<Item>, step: Option<Step>, start: Option<&Self>) -> Option<Self> {
         let stations = items.iter().map(|item| item.station + 1).max()?;
         let n = arm.parameters.len();
         let mut fit = Self {
@@ -263,10 +254,8 @@ impl<'a> Fit<'a> {
             let shift: Vector3<f64> = step.fixed_rows::<3>(column) * fraction;
             let turn: Vector3<f64> = step.fixed_rows::<3>(column + 3) * fraction;
             let centre = self.centroids[station].coords;
-            let turned = Isometry3::from_parts(
-                Translation3::from(centre + shift),
-                UnitQuaternion::from_scaled_axis(turn),
-            );
+            let turned =
+                Isometry3::from_parts(Translation3::from(centre + shift), UnitQuaternion::from_scaled_axis(turn));
             *frame = turned * Translation3::from(-centre) * *frame;
         }
         self.state = state;
@@ -384,6 +373,11 @@ impl<'a> Fit<'a> {
             Some(Step::Target(prior)) => self.state.step.fixed_rows::<3>(0) * prior,
             _ => Vector3::zeros(),
         }
+    }
+
+    /// How large the step is in units of its prior.
+    pub(super) fn step_size(&self) -> f64 {
+        self.state.step.norm()
     }
 
     /// The measured point in the base (m).

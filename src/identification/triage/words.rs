@@ -84,7 +84,9 @@ impl Finding {
                 let sign = if pair.deviation > 0.0 { "longer" } else { "shorter" };
                 let other = (names.sample)(pair.other);
                 let (deviation, expected) = (to_mm(pair.deviation.abs()), to_mm(pair.expected));
-                format!("{ratio}; distance to {other} {deviation:.2} mm {sign} than predicted, expected within {expected:.2} mm")
+                format!(
+                    "{ratio}; distance to {other} {deviation:.2} mm {sign} than predicted, expected within {expected:.2} mm"
+                )
             }
             None => ratio,
         }
@@ -104,20 +106,18 @@ fn story(sample: usize, cause: &Cause, names: &Names<'_>) -> String {
             (names.sample)(*since),
             unit_story(*factor)
         ),
-        Cause::JointSign { joint } => format!("joint {} turns the other way than the profile says", (names.joint)(*joint)),
-        Cause::MistypedJoint { joint, by, quantity } => format!(
-            "at {named} joint {} stood {} from the value shown",
-            (names.joint)(*joint),
-            amount(*by, *quantity)
-        ),
+        Cause::JointSign { joint } => {
+            format!("joint {} turns the other way than the profile says", (names.joint)(*joint))
+        }
+        Cause::MistypedJoint { joint, by, quantity } => {
+            format!("at {named} joint {} stood {} from the value shown", (names.joint)(*joint), amount(*by, *quantity))
+        }
         Cause::WrongPose { planned } => format!("{named} was taken at pose {}", (names.pose)(*planned)),
         Cause::StayedAtPrevious => format!("at {named} the robot still stood at the pose before"),
         Cause::SwappedRows { with } => format!("{named} and {} are exchanged", (names.sample)(*with)),
-        Cause::TargetMoved { since, by } => format!(
-            "the SMR has sat about {:.2} mm elsewhere since {}",
-            to_mm(*by),
-            (names.sample)(*since)
-        ),
+        Cause::TargetMoved { since, by } => {
+            format!("the SMR has sat about {:.2} mm elsewhere since {}", to_mm(*by), (names.sample)(*since))
+        }
         Cause::InstrumentMoved { since } => format!("the tracker stands elsewhere since {}", (names.sample)(*since)),
         Cause::NotAtRest { .. } => format!("at {named} the robot was not at rest"),
         Cause::Unexplained => format!("the reading of {named} is bad"),
