@@ -28,6 +28,7 @@ mod result;
 mod robust;
 mod settings;
 mod solver;
+pub mod triage;
 pub mod verification;
 
 use std::ops::ControlFlow;
