@@ -7,14 +7,16 @@ use crate::identification::circle_point::circle_plan;
 use crate::planning::collision::ArmShape;
 use crate::planning::{JointBox, low_discrepancy};
 use crate::profile::Profile;
-use crate::units::MILLIMETRE;
+use crate::units::{DEGREE, MILLIMETRE};
 
 /// Points per circle.
 const POINTS: usize = 8;
 /// Clearance to keep from everything (m).
 const CLEARANCE: f64 = 10.0 * MILLIMETRE;
-/// Base configurations that are tried.
-const TRIES: usize = 2000;
+/// Arcs that are tried (rad), the widest first: the wider the circle, the better its centre is known.
+const ARCS: [f64; 4] = [300.0 * DEGREE, 200.0 * DEGREE, 120.0 * DEGREE, 80.0 * DEGREE];
+/// Base configurations that are tried for each.
+const TRIES: usize = 500;
 /// Seed of the base configurations.
 const SEED: u64 = 1;
 
@@ -32,9 +34,15 @@ pub fn plan(profile: &Profile) -> Result<Vec<(usize, Vec<Vec<f64>>)>, Failure> {
     let joint_box = JointBox::new(limits.clone()).map_err(|error| usage(&error))?;
     // The middle of the limits first: nobody wants to measure in a corner.
     let middle: Vec<f64> = limits.iter().map(|(low, high)| f64::midpoint(*low, *high)).collect();
-    for base in std::iter::once(middle).chain(low_discrepancy(&joint_box, SEED).take(TRIES)) {
+    let bases = || std::iter::once(middle.clone()).chain(low_discrepancy(&joint_box, SEED).take(TRIES));
+    for (arc, base) in ARCS.into_iter().flat_map(|arc| bases().map(move |base| (arc, base))) {
+        let around: Vec<(f64, f64)> = limits
+            .iter()
+            .zip(&base)
+            .map(|((low, high), at)| (low.max(at - arc / 2.0), high.min(at + arc / 2.0)))
+            .collect();
         let circle =
-            |joint: usize| circle_plan(profile.chain(), &limits, joint, &base, POINTS).map(|plan| (joint, plan));
+            |joint: usize| circle_plan(profile.chain(), &around, joint, &base, POINTS).map(|plan| (joint, plan));
         let circles = turned.iter().map(|joint| circle(*joint)).collect::<Result<Vec<_>, _>>().map_err(|error| {
             usage(&error).hint("say where the SMR is, or leave it free: it is then identified with the arm")
         })?;

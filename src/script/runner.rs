@@ -170,7 +170,11 @@ impl<'a, W: Write> Runner<'a, W> {
     fn perform(&mut self, intent: &Intent) -> Result<(), Stop> {
         match self.offer(intent) {
             None => {
-                return Err(Stop::Failed(format!("{} is not offered here; offered: {}", intent.name(), self.offered())));
+                return Err(Stop::Failed(format!(
+                    "{} is not offered here; offered: {}",
+                    intent.name(),
+                    self.offered()
+                )));
             }
             Some(IntentInfo { blocked: Some(reason), .. }) => {
                 return Err(Stop::Failed(format!("{} is not possible now: {reason}", intent.name())));
@@ -257,7 +261,7 @@ impl<'a, W: Write> Runner<'a, W> {
     fn capture(&mut self, count: usize, on_finding: OnFinding) -> Result<(), Stop> {
         let mut taken = 0;
         let mut failed = 0;
-        while taken < count && self.session().open_rows().next().is_some() {
+        while self.resolve(on_finding)? && taken < count && self.session().open_rows().next().is_some() {
             let before = self.session().samples.len();
             let next = match self.offer(&Intent::Measure) {
                 Some(info) if info.is_enabled() => Intent::Measure,
@@ -278,9 +282,6 @@ impl<'a, W: Write> Runner<'a, W> {
             }
             failed = 0;
             taken += 1;
-            if !self.resolve(on_finding)? {
-                return Ok(());
-            }
         }
         Ok(())
     }

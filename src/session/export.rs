@@ -29,7 +29,7 @@ pub fn measurements_csv(session: &Session, robot: &Robot) -> String {
                 target: None,
                 configuration: from_edge(&sample.joints, &robot.joint_types),
                 point: session.point_of(sample),
-                sigma: Session::sigma_of(sample),
+                sigma: session.sigma_of(sample),
                 temperature: sample.noted.temperature_degc,
                 fields: Vec::new(),
             });

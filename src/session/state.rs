@@ -119,6 +119,8 @@ pub struct Sample {
     pub state: SampleState,
     /// Whether the operator said that it counts although something was found.
     pub kept: bool,
+    /// Number of the last measurement when it was corrected: what was found up to then is settled. 0: never.
+    pub settled: u64,
 }
 
 /// A measurement that gave no sample.
@@ -311,8 +313,12 @@ impl Session {
 
     /// A point that was noted at a measurement, in the tracker frame (m), corrections applied.
     pub fn corrected(&self, number: u64, xyz_mm: (f64, f64, f64)) -> Point3<f64> {
-        let factors = self.scales.iter().filter(|(since, _)| *since <= number).map(|(_, factor)| factor);
-        from_xyz_mm(xyz_mm) * factors.product::<f64>()
+        from_xyz_mm(xyz_mm) * self.scale_of(number)
+    }
+
+    /// What lengths that were noted at a measurement have to be multiplied by.
+    pub fn scale_of(&self, number: u64) -> f64 {
+        self.scales.iter().filter(|(since, _)| *since <= number).map(|(_, factor)| factor).product()
     }
 
     /// Where the robot stood at a sample: pendant values (rad, m).
@@ -321,16 +327,26 @@ impl Session {
     }
 
     /// Standard deviation of a sample (m), where the instrument stated one.
-    pub fn sigma_of(sample: &Sample) -> Option<f64> {
-        sample.noted.sigma_mm.filter(|sigma| *sigma > 0.0).map(from_mm)
+    pub fn sigma_of(&self, sample: &Sample) -> Option<f64> {
+        self.corrected_sigma(sample.noted.number, sample.noted.sigma_mm)
+    }
+
+    /// A standard deviation that was noted at a measurement (m), corrections applied.
+    pub fn corrected_sigma(&self, number: u64, sigma_mm: Option<f64>) -> Option<f64> {
+        Some(from_mm(sigma_mm?) * self.scale_of(number)).filter(|sigma| *sigma > 0.0)
     }
 
     /// What was found about samples that count and were neither kept nor corrected, oldest first: the sample it is about and
     /// the finding.
     pub fn doubts(&self) -> impl Iterator<Item = (&Sample, &FindingText)> {
-        self.counted().flat_map(|holder| &holder.noted.findings).filter_map(|finding| {
+        let findings = self.counted().flat_map(|holder| {
+            let number = holder.noted.number;
+            holder.noted.findings.iter().map(move |finding| (number, finding))
+        });
+        findings.filter_map(|(holder, finding)| {
             let about = self.sample(finding.about)?;
-            (about.state == SampleState::Counts && !about.kept).then_some((about, finding))
+            let is_open = about.state == SampleState::Counts && !about.kept && holder > about.settled;
+            is_open.then_some((about, finding))
         })
     }
 
@@ -376,6 +392,7 @@ impl Session {
             time: line.time,
             state: SampleState::Counts,
             kept: false,
+            settled: 0,
         });
         Ok(())
     }
@@ -431,7 +448,8 @@ impl Session {
                     }
                 }
                 let sample = self.sample_mut(moved)?;
-                (sample.row, sample.joints, sample.kept) = (*row, joints, true);
+                (sample.row, sample.joints) = (*row, joints);
+                self.settle(|number| number == moved);
             }
             Correction::Joints { sample, joints } => {
                 let dof = self.robot.as_ref()?.joint_types.len();
@@ -440,7 +458,8 @@ impl Session {
                     return None;
                 }
                 sample.joints.clone_from(joints);
-                sample.kept = true;
+                let mended = sample.noted.number;
+                self.settle(|number| number == mended);
             }
         }
         Some(())
@@ -448,8 +467,9 @@ impl Session {
 
     /// What was found about these measurements is settled.
     fn settle(&mut self, concerns: impl Fn(u64) -> bool) {
+        let measurements = self.measurements;
         for sample in self.samples.iter_mut().filter(|sample| concerns(sample.noted.number)) {
-            sample.kept = true;
+            sample.settled = measurements;
         }
     }
 }

@@ -107,7 +107,7 @@ impl CaptureStep {
             target: 0,
             joints: to_edge(&planned.configuration, &robot.joint_types),
             reported_joints: reported,
-            xyz_mm: to_xyz_mm(&reading.point, 6),
+            xyz_mm: to_xyz_mm(&reading.point, 9),
             sigma_mm: reading.sigma.map(to_mm),
             scatter_mm: reading.scatter.map(|scatter| (to_mm(scatter) * 1e6).round() / 1e6),
             shots: reading.shots,
@@ -128,10 +128,11 @@ impl CaptureStep {
             && scatter > limit
         {
             let reason = reading::scatter_message(scatter, limit);
+            let entry = refused(&noted, reason.clone());
             self.held = Some(Held { noted, reason: reason.clone() });
             let notice = Notice::attention(reason)
                 .hint("wait until it is at rest and measure again; or take the reading as it is");
-            return vec![Action::Say(notice)];
+            return vec![Action::Write(vec![entry]), Action::Say(notice)];
         }
         self.write(noted, cx)
     }

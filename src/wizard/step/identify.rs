@@ -36,7 +36,7 @@ pub(super) fn samples(session: &Session, kind: PoseKind) -> Vec<NamedSample> {
                 at: TargetAt { configuration: session.configuration_of(sample), target: sample.noted.target },
                 station: 0,
                 point: session.point_of(sample),
-                sigma: Session::sigma_of(sample),
+                sigma: session.sigma_of(sample),
             },
         })
         .collect()

@@ -76,7 +76,7 @@ impl TargetStep {
             number,
             joint: next.joint,
             joints: to_edge(joints, &robot.joint_types),
-            xyz_mm: to_xyz_mm(&reading.point, 6),
+            xyz_mm: to_xyz_mm(&reading.point, 9),
         })])]
     }
 }
