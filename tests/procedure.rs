@@ -49,6 +49,7 @@ fn request() -> IdentifyRequest {
         samples.into_iter().map(|(_, sample)| sample).collect::<Vec<_>>().into()
     };
     IdentifyRequest {
+        mounted: None,
         profile,
         profile_text,
         created: CREATED.to_owned(),

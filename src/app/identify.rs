@@ -52,6 +52,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     let verification_set = sample_set(&verification_rows, profile, file, odd)?;
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
     let request = IdentifyRequest {
+        mounted: None,
         profile: loaded.profile,
         profile_text: loaded.text,
         created: now(),

@@ -33,7 +33,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
             .hint("a calibration is written by 'trupose identify --out DIR'")
     })?;
     let loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
-    let profile = &loaded.profile;
+    let profile = &calibration.mounted.map_or_else(|| loaded.profile.clone(), |mounted| mounted.on(&loaded.profile));
     let measured = load::measurements(&args.measurements, args.layout, profile, "verification")?;
     let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;
     let (rows, _) = load::split(&measured.table, filter.as_ref())?;

@@ -12,7 +12,7 @@ use crate::identification::{
     ArmModel, Identification, Iteration, Observations, PointSample, Problem, TargetAt, identify_while,
 };
 use crate::profile::{Level, Profile};
-use crate::session::calibration::{self, Calibration, SampleText};
+use crate::session::calibration::{self, Calibration, MountedText, SampleText};
 use crate::session::summary::{IdentificationSummary, InputFile, VerificationMode, VerificationSummary, Warning};
 use crate::units::to_mm;
 
@@ -63,6 +63,8 @@ pub struct IdentifyRequest {
     pub profile: Profile,
     /// The text of the profile, which the calibration carries along.
     pub profile_text: String,
+    /// Where the first target is mounted, if not where the profile has it.
+    pub mounted: Option<MountedText>,
     /// When this is asked for (RFC 3339, UTC).
     pub created: String,
     /// Files that the samples came from.
@@ -102,7 +104,8 @@ pub fn identify(
     request: &IdentifyRequest,
     progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Identified, Failure> {
-    let IdentifyRequest { profile, identification, verification, .. } = request;
+    let IdentifyRequest { identification, verification, mounted, .. } = request;
+    let profile = &mounted.map_or_else(|| request.profile.clone(), |mounted| mounted.on(&request.profile));
     let parameters = request.settings.parameters(profile);
     let targets = nominal_targets(profile);
     let observations = Observations { points: identification.points(), ..Observations::default() };
@@ -158,8 +161,10 @@ pub fn identify(
         verification: verified,
     };
     let summary = finished.summary();
-    let calibration = (!unusable)
-        .then(|| calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, Some(&found)));
+    let calibration = (!unusable).then(|| Calibration {
+        mounted: *mounted,
+        ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, Some(&found))
+    });
     Ok(Identified { summary, calibration, found, nominal })
 }
 
@@ -223,6 +228,7 @@ pub(crate) fn calibration(
             .map(|point| (to_mm(point.x), to_mm(point.y), to_mm(point.z)))
             .collect(),
         samples: problem.observations.places().map(sample).collect(),
+        mounted: None,
         profile: profile_text.to_owned(),
     }
 }

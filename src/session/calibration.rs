@@ -2,11 +2,12 @@
 //!
 //! It carries the text of the profile it was made with, so the nominal robot cannot drift away from its deviations.
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::summary::{IdentificationSettings, ParameterSummary, Provenance, SigmaSummary, Verdict, Warning};
+use crate::profile::{Profile, Target};
 use crate::units::{from_mm, to_mm};
 
 /// Version of the layout.
@@ -122,8 +123,40 @@ pub struct Calibration {
     pub nominal_targets_mm: Vec<(f64, f64, f64)>,
     /// The identification samples: a verification on the same ones would say nothing.
     pub samples: Vec<SampleText>,
+    /// Where the first target was said to be mounted, if not where the profile has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mounted: Option<MountedText>,
     /// The profile, as it was read.
     pub profile: String,
+}
+
+/// A target that is mounted elsewhere than the profile says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MountedText {
+    /// Centre of the SMR in the flange frame.
+    pub xyz_mm: (f64, f64, f64),
+    /// Standard deviation of each coordinate; zero: exact.
+    pub sigma_mm: f64,
+}
+
+impl MountedText {
+    /// The robot of `profile` with its first target mounted so.
+    pub fn on(&self, profile: &Profile) -> Profile {
+        let (x, y, z) = self.xyz_mm;
+        let mounted = profile.targets().first().map(|target| Target {
+            position_in_flange: Point3::new(from_mm(x), from_mm(y), from_mm(z)),
+            uncertainty: from_mm(self.sigma_mm),
+            ..target.clone()
+        });
+        mounted.map_or_else(|| profile.clone(), |target| profile.with_target(0, target))
+    }
+
+    /// Whether its numbers can be meant.
+    fn is_usable(&self) -> bool {
+        let (x, y, z) = self.xyz_mm;
+        [x, y, z].into_iter().all(f64::is_finite) && self.sigma_mm.is_finite() && self.sigma_mm >= 0.0
+    }
 }
 
 /// A calibration file that cannot be used.
@@ -221,6 +254,9 @@ impl Calibration {
             if pose.is_some_and(|pose| !pose.is_usable()) {
                 return Err(CalibrationError::Pose { field });
             }
+        }
+        if calibration.mounted.is_some_and(|mounted| !mounted.is_usable()) {
+            return Err(CalibrationError::Target { target: 1 });
         }
         for (index, (x, y, z)) in calibration.nominal_targets_mm.iter().enumerate() {
             if ![x, y, z].into_iter().all(|value| value.is_finite()) {

@@ -8,9 +8,10 @@ use jiff::Timestamp;
 use nalgebra::Point3;
 use thiserror::Error;
 
+use super::calibration::MountedText;
 use super::journal::{
     CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText,
-    PlannedText, from_edge, from_xyz_mm,
+    PlannedText, from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
 use super::set_up::{InstrumentChoice, Step, TargetChoice};
@@ -255,6 +256,26 @@ impl Session {
         self.lines = line.number;
         self.latest = self.latest.max(Some(line.time));
         Ok(())
+    }
+
+    /// Where the SMR is mounted, if not where the profile has it.
+    pub fn mounted(&self) -> Option<MountedText> {
+        match self.target? {
+            TargetChoice::Profile => None,
+            TargetChoice::Known { xyz_mm, sigma_mm } | TargetChoice::Circles { xyz_mm, sigma_mm } => {
+                Some(MountedText { xyz_mm, sigma_mm })
+            }
+            TargetChoice::Free { sigma_mm } => {
+                let target = self.robot.as_ref()?.profile.targets().first()?;
+                Some(MountedText { xyz_mm: to_xyz_mm(&target.position_in_flange, 6), sigma_mm })
+            }
+        }
+    }
+
+    /// The robot with the SMR where it is mounted.
+    pub fn mounted_profile(&self) -> Option<Profile> {
+        let profile = &self.robot.as_ref()?.profile;
+        Some(self.mounted().map_or_else(|| profile.clone(), |mounted| mounted.on(profile)))
     }
 
     /// Whether anything was measured.

@@ -17,12 +17,11 @@ use super::effect::{Answer, Request};
 use super::intent::{Intent, IntentInfo};
 use super::notice::Notice;
 use super::view::Content;
-use crate::profile::{Profile, Target};
+use crate::profile::Profile;
 use crate::session::journal::Entry;
 use crate::session::plan::PlannedPose;
-use crate::session::set_up::{Step, TargetChoice};
+use crate::session::set_up::Step;
 use crate::session::state::{Robot, Session};
-use crate::units::from_mm;
 
 /// What a step may look at.
 #[derive(Clone, Copy, Debug)]
@@ -40,17 +39,7 @@ impl Cx<'_> {
 
     /// The profile with the target as it was chosen.
     pub(super) fn profile(&self) -> Option<Profile> {
-        let profile = &self.session.robot.as_ref()?.profile;
-        let nominal = profile.targets().first()?.clone();
-        let point = |(x, y, z): (f64, f64, f64)| nalgebra::Point3::new(from_mm(x), from_mm(y), from_mm(z));
-        let mounted = match self.session.target.unwrap_or(TargetChoice::Profile) {
-            TargetChoice::Profile => nominal,
-            TargetChoice::Known { xyz_mm, sigma_mm } | TargetChoice::Circles { xyz_mm, sigma_mm } => {
-                Target { position_in_flange: point(xyz_mm), uncertainty: from_mm(sigma_mm), ..nominal }
-            }
-            TargetChoice::Free { sigma_mm } => Target { uncertainty: from_mm(sigma_mm), ..nominal },
-        };
-        Some(profile.with_target(0, mounted))
+        self.session.mounted_profile()
     }
 }
 

@@ -47,8 +47,9 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
     let verification = samples(cx.session, PoseKind::Verification);
     let mode = if verification.is_empty() { VerificationMode::None } else { VerificationMode::Session };
     Some(Request::Identify(Box::new(IdentifyRequest {
-        profile: cx.profile()?,
+        profile: robot.profile.clone(),
         profile_text: robot.text.clone(),
+        mounted: cx.session.mounted(),
         created: cx.now.to_string(),
         inputs: Vec::new(),
         settings: EstimationSettings::default(),

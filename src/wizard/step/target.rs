@@ -255,7 +255,7 @@ impl StepMachine for TargetStep {
         match entry {
             // The last point of the last circle shows whether the result can be used.
             Entry::CirclePoint(_) if self.next(cx.session).is_none() => match locate(cx.session) {
-                Some(Ok(found)) => vec![Action::Say(verdict(&found))],
+                Some(Ok(found)) => vec![Action::Say(verdict(&found, cx.session))],
                 Some(Err(error)) => {
                     vec![Action::Say(
                         Notice::attention(error.to_string()).hint("measure the circles anew, or leave the SMR free"),
@@ -282,7 +282,7 @@ impl StepMachine for TargetStep {
 }
 
 /// What to say about complete circles.
-fn verdict(found: &TargetLocation) -> Notice {
+fn verdict(found: &TargetLocation, session: &Session) -> Notice {
     /// Residuals larger than expected by this factor are called out.
     const TOO_LARGE: f64 = 3.0;
     let (rms, expected) = (to_mm(found.rms), to_mm(found.expected_rms));
@@ -291,6 +291,20 @@ fn verdict(found: &TargetLocation) -> Notice {
             "the points miss the circles by {rms:.3} mm (RMS), {expected:.3} mm can be expected: a joint value may be wrong, or the SMR has moved"
         ))
         .hint("measure the circles anew");
+    }
+    // With perpendicular last axes a reversed joint leaves no residual: only the expected place shows it.
+    let target = session.robot.as_ref().and_then(|robot| robot.profile.targets().first());
+    if let Some(target) = target {
+        let off = (found.point_in_flange - target.position_in_flange).norm();
+        let allowed = FREE_TARGET_UNCERTAINTY.max(target.uncertainty);
+        if off > allowed {
+            return Notice::attention(format!(
+                "the SMR comes out {:.0} mm away from where the profile has it, {:.0} mm can be expected: another mounting, a joint that turns the other way, or a left-handed frame",
+                to_mm(off),
+                to_mm(allowed)
+            ))
+            .hint("look at the flange: is the SMR where the result says? If not, check the joint signs and the frame of the tracker");
+        }
     }
     Notice::info(format!(
         "the circles fit to {rms:.3} mm (RMS); the SMR is known to {:.3} mm",

@@ -29,7 +29,7 @@ impl Prediction {
     }
 
     fn try_of(session: &Session) -> Option<Self> {
-        let profile = &session.robot.as_ref()?.profile;
+        let profile = &session.mounted_profile()?;
         let at = |configuration: Vec<f64>| TargetAt { configuration, target: 0 };
         let measured: Vec<TargetAt> =
             session.counted_of(PoseKind::Identification).map(|sample| at(session.configuration_of(sample))).collect();
