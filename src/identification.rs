@@ -27,6 +27,7 @@ mod result;
 mod robust;
 mod settings;
 mod solver;
+pub mod triage;
 pub mod verification;
 
 use nalgebra::{DMatrix, DVector, Point3};
