@@ -5,10 +5,10 @@
 //! [`super::Weighting::Covariance`], all distances with their covariance are the points with the rigid motion of the station left
 //! free, so points are compared instead of M(M−1)/2 pairs: the answer is the same for any position of the tracker.
 //!
-//! - [`fit`]: the most probable arm given some samples, its uncertainty, and the probability of the data.
-//! - [`alarm`]: whether anything is wrong at all; limits that a faultless session hardly ever crosses.
-//! - [`explain`]: every fault that could be behind it, compared by the probability that it gives to *all* data.
-//! - [`slips`]: faults of one sample. [`words`]: for the technician.
+//! - `fit`: the most probable arm given some samples, its uncertainty, and the probability of the data.
+//! - `alarm`: whether anything is wrong at all; limits that a faultless session hardly ever crosses.
+//! - `explain`: every fault that could be behind it, compared by the probability that it gives to *all* data.
+//! - `slips`: faults of one sample. `words`: for the technician.
 //!
 //! `docs/triage.md` shows what was measured: which faults of what size are found when.
 
@@ -24,7 +24,7 @@ use nalgebra::Point3;
 
 use super::PointSample;
 use super::linearise::SMALLEST_SIGMA;
-use crate::kinematics::{FreeParameter, KinematicChain};
+use crate::kinematics::{FreeParameter, KinematicChain, ParameterId};
 use crate::units::Quantity;
 use fit::{Arm, Item};
 pub use words::Names;
@@ -199,7 +199,13 @@ fn fits_together(triage: &Triage<'_>) -> bool {
             && sample.at.target < triage.targets.len()
             && sample.at.configuration.iter().chain(sample.point.coords.iter()).all(|value| value.is_finite())
     };
+    let parameter_ok = |parameter: &FreeParameter| match parameter.id {
+        ParameterId::Target { target, .. } => target < triage.targets.len(),
+        ParameterId::Link { .. } => triage.chain.parameter(parameter.id).is_some(),
+    };
     triage.samples.iter().all(sample_ok)
+        && triage.parameters.iter().all(parameter_ok)
+        && triage.excluded.iter().all(|sample| *sample < triage.samples.len())
         && triage.planned.iter().all(|configuration| configuration.len() == triage.chain.dof())
 }
 

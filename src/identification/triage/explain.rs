@@ -6,6 +6,8 @@
 
 use nalgebra::Point3;
 
+use super::super::robust::gross_trust;
+use super::super::{Observations, Problem};
 use super::alarm::{EARLIER, SHIFT, limit_of_sum};
 use super::fit::{Arm, Fit, Item, Step};
 use super::slips::{Slip, outlier_energy, slips};
@@ -102,6 +104,8 @@ fn set_aside<'a>(triage: &Triage<'_>, arm: &'a Arm<'a>, items: &[Item]) -> Optio
     };
     let mut aside: Vec<usize> =
         earlier.iter().map(|item| item.sample).filter(|sample| triage.excluded.contains(sample)).collect();
+    let left_out = aside.len();
+    aside.extend(gross(triage, &items[..earlier.len()], &aside));
     let mut base = without(&aside, None)?;
     for _ in 0..SET_ASIDE {
         if base.items.len() <= FEWEST {
@@ -111,7 +115,7 @@ fn set_aside<'a>(triage: &Triage<'_>, arm: &'a Arm<'a>, items: &[Item]) -> Optio
         let mut worst: Vec<usize> = (0..gains.len()).filter(|&index| gains[index] > EARLIER).collect();
         worst.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
         // The worst one need not be the culprit: with few samples it may only be the one with the most to say.
-        let candidates = if base.items.len() > MANY { 1 } else { 2 };
+        let candidates = if base.items.len() > MANY { 1 } else { 3 };
         let tried = worst.into_iter().take(candidates).filter_map(|index| {
             let samples = [&aside[..], &[base.items[index].sample]].concat();
             Some((without(&samples, Some(&base))?, samples))
@@ -119,8 +123,33 @@ fn set_aside<'a>(triage: &Triage<'_>, arm: &'a Arm<'a>, items: &[Item]) -> Optio
         let Some(best) = tried.min_by(|a, b| a.0.cost.total_cmp(&b.0.cost)) else { break };
         (base, aside) = best;
     }
+    // What looked bad beside a worse one may be good.
+    let fits = |sample: &usize| base.innovation(&items[*sample]).square() < SUSPICIOUS;
+    let (back, bad): (Vec<usize>, Vec<usize>) = aside[left_out..].iter().partition(|sample| fits(sample));
+    if !back.is_empty() {
+        aside.truncate(left_out);
+        aside.extend(bad);
+        base = without(&aside, Some(&base))?;
+    }
     aside.sort_unstable();
     Some((base, aside))
+}
+
+/// Samples that even the nominal arm shows to be impossible: one of them can lead a fit astray for good. None where so many are
+/// that the arm, not a sample, is in question.
+fn gross(triage: &Triage<'_>, earlier: &[Item], left_out: &[usize]) -> Vec<usize> {
+    let kept: Vec<&Item> = earlier.iter().filter(|item| !left_out.contains(&item.sample)).collect();
+    let points = kept.iter().map(|item| triage.samples[item.sample].clone()).collect();
+    let observations = Observations { points, ..Observations::default() };
+    let Triage { chain, targets, parameters, .. } = *triage;
+    let problem = Problem { chain, targets, parameters, observations: &observations };
+    let arm = ForwardKinematics::new(chain);
+    let predicted: Vec<Point3<f64>> =
+        kept.iter().map(|item| arm.point_in_base(&item.configuration, &targets[item.target])).collect();
+    let trust = gross_trust(&problem, &predicted);
+    let impossible: Vec<usize> =
+        kept.iter().zip(trust).filter(|(_, trust)| *trust <= 0.0).map(|(item, _)| item.sample).collect();
+    if impossible.len() <= SET_ASIDE && kept.len() >= impossible.len() + FEWEST { impossible } else { Vec::new() }
 }
 
 impl<'a> Case<'a, '_> {

@@ -3,11 +3,11 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
-use rand::{RngExt as _, SeedableRng as _};
+use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::{Cause, Finding, Names, Triage, triage};
+use super::{Cause, Explanation, Finding, Names, Triage, triage};
 use crate::identification::{PointSample, TargetAt};
 use crate::kinematics::{ForwardKinematics, FreeParameter, KinematicChain};
 use crate::profile::{Level, Profile, builtin};
@@ -264,13 +264,25 @@ fn an_old_bad_point_does_not_hide_a_new_one() {
 }
 
 #[test]
-fn with_four_points_it_is_not_clear_who_is_wrong() {
+fn with_four_points_it_is_often_not_clear_who_is_wrong() {
+    let mut unclear = 0;
+    for seed in 11..19 {
+        let mut session = Session::new(seed);
+        let good = session.samples[2].point;
+        // The smallest fault that is seen at all.
+        let finding = (1..100).find_map(|off| {
+            session.samples[2].point = good + Vector3::x() * from_mm(f64::from(off));
+            session.after(4)
+        });
+        let finding = finding.unwrap();
+        if finding.alternatives.iter().any(|other| other.sample != finding.sample) {
+            unclear += 1;
+        }
+    }
+    assert!(unclear > 0);
     let mut session = Session::new(11);
-    session.samples[2].point.x += 0.2;
-    let early = session.after(4).unwrap();
-    assert!(early.suspects().len() > 1 && early.suspects().contains(&2), "{early:?}");
-    let later = session.after(10).unwrap();
-    assert_eq!(later.suspects(), [2], "{later:?}");
+    session.samples[2].point.x += 0.02;
+    assert_eq!(session.after(10).unwrap().suspects(), [2]);
 }
 
 #[test]
@@ -302,11 +314,31 @@ fn words_say_what_how_sure_and_what_to_do() {
 }
 
 #[test]
+fn several_suspects_are_all_named() {
+    let blame = |sample| Explanation { sample, cause: Cause::Unexplained, share: 0.25 };
+    let finding = Finding {
+        sample: 3,
+        ratio: 7.0,
+        worst: Vec::new(),
+        cause: Cause::Unexplained,
+        share: 0.4,
+        alternatives: vec![blame(1), blame(0)],
+    };
+    assert_eq!(finding.suspects(), [3, 1, 0]);
+    let text = told(&finding);
+    assert!(text.contains("which of point 4, point 2, point 1 is wrong: the next point will tell"), "{text}");
+}
+
+#[test]
 fn misuse_is_no_finding() {
     let mut session = Session::new(13);
     session.samples[3].at.configuration.pop();
     assert!(session.after(10).is_none());
     let mut session = Session::new(13);
     session.samples[3].point.x = f64::NAN;
+    assert!(session.after(10).is_none());
+    let mut session = Session::new(13);
+    session.samples[3].point.x += 1.0;
+    session.excluded = vec![40];
     assert!(session.after(10).is_none());
 }
