@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Steps: Profile → Instrument → Target → Plan → Capture → Identify → Verify → Deliver. Every step is a small machine of its own
-//! ([`step`]) that owns only what is not in the session. It answers with actions; only this module gives them ids, orders them
+//! (`step`) that owns only what is not in the session. It answers with actions; only this module gives them ids, orders them
 //! and turns them into [`Effect`]s.
 //!
 //! - **Journal first**: a change is an entry; it is applied to the [`Session`] when the store says that it is on disk, and only
@@ -234,10 +234,12 @@ impl Wizard {
             return Vec::new();
         }
         if self.is_stuck() {
-            return match intent {
-                Intent::Retry => self.write_again(),
-                Intent::Quit => self.end("quit; the last change could not be saved".to_owned()),
-                _ => Vec::new(),
+            return if intent == Intent::Retry {
+                self.write_again()
+            } else if intent == Intent::Quit {
+                self.end("quit; the last change could not be saved".to_owned())
+            } else {
+                Vec::new()
             };
         }
         if self.writing.is_some() {
@@ -246,14 +248,15 @@ impl Wizard {
             }
             return Vec::new();
         }
-        match intent {
-            Intent::Quit => return self.shut_down("quit".to_owned()),
-            Intent::Dismiss => {
-                self.notice = None;
-                return Vec::new();
-            }
-            Intent::Cancel => return self.cancel(),
-            _ => {}
+        if intent == Intent::Quit {
+            return self.shut_down("quit".to_owned());
+        }
+        if intent == Intent::Cancel {
+            return self.cancel();
+        }
+        if intent == Intent::Dismiss {
+            self.notice = None;
+            return Vec::new();
         }
         // The offers are the one place that decides what can be done.
         let blocked = match self.intents().into_iter().find(|info| info.intent.name() == intent.name()) {

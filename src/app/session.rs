@@ -40,8 +40,8 @@ fn list<O: Write, E: Write>(root: &Path, console: &mut Console<O, E>) -> Result<
         console.remark(&format!("no session in '{}'", root.display()));
         return Ok(ExitStatus::Accepted);
     }
-    let mut text =
-        format!("{:<32} {:<20} {:<10} {:>7}  {}\n", "session", "robot", "step", "samples", "last entry (UTC)");
+    let mut table =
+        vec![format!("{:<32} {:<20} {:<10} {:>7}  last entry (UTC)", "session", "robot", "step", "samples")];
     for folder in found {
         let name = folder.file_name().map_or_else(String::new, |name| printable(&name.to_string_lossy()));
         match load(&folder) {
@@ -49,15 +49,16 @@ fn list<O: Write, E: Write>(root: &Path, console: &mut Console<O, E>) -> Result<
                 let robot = session.robot.as_ref().map_or("-", |robot| robot.profile.name());
                 let latest = session.latest.map_or_else(String::new, |time| time.to_string());
                 let step = session.step.to_string();
-                text += &format!("{name:<32} {robot:<20} {step:<10} {:>7}  {latest}\n", session.counted().count());
+                let samples = session.counted().count();
+                table.push(format!("{name:<32} {robot:<20} {step:<10} {samples:>7}  {latest}"));
             }
             Err(failure) => {
-                text += &format!("{name:<32} cannot be read\n");
+                table.push(format!("{name:<32} cannot be read"));
                 console.remark(&failure.to_string());
             }
         }
     }
-    console.print(&text)?;
+    console.print(&(table.join("\n") + "\n"))?;
     Ok(ExitStatus::Accepted)
 }
 
@@ -77,8 +78,8 @@ fn show<O: Write, E: Write>(
         console.print(&to_json(&entries)?)?;
         return Ok(ExitStatus::Accepted);
     }
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| text += &format!("{name:<14} {value}\n");
+    let mut lines = Vec::new();
+    let mut line = |name: &str, value: String| lines.push(format!("{name:<14} {value}"));
     line("session", session.name.clone());
     line("opened", session.opened.map_or_else(|| "-".to_owned(), |time| format!("{time} by {}", session.program)));
     line(
@@ -140,12 +141,13 @@ fn show<O: Write, E: Write>(
         );
     }
     if with_journal {
-        text += "\n";
-        for entry in &journal.lines {
-            text += &format!("{:>5} {} {}\n", entry.number, entry.time, printable(&entry.entry.describe()));
-        }
+        lines.push(String::new());
+        let entries = journal.lines.iter();
+        lines.extend(
+            entries.map(|line| format!("{:>5} {} {}", line.number, line.time, printable(&line.entry.describe()))),
+        );
     }
-    console.print(&text)?;
+    console.print(&(lines.join("\n") + "\n"))?;
     Ok(ExitStatus::Accepted)
 }
 

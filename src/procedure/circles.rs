@@ -20,11 +20,14 @@ const TRIES: usize = 500;
 /// Seed of the base configurations.
 const SEED: u64 = 1;
 
+/// A joint with the configurations that turn it.
+pub type Circle = (usize, Vec<Vec<f64>>);
+
 /// Configurations per joint: the last joint, then the one before it. The arm can go from each to the next.
 ///
 /// # Errors
 /// The arm cannot turn its last two joints freely anywhere, or they do not turn at all.
-pub fn plan(profile: &Profile) -> Result<Vec<(usize, Vec<Vec<f64>>)>, Failure> {
+pub fn plan(profile: &Profile) -> Result<Vec<Circle>, Failure> {
     let limits = planning_limits(profile)?;
     let usage = |error: &dyn std::error::Error| Failure::from_error(ExitStatus::Usage, error);
     let cell = cell(profile, limits.clone(), None, true)?;

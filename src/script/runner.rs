@@ -12,7 +12,7 @@ use crate::session::summary::IdentificationSummary;
 use crate::wizard::{Intent, IntentInfo, ViewModel};
 
 /// Longest real time in which nothing at all happens while something is under way; a search reports far more often.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_mins(5);
 /// A measurement that fails is tried again so often.
 const TRIES: usize = 3;
 /// Characters of an intent in the transcript.
@@ -58,7 +58,7 @@ pub struct Runner<'a, W: Write> {
     done: Vec<Intent>,
 }
 
-impl<'a, W: Write> std::fmt::Debug for Runner<'a, W> {
+impl<W: Write> std::fmt::Debug for Runner<'_, W> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Runner").field("engine", &self.engine).finish_non_exhaustive()
     }

@@ -36,5 +36,6 @@ pub fn measurements_csv(session: &Session, robot: &Robot) -> String {
         }
     }
     let table = measurements::write(&rows, &robot.joint_types);
-    table.lines().zip(kinds).map(|(line, kind)| format!("{line},{kind}\n")).collect()
+    let lines: Vec<String> = table.lines().zip(kinds).map(|(line, kind)| format!("{line},{kind}")).collect();
+    lines.join("\n") + "\n"
 }

@@ -1,7 +1,7 @@
 //! The state of a session: the fold of its journal, and nothing else.
 //!
 //! A sample is never removed: it is superseded by a later measurement of the same row, left out or undone, and stays to be
-//! seen. What was measured stays as it was noted; corrections are applied when samples are used ([`Sample::point`] and the
+//! seen. What was measured stays as it was noted; corrections are applied when samples are used ([`Session::point_of`] and the
 //! configuration).
 
 use jiff::Timestamp;

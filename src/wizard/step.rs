@@ -3,6 +3,11 @@
 //! A step is made anew whenever it is entered, from the session alone: going back and forth, or resuming, loses nothing but a
 //! proposal that was not accepted. It answers intents and results with [`Action`]s and never touches the session itself.
 
+#![expect(
+    clippy::wildcard_enum_match_arm,
+    reason = "a step answers its own intents, answers and entries; all others mean nothing to it"
+)]
+
 mod capture;
 mod deliver;
 mod identify;
@@ -83,7 +88,7 @@ pub(super) enum Phase {
     Instrument(instrument::InstrumentStep),
     Target(target::TargetStep),
     Plan(plan::PlanStep),
-    Capture(capture::CaptureStep),
+    Capture(Box<capture::CaptureStep>),
     Identify(identify::IdentifyStep),
     Verify(identify::VerifyStep),
     Deliver(deliver::DeliverStep),
@@ -113,7 +118,7 @@ impl Phase {
             Step::Instrument => Self::Instrument(instrument::InstrumentStep),
             Step::Target => Self::Target(target::TargetStep::enter(session)),
             Step::Plan => Self::Plan(plan::PlanStep::default()),
-            Step::Capture => Self::Capture(capture::CaptureStep::enter(session)),
+            Step::Capture => Self::Capture(Box::new(capture::CaptureStep::enter(session))),
             Step::Identify => Self::Identify(identify::IdentifyStep),
             Step::Verify => Self::Verify(identify::VerifyStep),
             Step::Deliver => Self::Deliver(deliver::DeliverStep),

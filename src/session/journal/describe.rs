@@ -70,19 +70,16 @@ fn sample_text(sample: &MeasuredText) -> String {
 
 fn plan_text(plan: &PlanText) -> String {
     let count = |kind: PoseKind| plan.rows.iter().filter(|row| row.kind == kind).count();
-    let mut text = format!(
-        "{} identification and {} verification poses, {}",
+    let condition = plan.condition_number.map(|condition| format!(", condition number {condition:.1}"));
+    let error = plan.predicted_error_sigma.map(|error| format!(", predicted error {error:.3} sigma"));
+    format!(
+        "{} identification and {} verification poses, {}{}{}",
         count(PoseKind::Identification),
         count(PoseKind::Verification),
-        plan.origin
-    );
-    if let Some(condition) = plan.condition_number {
-        text += &format!(", condition number {condition:.1}");
-    }
-    if let Some(error) = plan.predicted_error_sigma {
-        text += &format!(", predicted error {error:.3} sigma");
-    }
-    text
+        plan.origin,
+        condition.unwrap_or_default(),
+        error.unwrap_or_default()
+    )
 }
 
 fn correction_text(correction: &Correction) -> String {
@@ -106,7 +103,7 @@ fn result_text(summary: &IdentificationSummary, is_usable: bool) -> String {
         return format!("identified from {} samples: no usable solution", summary.samples);
     }
     let rank = summary.rank.map_or_else(|| "unclear".to_owned(), |rank| rank.to_string());
-    let mut text = format!(
+    let text = format!(
         "identified from {} samples: {} parameters, rank {rank}, {} rejected",
         summary.samples,
         summary.parameter_count,
@@ -116,7 +113,7 @@ fn result_text(summary: &IdentificationSummary, is_usable: bool) -> String {
     let position = |statistics: &Option<StatisticsSummary>| {
         statistics.map_or_else(|| "-".to_owned(), |position| format!("{:.3}", position.mean))
     };
-    text += &format!(
+    let verified = format!(
         "; verified on {} samples: mean position error {} mm nominal, {} mm identified",
         verification.samples,
         position(&verification.nominal.position_mm),
@@ -127,7 +124,7 @@ fn result_text(summary: &IdentificationSummary, is_usable: bool) -> String {
         VerdictStatus::NotAccepted => "NOT accepted",
         VerdictStatus::NotEvaluated => "not evaluated",
     };
-    format!("{text}; {verdict}")
+    format!("{text}{verified}; {verdict}")
 }
 
 /// An instrument in one line.

@@ -134,11 +134,11 @@ impl CaptureStep {
                 .hint("wait until it is at rest and measure again; or take the reading as it is");
             return vec![Action::Write(vec![entry]), Action::Say(notice)];
         }
-        self.write(noted, cx)
+        Self::write(noted, cx)
     }
 
     /// Writes a sample with what the checks say about it.
-    fn write(&mut self, mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
+    fn write(mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
         let earlier = noted.findings.clone();
         noted.findings = checks::findings(cx, &noted);
         noted.findings.extend(earlier);
@@ -263,7 +263,7 @@ impl StepMachine for CaptureStep {
                     message: reason,
                     remedy: None,
                 });
-                self.write(noted, cx)
+                Self::write(noted, cx)
             }
             Intent::MeasureAgain => {
                 let row = self.question.and_then(|number| session.sample(number)).map(|sample| sample.row);

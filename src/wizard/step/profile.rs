@@ -13,7 +13,7 @@ use crate::wizard::view::{Content, ProfileCard, ProfileView};
 /// The profile step: a profile that is looked at and not yet taken.
 #[derive(Clone, Debug, Default)]
 pub(in crate::wizard) struct ProfileStep {
-    chosen: Option<Chosen>,
+    chosen: Option<Box<Chosen>>,
     name: Option<String>,
 }
 
@@ -92,7 +92,7 @@ impl StepMachine for ProfileStep {
         match Profile::parse(&text, &source) {
             Ok((profile, warnings)) => {
                 let warnings = warnings.iter().map(ToString::to_string).collect();
-                self.chosen = Some(Chosen { source, text, profile, warnings });
+                self.chosen = Some(Box::new(Chosen { source, text, profile, warnings }));
                 Vec::new()
             }
             Err(errors) => {

@@ -87,10 +87,13 @@ fn pose_name(robot: &Robot, joint: usize, index: usize) -> String {
     format!("circle-{name}-{}", index + 1)
 }
 
+/// A joint with the configurations (rad) that turned it and the points (m) measured there.
+type Measured = (usize, Vec<Vec<f64>>, Vec<Point3<f64>>);
+
 /// What the measured circles say; `None` before both are complete.
 fn locate(session: &Session) -> Option<Result<TargetLocation, CirclePointError>> {
     let robot = session.robot.as_ref()?;
-    let mut series: Vec<(usize, Vec<Vec<f64>>, Vec<Point3<f64>>)> = Vec::new();
+    let mut series: Vec<Measured> = Vec::new();
     for point in &session.circle_points {
         let configuration = from_edge(&point.joints, &robot.joint_types);
         let measured = session.corrected(point.number, point.xyz_mm);
