@@ -40,18 +40,23 @@ impl Cx<'_> {
 
     /// The profile with the target as it was chosen.
     pub(super) fn profile(&self) -> Option<Profile> {
-        let profile = &self.session.robot.as_ref()?.profile;
-        let nominal = profile.targets().first()?.clone();
-        let point = |(x, y, z): (f64, f64, f64)| nalgebra::Point3::new(from_mm(x), from_mm(y), from_mm(z));
-        let mounted = match self.session.target.unwrap_or(TargetChoice::Profile) {
-            TargetChoice::Profile => nominal,
-            TargetChoice::Known { xyz_mm, sigma_mm } | TargetChoice::Circles { xyz_mm, sigma_mm } => {
-                Target { position_in_flange: point(xyz_mm), uncertainty: from_mm(sigma_mm), ..nominal }
-            }
-            TargetChoice::Free { sigma_mm } => Target { uncertainty: from_mm(sigma_mm), ..nominal },
-        };
-        Some(profile.with_target(0, mounted))
+        profile(self.session)
     }
+}
+
+/// The profile of a session with the target as it was chosen.
+fn profile(session: &Session) -> Option<Profile> {
+    let profile = &session.robot.as_ref()?.profile;
+    let nominal = profile.targets().first()?.clone();
+    let point = |(x, y, z): (f64, f64, f64)| nalgebra::Point3::new(from_mm(x), from_mm(y), from_mm(z));
+    let mounted = match session.target.unwrap_or(TargetChoice::Profile) {
+        TargetChoice::Profile => nominal,
+        TargetChoice::Known { xyz_mm, sigma_mm } | TargetChoice::Circles { xyz_mm, sigma_mm } => {
+            Target { position_in_flange: point(xyz_mm), uncertainty: from_mm(sigma_mm), ..nominal }
+        }
+        TargetChoice::Free { sigma_mm } => Target { uncertainty: from_mm(sigma_mm), ..nominal },
+    };
+    Some(profile.with_target(0, mounted))
 }
 
 /// An instrument that answers.

@@ -5,6 +5,7 @@ use crate::planning::{Information, JointBox, random};
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
 use crate::session::state::Session;
+use crate::wizard::step::profile;
 
 /// Fresh poses over which the prediction is averaged.
 const FRESH_POSES: usize = 200;
@@ -29,7 +30,7 @@ impl Prediction {
     }
 
     fn try_of(session: &Session) -> Option<Self> {
-        let profile = &session.robot.as_ref()?.profile;
+        let profile = &profile(session)?;
         let at = |configuration: Vec<f64>| TargetAt { configuration, target: 0 };
         let measured: Vec<TargetAt> =
             session.counted_of(PoseKind::Identification).map(|sample| at(session.configuration_of(sample))).collect();
