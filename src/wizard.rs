@@ -302,11 +302,15 @@ impl Wizard {
         let id = match &event {
             StoreEvent::Created { id, .. } | StoreEvent::Written { id } | StoreEvent::Failed { id, .. } => *id,
         };
-        let Some(mut writing) = self.writing.take().filter(|writing| writing.id == id) else {
-            return Vec::new();
-        };
+        // What has failed waits for the operator: a late word about it changes nothing.
+        let is_awaited = |writing: &mut Writing| writing.id == id && writing.failed.is_none();
+        let Some(mut writing) = self.writing.take_if(is_awaited) else { return Vec::new() };
         match (event, writing.what) {
             (StoreEvent::Failed { message, .. }, what) => {
+                if self.ended.is_some() {
+                    self.drop_everything();
+                    return vec![Effect::Exit];
+                }
                 self.waiting.clear();
                 let on_disk = counted(self.session.samples.len(), "sample is", "samples are");
                 self.notice = Some(
@@ -316,7 +320,7 @@ impl Wizard {
                 );
                 writing.failed = Some(message);
                 self.writing = Some(Writing { what, ..writing });
-                if self.ended.is_some() { vec![Effect::Exit] } else { Vec::new() }
+                Vec::new()
             }
             (StoreEvent::Created { folder, name, .. }, Write::Folder { mut entries, .. }) => {
                 self.folder = Some(folder);
@@ -392,6 +396,10 @@ impl Wizard {
                         .zip(first..)
                         .map(|(entry, number)| Line { number, time: self.now, entry })
                         .collect();
+                    if let Some(misfit) = self.misfit(&lines) {
+                        self.notice = Some(misfit);
+                        continue;
+                    }
                     let id = self.next_id();
                     effects.push(Effect::Append { id, lines: lines.clone() });
                     self.writing = Some(Writing { id, what: Write::Lines(lines), failed: None });
@@ -412,6 +420,16 @@ impl Wizard {
         effects
     }
 
+    /// What to say about lines that do not fit the session: they are never written, a journal with them could not be read.
+    fn misfit(&self, lines: &[Line]) -> Option<Notice> {
+        let mut session = self.session.clone();
+        let error = lines.iter().find_map(|line| session.apply(line).err())?;
+        Some(
+            Notice::stop(format!("not done: {error}"))
+                .hint("nothing was written, the session is intact; please report this with its journal"),
+        )
+    }
+
     fn next_id(&mut self) -> RequestId {
         self.last_id += 1;
         RequestId(self.last_id)
@@ -428,7 +446,8 @@ impl Wizard {
         let mut effects = self.cancel();
         self.busy = None;
         self.waiting.clear();
-        self.actions.clear();
+        // A reading that waits for a note to be on disk is not lost.
+        self.actions.retain(|action| matches!(action, Action::Write(_)));
         self.actions.push_back(Action::Write(vec![Entry::Closed { reason: cause.clone() }]));
         self.actions.push_back(Action::Exit);
         effects.extend(self.run());
@@ -439,8 +458,17 @@ impl Wizard {
     fn end(&mut self, cause: String) -> Vec<Effect> {
         let mut effects = self.cancel();
         self.ended = Some(cause);
+        self.drop_everything();
         effects.push(Effect::Exit);
         effects
+    }
+
+    /// Nothing is under way any more, and whatever is still answered means nothing.
+    fn drop_everything(&mut self) {
+        self.busy = None;
+        self.writing = None;
+        self.waiting.clear();
+        self.actions.clear();
     }
 }
 

@@ -35,6 +35,8 @@ pub(in crate::wizard) struct CaptureStep {
     held: Option<Held>,
     /// The sample that the operator has to look at.
     question: Option<u64>,
+    /// A measurement is under way; what else fails is no refused measurement.
+    measuring: bool,
     /// What the samples so far let expect.
     prediction: Prediction,
 }
@@ -48,8 +50,7 @@ struct Held {
 
 /// Why there are too few identification samples to identify from.
 pub(super) fn too_few(session: &Session) -> Option<String> {
-    let robot = session.robot.as_ref()?;
-    let free = robot.profile.free_parameters(crate::profile::Level::Geometric).len();
+    let free = session.mounted_profile()?.free_parameters(crate::profile::Level::Geometric).len();
     let fewest = (free + 6).div_ceil(3);
     let measured = session.counted_of(PoseKind::Identification).count();
     (measured < fewest).then(|| format!("{measured} of at least {fewest} identification poses are measured"))
@@ -58,14 +59,22 @@ pub(super) fn too_few(session: &Session) -> Option<String> {
 impl CaptureStep {
     /// Begins at the first row that waits to be measured.
     pub(super) fn enter(session: &Session) -> Self {
-        let question = session.doubts().map(|(sample, _)| sample.noted.number).last();
-        let asked = question.and_then(|number| session.sample(number)).map(|sample| sample.row);
-        Self {
-            row: asked.or_else(|| session.open_rows().next()),
+        let mut step = Self {
+            row: session.open_rows().next(),
             held: None,
-            question,
+            question: None,
+            measuring: false,
             prediction: Prediction::of(session),
-        }
+        };
+        step.ask(session);
+        step
+    }
+
+    /// Asks about the last sample that is in doubt, if there is one, and shows its row.
+    fn ask(&mut self, session: &Session) {
+        let doubt = session.doubts().map(|(sample, _)| (sample.noted.number, sample.row)).last();
+        self.question = doubt.map(|(number, _)| number);
+        self.row = doubt.map(|(_, row)| row).or(self.row);
     }
 
     /// The row after the one shown that waits to be measured, or the first one.
@@ -78,8 +87,9 @@ impl CaptureStep {
         self.row = self.following(session).or_else(|| session.open_rows().next());
     }
 
-    fn measure(&self, cx: &Cx<'_>, row: usize) -> Vec<Action> {
+    fn measure(&mut self, cx: &Cx<'_>, row: usize) -> Vec<Action> {
         let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
+        self.measuring = true;
         let following = self.following(cx.session).and_then(|row| cx.session.rows.get(row));
         vec![Action::Ask(Request::Measure(MeasureRequest {
             number: cx.session.measurements + 1,
@@ -161,7 +171,11 @@ impl CaptureStep {
             session.rows.get(*row).is_some_and(|row| row.planned.pose == pose && row.planned.kind.is_measured())
         };
         let rows: Vec<usize> = (0..session.rows.len()).filter(named).collect();
-        let found = rows.iter().find(|row| session.is_open(**row)).or_else(|| rows.last()).copied();
+        let active = |row: &&usize| session.rows.get(**row).is_some_and(|row| row.active);
+        let skipped = |row: &&usize| active(row) && session.rows.get(**row).is_some_and(|row| row.skipped);
+        let found = rows.iter().find(|row| session.is_open(**row)).or_else(|| rows.iter().find(skipped));
+        // Of those that are done the pose itself, not its repetitions for drift.
+        let found = found.or_else(|| rows.iter().find(active)).or_else(|| rows.last()).copied();
         let Some(row) = found else {
             let pose = crate::session::printable(pose);
             return vec![Action::Say(Notice::attention(format!("there is no pose '{pose}' in the plan")))];
@@ -215,6 +229,7 @@ impl StepMachine for CaptureStep {
         let has_more = session.open_rows().next().is_some();
         let measure = IntentInfo::new(Intent::Measure, "measure")
             .unless(blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()));
+        let skip_blocked = no_row.clone().or_else(|| question.clone());
         let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
             .unless(not_by_hand.or_else(|| blocked.clone()).or(question));
         let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone());
@@ -229,7 +244,7 @@ impl StepMachine for CaptureStep {
                 .unless(no_question)
                 .with_danger(Danger::DropsData),
             IntentInfo::new(Intent::ApplyRemedy, "correct it as proposed").unless(no_remedy),
-            IntentInfo::new(Intent::Skip, "skip this pose").unless(no_row.clone()),
+            IntentInfo::new(Intent::Skip, "skip this pose").unless(skip_blocked),
             IntentInfo::new(Intent::Undo, "take the last sample back")
                 .unless(no_sample.clone())
                 .with_danger(Danger::DropsData),
@@ -303,8 +318,9 @@ impl StepMachine for CaptureStep {
     }
 
     fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
+        let was_measuring = std::mem::take(&mut self.measuring);
         match answer {
-            Answer::Measured(reading) => self.take(&reading, cx),
+            Answer::Measured(reading) if was_measuring => self.take(&reading, cx),
             Answer::Planned { summary, rows, .. } => {
                 let new: Vec<_> = rows.into_iter().filter(|row| row.kind != PoseKind::Home).collect();
                 let origin = format!("{} next best poses", new.iter().filter(|row| row.kind.is_measured()).count());
@@ -315,7 +331,8 @@ impl StepMachine for CaptureStep {
     }
 
     fn on_failure(&mut self, problem: Problem, cx: &Cx<'_>) -> Vec<Action> {
-        let row = self.row.and_then(|row| cx.session.rows.get(row));
+        let was_measuring = std::mem::take(&mut self.measuring);
+        let row = self.row.filter(|_| was_measuring).and_then(|row| cx.session.rows.get(row));
         let Some(row) = row else { return vec![Action::Say(problem.into())] };
         let pose = row.planned.pose.clone();
         let number = cx.session.measurements + 1;
@@ -329,35 +346,30 @@ impl StepMachine for CaptureStep {
             Entry::Sample(noted) => {
                 self.held = None;
                 self.prediction = Prediction::of(session);
-                let doubt = session.doubts().filter(|(_, finding)| noted.findings.contains(finding)).last();
-                self.question = doubt.map(|(about, _)| about.noted.number);
+                self.ask(session);
                 match noted.findings.first() {
                     Some(finding) if self.question.is_some() => {
                         return vec![Action::Say(Notice::attention(finding.message.clone()))];
                     }
-                    _ => self.advance(session),
+                    _ if self.question.is_none() => self.advance(session),
+                    _ => {}
                 }
             }
             Entry::Decision { sample, decision } => {
                 self.prediction = Prediction::of(session);
-                if self.question == Some(*sample) {
-                    self.question = None;
-                }
                 match decision {
                     Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
                     Decision::Keep | Decision::LeaveOut => self.advance(session),
                 }
+                self.ask(session);
             }
             Entry::Correction(correction) => {
                 self.prediction = Prediction::of(session);
-                self.question = None;
                 self.row = session.open_rows().next();
+                self.ask(session);
                 return vec![Action::Say(Notice::info(corrected(correction)))];
             }
-            Entry::Skipped { skipped: true, .. } => {
-                self.question = None;
-                self.advance(session);
-            }
+            Entry::Skipped { skipped: true, .. } => self.advance(session),
             Entry::PlanExtended(_) | Entry::Plan(_) => {
                 self.prediction = Prediction::of(session);
                 self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());

@@ -42,7 +42,7 @@ impl StepMachine for InstrumentStep {
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
         match intent {
             Intent::ChooseInstrument(instrument) => {
-                vec![Action::Disconnect, Action::Write(vec![Entry::Instrument(instrument)])]
+                vec![Action::Write(vec![Entry::Instrument(instrument)]), Action::Disconnect]
             }
             Intent::Retry => connect(cx),
             Intent::Next => vec![Action::go(Step::Target)],

@@ -80,7 +80,13 @@ impl StepMachine for ProfileStep {
                 let entries = vec![profile, Entry::Step(Step::Instrument)];
                 match (cx.session.opened, self.session_name(cx)) {
                     (None, Some(name)) => vec![Action::Create { name, entries }],
-                    _ => vec![Action::Write(entries)],
+                    // An instrument that looked at the robot before does not know this one.
+                    _ => {
+                        let profile = Box::new(chosen.profile.clone());
+                        let instrument = cx.session.instrument.clone();
+                        let connect = instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
+                        [Action::Write(entries), Action::Disconnect].into_iter().chain(connect).collect()
+                    }
                 }
             }
             _ => Vec::new(),
@@ -108,7 +114,10 @@ impl StepMachine for ProfileStep {
         Content::Profile(ProfileView {
             profiles: builtin_names().map(str::to_owned).collect(),
             chosen: shown.map(|(profile, warnings)| ProfileCard::new(profile, warnings)),
-            session: self.session_name(cx).unwrap_or_else(|| cx.session.name.clone()),
+            session: match cx.session.opened {
+                Some(_) => cx.session.name.clone(),
+                None => self.session_name(cx).unwrap_or_default(),
+            },
             is_fixed: cx.session.has_measurements(),
         })
     }
