@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn without_options_the_command_identifies_by_default() {
         let words = ["trupose", "identify", "--profile", "soochow", "--measurements", "points.csv"];
-        let Command::Identify(args) = Cli::parse_from(words).command else { panic!("not the command") };
+        let Some(Command::Identify(args)) = Cli::parse_from(words).command else { panic!("not the command") };
         let asked = estimation_settings(&args.estimation, args.weighting.into());
         assert_eq!(asked, EstimationSettings::default());
     }

@@ -478,3 +478,6 @@ fn robot(line: u64, source: &str, sha256: &str, text: &str) -> Result<Robot, Fol
     let joint_types = profile.chain().joints().iter().map(|joint| joint.joint_type).collect();
     Ok(Robot { source: source.to_owned(), sha256: sha256.to_owned(), text: text.to_owned(), profile, joint_types })
 }
+
+#[cfg(test)]
+mod tests;

@@ -86,7 +86,11 @@ fn plan() -> PlanText {
         condition_number: Some(69.25),
         predicted_error_sigma: None,
         minutes: Some(0.1),
-        rows: PoseKind::ALL.into_iter().map(|kind| row(kind, Some((1.0, 2.0, -3.001)))).chain([row(PoseKind::Via, None)]).collect(),
+        rows: PoseKind::ALL
+            .into_iter()
+            .map(|kind| row(kind, Some((1.0, 2.0, -3.001))))
+            .chain([row(PoseKind::Via, None)])
+            .collect(),
     }
 }
 
@@ -141,11 +145,12 @@ fn all_entries() -> Vec<Entry> {
         layout: layout.to_owned(),
     };
     let fault = |text: &str| text.to_owned().try_into().unwrap();
-    let faults: Vec<Fault> = ["wrong-pose@12", "target-bumped@20:5mm", "joint-sign@1:j3", "beam-break@7-9", "drift@3:0.25mm/h"]
-        .into_iter()
-        .filter_map(|text| Fault::try_from(text.to_owned()).ok())
-        .chain([fault("inch@2")])
-        .collect();
+    let faults: Vec<Fault> =
+        ["wrong-pose@12", "target-bumped@20:5mm", "joint-sign@1:j3", "beam-break@7-9", "drift@3:0.25mm/h"]
+            .into_iter()
+            .filter_map(|text| Fault::try_from(text.to_owned()).ok())
+            .chain([fault("inch@2")])
+            .collect();
     let instruments = CoordinateUnit::ALL.map(|unit| InstrumentChoice::Manual { unit }).into_iter().chain([
         InstrumentChoice::Simulated(Simulation { seed: u64::MAX, truth: Truth::Paper, noise_mm: Some(0.5), faults }),
         InstrumentChoice::Simulated(Simulation::default()),
