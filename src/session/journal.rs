@@ -34,6 +34,9 @@ pub const SCHEMA: u32 = 1;
 /// Name of the file in a session's folder.
 pub const FILE_NAME: &str = "journal.ron";
 
+/// How every line begins.
+const BEGIN: &[u8] = b"(\"";
+
 /// Bytes of a check sum in hexadecimal.
 const SUM_DIGITS: usize = 16;
 
@@ -141,7 +144,7 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
     }
     journal.torn_bytes = bytes.len() - journal.good_bytes;
     match journal.lines.first().map(|line| &line.entry) {
-        None if bytes.starts_with(b"(\"") || bytes.is_empty() => Err(JournalError::Empty),
+        None if bytes.starts_with(BEGIN) || BEGIN.starts_with(bytes) => Err(JournalError::Empty),
         Some(Entry::Opened { .. }) => Ok(journal),
         _ => Err(JournalError::NotAJournal),
     }
