@@ -5,7 +5,6 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    clippy::print_stderr,
     clippy::disallowed_methods,
     clippy::indexing_slicing,
     reason = "a failure of a test is a panic; what is skipped is said; test files need no atomic writes"
@@ -14,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, ChildStdout, Command, Output, Stdio};
@@ -516,6 +515,27 @@ fn a_journal_that_cannot_grow_stops_the_run_and_goes_on_later() {
     assert!(stopped > 5);
 }
 
+#[test]
+fn a_reader_that_goes_away_costs_nothing_that_was_saved() {
+    let expected = finished().measurements("sessions/s");
+    for lines in [1, 12, 20, 30] {
+        let place = Place::new();
+        let script = place.write_script("run.script.ron", &whole());
+        let mut running = Paused::start(place.command(&["--script", &script, "--json"]));
+        assert!(running.read_lines(lines));
+        let Paused { mut child, out, seen, .. } = running;
+        drop(out);
+        let code = child.wait().unwrap().code();
+        // All may have been in the pipe already.
+        assert!(matches!(code, Some(0 | 5)), "{code:?}");
+        everything_saved_is_there(&seen, &place.session());
+        if read_journal(&place.session()).is_ok() {
+            place.complete("sessions/s");
+            assert_eq!(place.measurements("sessions/s"), expected, "after {lines} lines");
+        }
+    }
+}
+
 /// A small file system in memory; none where that is not allowed.
 struct SmallDisk(PathBuf);
 
@@ -540,7 +560,9 @@ fn a_full_disk_stops_the_run_and_goes_on_when_there_is_room() {
     for room in [4, 12, 16, 20, 24] {
         let place = Place::new();
         let Some(disk) = SmallDisk::mount(place.path("sessions")) else {
-            eprintln!("SKIPPED a_full_disk_stops_the_run_and_goes_on_when_there_is_room: no right to mount a tmpfs");
+            // Not by `eprintln!`, which the test harness swallows.
+            let skipped = "SKIPPED a_full_disk_stops_the_run_and_goes_on_when_there_is_room: no right to mount a tmpfs";
+            writeln!(io::stderr(), "{skipped}").unwrap();
             return;
         };
         let ballast = disk.0.join("ballast");

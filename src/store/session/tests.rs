@@ -363,7 +363,9 @@ fn a_folder_that_must_not_be_written_is_named() {
     let root = tempfile::tempdir().unwrap();
     // Whoever made the folder is who runs the test.
     if fs::metadata(root.path()).unwrap().uid() == 0 {
-        eprintln!("SKIPPED a_folder_that_must_not_be_written_is_named: root may write everywhere");
+        // Not by `eprintln!`, which the test harness swallows.
+        writeln!(io::stderr(), "SKIPPED a_folder_that_must_not_be_written_is_named: root may write everywhere")
+            .unwrap();
         return;
     }
     let mut folder = SessionFolder::create(root.path(), "s").unwrap();
