@@ -101,6 +101,7 @@ fn play<O: Write, E: Write>(
     let transcript = Transcript::new(&mut console.out, format, script.clock.is_some());
     let reopen = |folder: &str| {
         let engine = open(Path::new(folder), options(script, args)).map_err(|failure| failure.message)?;
+        received.follow(engine.sender());
         Ok(engine)
     };
     let mut runner = Runner::new(engine, transcript, &reopen);

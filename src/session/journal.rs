@@ -34,6 +34,9 @@ pub const SCHEMA: u32 = 1;
 /// Name of the file in a session's folder.
 pub const FILE_NAME: &str = "journal.ron";
 
+/// How every line begins.
+const BEGIN: &[u8] = b"(\"";
+
 /// Bytes of a check sum in hexadecimal.
 const SUM_DIGITS: usize = 16;
 
@@ -126,11 +129,11 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
                 journal.good_bytes += end + 1;
                 rest = after;
             }
-            // A crash leaves damage at the end only.
-            _ if after.is_empty() => break,
             Ok((line, _)) => {
                 return Err(damaged(number, format!("it has number {}", line.number)));
             }
+            // A crash leaves damage at the end only. A line whose check sum fits is not torn, whatever it says.
+            Err(LineError::Text(_)) if after.is_empty() => break,
             Err(error) => return Err(error.at(number)),
         }
         if let [Line { entry: Entry::Opened { schema, program, .. }, .. }] = journal.lines.as_slice()
@@ -141,7 +144,7 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
     }
     journal.torn_bytes = bytes.len() - journal.good_bytes;
     match journal.lines.first().map(|line| &line.entry) {
-        None if bytes.starts_with(b"(\"") || bytes.is_empty() => Err(JournalError::Empty),
+        None if bytes.starts_with(BEGIN) || BEGIN.starts_with(bytes) => Err(JournalError::Empty),
         Some(Entry::Opened { .. }) => Ok(journal),
         _ => Err(JournalError::NotAJournal),
     }

@@ -431,7 +431,9 @@ impl Session {
                     sample.state = SampleState::Counts;
                 }
             }
-            Decision::LeaveOut => sample.state = SampleState::LeftOut,
+            // One that does not count anyway stays what it is: it must not come back beside the one that counts instead.
+            Decision::LeaveOut if sample.state == SampleState::Counts => sample.state = SampleState::LeftOut,
+            Decision::LeaveOut => {}
             Decision::Undo => sample.state = SampleState::Undone,
         }
         Some(())
@@ -453,6 +455,8 @@ impl Session {
                 let (other_row, other_joints) = (self.samples[b].row, self.samples[b].joints.clone());
                 (self.samples[a].row, self.samples[a].joints) = (other_row, other_joints);
                 (self.samples[b].row, self.samples[b].joints) = (row, joints);
+                self.keep_latest(row);
+                self.keep_latest(other_row);
                 self.settle(|number| number == *first || number == *second);
             }
             Correction::Row { sample, row } => {
@@ -462,15 +466,16 @@ impl Session {
                     super::journal::to_edge(&planned.configuration, &robot.joint_types)
                 };
                 let moved = *sample;
-                self.sample(moved)?;
+                let counts = self.sample(moved)?.state == SampleState::Counts;
                 for other in self.samples.iter_mut().filter(|other| other.row == *row && other.noted.number != moved) {
-                    if other.state == SampleState::Counts {
+                    if counts && matches!(other.state, SampleState::Counts | SampleState::LeftOut) {
                         other.state = SampleState::Superseded;
                     }
                 }
                 let sample = self.sample_mut(moved)?;
                 (sample.row, sample.joints) = (*row, joints);
                 self.settle(|number| number == moved);
+                self.keep_latest(*row);
             }
             Correction::Joints { sample, joints } => {
                 let dof = self.robot.as_ref()?.joint_types.len();
@@ -484,6 +489,16 @@ impl Session {
             }
         }
         Some(())
+    }
+
+    /// At most one sample of a row counts or is left out: the latest one.
+    fn keep_latest(&mut self, row: usize) {
+        let stands = |sample: &&mut Sample| {
+            sample.row == row && matches!(sample.state, SampleState::Counts | SampleState::LeftOut)
+        };
+        for sample in self.samples.iter_mut().filter(stands).rev().skip(1) {
+            sample.state = SampleState::Superseded;
+        }
     }
 
     /// What was found about these measurements is settled.
@@ -504,3 +519,6 @@ fn robot(line: u64, source: &str, sha256: &str, text: &str) -> Result<Robot, Fol
     let joint_types = profile.chain().joints().iter().map(|joint| joint.joint_type).collect();
     Ok(Robot { source: source.to_owned(), sha256: sha256.to_owned(), text: text.to_owned(), profile, joint_types })
 }
+
+#[cfg(test)]
+mod tests;

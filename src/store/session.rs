@@ -168,15 +168,26 @@ impl SessionFolder {
                 Err(source) => return Err(StoreError::Write { path: folder, source }.into()),
             }
         };
-        let lock = lock(&folder)?;
+        Self::begin(root, &folder).inspect_err(|_error| {
+            // Nothing was measured there: a second try on a full disk must not find the name taken by what the first has left.
+            for file in [FILE_NAME, LOCK_NAME] {
+                drop(fs::remove_file(folder.join(file)));
+            }
+            drop(fs::remove_dir(&folder));
+        })
+    }
+
+    /// Takes hold of a folder that was just made, with an empty journal.
+    fn begin(root: &Path, folder: &Path) -> Result<Self, SessionError> {
+        let lock = lock(folder)?;
         let path = folder.join(FILE_NAME);
         let failed = |source| StoreError::Write { path: path.clone(), source };
         let file = OpenOptions::new().read(true).write(true).create_new(true).open(&path).map_err(failed)?;
         // The new names themselves must survive a power cut.
-        for place in [&folder, root] {
+        for place in [folder, root] {
             File::open(place).and_then(|place| place.sync_all()).map_err(failed)?;
         }
-        Ok(Self { folder, writer: JournalWriter::after(file, &Journal::default()), _lock: lock })
+        Ok(Self { folder: folder.to_owned(), writer: JournalWriter::after(file, &Journal::default()), _lock: lock })
     }
 
     /// Opens an existing folder to go on with its session.

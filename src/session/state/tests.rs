@@ -1,0 +1,196 @@
+//! The fold: what must hold after any entries, and entries that do not fit.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::profile::builtin;
+use crate::session::journal::SCHEMA;
+
+const ROWS: usize = 4;
+
+fn line(number: u64, second: i64, entry: Entry) -> Line {
+    Line { number, time: Timestamp::from_second(1_772_356_502 + second).unwrap(), entry }
+}
+
+fn planned(pose: usize) -> PlannedText {
+    PlannedText { pose: pose.to_string(), kind: PoseKind::Identification, joints: vec![pose as f64; 6], xyz_mm: None }
+}
+
+fn plan() -> PlanText {
+    let rows = (0..ROWS).map(planned).collect();
+    PlanText { origin: "test".to_owned(), condition_number: None, predicted_error_sigma: None, minutes: None, rows }
+}
+
+/// A session that can be measured.
+fn begun() -> Session {
+    let text = builtin("soochow").unwrap().to_owned();
+    let sha256 = crate::session::sha256(text.as_bytes());
+    let opened = Entry::Opened { schema: SCHEMA, program: "trupose".to_owned(), name: "s".to_owned() };
+    let profile = Entry::Profile { source: "soochow".to_owned(), sha256, text };
+    let mut session = Session::default();
+    for (number, entry) in (1..).zip([opened, profile, Entry::Plan(plan())]) {
+        session.apply(&line(number, 0, entry)).unwrap();
+    }
+    session
+}
+
+fn sample(number: u64, row: usize) -> Entry {
+    Entry::Sample(MeasuredText {
+        number,
+        row,
+        pose: row.to_string(),
+        kind: PoseKind::Identification,
+        target: 0,
+        joints: vec![row as f64; 6],
+        reported_joints: None,
+        xyz_mm: (number as f64, 0.0, 0.0),
+        sigma_mm: None,
+        scatter_mm: None,
+        shots: 1,
+        temperature_degc: None,
+        seconds: 10.0,
+        findings: Vec::new(),
+    })
+}
+
+/// One of everything that changes which samples count.
+#[derive(Clone, Debug)]
+enum Deed {
+    Measure(usize),
+    Decide(u64, Decision),
+    Swap(u64, u64),
+    Move(u64, usize),
+    Skip(usize, bool),
+    Replan,
+}
+
+fn deed() -> impl Strategy<Value = Deed> {
+    let number = || 1..9_u64;
+    prop_oneof![
+        4 => (0..ROWS).prop_map(Deed::Measure),
+        3 => (number(), prop_oneof![Just(Decision::Keep), Just(Decision::LeaveOut), Just(Decision::Undo)])
+            .prop_map(|(number, decision)| Deed::Decide(number, decision)),
+        2 => (number(), number()).prop_map(|(first, second)| Deed::Swap(first, second)),
+        2 => (number(), 0..ROWS).prop_map(|(number, row)| Deed::Move(number, row)),
+        1 => (0..ROWS, any::<bool>()).prop_map(|(row, skipped)| Deed::Skip(row, skipped)),
+        1 => Just(Deed::Replan),
+    ]
+}
+
+fn entry(deed: &Deed, session: &Session) -> Entry {
+    match *deed {
+        Deed::Measure(row) => sample(session.measurements + 1, row),
+        Deed::Decide(sample, decision) => Entry::Decision { sample, decision },
+        Deed::Swap(first, second) => Entry::Correction(Correction::Swap { first, second }),
+        Deed::Move(sample, row) => Entry::Correction(Correction::Row { sample, row }),
+        Deed::Skip(row, skipped) => Entry::Skipped { row, skipped },
+        Deed::Replan => Entry::Plan(plan()),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_row_has_one_sample_that_counts_and_nothing_measured_is_lost(deeds in proptest::collection::vec(deed(), 0..25)) {
+        let mut session = begun();
+        let mut measured = 0;
+        for deed in deeds {
+            let before = session.clone();
+            let entry = entry(&deed, &session);
+            match session.apply(&line(session.lines + 1, 0, entry)) {
+                Ok(()) => measured += usize::from(matches!(deed, Deed::Measure(_))),
+                Err(_) => prop_assert_eq!(&session, &before, "an entry that does not fit changes nothing"),
+            }
+            prop_assert_eq!(session.samples.len(), measured);
+            for row in 0..session.rows.len() {
+                let stands = session.samples.iter().filter(|sample| {
+                    sample.row == row && matches!(sample.state, SampleState::Counts | SampleState::LeftOut)
+                });
+                prop_assert!(stands.count() <= 1, "row {} after {:?}: {:?}", row, deed, session.samples);
+                let is_open = session.is_open(row);
+                prop_assert!(!is_open || session.sample_of_row(row).is_none());
+            }
+            let mut numbers: Vec<u64> = session.samples.iter().map(|sample| sample.noted.number).collect();
+            numbers.dedup();
+            prop_assert_eq!(numbers.len(), measured);
+        }
+    }
+}
+
+#[test]
+fn a_sample_that_was_measured_again_does_not_come_back() {
+    let mut session = begun();
+    let mut apply = |entry| {
+        let number = session.lines + 1;
+        session.apply(&line(number, 0, entry)).unwrap();
+        session.counted().map(|sample| sample.noted.number).collect::<Vec<_>>()
+    };
+    let decide = |sample, decision| Entry::Decision { sample, decision };
+    assert_eq!(apply(sample(1, 0)), [1]);
+    assert_eq!(apply(sample(2, 0)), [2]);
+    assert_eq!(apply(decide(1, Decision::LeaveOut)), [2]);
+    assert_eq!(apply(decide(1, Decision::Keep)), [2]);
+    assert_eq!(apply(decide(2, Decision::LeaveOut)), [0; 0]);
+    assert_eq!(apply(decide(2, Decision::Keep)), [2]);
+    assert_eq!(apply(decide(2, Decision::Undo)), [0; 0]);
+    assert_eq!(apply(sample(3, 1)), [3]);
+    // Superseded, it changes places with one that counts in a row that has one already.
+    assert_eq!(apply(sample(4, 0)), [3, 4]);
+    assert_eq!(apply(Entry::Correction(Correction::Swap { first: 1, second: 3 })), [4]);
+}
+
+#[test]
+fn a_clock_that_jumps_back_changes_nothing_but_times() {
+    let mut session = begun();
+    for (number, second) in [(1, 100), (2, -1_000_000), (3, 50)] {
+        session.apply(&line(session.lines + 1, second, sample(number, 0))).unwrap();
+    }
+    assert_eq!(session.counted().map(|sample| sample.noted.number).collect::<Vec<_>>(), [3]);
+    assert_eq!(session.latest, Some(line(1, 100, sample(1, 0)).time));
+}
+
+#[test]
+fn entries_that_do_not_fit_are_refused() {
+    let session = begun();
+    let text = builtin("ur5").unwrap().to_owned();
+    let short = PlannedText { joints: vec![0.0; 5], ..planned(0) };
+    let endless = PlannedText { joints: vec![f64::NAN; 6], ..planned(0) };
+    let bad_plan = |row| Entry::Plan(PlanText { rows: vec![planned(1), row], ..plan() });
+    let misfits = [
+        Entry::Opened { schema: SCHEMA, program: String::new(), name: String::new() },
+        Entry::Profile { source: "ur5".to_owned(), sha256: "wrong".to_owned(), text: text.clone() },
+        Entry::Profile {
+            source: "x".to_owned(),
+            sha256: crate::session::sha256(b"not RON"),
+            text: "not RON".to_owned(),
+        },
+        bad_plan(short),
+        bad_plan(endless),
+        sample(1, ROWS),
+        sample(0, 0),
+        Entry::Decision { sample: 1, decision: Decision::Keep },
+        Entry::Correction(Correction::Row { sample: 1, row: 0 }),
+        Entry::Correction(Correction::Joints { sample: 1, joints: vec![0.0; 6] }),
+        Entry::Correction(Correction::Swap { first: 1, second: 1 }),
+        Entry::Correction(Correction::Scale { since: 1, factor: 0.0 }),
+        Entry::Correction(Correction::Scale { since: 1, factor: f64::NAN }),
+        Entry::Skipped { row: ROWS, skipped: true },
+    ];
+    for entry in misfits {
+        let mut tried = session.clone();
+        let error = tried.apply(&line(4, 0, entry.clone())).unwrap_err().to_string();
+        assert!(error.starts_with("line 4: "), "{entry:?}: {error}");
+        assert_eq!(tried, session);
+    }
+    let mut measured = session;
+    measured.apply(&line(4, 0, sample(1, 0))).unwrap();
+    let sha256 = crate::session::sha256(text.as_bytes());
+    let other = Entry::Profile { source: "ur5".to_owned(), sha256, text };
+    assert_eq!(
+        measured.apply(&line(5, 0, other)).unwrap_err().to_string(),
+        "line 5: another profile after measuring has begun; the journal was not written by this program"
+    );
+    // A number is used once.
+    assert!(measured.apply(&line(5, 0, sample(1, 1))).is_err());
+}
