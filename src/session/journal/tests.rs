@@ -117,6 +117,7 @@ fn identified() -> IdentifiedText {
     let (verification, identification) = named.split_at(12);
     let found = identify(
         &IdentifyRequest {
+            mounted: None,
             profile,
             profile_text: profile_text.to_owned(),
             created: "2026-01-02T03:04:05Z".to_owned(),
