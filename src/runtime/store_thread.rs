@@ -1,7 +1,7 @@
 //! The thread that writes: the only one that touches the session's folder.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
@@ -60,7 +60,7 @@ impl Drop for StoreThread {
     }
 }
 
-fn work(root: &PathBuf, mut held: Option<SessionFolder>, commands: &Receiver<Command>, events: &Events) {
+fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Command>, events: &Events) {
     while let Ok(command) = commands.recv() {
         let event = match command {
             Command::Create { id, name } => Event::Store(match SessionFolder::create(root, &name) {

@@ -153,7 +153,7 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
 impl Sum {
     fn next(&self, rest: &str) -> Self {
         let digest = Sha256::new().chain_update(&self.0).chain_update(rest).finalize();
-        Self(digest.iter().take(SUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect())
+        Self(digest.iter().take(SUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat())
     }
 }
 
