@@ -317,6 +317,22 @@ fn a_session_is_held_by_one_at_a_time() {
 }
 
 #[test]
+fn what_a_killed_program_left_half_written_is_removed() {
+    let root = tempfile::tempdir().unwrap();
+    let mut folder = SessionFolder::create(root.path(), "s").unwrap();
+    let path = folder.path().to_owned();
+    folder.append(&[line(1)]).unwrap();
+    folder.replace("report.json", "{}").unwrap();
+    fs::write(path.join(".trupose-a1B2c3"), "{").unwrap();
+    // Not by somebody who does not hold the folder.
+    assert!(SessionFolder::open(&path).is_err());
+    assert_eq!(names(&path), [".lock", ".trupose-a1B2c3", "journal.ron", "report.json"]);
+    drop(folder);
+    drop(SessionFolder::open(&path).unwrap());
+    assert_eq!(names(&path), [".lock", "journal.ron", "report.json"]);
+}
+
+#[test]
 fn what_is_no_session_is_named() {
     let root = tempfile::tempdir().unwrap();
     for folder in [root.path().to_owned(), root.path().join("missing")] {
