@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+/// How the names of files begin that will replace others.
+const TEMPORARY: &str = ".trupose-";
+
 /// A file that could not be read or written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -53,7 +56,7 @@ pub fn create_folder(path: &Path) -> Result<(), StoreError> {
 pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
     let written = || -> io::Result<()> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-        let mut file = tempfile::Builder::new().prefix(".trupose-").tempfile_in(folder)?;
+        let mut file = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder)?;
         file.write_all(text.as_bytes())?;
         file.as_file().sync_all()?;
         set_readable(file.as_file())?;

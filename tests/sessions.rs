@@ -4,9 +4,7 @@
 
 #![expect(
     clippy::unwrap_used,
-    clippy::panic,
     clippy::disallowed_methods,
-    clippy::indexing_slicing,
     reason = "a failure of a test is a panic; what is skipped is said; test files need no atomic writes"
 )]
 #![cfg(unix)]
@@ -258,17 +256,14 @@ fn kill_at_random(seed: u64, kills: usize, expected: &str) -> (usize, BTreeSet<u
             let journal = read_journal(&place.session()).ok();
             let step = journal.as_ref().map_or(Step::Profile, |journal| Session::of(journal).unwrap().step);
             let before = journal.as_ref().map_or(0, |journal| journal.lines.len());
-            let command = match &journal {
-                None => {
-                    // Killed before anything was saved: there is nothing to go on with, the name must not be in the way.
-                    drop(fs::remove_dir_all(place.session()));
-                    let script = place.write_script("run.script.ron", &whole());
-                    place.command(&["--script", &script, "--json"])
-                }
-                Some(_) => {
-                    let script = place.write_script("rest.script.ron", &from_step(step));
-                    place.command(&["resume", "sessions/s", "--script", &script, "--json"])
-                }
+            let command = if journal.is_some() {
+                let script = place.write_script("rest.script.ron", &from_step(step));
+                place.command(&["resume", "sessions/s", "--script", &script, "--json"])
+            } else {
+                // Killed before anything was saved: there is nothing to go on with.
+                drop(fs::remove_dir_all(place.session()));
+                let script = place.write_script("run.script.ron", &whole());
+                place.command(&["--script", &script, "--json"])
             };
             let mut running = Paused::start(command);
             let lines = random.random_range(0..60_usize.saturating_sub(before).max(6));

@@ -384,13 +384,16 @@ impl Session {
 
     fn planned_rows(&self, rows: &[PlannedText]) -> Option<Vec<Row>> {
         let robot = self.robot.as_ref()?;
-        let fits = |row: &PlannedText| {
-            row.joints.len() == robot.joint_types.len() && row.joints.iter().all(|value| value.is_finite())
-        };
-        rows.iter().all(fits).then(|| {
+        rows.iter().all(|row| self.fits(&row.joints)).then(|| {
             let planned = rows.iter().map(|row| row.planned(&robot.joint_types));
             planned.map(|planned| Row { planned, active: true, skipped: false }).collect()
         })
+    }
+
+    /// Whether these are joint values of the robot.
+    fn fits(&self, joints: &[f64]) -> bool {
+        let dof = self.robot.as_ref().map(|robot| robot.joint_types.len());
+        dof == Some(joints.len()) && joints.iter().all(|value| value.is_finite())
     }
 
     fn add_sample(&mut self, noted: &MeasuredText, line: &Line) -> Result<(), &'static str> {
@@ -399,6 +402,9 @@ impl Session {
         }
         if noted.number <= self.measurements {
             return Err("a measurement with a number that was already used");
+        }
+        if !(self.fits(&noted.joints) && noted.reported_joints.as_deref().is_none_or(|joints| self.fits(joints))) {
+            return Err("a sample whose joint values do not fit the robot");
         }
         self.measurements = noted.number;
         for sample in self.samples.iter_mut().filter(|sample| sample.row == noted.row) {
@@ -478,11 +484,10 @@ impl Session {
                 self.keep_latest(*row);
             }
             Correction::Joints { sample, joints } => {
-                let dof = self.robot.as_ref()?.joint_types.len();
-                let sample = self.sample_mut(*sample)?;
-                if joints.len() != dof {
+                if !self.fits(joints) {
                     return None;
                 }
+                let sample = self.sample_mut(*sample)?;
                 sample.joints.clone_from(joints);
                 let mended = sample.noted.number;
                 self.settle(|number| number == mended);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::{StoreError, create_folder, read, replace};
+use super::{StoreError, TEMPORARY, create_folder, read, replace};
 use crate::session::journal::{self, FILE_NAME, Journal, JournalError, Line, Sum};
 
 /// Name of the file whose lock says that a program works in the folder.
@@ -206,6 +206,7 @@ impl SessionFolder {
             .write(true)
             .open(&path)
             .map_err(|source| StoreError::Write { path: path.clone(), source })?;
+        remove_leftovers(folder);
         let writer = JournalWriter::after(file, &journal);
         Ok((Self { folder: folder.to_owned(), writer, _lock: lock }, journal))
     }
@@ -261,6 +262,16 @@ pub fn folders(root: &Path) -> Result<Vec<PathBuf>, StoreError> {
     }
     found.sort();
     Ok(found)
+}
+
+/// Removes what a program that died while it replaced a file has left. Only for who holds the folder; it may stay if it must.
+fn remove_leftovers(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+            drop(fs::remove_file(entry.path()));
+        }
+    }
 }
 
 /// Takes the lock of a folder; the system gives it back when the process ends, however it ends.

@@ -60,7 +60,7 @@ fn sample(number: u64) -> MeasuredText {
         target: 1,
         joints: vec![0.1 + 0.2, -1e-9, 180.0],
         reported_joints: Some(vec![f64::MIN_POSITIVE, f64::MAX, -0.0]),
-        xyz_mm: (1.0 / 3.0, -2345.678_901, 1e-300),
+        xyz_mm: (1.0 / 3.0, -2_345.678_901, 1e-300),
         sigma_mm: Some(0.012),
         scatter_mm: Some(0.0),
         shots: u32::MAX,

@@ -98,9 +98,10 @@ proptest! {
         for deed in deeds {
             let before = session.clone();
             let entry = entry(&deed, &session);
-            match session.apply(&line(session.lines + 1, 0, entry)) {
-                Ok(()) => measured += usize::from(matches!(deed, Deed::Measure(_))),
-                Err(_) => prop_assert_eq!(&session, &before, "an entry that does not fit changes nothing"),
+            if session.apply(&line(session.lines + 1, 0, entry)).is_ok() {
+                measured += usize::from(matches!(deed, Deed::Measure(_)));
+            } else {
+                prop_assert_eq!(&session, &before, "an entry that does not fit changes nothing");
             }
             prop_assert_eq!(session.samples.len(), measured);
             for row in 0..session.rows.len() {
@@ -185,6 +186,17 @@ fn entries_that_do_not_fit_are_refused() {
     }
     let mut measured = session;
     measured.apply(&line(4, 0, sample(1, 0))).unwrap();
+    for joints in [vec![0.0; 7], vec![f64::INFINITY; 6]] {
+        let Entry::Sample(noted) = sample(2, 0) else { panic!("it is a sample") };
+        let wrong = [
+            Entry::Sample(MeasuredText { joints: joints.clone(), ..noted.clone() }),
+            Entry::Sample(MeasuredText { reported_joints: Some(joints.clone()), ..noted }),
+            Entry::Correction(Correction::Joints { sample: 1, joints }),
+        ];
+        for entry in wrong {
+            assert!(measured.clone().apply(&line(5, 0, entry.clone())).is_err(), "{entry:?}");
+        }
+    }
     let sha256 = crate::session::sha256(text.as_bytes());
     let other = Entry::Profile { source: "ur5".to_owned(), sha256, text };
     assert_eq!(

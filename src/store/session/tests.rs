@@ -1,5 +1,7 @@
 //! The journal on a medium that fails at any moment, and folders that are held, broken or missing.
 
+#![expect(clippy::disallowed_methods, reason = "test files need no atomic writes")]
+
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -158,6 +160,25 @@ fn a_full_disk_that_cannot_be_cut_either_goes_on_when_it_is_mended() {
     }
 }
 
+/// Appends all batches; while the batch `failing` is written, nothing can be forced to disk.
+fn write_without_sync(medium: &Faulty, failing: usize, cut_fails: bool) {
+    let mut writer = JournalWriter::after(medium.clone(), &Journal::default());
+    let holds = if cut_fails { holds_at_least } else { holds_exactly };
+    let mut acknowledged = 0;
+    for (index, batch) in BATCHES.into_iter().enumerate() {
+        let lines: Vec<Line> = (acknowledged + 1..=acknowledged + batch).map(line).collect();
+        let fails = index == failing;
+        medium.set(|state| (state.sync_fails, state.cut_fails) = (fails, fails && cut_fails));
+        for _ in 0..if fails { 3 } else { 0 } {
+            assert_eq!(writer.append(&lines).unwrap_err().to_string(), "medium error");
+            holds(&medium.bytes(), acknowledged);
+        }
+        medium.set(|state| (state.sync_fails, state.cut_fails) = (false, false));
+        writer.append(&lines).unwrap();
+        acknowledged += batch;
+    }
+}
+
 #[test]
 fn what_is_not_forced_to_disk_does_not_count() {
     let intact = intact();
@@ -165,23 +186,7 @@ fn what_is_not_forced_to_disk_does_not_count() {
         for failing in 0..BATCHES.len() {
             let medium = Faulty::default();
             medium.set(|state| state.room = usize::MAX / 2);
-            let mut writer = JournalWriter::after(medium.clone(), &Journal::default());
-            let mut acknowledged = 0;
-            for (index, batch) in BATCHES.into_iter().enumerate() {
-                let lines: Vec<Line> = (acknowledged + 1..=acknowledged + batch).map(line).collect();
-                if index == failing {
-                    medium.set(|state| (state.sync_fails, state.cut_fails) = (true, cut_fails));
-                    for _ in 0..3 {
-                        let error = writer.append(&lines).unwrap_err();
-                        assert_eq!(error.to_string(), "medium error");
-                        let holds = if cut_fails { holds_at_least } else { holds_exactly };
-                        holds(&medium.bytes(), acknowledged);
-                    }
-                    medium.set(|state| (state.sync_fails, state.cut_fails) = (false, false));
-                }
-                writer.append(&lines).unwrap();
-                acknowledged += batch;
-            }
+            write_without_sync(&medium, failing, cut_fails);
             assert_eq!(medium.bytes(), intact);
         }
     }
@@ -309,6 +314,22 @@ fn a_session_is_held_by_one_at_a_time() {
     assert_eq!(error.to_string(), format!("session '{}' is open in another program", path.display()));
     drop(held);
     SessionFolder::open(&path).unwrap();
+}
+
+#[test]
+fn what_a_killed_program_left_half_written_is_removed() {
+    let root = tempfile::tempdir().unwrap();
+    let mut folder = SessionFolder::create(root.path(), "s").unwrap();
+    let path = folder.path().to_owned();
+    folder.append(&[line(1)]).unwrap();
+    folder.replace("report.json", "{}").unwrap();
+    fs::write(path.join(".trupose-a1B2c3"), "{").unwrap();
+    // Not by somebody who does not hold the folder.
+    assert!(SessionFolder::open(&path).is_err());
+    assert_eq!(names(&path), [".lock", ".trupose-a1B2c3", "journal.ron", "report.json"]);
+    drop(folder);
+    drop(SessionFolder::open(&path).unwrap());
+    assert_eq!(names(&path), [".lock", "journal.ron", "report.json"]);
 }
 
 #[test]
