@@ -440,7 +440,9 @@ impl Wizard {
         if self.ended.is_some() {
             return Vec::new();
         }
-        if self.folder.is_none() || self.is_stuck() || self.session.opened.is_none() {
+        // What is on its way to the disk is waited for: an opened session is closed in good order.
+        let has_session = self.session.opened.is_some() || self.writing.is_some();
+        if !has_session || self.is_stuck() {
             return self.end(cause);
         }
         let mut effects = self.cancel();

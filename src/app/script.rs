@@ -11,7 +11,8 @@ use crate::cli::{DemoArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::report;
 use crate::runtime::{Clock, Engine, Options, signals};
-use crate::script::{Format, Outcome, Runner, Script, ScriptStep, Transcript};
+use crate::script::{Format, Outcome, Runner, Script, Transcript};
+use crate::session::journal::JournalError;
 use crate::session::state::Session;
 use crate::store;
 use crate::store::session::{SessionError, SessionFolder};
@@ -79,6 +80,11 @@ pub(super) fn session_failure(error: &SessionError) -> Failure {
     match error {
         SessionError::Locked { .. } => failure.hint("end the other program first, or go on there"),
         SessionError::NotASession { .. } => failure.hint("'trupose session list' shows the sessions of a folder"),
+        SessionError::Journal { source: JournalError::Newer { .. }, .. } => failure.hint("use the program that wrote it"),
+        SessionError::Journal { source: JournalError::Empty, .. } => {
+            failure.hint("the program ended before the first entry was on disk: the folder can be removed")
+        }
+        SessionError::Journal { source: JournalError::NotAJournal, .. } => failure.hint("is this the right folder?"),
         SessionError::Journal { .. } => {
             failure.hint("nothing was changed; copy the folder, then cut the journal before the damaged line to save what is before it")
         }
@@ -105,15 +111,28 @@ fn play<O: Write, E: Write>(
         Ok(engine)
     };
     let mut runner = Runner::new(engine, transcript, &reopen);
-    let output = |error: std::io::Error| match error.kind() {
-        // A reader that went away has seen enough; the session is safe all the same.
-        std::io::ErrorKind::BrokenPipe => Failure::new(ExitStatus::Store, "the reader of the transcript went away"),
-        _ => Failure::new(ExitStatus::Store, format!("cannot write the transcript: {error}")),
+    let signalled = |saved: bool| {
+        let saved = if saved { "the session is saved" } else { "no session was begun" };
+        received
+            .signal()
+            .map(|signal| Failure::new(ExitStatus::Signal(signal), format!("ended by signal {signal}; {saved}")))
     };
-    let outcome = runner.run(script).map_err(output)?;
+    let outcome = runner.run(script);
+    let has_session = runner.session().opened.is_some();
+    // A terminal that went away sends SIGHUP: that is the cause, not the writing that failed.
+    let output = |error: std::io::Error| {
+        signalled(has_session).unwrap_or_else(|| match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Failure::new(
+                ExitStatus::Store,
+                "the reader of the transcript went away: the script was ended; the session is saved",
+            ),
+            _ => Failure::new(ExitStatus::Store, format!("cannot write the transcript: {error}")),
+        })
+    };
+    let outcome = outcome.map_err(output)?;
     if let Some(file) = &args.record_script {
-        let steps = runner.done().iter().cloned().map(ScriptStep::Do).collect();
-        let recorded = Script { title: format!("recorded: {}", script.title), clock: script.clock.clone(), steps };
+        let title = format!("recorded: {}", script.title);
+        let recorded = Script { title, clock: script.clock.clone(), steps: runner.done().to_vec() };
         let text = recorded.to_text().map_err(|error| internal(&error))?;
         store::replace(file, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
     }
@@ -128,12 +147,10 @@ fn play<O: Write, E: Write>(
     }
     match outcome {
         Outcome::Done => Ok(ExitStatus::Accepted),
-        Outcome::Failed { step, message } => {
-            Err(Failure::new(ExitStatus::NotAccepted, format!("script step {step}: {message}")))
+        Outcome::Failed { step, message, not_saved } => {
+            let status = if not_saved { ExitStatus::Store } else { ExitStatus::NotAccepted };
+            Err(Failure::new(status, format!("script step {step}: {message}")))
         }
-        Outcome::Ended { cause } => match received.signal() {
-            Some(signal) => Err(Failure::new(ExitStatus::Signal(signal), format!("{cause}; the session is saved"))),
-            None => Ok(ExitStatus::Accepted),
-        },
+        Outcome::Ended { .. } => signalled(has_session).map_or(Ok(ExitStatus::Accepted), Err),
     }
 }

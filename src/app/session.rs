@@ -35,7 +35,8 @@ pub(super) fn load(folder: &Path) -> Result<(Journal, Session), Failure> {
 }
 
 fn list<O: Write, E: Write>(root: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let found = folders(root).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    let found = if root.exists() { folders(root) } else { Ok(Vec::new()) };
+    let found = found.map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     if found.is_empty() {
         console.remark(&format!("no session in '{}'", root.display()));
         return Ok(ExitStatus::Accepted);
@@ -79,7 +80,7 @@ fn show<O: Write, E: Write>(
         return Ok(ExitStatus::Accepted);
     }
     let mut lines = Vec::new();
-    let mut line = |name: &str, value: String| lines.push(format!("{name:<14} {value}"));
+    let mut line = |name: &str, value: String| lines.push(format!("{name:<14} {}", printable(&value)));
     line("session", session.name.clone());
     line("opened", session.opened.map_or_else(|| "-".to_owned(), |time| format!("{time} by {}", session.program)));
     line(

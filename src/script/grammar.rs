@@ -27,6 +27,8 @@ pub struct Script {
 pub enum ScriptStep {
     /// Do this, and wait until nothing is under way. It must be possible.
     Do(Intent),
+    /// Do this, which must fail with a message that contains the text.
+    Fails(Intent, String),
     /// This must not be possible now; the reason contains the text.
     Blocked(Intent, String),
     /// Something on the screen, by its path in the view, must be so.

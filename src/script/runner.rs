@@ -9,7 +9,7 @@ use super::transcript::Transcript;
 use crate::runtime::{Engine, Happening};
 use crate::session::state::Session;
 use crate::session::summary::IdentificationSummary;
-use crate::wizard::{Intent, IntentInfo, ViewModel};
+use crate::wizard::{Intent, IntentInfo, Severity, ViewModel};
 
 /// Longest real time in which nothing at all happens while something is under way; a search reports far more often.
 const PATIENCE: Duration = Duration::from_mins(5);
@@ -29,6 +29,8 @@ pub enum Outcome {
         step: usize,
         /// What was expected and what was seen.
         message: String,
+        /// The session could not be written: what was measured up to then is safe.
+        not_saved: bool,
     },
     /// The program was told to end, by a signal or by `Quit`.
     Ended {
@@ -40,6 +42,7 @@ pub enum Outcome {
 /// Why a step ends the script.
 enum Stop {
     Failed(String),
+    NotSaved(String),
     Ended(String),
     Output(io::Error),
 }
@@ -55,7 +58,7 @@ pub struct Runner<'a, W: Write> {
     engine: Engine,
     transcript: Transcript<'a, W>,
     reopen: &'a dyn Fn(&str) -> Result<Engine, String>,
-    done: Vec<Intent>,
+    done: Vec<ScriptStep>,
 }
 
 impl<W: Write> std::fmt::Debug for Runner<'_, W> {
@@ -84,8 +87,8 @@ impl<'a, W: Write> Runner<'a, W> {
         self.engine.wizard().folder()
     }
 
-    /// What was done, in order.
-    pub fn done(&self) -> &[Intent] {
+    /// What was done, in order, as steps of a script.
+    pub fn done(&self) -> &[ScriptStep] {
         &self.done
     }
 
@@ -94,33 +97,38 @@ impl<'a, W: Write> Runner<'a, W> {
         self.session().identified.as_ref().map(|result| &result.summary)
     }
 
-    /// Runs the steps, then closes the session in good order.
+    /// Runs the steps, then closes the session in good order, whatever has happened.
     ///
     /// # Errors
     /// The transcript cannot be written.
     pub fn run(&mut self, script: &Script) -> io::Result<Outcome> {
+        let outcome = self.steps(script);
+        self.end();
+        self.report()?;
+        outcome
+    }
+
+    fn steps(&mut self, script: &Script) -> io::Result<Outcome> {
         self.transcript.event("script", &script.title)?;
-        let mut outcome = Outcome::Done;
-        for (index, step) in std::iter::once(None).chain(script.steps.iter().map(Some)).enumerate() {
+        // What resuming has set in motion comes first; a signal after the last step is still heard.
+        let steps = std::iter::once(None).chain(script.steps.iter().map(Some)).chain(std::iter::once(None));
+        for (index, step) in steps.enumerate() {
             let result = match step {
-                // What resuming has set in motion comes first.
                 None => self.settle(),
                 Some(step) => self.step(step),
             };
-            outcome = match result {
+            let (message, not_saved) = match result {
                 Ok(()) => continue,
                 Err(Stop::Output(error)) => return Err(error),
-                Err(Stop::Ended(cause)) => Outcome::Ended { cause },
-                Err(Stop::Failed(message)) => {
-                    let text = step.map_or_else(String::new, |step| format!(" ({})", short(&format!("{step:?}"))));
-                    self.transcript.event("failed", &format!("step {index}{text}: {message}"))?;
-                    Outcome::Failed { step: index, message }
-                }
+                Err(Stop::Ended(cause)) => return Ok(Outcome::Ended { cause }),
+                Err(Stop::Failed(message)) => (message, false),
+                Err(Stop::NotSaved(message)) => (message, true),
             };
-            break;
+            let text = step.map_or_else(String::new, |step| format!(" ({})", short(&format!("{step:?}"))));
+            self.transcript.event("failed", &format!("step {index}{text}: {message}"))?;
+            return Ok(Outcome::Failed { step: index, message, not_saved });
         }
-        self.close()?;
-        Ok(outcome)
+        Ok(Outcome::Done)
     }
 
     /// A table for people, after the last line.
@@ -139,18 +147,21 @@ impl<'a, W: Write> Runner<'a, W> {
         self.transcript.event(event, text)
     }
 
-    /// Ends the wizard and waits until its last entry is on disk.
-    fn close(&mut self) -> io::Result<()> {
+    /// Ends the wizard and waits until its last entry is on disk. What is under way is cancelled.
+    fn end(&mut self) {
         if self.engine.wizard().ended().is_none() {
             self.engine.intend(Intent::Quit);
         }
         while !self.engine.has_exited() && self.engine.wait(PATIENCE) {}
-        self.report()
     }
 
     fn step(&mut self, step: &ScriptStep) -> Result<(), Stop> {
         match step {
-            ScriptStep::Do(intent) => self.perform(intent),
+            ScriptStep::Do(intent) => match self.perform(intent)? {
+                None => Ok(()),
+                Some(failure) => Err(Stop::Failed(failure)),
+            },
+            ScriptStep::Fails(intent, text) => self.check_failure(intent, text),
             ScriptStep::Blocked(intent, reason) => self.check_blocked(intent, reason),
             ScriptStep::Expect(path, check) => self.expect(path, check),
             ScriptStep::CaptureAll(on_finding) => self.capture(usize::MAX, *on_finding),
@@ -166,15 +177,12 @@ impl<'a, W: Write> Runner<'a, W> {
         self.engine.wizard().intents().into_iter().find(|info| info.intent.name() == intent.name())
     }
 
-    /// Does an intent, which must be possible, and waits until nothing is under way.
-    fn perform(&mut self, intent: &Intent) -> Result<(), Stop> {
+    /// Does an intent, which must be possible, and waits until nothing is under way. Returns why it could not be done.
+    fn perform(&mut self, intent: &Intent) -> Result<Option<String>, Stop> {
         match self.offer(intent) {
             None => {
-                return Err(Stop::Failed(format!(
-                    "{} is not offered here; offered: {}",
-                    intent.name(),
-                    self.offered()
-                )));
+                let (name, offered) = (intent.name(), self.offered());
+                return Err(Stop::Failed(format!("{name} is not offered here; offered: {offered}")));
             }
             Some(IntentInfo { blocked: Some(reason), .. }) => {
                 return Err(Stop::Failed(format!("{} is not possible now: {reason}", intent.name())));
@@ -183,14 +191,31 @@ impl<'a, W: Write> Runner<'a, W> {
         }
         let text = ron::to_string(intent).unwrap_or_else(|_error| intent.name().to_owned());
         self.transcript.event("do", &short(&text))?;
-        self.act(intent)
+        Ok(self.act(intent)?.map(|message| format!("{} failed: {message}", intent.name())))
+    }
+
+    fn check_failure(&mut self, intent: &Intent, text: &str) -> Result<(), Stop> {
+        match self.perform(intent)? {
+            Some(failure) if failure.contains(text) => {
+                Ok(self.transcript.event("expect", &format!("{} fails with '{text}'", intent.name()))?)
+            }
+            Some(failure) => Err(Stop::Failed(format!("expected a failure with '{text}'; seen: {failure}"))),
+            None => Err(Stop::Failed(format!("expected {} to fail with '{text}'; it was done", intent.name()))),
+        }
     }
 
     /// As [`Self::perform`], without a line of its own.
-    fn act(&mut self, intent: &Intent) -> Result<(), Stop> {
-        self.done.push(intent.clone());
+    fn act(&mut self, intent: &Intent) -> Result<Option<String>, Stop> {
         self.engine.intend(intent.clone());
-        self.settle()
+        self.settle()?;
+        // Doing something takes the message before it away: an error is this intent's own.
+        let notice = self.engine.wizard().notice().filter(|notice| notice.severity == Severity::Error);
+        let error = notice.map(|notice| notice.what.clone());
+        self.done.push(match &error {
+            None => ScriptStep::Do(intent.clone()),
+            Some(message) => ScriptStep::Fails(intent.clone(), message.clone()),
+        });
+        Ok(error)
     }
 
     fn offered(&self) -> String {
@@ -200,6 +225,8 @@ impl<'a, W: Write> Runner<'a, W> {
 
     /// Waits until nothing is under way, printing what happens.
     fn settle(&mut self) -> Result<(), Stop> {
+        // Signals arrive also while nothing is under way.
+        while self.engine.wait(Duration::ZERO) {}
         loop {
             self.report()?;
             if let Some(cause) = self.engine.wizard().ended() {
@@ -209,8 +236,14 @@ impl<'a, W: Write> Runner<'a, W> {
                 return Ok(());
             }
             if self.view().is_stopped() {
-                let notice = self.engine.wizard().notice().map_or_else(String::new, |notice| notice.what.clone());
-                return Err(Stop::Failed(notice));
+                let notice = self.engine.wizard().notice();
+                let text = notice.map_or_else(String::new, |notice| {
+                    std::iter::once(notice.what.as_str())
+                        .chain(notice.hints.iter().map(String::as_str))
+                        .collect::<Vec<_>>()
+                        .join("; ")
+                });
+                return Err(Stop::NotSaved(text));
             }
             if !self.engine.wait(PATIENCE) {
                 return Err(Stop::Failed(format!("nothing happened for {} s", PATIENCE.as_secs())));
@@ -308,7 +341,11 @@ impl<'a, W: Write> Runner<'a, W> {
                     return Err(Stop::Failed(format!("still in question after {TRIES} more measurements")));
                 }
             };
-            self.perform(&intent)?;
+            if let Some(failure) = self.perform(&intent)?
+                && intent != Intent::MeasureAgain
+            {
+                return Err(Stop::Failed(failure));
+            }
         }
         Ok(true)
     }
@@ -330,7 +367,8 @@ impl<'a, W: Write> Runner<'a, W> {
     fn restart(&mut self) -> Result<(), Stop> {
         let folder =
             self.folder().ok_or_else(|| Stop::Failed("there is no session to resume yet".to_owned()))?.to_owned();
-        self.close()?;
+        self.end();
+        self.report()?;
         self.transcript.event("restart", "the program ends and resumes the session")?;
         // The lock must be free before it is taken again.
         self.engine.release();

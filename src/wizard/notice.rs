@@ -9,6 +9,8 @@ pub enum Severity {
     Info,
     /// To be looked at before going on.
     Attention,
+    /// What was asked for could not be done.
+    Error,
     /// Nothing goes on before it is resolved.
     Stop,
 }
@@ -35,6 +37,11 @@ impl Notice {
         Self { severity: Severity::Attention, what: what.into(), hints: Vec::new() }
     }
 
+    /// What was asked for could not be done.
+    pub fn error(what: impl Into<String>) -> Self {
+        Self { severity: Severity::Error, what: what.into(), hints: Vec::new() }
+    }
+
     /// Nothing goes on before it is resolved.
     pub fn stop(what: impl Into<String>) -> Self {
         Self { severity: Severity::Stop, what: what.into(), hints: Vec::new() }
@@ -59,6 +66,6 @@ pub struct Problem {
 
 impl From<Problem> for Notice {
     fn from(problem: Problem) -> Self {
-        Self { severity: Severity::Attention, what: problem.message, hints: problem.hints }
+        Self { severity: Severity::Error, what: problem.message, hints: problem.hints }
     }
 }

@@ -128,7 +128,7 @@ impl CaptureStep {
         let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
         let previous = previous.map(crate::session::journal::from_xyz_mm);
         if let Some(reason) = reading::gate(&crate::session::journal::from_xyz_mm(noted.xyz_mm), previous.as_ref()) {
-            let notice = Notice::attention(format!("pose {}: {reason}", noted.pose)).hint("measure again");
+            let notice = Notice::error(format!("pose {}: {reason}", noted.pose)).hint("measure again");
             return vec![Action::Write(vec![refused(&noted, reason)]), Action::Say(notice)];
         }
         let sigma =
@@ -178,7 +178,7 @@ impl CaptureStep {
         let found = found.or_else(|| rows.iter().find(active)).or_else(|| rows.last()).copied();
         let Some(row) = found else {
             let pose = crate::session::printable(pose);
-            return vec![Action::Say(Notice::attention(format!("there is no pose '{pose}' in the plan")))];
+            return vec![Action::Say(Notice::error(format!("there is no pose '{pose}' in the plan")))];
         };
         self.row = Some(row);
         self.held = None;
@@ -266,7 +266,7 @@ impl StepMachine for CaptureStep {
             }
             Intent::TypeReading(text) => match reading::parse(&text, Self::manual_unit(cx).unwrap_or_default()) {
                 Ok(point) => self.take(&reading::typed(point), cx),
-                Err(message) => vec![Action::Say(Notice::attention(message))],
+                Err(message) => vec![Action::Say(Notice::error(message))],
             },
             Intent::AcceptReading => {
                 let Some(Held { mut noted, reason }) = self.held.take() else { return Vec::new() };

@@ -45,7 +45,7 @@ impl StepMachine for DeliverStep {
         }
         match files(cx) {
             Ok(files) => vec![Action::Ask(Request::Deliver { files })],
-            Err(message) => vec![Action::Say(Notice::attention(message))],
+            Err(message) => vec![Action::Say(Notice::error(message))],
         }
     }
 

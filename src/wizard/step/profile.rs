@@ -69,7 +69,7 @@ impl StepMachine for ProfileStep {
                 }
                 let name = crate::session::printable(&name);
                 vec![Action::Say(
-                    Notice::attention(format!("'{name}' cannot be the name of a session"))
+                    Notice::error(format!("'{name}' cannot be the name of a session"))
                         .hint("use up to 64 letters, digits, '-', '_' and '.', beginning with a letter or digit"),
                 )]
             }
@@ -84,7 +84,8 @@ impl StepMachine for ProfileStep {
                     _ => {
                         let profile = Box::new(chosen.profile.clone());
                         let instrument = cx.session.instrument.clone();
-                        let connect = instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
+                        let connect =
+                            instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
                         [Action::Write(entries), Action::Disconnect].into_iter().chain(connect).collect()
                     }
                 }
@@ -103,7 +104,7 @@ impl StepMachine for ProfileStep {
             }
             Err(errors) => {
                 let what = format!("profile '{source}' cannot be used\n{errors}");
-                vec![Action::Say(Notice::attention(what).hint("mend the file, then choose it again"))]
+                vec![Action::Say(Notice::error(what).hint("mend the file, then choose it again"))]
             }
         }
     }

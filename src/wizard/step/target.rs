@@ -65,7 +65,7 @@ impl TargetStep {
             reading.scatter.filter(|scatter| *scatter > limit).map(|scatter| reading::scatter_message(scatter, limit));
         if let Some(reason) = reading::gate(&reading.point, previous.as_ref()).or(shaky) {
             let pose = pose_name(robot, next.joint, next.index);
-            let notice = Notice::attention(reason.clone()).hint("measure again");
+            let notice = Notice::error(reason.clone()).hint("measure again");
             return vec![
                 Action::Write(vec![Entry::Refused { number, pose, reason, xyz_mm: None }]),
                 Action::Say(notice),
@@ -191,7 +191,7 @@ impl StepMachine for TargetStep {
         match intent {
             Intent::ChooseTarget(choice) if is_sensible(&choice) => vec![Action::Write(vec![Entry::Target(choice)])],
             Intent::ChooseTarget(_) => {
-                let notice = Notice::attention("the SMR cannot be there")
+                let notice = Notice::error("the SMR cannot be there")
                     .hint("give coordinates below 5 m and a standard deviation of 0 to 1000 mm");
                 vec![Action::Say(notice)]
             }
@@ -218,7 +218,7 @@ impl StepMachine for TargetStep {
                 };
                 match reading::parse(&text, unit) {
                     Ok(point) => self.take(&reading::typed(point), cx),
-                    Err(message) => vec![Action::Say(Notice::attention(message))],
+                    Err(message) => vec![Action::Say(Notice::error(message))],
                 }
             }
             Intent::UseCircles => {
@@ -261,7 +261,7 @@ impl StepMachine for TargetStep {
                 Some(Ok(found)) => vec![Action::Say(verdict(&found, cx.session))],
                 Some(Err(error)) => {
                     vec![Action::Say(
-                        Notice::attention(error.to_string()).hint("measure the circles anew, or leave the SMR free"),
+                        Notice::error(error.to_string()).hint("measure the circles anew, or leave the SMR free"),
                     )]
                 }
                 None => Vec::new(),
