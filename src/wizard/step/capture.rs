@@ -127,7 +127,8 @@ impl CaptureStep {
         };
         let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
         let previous = previous.map(crate::session::journal::from_xyz_mm);
-        if let Some(reason) = reading::gate(&crate::session::journal::from_xyz_mm(noted.xyz_mm), previous.as_ref()) {
+        let gate = reading::gate(&crate::session::journal::from_xyz_mm(noted.xyz_mm), previous.as_ref());
+        if let Some(reason) = gate.or_else(|| reading::foreign_joints(reading, robot.joint_types.len())) {
             let notice = Notice::attention(format!("pose {}: {reason}", noted.pose)).hint("measure again");
             return vec![Action::Write(vec![refused(&noted, reason)]), Action::Say(notice)];
         }
@@ -135,7 +136,7 @@ impl CaptureStep {
             noted.sigma_mm.map(from_mm).or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
         let limit = reading::scatter_limit(sigma);
         if let Some(scatter) = reading.scatter
-            && scatter > limit
+            && (scatter.is_nan() || scatter > limit)
         {
             let reason = reading::scatter_message(scatter, limit);
             self.held = Some(Held { noted, reason: reason.clone() });

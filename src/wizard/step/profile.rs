@@ -84,7 +84,8 @@ impl StepMachine for ProfileStep {
                     _ => {
                         let profile = Box::new(chosen.profile.clone());
                         let instrument = cx.session.instrument.clone();
-                        let connect = instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
+                        let connect =
+                            instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
                         [Action::Write(entries), Action::Disconnect].into_iter().chain(connect).collect()
                     }
                 }
