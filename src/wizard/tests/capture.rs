@@ -140,7 +140,7 @@ fn poses_can_be_measured_in_any_order() {
 fn a_skipped_pose_can_be_measured_after_all() {
     let mut bench = Bench::at(Step::Capture);
     let effects = bench.intend(Intent::Skip);
-    assert_eq!(texts(&effects), ["append 9 row 2 of the plan skipped"]);
+    assert_eq!(texts(&effects), ["append 10 row 2 of the plan skipped"]);
     bench.settle(effects);
     let view = bench.capture();
     assert_eq!((view.pose.as_deref(), view.skipped, view.open), (Some("2"), 1, MEASURED - 1));
@@ -150,7 +150,7 @@ fn a_skipped_pose_can_be_measured_after_all() {
     assert_eq!(bench.capture().kind, Some(PoseKind::Drift));
     bench.does(Intent::Measure);
     let effects = bench.intend(go_to("1"));
-    assert_eq!(texts(&effects), ["append 11 row 2 of the plan is to be measured after all"]);
+    assert_eq!(texts(&effects), ["append 12 row 2 of the plan is to be measured after all"]);
     bench.settle(effects);
     let view = bench.capture();
     assert_eq!((view.row, view.skipped), (Some(1), 0));
@@ -182,7 +182,7 @@ fn undo_takes_back_one_sample_after_the_other() {
     let mut bench = Bench::at(Step::Capture);
     bench.measure(3);
     let effects = bench.intend(Intent::Undo);
-    assert_eq!(texts(&effects), ["append 12 measurement 3: taken back"]);
+    assert_eq!(texts(&effects), ["append 13 measurement 3: taken back"]);
     bench.settle(effects);
     assert_eq!((bench.capture().pose.as_deref(), bench.capture().measured), (Some("3"), 2));
     bench.does(Intent::Undo);

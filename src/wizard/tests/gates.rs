@@ -56,7 +56,7 @@ fn a_link_that_fails_is_noted_with_its_message() {
     let effects = bench.intend(Intent::Measure);
     let (id, _) = started(&effects);
     let effects = bench.answer(id, failure("the beam is broken"));
-    assert_eq!(texts(&effects), ["append 9 measurement 1: pose 1: no sample: the beam is broken"]);
+    assert_eq!(texts(&effects), ["append 10 measurement 1: pose 1: no sample: the beam is broken"]);
     bench.settle(effects);
     assert_eq!((bench.told().as_str(), bench.capture().pose.as_deref()), ("the beam is broken", Some("1")));
 }

@@ -61,11 +61,11 @@ fn what_is_wanted_meanwhile_is_done_in_order() {
     assert_eq!(
         done,
         [
-            "append 9 note to pose 1: first",
-            "append 10 note to pose 1: second",
-            "append 11 row 2 of the plan skipped",
+            "append 10 note to pose 1: first",
+            "append 11 note to pose 1: second",
+            "append 12 row 2 of the plan skipped",
             "start measuring",
-            "append 12 note to pose 2: third",
+            "append 13 note to pose 2: third",
         ]
     );
     assert_eq!((bench.told().as_str(), bench.step()), ("not now: measuring is under way", Step::Capture));
@@ -79,7 +79,7 @@ fn a_reading_waits_for_the_note_before_it() {
     let mut effects = bench.intend(note("shaky"));
     assert!(bench.answer(id, super::bench::answer(&request)).is_empty());
     effects = bench.perform(effects.remove(0));
-    assert_eq!(appended(&effects).1[0].number, 10);
+    assert_eq!(appended(&effects).1[0].number, 11);
     bench.settle(effects);
     assert_eq!(bench.wizard.session().samples.len(), 1);
     assert_eq!(bench.wizard.session().notes.len(), 1);
@@ -152,7 +152,7 @@ fn a_full_disk_while_measuring_keeps_the_reading_for_later() {
     bench.failed(id);
     assert!(bench.answer(measurement, super::bench::answer(&request)).is_empty());
     let effects = bench.intend(Intent::Retry);
-    assert_eq!(texts(&effects), ["append 9 note to pose 1: before"]);
+    assert_eq!(texts(&effects), ["append 10 note to pose 1: before"]);
     bench.settle(effects);
     assert_eq!(bench.wizard.session().samples.len(), 1);
     assert_eq!(*bench.wizard.session(), fold(&bench.journal));

@@ -88,8 +88,8 @@ fn every_prefix_can_be_brought_to_the_end() {
 #[test]
 fn resuming_is_journaled_then_said_then_the_instrument_is_connected() {
     let full = Bench::at(Step::Capture);
-    let (mut bench, mut effects) = full.resumed(8);
-    assert_eq!(texts(&effects), [format!("append 9 resumed by {}", crate::wizard::program())]);
+    let (mut bench, mut effects) = full.resumed(9);
+    assert_eq!(texts(&effects), [format!("append 10 resumed by {}", crate::wizard::program())]);
     assert_eq!(bench.wizard.notice(), None);
     effects = bench.perform(effects.remove(0));
     assert_eq!(texts(&effects), ["start connecting"]);

@@ -65,7 +65,7 @@ fn what_is_under_way_is_cancelled() {
     let mut bench = Bench::at(Step::Plan);
     bench.intend(Intent::MakePlan(PlanSettings::default()));
     let effects = shut_down(&mut bench);
-    assert_eq!(texts(&effects), ["cancel", "append 7 closed: SIGTERM"]);
+    assert_eq!(texts(&effects), ["cancel", "append 8 closed: SIGTERM"]);
     bench.settle(effects);
     is_over(&mut bench);
 }

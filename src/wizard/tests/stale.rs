@@ -147,7 +147,7 @@ fn a_cancelled_measurement_is_noted_and_its_number_is_used_up() {
     let mut bench = Bench::at(Step::Capture);
     let id = cancelled(&mut bench, Intent::Measure);
     let effects = bench.answer(id, Answer::Cancelled);
-    assert_eq!(texts(&effects), ["append 9 measurement 1: pose 1: no sample: cancelled"]);
+    assert_eq!(texts(&effects), ["append 10 measurement 1: pose 1: no sample: cancelled"]);
     bench.settle(effects);
     assert_eq!(bench.capture().refused, [("1".to_owned(), "cancelled".to_owned())]);
     let effects = bench.intend(Intent::Measure);
@@ -183,7 +183,7 @@ fn a_search_that_fails_while_capturing_is_no_refused_measurement() {
 
 #[test]
 fn an_instrument_that_is_gone_after_resuming_is_no_refused_measurement() {
-    let (mut bench, mut effects) = Bench::at(Step::Capture).resumed(8);
+    let (mut bench, mut effects) = Bench::at(Step::Capture).resumed(9);
     effects = bench.perform(effects.remove(0));
     let (id, _) = started(&effects);
     assert!(bench.answer(id, failure("no route to host")).is_empty());

@@ -204,7 +204,7 @@ fn plan_is_proposed_then_accepted() {
     let effects = bench.intend(Intent::AcceptPlan);
     assert_eq!(
         texts(&effects),
-        ["append 7 plan: 14 identification and 4 verification poses, the plan of the bench | 8 step 5 of 8: Capture"]
+        ["append 8 plan: 14 identification and 4 verification poses, the plan of the bench | 9 step 5 of 8: Capture"]
     );
     bench.settle(effects);
     assert_eq!(bench.step(), Step::Capture);
