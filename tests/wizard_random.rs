@@ -308,7 +308,7 @@ impl Cell {
         Reading {
             point,
             sigma: odd.or_else(|| some(10.0 * MICROMETRE, self)),
-            scatter: odd.or_else(|| some(8.0 * MICROMETRE, self)).filter(|value| !value.is_nan()),
+            scatter: odd.or_else(|| some(8.0 * MICROMETRE, self)),
             shots: request.shots,
             temperature: Some(20.0),
             configuration: if self.chance(10) { Some(vec![0.1; self.pick(8)]) } else { None },

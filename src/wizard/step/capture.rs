@@ -118,8 +118,11 @@ impl CaptureStep {
             joints: to_edge(&planned.configuration, &robot.joint_types),
             reported_joints: reported,
             xyz_mm: to_xyz_mm(&reading.point, 6),
-            sigma_mm: reading.sigma.map(to_mm),
-            scatter_mm: reading.scatter.map(|scatter| (to_mm(scatter) * 1e6).round() / 1e6),
+            sigma_mm: reading.sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0).map(to_mm),
+            scatter_mm: reading
+                .scatter
+                .filter(|scatter| scatter.is_finite())
+                .map(|scatter| (to_mm(scatter) * 1e6).round() / 1e6),
             shots: reading.shots,
             temperature_degc: reading.temperature,
             seconds: reading.seconds,

@@ -2,11 +2,12 @@
 
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
+use std::sync::LazyLock;
 
 use jiff::{SignedDuration, Timestamp};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::kinematics::{ForwardKinematics, LinkParameter, ParameterId};
+use crate::kinematics::{ForwardKinematics, KinematicChain, LinkParameter, ParameterId};
 use crate::procedure::identify::identify;
 use crate::profile::{Profile, builtin};
 use crate::session::journal::{Entry, Journal, Line};
@@ -48,15 +49,25 @@ pub(super) fn start() -> Timestamp {
     "2026-03-01T09:15:02Z".parse().unwrap()
 }
 
-pub(super) fn profile() -> Profile {
-    Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap().0
-}
+/// The robot of the bench.
+static PROFILE: LazyLock<Profile> = LazyLock::new(|| Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap().0);
+
+/// The robot as it really is.
+static TRUE_ARM: LazyLock<KinematicChain> = LazyLock::new(|| {
+    let deviation = |joint, parameter, value| (ParameterId::Link { joint, parameter }, value);
+    let deviations = [
+        deviation(1, LinkParameter::Theta, 0.02 * DEGREE),
+        deviation(2, LinkParameter::A, 0.3 * MILLIMETRE),
+        deviation(4, LinkParameter::Theta, -0.03 * DEGREE),
+    ];
+    PROFILE.chain().with_deviations(deviations).unwrap()
+});
 
 /// The n-th of evenly spread configurations within the planning limits (rad).
 pub(super) fn configuration(index: usize) -> Vec<f64> {
     // Fractional parts of multiples of the square roots of primes.
     let roots = [2.0_f64, 3.0, 5.0, 7.0, 11.0, 13.0].map(f64::sqrt);
-    let limits = profile().joints().iter().map(|range| range.planning_limits.unwrap()).collect::<Vec<_>>();
+    let limits = PROFILE.joints().iter().map(|range| range.planning_limits.unwrap()).collect::<Vec<_>>();
     let spread = |(root, (low, high)): (f64, &(f64, f64))| low + (high - low) * (root * (index + 1) as f64).fract();
     roots.into_iter().zip(&limits).map(spread).collect()
 }
@@ -85,19 +96,9 @@ pub(super) fn plan() -> Vec<PlannedPose> {
 
 /// Where the tracker sees the SMR of the true arm (m).
 pub(super) fn seen_at(configuration: &[f64]) -> Point3<f64> {
-    let profile = profile();
-    let deviation = |joint, parameter, value| (ParameterId::Link { joint, parameter }, value);
-    let chain = profile
-        .chain()
-        .with_deviations([
-            deviation(1, LinkParameter::Theta, 0.02 * DEGREE),
-            deviation(2, LinkParameter::A, 0.3 * MILLIMETRE),
-            deviation(4, LinkParameter::Theta, -0.03 * DEGREE),
-        ])
-        .unwrap();
-    let target = profile.targets()[0].position_in_flange;
+    let target = PROFILE.targets()[0].position_in_flange;
     let base_from_tracker = Isometry3::new(Vector3::new(3.5, 0.0, 1.0), Vector3::new(0.0, 0.0, 3.0));
-    base_from_tracker.inverse() * ForwardKinematics::new(&chain).point_in_base(configuration, &target)
+    base_from_tracker.inverse() * ForwardKinematics::new(&TRUE_ARM).point_in_base(configuration, &target)
 }
 
 /// What the instrument gives: a little different each time.

@@ -51,8 +51,8 @@ fn what_is_wanted_meanwhile_is_done_in_order() {
     }
     let mut done = Vec::new();
     while !effects.is_empty() {
-        done.extend(texts(&effects));
         let effect = effects.remove(0);
+        done.extend(texts(std::slice::from_ref(&effect)));
         // The measurement is not answered: so the step cannot be left.
         if !matches!(effect, Effect::Start { .. }) {
             effects.extend(bench.perform(effect));
