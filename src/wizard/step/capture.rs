@@ -256,7 +256,7 @@ impl StepMachine for CaptureStep {
             IntentInfo::new(Intent::Note(String::new()), "write a note"),
             IntentInfo::new(Intent::SuggestPoses(SUGGESTED), "add the next best poses").unless(no_sample),
         ];
-        intents.push(if has_more { next } else { next.default_action() });
+        intents.push(if has_more || asked.is_some() { next } else { next.default_action() });
         intents
     }
 

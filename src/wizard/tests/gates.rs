@@ -251,3 +251,16 @@ fn one_question_after_the_other_is_asked() {
     bench.does(Intent::Measure);
     assert_eq!(bench.wizard.session().samples.len(), 4);
 }
+
+#[test]
+fn a_question_about_the_last_sample_comes_before_going_on() {
+    let mut bench = Bench::at(Step::Capture);
+    bench.measure(super::bench::MEASURED - 1);
+    measure(&mut bench, |reading| reading.scatter = Some(MILLIMETRE));
+    bench.does(Intent::AcceptReading);
+    let defaults =
+        |bench: &Bench| offers(&bench.wizard).into_iter().filter(|offer| offer.contains('*')).collect::<Vec<_>>();
+    assert_eq!(defaults(&bench), ["MeasureAgain*"]);
+    bench.does(Intent::Keep);
+    assert_eq!(defaults(&bench), ["Next*"]);
+}
