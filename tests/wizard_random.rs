@@ -4,6 +4,7 @@
 //! More events: raise [`SEEDS`] or [`EVENTS`]; the streams of the present seeds stay the same.
 
 #![expect(clippy::unwrap_used, reason = "a failure of a test is a panic")]
+#![expect(clippy::print_stderr, reason = "a failure names its seed")]
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -366,25 +367,21 @@ impl Cell {
         let starts = effects.iter().filter(|effect| matches!(effect, Effect::Start { .. })).count();
         let writes = effects.iter().filter(|effect| matches!(effect, Effect::Append { .. } | Effect::Create { .. }));
         assert!(starts <= 1 && writes.count() <= 1, "one thing at a time");
-        match self.wizard.ended() {
-            Some(_) => {
-                assert!(view.intents.is_empty());
-                let closing =
-                    |effect: &Effect| matches!(effect, Effect::Append { .. } | Effect::Exit | Effect::Cancel(_));
-                assert!(!had_ended || effects.iter().all(closing), "nothing begins after the end");
-            }
-            None => {
-                assert!(view.intents.iter().any(trupose::wizard::IntentInfo::is_enabled), "no way on");
-                assert!(view.intents.iter().filter(|info| info.is_default).count() <= 1, "two defaults");
-                let offers = |name: &str| view.intents.iter().find(|info| info.intent.name() == name);
-                assert!(offers("Quit").is_some_and(trupose::wizard::IntentInfo::is_enabled));
-                // While the disk is full the only question is that one.
-                let is_stuck = view.intents.len() == 2 && offers("Retry").is_some();
-                if let (Some(busy), false) = (&view.busy, is_stuck) {
-                    let cancel = offers("Cancel").unwrap();
-                    assert!(cancel.is_enabled() != busy.is_cancelled);
-                }
-            }
+        if self.wizard.ended().is_some() {
+            assert!(view.intents.is_empty());
+            let closing = |effect: &Effect| matches!(effect, Effect::Append { .. } | Effect::Exit | Effect::Cancel(_));
+            assert!(!had_ended || effects.iter().all(closing), "nothing begins after the end");
+            return;
+        }
+        assert!(view.intents.iter().any(trupose::wizard::IntentInfo::is_enabled), "no way on");
+        assert!(view.intents.iter().filter(|info| info.is_default).count() <= 1, "two defaults");
+        let offers = |name: &str| view.intents.iter().find(|info| info.intent.name() == name);
+        assert!(offers("Quit").is_some_and(trupose::wizard::IntentInfo::is_enabled));
+        // While the disk is full the only question is that one.
+        let is_stuck = view.intents.len() == 2 && offers("Retry").is_some();
+        if let (Some(busy), false) = (&view.busy, is_stuck) {
+            let cancel = offers("Cancel").unwrap();
+            assert!(cancel.is_enabled() != busy.is_cancelled);
         }
     }
 

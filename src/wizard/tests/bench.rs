@@ -123,10 +123,8 @@ pub(super) fn answer(request: &Request) -> Answer {
             None => failure(&format!("there is no profile or file '{source}'")),
         },
         Request::Connect { instrument, .. } => {
-            let recorded = match instrument {
-                InstrumentChoice::Replay { .. } => plan().into_iter().filter(|row| row.kind.is_measured()).collect(),
-                _ => Vec::new(),
-            };
+            let is_recording = matches!(instrument, InstrumentChoice::Replay { .. });
+            let recorded = plan().into_iter().filter(|row| is_recording && row.kind.is_measured()).collect();
             Answer::Connected { identity: "bench instrument".to_owned(), recorded }
         }
         Request::Measure(request) => Answer::Measured(reading(request)),
@@ -174,18 +172,18 @@ pub(super) fn failure(message: &str) -> Answer {
 
 /// The id and request of the only `Start` among the effects.
 pub(super) fn started(effects: &[Effect]) -> (RequestId, Request) {
-    let found = effects.iter().find_map(|effect| match effect {
-        Effect::Start { id, request } => Some((*id, request.clone())),
-        _ => None,
+    let found = effects.iter().find_map(|effect| {
+        let Effect::Start { id, request } = effect else { return None };
+        Some((*id, request.clone()))
     });
     found.unwrap_or_else(|| panic!("nothing was started: {:?}", texts(effects)))
 }
 
 /// The id and lines of the only `Append` among the effects.
 pub(super) fn appended(effects: &[Effect]) -> (RequestId, Vec<Line>) {
-    let found = effects.iter().find_map(|effect| match effect {
-        Effect::Append { id, lines } => Some((*id, lines.clone())),
-        _ => None,
+    let found = effects.iter().find_map(|effect| {
+        let Effect::Append { id, lines } = effect else { return None };
+        Some((*id, lines.clone()))
     });
     found.unwrap_or_else(|| panic!("nothing was appended: {:?}", texts(effects)))
 }
@@ -321,10 +319,8 @@ impl Bench {
     }
 
     pub(super) fn capture(&self) -> CaptureView {
-        match self.wizard.view().content {
-            Content::Capture(view) => *view,
-            other => panic!("not in the capture step: {other:?}"),
-        }
+        let Content::Capture(view) = self.wizard.view().content else { panic!("not in the capture step") };
+        *view
     }
 
     /// The message on the screen.
