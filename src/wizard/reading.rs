@@ -132,6 +132,13 @@ pub(super) fn gate(point: &Point3<f64>, previous: Option<&Point3<f64>>) -> Optio
     None
 }
 
+/// Why joint values that came with a reading cannot be those of a robot with so many joints.
+pub(super) fn foreign_joints(reading: &Reading, joints: usize) -> Option<String> {
+    let reported = reading.configuration.as_ref()?;
+    let fits = reported.len() == joints && reported.iter().all(|value| value.is_finite());
+    (!fits).then(|| format!("the robot reported {} joint values that cannot be its own", reported.len()))
+}
+
 /// Largest scatter (m) of the shots of a robot at rest, for an instrument with `sigma` (m) per coordinate.
 pub(super) fn scatter_limit(sigma: Option<f64>) -> f64 {
     sigma.map_or(SCATTER_ALWAYS, |sigma| (SCATTER_FACTOR * 3.0_f64.sqrt() * sigma).max(SCATTER_ALWAYS))

@@ -1,1 +1,10 @@
+//! The wizard as a function: events in, effects out.
 
+mod bench;
+mod capture;
+mod gates;
+mod journal_first;
+mod resume;
+mod shutdown;
+mod stale;
+mod steps;

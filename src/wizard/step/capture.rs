@@ -118,8 +118,11 @@ impl CaptureStep {
             joints: to_edge(&planned.configuration, &robot.joint_types),
             reported_joints: reported,
             xyz_mm: to_xyz_mm(&reading.point, 9),
-            sigma_mm: reading.sigma.map(to_mm),
-            scatter_mm: reading.scatter.map(|scatter| (to_mm(scatter) * 1e6).round() / 1e6),
+            sigma_mm: reading.sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0).map(to_mm),
+            scatter_mm: reading
+                .scatter
+                .filter(|scatter| scatter.is_finite())
+                .map(|scatter| (to_mm(scatter) * 1e6).round() / 1e6),
             shots: reading.shots,
             temperature_degc: reading.temperature,
             seconds: reading.seconds,
@@ -127,7 +130,8 @@ impl CaptureStep {
         };
         let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
         let previous = previous.map(crate::session::journal::from_xyz_mm);
-        if let Some(reason) = reading::gate(&crate::session::journal::from_xyz_mm(noted.xyz_mm), previous.as_ref()) {
+        let gate = reading::gate(&crate::session::journal::from_xyz_mm(noted.xyz_mm), previous.as_ref());
+        if let Some(reason) = gate.or_else(|| reading::foreign_joints(reading, robot.joint_types.len())) {
             let notice = Notice::error(format!("pose {}: {reason}", noted.pose)).hint("measure again");
             return vec![Action::Write(vec![refused(&noted, reason)]), Action::Say(notice)];
         }
@@ -135,7 +139,7 @@ impl CaptureStep {
             noted.sigma_mm.map(from_mm).or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
         let limit = reading::scatter_limit(sigma);
         if let Some(scatter) = reading.scatter
-            && scatter > limit
+            && (scatter.is_nan() || scatter > limit)
         {
             let reason = reading::scatter_message(scatter, limit);
             let entry = refused(&noted, reason.clone());
@@ -253,7 +257,7 @@ impl StepMachine for CaptureStep {
             IntentInfo::new(Intent::Note(String::new()), "write a note"),
             IntentInfo::new(Intent::SuggestPoses(SUGGESTED), "add the next best poses").unless(no_sample),
         ];
-        intents.push(if has_more { next } else { next.default_action() });
+        intents.push(if has_more || asked.is_some() { next } else { next.default_action() });
         intents
     }
 

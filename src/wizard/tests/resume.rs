@@ -1,0 +1,126 @@
+//! A session goes on from whatever its journal holds.
+
+use super::bench::{Bench, FOLDER, fold, offers, simulated, start, texts};
+use crate::session::set_up::Step;
+use crate::wizard::view::{Content, ViewModel};
+use crate::wizard::{Intent, Wizard};
+
+/// A session with everything in it, up to the end.
+fn full_run() -> Bench {
+    let mut bench = Bench::at(Step::Capture);
+    bench.measure(2);
+    bench.does(Intent::Skip);
+    bench.does(Intent::Note("draught from the door".to_owned()));
+    bench.measure(3);
+    bench.does(Intent::Undo);
+    bench.measure(usize::MAX);
+    bench.does(Intent::SuggestPoses(2));
+    bench.measure(usize::MAX);
+    bench.does(Intent::Next);
+    bench.does(Intent::Identify);
+    bench.does(Intent::Back);
+    bench.does(Intent::Next);
+    bench.does(Intent::Next);
+    bench.does(Intent::Next);
+    bench.does(Intent::Deliver);
+    bench.does(Intent::Quit);
+    assert_eq!(bench.exits, 1);
+    bench
+}
+
+/// A view without what lives only as long as the program.
+fn lasting(mut view: ViewModel) -> ViewModel {
+    view.busy = None;
+    view.notice = None;
+    view.ended = None;
+    view.intents.clear();
+    view.header.instrument = None;
+    view.header.is_saving = false;
+    match &mut view.content {
+        Content::Instrument(instrument) => {
+            instrument.identity = None;
+            instrument.recorded_poses = 0;
+        }
+        Content::Plan(plan) => {
+            plan.proposal = None;
+            plan.settings = crate::wizard::PlanSettings::default();
+        }
+        Content::Profile(_)
+        | Content::Target(_)
+        | Content::Capture(_)
+        | Content::Identify(_)
+        | Content::Verify(_)
+        | Content::Deliver(_) => {}
+    }
+    view
+}
+
+#[test]
+fn after_every_acknowledged_line_the_view_is_that_of_a_resumed_session() {
+    let bench = full_run();
+    for (lines, seen) in &bench.seen {
+        let (resumed, _) = bench.resumed(*lines);
+        assert_eq!(lasting(resumed.wizard.view()), lasting(seen.clone()), "after {lines} lines");
+    }
+}
+
+#[test]
+fn every_prefix_can_be_brought_to_the_end() {
+    let full = full_run();
+    // An identification takes a while: not from every single pose.
+    let lines = full.journal.len();
+    for kept in (1..=lines).filter(|kept| *kept < 10 || *kept > lines - 7 || kept % 9 == 0) {
+        let (mut bench, effects) = full.resumed(kept);
+        assert_eq!(texts(&effects).len(), 1, "{kept}");
+        bench.settle(effects);
+        for _ in 0..10 {
+            if bench.wizard.session().delivered.is_empty() {
+                bench.pass(&simulated());
+            }
+        }
+        assert_eq!(bench.wizard.session().delivered.len(), 4, "{kept} lines");
+        assert_eq!(*bench.wizard.session(), fold(&bench.journal), "{kept} lines");
+        bench.does(Intent::Quit);
+        assert_eq!(bench.exits, 1);
+    }
+}
+
+#[test]
+fn resuming_is_journaled_then_said_then_the_instrument_is_connected() {
+    let full = Bench::at(Step::Capture);
+    let (mut bench, mut effects) = full.resumed(9);
+    assert_eq!(texts(&effects), [format!("append 10 resumed by {}", crate::wizard::program())]);
+    assert_eq!(bench.wizard.notice(), None);
+    effects = bench.perform(effects.remove(0));
+    assert_eq!(texts(&effects), ["start connecting"]);
+    assert_eq!(bench.told(), "session 'soochow-20260301-0915' goes on: 0 samples");
+    bench.settle(effects);
+    assert_eq!(bench.wizard.view().header.instrument.as_deref(), Some("bench instrument"));
+    assert_eq!(bench.wizard.session().resumed, 1);
+    let live = offers(&full.wizard);
+    assert_eq!(offers(&bench.wizard).into_iter().filter(|offer| offer != "Dismiss").collect::<Vec<_>>(), live);
+    bench.measure(1);
+    assert_eq!(bench.wizard.session().samples.len(), 1);
+}
+
+#[test]
+fn bytes_that_were_lost_are_said() {
+    let bench = Bench::at(Step::Plan);
+    let (mut wizard, effects) = Wizard::resume(fold(&bench.journal), FOLDER.to_owned(), 37, start());
+    assert!(texts(&effects)[0].contains("37 bytes of an incomplete last entry dropped"));
+    let (id, _) = super::bench::appended(&effects);
+    wizard.update(crate::wizard::Event::Store(crate::wizard::StoreEvent::Written { id }));
+    assert!(wizard.notice().unwrap().hints[0].contains("(37 bytes) and was dropped"));
+}
+
+#[test]
+fn a_session_without_a_robot_asks_for_one() {
+    let (mut bench, effects) = Bench::at(Step::Instrument).resumed(1);
+    bench.settle(effects);
+    assert_eq!(bench.step(), Step::Profile);
+    bench.does(Intent::ChooseProfile("soochow".to_owned()));
+    let effects = bench.intend(Intent::Next);
+    assert!(texts(&effects)[0].starts_with("append 3 profile 'soochow'"));
+    bench.settle(effects);
+    assert_eq!(bench.step(), Step::Instrument);
+}

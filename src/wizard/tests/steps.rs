@@ -1,0 +1,368 @@
+//! Every step: what it offers, what it does, what it shows.
+
+use super::bench::{Bench, FOLDER, IDENTIFICATION, MANUAL, MEASURED, VERIFICATION, blocked, offers, started, texts};
+use crate::session::journal::Entry;
+use crate::session::plan::PoseKind;
+use crate::session::set_up::{InstrumentChoice, RecordedSet, Step, TargetChoice};
+use crate::wizard::view::Content;
+use crate::wizard::{Intent, PlanSettings, Request, Severity};
+
+fn text(name: &str) -> String {
+    name.to_owned()
+}
+
+#[test]
+fn profile_begins_with_nothing_chosen() {
+    let mut bench = Bench::new();
+    assert_eq!(offers(&bench.wizard), ["Next -- choose a robot first", "ChooseProfile", "NameSession", "Quit"]);
+    let view = bench.wizard.view();
+    assert_eq!((view.header.step, view.header.number, view.header.steps), (Step::Profile, 1, 8));
+    assert_eq!((view.header.folder, view.header.session, view.header.saved_entries), (None, None, 0));
+    let effects = bench.intend(Intent::ChooseProfile(text("soochow")));
+    assert_eq!(texts(&effects), ["start reading the profile"]);
+    bench.settle(effects);
+    assert_eq!(offers(&bench.wizard), ["Next*", "ChooseProfile", "NameSession", "Quit"]);
+    let Content::Profile(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.session, "soochow-20260301-0915");
+    assert_eq!(view.chosen.map(|card| (card.name, card.joints.len())), Some((text("soochow"), 6)));
+    assert!(!view.is_fixed);
+}
+
+#[test]
+fn the_folder_is_made_before_the_first_lines() {
+    let mut bench = Bench::new();
+    bench.does(Intent::ChooseProfile(text("soochow")));
+    bench.does(Intent::NameSession(text("first")));
+    let mut effects = bench.intend(Intent::Next);
+    assert_eq!(texts(&effects), ["create first"]);
+    assert_eq!(bench.wizard.folder(), None);
+    effects = bench.perform(effects.remove(0));
+    let Some(crate::wizard::Effect::Append { lines, .. }) = effects.first() else { panic!() };
+    assert_eq!(lines.iter().map(|line| line.number).collect::<Vec<_>>(), [1, 2, 3]);
+    assert!(matches!(&lines[0].entry, Entry::Opened { name, .. } if name == "first"));
+    assert!(matches!(&lines[1].entry, Entry::Profile { source, .. } if source == "soochow"));
+    assert_eq!(lines[2].entry, Entry::Step(Step::Instrument));
+    assert_eq!((bench.step(), bench.wizard.folder()), (Step::Profile, Some(FOLDER)));
+    bench.settle(effects);
+    assert_eq!(bench.step(), Step::Instrument);
+    assert_eq!(bench.wizard.view().header.session, Some(text("first")));
+}
+
+#[test]
+fn names_that_cannot_be_a_folder_are_refused() {
+    let mut bench = Bench::new();
+    bench.does(Intent::ChooseProfile(text("soochow")));
+    for name in ["", "..", "a/b", "-x", "ä", &"x".repeat(65)] {
+        bench.does(Intent::NameSession(text(name)));
+        let notice = bench.wizard.notice().unwrap();
+        assert_eq!(notice.severity, Severity::Attention, "{name}");
+        assert!(notice.what.contains("cannot be the name"), "{}", notice.what);
+    }
+    let Content::Profile(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.session, "soochow-20260301-0915");
+}
+
+#[test]
+fn a_profile_that_cannot_be_read_is_said_and_nothing_is_chosen() {
+    let mut bench = Bench::new();
+    bench.does(Intent::ChooseProfile(text("nowhere")));
+    assert_eq!(bench.told(), "there is no profile or file 'nowhere'");
+    let effects = bench.intend(Intent::ChooseProfile(text("broken.ron")));
+    let (id, _) = started(&effects);
+    let broken = crate::wizard::Answer::Profile { source: text("broken.ron"), text: text("(name: 1)") };
+    assert!(bench.answer(id, broken).is_empty());
+    assert!(bench.told().starts_with("profile 'broken.ron' cannot be used"));
+    assert_eq!(blocked(&bench.wizard, "Next"), "choose a robot first");
+}
+
+#[test]
+fn instrument_connects_as_soon_as_it_is_chosen() {
+    let mut bench = Bench::at(Step::Instrument);
+    assert_eq!(
+        offers(&bench.wizard),
+        [
+            "Next -- choose an instrument first",
+            "ChooseInstrument",
+            "Retry -- there is nothing to connect again",
+            "Back",
+            "Quit"
+        ]
+    );
+    let mut effects = bench.intend(Intent::ChooseInstrument(MANUAL));
+    assert_eq!(texts(&effects), ["append 4 instrument: typed in by hand, in mm"]);
+    effects = bench.perform(effects.remove(0));
+    assert_eq!(texts(&effects), ["start connecting"]);
+    assert_eq!(
+        offers(&bench.wizard),
+        [
+            "Cancel",
+            "Next -- the instrument does not answer yet",
+            "ChooseInstrument -- connecting is under way",
+            "Retry -- connecting is under way",
+            "Back -- connecting is under way",
+            "Quit"
+        ]
+    );
+    bench.settle(effects);
+    assert_eq!(bench.wizard.view().header.instrument, Some(text("bench instrument")));
+    let Content::Instrument(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.choice, Some(text("typed in by hand, in mm")));
+    assert_eq!(view.recorded_poses, 0);
+    assert!(offers(&bench.wizard).contains(&text("Next*")));
+}
+
+#[test]
+fn an_instrument_that_does_not_answer_can_be_tried_again() {
+    let mut bench = Bench::at(Step::Instrument);
+    let mut effects = bench.intend(Intent::ChooseInstrument(MANUAL));
+    effects = bench.perform(effects.remove(0));
+    let (id, _) = started(&effects);
+    assert!(bench.answer(id, super::bench::failure("no route to host")).is_empty());
+    assert_eq!(bench.told(), "no route to host");
+    assert_eq!(blocked(&bench.wizard, "Next"), "the instrument does not answer yet");
+    bench.does(Intent::Retry);
+    assert_eq!(bench.wizard.view().header.instrument, Some(text("bench instrument")));
+}
+
+#[test]
+fn another_robot_is_shown_to_the_instrument() {
+    let mut bench = Bench::at(Step::Target);
+    bench.does(Intent::Back);
+    bench.does(Intent::Back);
+    bench.does(Intent::ChooseProfile(text("ur5")));
+    let Content::Profile(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.session, "soochow-20260301-0915", "the session has its name");
+    let mut effects = bench.intend(Intent::Next);
+    effects = bench.perform(effects.remove(0));
+    let (_, request) = started(&effects);
+    let Request::Connect { profile, .. } = request else { panic!() };
+    assert_eq!(profile.name(), "ur5");
+    assert_eq!(bench.wizard.view().header.instrument, None);
+}
+
+#[test]
+fn target_says_where_the_smr_is() {
+    let mut bench = Bench::at(Step::Target);
+    assert_eq!(blocked(&bench.wizard, "Next"), "say where the SMR is first");
+    assert_eq!(blocked(&bench.wizard, "UseCircles"), "no circle is measured");
+    bench.does(Intent::ChooseTarget(TargetChoice::Free { sigma_mm: f64::NAN }));
+    assert_eq!(bench.told(), "the SMR cannot be there");
+    assert_eq!(bench.wizard.session().target, None);
+    let known = TargetChoice::Known { xyz_mm: (1.0, 2.0, 3.0), sigma_mm: 0.5 };
+    bench.does(Intent::ChooseTarget(known));
+    assert_eq!(*bench.last_entry(), Entry::Target(known));
+    let Content::Target(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.choice, Some(text("(1.000, 2.000, 3.000) mm in the flange, to 0.5 mm")));
+    assert!(offers(&bench.wizard).contains(&text("Next*")));
+}
+
+#[test]
+fn circles_find_the_smr() {
+    let mut bench = Bench::at(Step::Target);
+    bench.does(Intent::StartCircles);
+    for _ in 0..12 {
+        bench.does(Intent::Measure);
+    }
+    let Content::Target(view) = bench.wizard.view().content else { panic!() };
+    let circles = view.circles.unwrap();
+    assert_eq!((circles.measured, circles.of, circles.fits.len(), circles.problem), (12, 12, 2, None));
+    bench.does(Intent::UseCircles);
+    let Some(TargetChoice::Circles { xyz_mm, sigma_mm }) = bench.wizard.session().target else { panic!() };
+    let off = [xyz_mm.0 + 1.473, xyz_mm.1 - 26.384, xyz_mm.2 - 71.991];
+    assert!(off.iter().all(|off| off.abs() < 1.0), "{off:?}");
+    assert!(sigma_mm > 0.0);
+    bench.does(Intent::DiscardCircles);
+    assert!(bench.wizard.session().circle_points.is_empty());
+}
+
+#[test]
+fn plan_is_proposed_then_accepted() {
+    let mut bench = Bench::at(Step::Plan);
+    assert_eq!(
+        offers(&bench.wizard),
+        [
+            "AcceptPlan -- there is no new plan to accept",
+            "MakePlan*",
+            "LoadPlan",
+            "PlanFromRecording -- the instrument plays no recorded measurements",
+            "Next -- accept a plan first",
+            "Back",
+            "Quit"
+        ]
+    );
+    let settings = PlanSettings { poses: 14, verification: 4, ..PlanSettings::default() };
+    let effects = bench.intend(Intent::MakePlan(settings));
+    let (_, request) = started(&effects);
+    let Request::Plan { request, .. } = request else { panic!() };
+    assert_eq!((request.poses, request.verification, request.included.len()), (14, 4, 0));
+    bench.settle(effects);
+    assert!(offers(&bench.wizard).contains(&text("AcceptPlan*")));
+    assert!(bench.wizard.session().rows.is_empty(), "a proposal is no plan");
+    let Content::Plan(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.proposal.map(|figures| (figures.identification, figures.verification)), Some((14, 4)));
+    assert_eq!((view.accepted, view.settings), (None, settings));
+    let effects = bench.intend(Intent::AcceptPlan);
+    assert_eq!(
+        texts(&effects),
+        ["append 8 plan: 14 identification and 4 verification poses, the plan of the bench | 9 step 5 of 8: Capture"]
+    );
+    bench.settle(effects);
+    assert_eq!(bench.step(), Step::Capture);
+    bench.does(Intent::Back);
+    assert!(offers(&bench.wizard).contains(&text("Next*")));
+}
+
+#[test]
+fn recorded_poses_can_be_the_plan() {
+    let set = RecordedSet { file: text("m.csv"), kind: PoseKind::Identification, rows: None, layout: text("named") };
+    let mut bench = Bench::with(&InstrumentChoice::Replay { sets: vec![set] }, Step::Plan);
+    bench.does(Intent::PlanFromRecording);
+    bench.does(Intent::AcceptPlan);
+    assert_eq!(bench.wizard.session().open_rows().count(), MEASURED);
+    assert_eq!(bench.wizard.session().plan.as_ref().unwrap().origin, "the poses of the recorded measurements");
+}
+
+#[test]
+fn poses_of_another_arm_are_never_written() {
+    let mut bench = Bench::at(Step::Plan);
+    let effects = bench.intend(Intent::LoadPlan(text("other.csv")));
+    let (id, _) = started(&effects);
+    let mut rows = super::bench::plan();
+    rows[1].configuration.truncate(4);
+    bench.answer(id, crate::wizard::Answer::Planned { summary: None, rows, origin: text("other") });
+    let before = bench.wizard.session().clone();
+    assert!(bench.intend(Intent::AcceptPlan).is_empty());
+    assert_eq!(*bench.wizard.session(), before);
+    assert_eq!(bench.wizard.notice().unwrap().severity, Severity::Stop);
+    assert!(bench.wizard.is_idle());
+}
+
+#[test]
+fn identify_verify_and_deliver_end_in_files() {
+    let mut bench = Bench::at(Step::Identify);
+    assert_eq!(offers(&bench.wizard), ["Identify*", "Next -- identify first", "Back", "Quit"]);
+    let effects = bench.intend(Intent::Identify);
+    let (_, request) = started(&effects);
+    let Request::Identify(request) = request else { panic!() };
+    // The drift pose is in neither set.
+    assert_eq!(request.identification.samples.len(), IDENTIFICATION);
+    assert_eq!(request.verification.samples.len(), VERIFICATION);
+    bench.settle(effects);
+    assert_eq!(offers(&bench.wizard)[..2], ["Next*", "Identify"]);
+    let Content::Identify(view) = bench.wizard.view().content else { panic!() };
+    assert!(view.is_current && view.is_usable);
+    assert_eq!(view.summary.unwrap().verification, None, "that is for the next step");
+    bench.does(Intent::Next);
+    let Content::Verify(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!((view.samples, view.is_current, view.too_few), (VERIFICATION, true, None));
+    let verification = view.verification.unwrap();
+    let mean = |model: &crate::session::summary::ModelSummary| model.position_mm.unwrap().mean;
+    assert!(mean(&verification.identified) < 0.2 * mean(&verification.nominal));
+    assert_eq!(offers(&bench.wizard), ["Next*", "Back", "Quit"]);
+    bench.does(Intent::Next);
+    assert_eq!(offers(&bench.wizard), ["Deliver*", "Back", "Quit"]);
+    let effects = bench.intend(Intent::Deliver);
+    assert_eq!(texts(&effects), ["start writing files"]);
+    bench.settle(effects);
+    let files = ["plan.csv", "measurements.csv", "calibration.ron", "report.json"];
+    assert_eq!(bench.wizard.session().delivered, files);
+    let Content::Deliver(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.files, files);
+    assert!(view.is_current);
+}
+
+#[test]
+fn files_that_cannot_be_written_can_be_written_again() {
+    let mut bench = Bench::at(Step::Deliver);
+    let effects = bench.intend(Intent::Deliver);
+    let (id, _) = started(&effects);
+    assert!(bench.answer(id, super::bench::failure("disk full")).is_empty());
+    assert_eq!(bench.told(), "disk full");
+    assert!(offers(&bench.wizard).contains(&text("Deliver*")));
+    bench.does(Intent::Deliver);
+    assert_eq!(bench.wizard.session().delivered.len(), 4);
+}
+
+#[test]
+fn going_back_and_forth_loses_nothing_measured() {
+    let mut bench = Bench::at(Step::Deliver);
+    let before = bench.wizard.session().clone();
+    let views: Vec<Content> = std::iter::from_fn(|| {
+        let content = bench.wizard.view().content;
+        (bench.step() != Step::Profile).then(|| bench.does(Intent::Back)).map(|()| content)
+    })
+    .collect();
+    assert_eq!(views.len(), 7);
+    for (step, seen) in Step::ALL.iter().skip(1).zip(views.iter().rev()) {
+        bench.does(Intent::Next);
+        assert_eq!((bench.step(), &bench.wizard.view().content), (*step, seen));
+    }
+    let after = bench.wizard.session();
+    assert_eq!((&after.samples, &after.rows, &after.identified), (&before.samples, &before.rows, &before.identified));
+    assert!(after.is_current());
+}
+
+#[test]
+fn what_is_not_on_offer_is_answered_with_a_reason() {
+    let mut bench = Bench::at(Step::Plan);
+    assert!(bench.intend(Intent::Measure).is_empty());
+    assert_eq!(bench.told(), "not now: 'Measure' has no meaning in the step Plan");
+    assert!(bench.intend(Intent::Next).is_empty());
+    assert_eq!(bench.told(), "not now: accept a plan first");
+    assert!(offers(&bench.wizard).contains(&text("Dismiss")));
+    bench.does(Intent::Dismiss);
+    assert_eq!(bench.told(), "");
+    assert!(!offers(&bench.wizard).contains(&text("Dismiss")));
+}
+
+#[test]
+fn what_is_measured_fixes_robot_instrument_and_target() {
+    let mut bench = Bench::at(Step::Capture);
+    bench.measure(1);
+    for _ in 0..2 {
+        bench.does(Intent::Back);
+    }
+    assert_eq!(bench.step(), Step::Target);
+    let fixed = "samples are measured with this SMR; another mounting is another session";
+    assert_eq!(blocked(&bench.wizard, "ChooseTarget"), fixed);
+    assert_eq!(blocked(&bench.wizard, "StartCircles"), fixed);
+    assert!(bench.intend(Intent::ChooseTarget(TargetChoice::Profile)).is_empty());
+    bench.does(Intent::Back);
+    assert_eq!(
+        blocked(&bench.wizard, "ChooseInstrument"),
+        "points of another instrument cannot be mixed with those measured; start another session"
+    );
+    assert!(bench.intend(Intent::ChooseInstrument(MANUAL)).is_empty());
+    bench.does(Intent::Back);
+    assert_eq!(
+        blocked(&bench.wizard, "ChooseProfile"),
+        "something is measured already: a session has one robot; start another session"
+    );
+    assert!(bench.intend(Intent::ChooseProfile(text("ur5"))).is_empty());
+    assert_eq!(blocked(&bench.wizard, "NameSession"), "the session has its name");
+    let Content::Profile(view) = bench.wizard.view().content else { panic!() };
+    assert!(view.is_fixed);
+    assert_eq!(view.chosen.unwrap().name, "soochow");
+    // Taking the last sample back does not open them again: it was measured all the same.
+    for _ in 0..4 {
+        bench.does(Intent::Next);
+    }
+    bench.does(Intent::Undo);
+    bench.does(Intent::Back);
+    bench.does(Intent::Back);
+    assert_eq!(blocked(&bench.wizard, "ChooseTarget"), fixed);
+}
+
+#[test]
+fn every_offer_has_a_label_and_at_most_one_is_the_default() {
+    for step in Step::ALL {
+        let bench = Bench::at(step);
+        let intents = bench.wizard.intents();
+        assert!(intents.iter().all(|info| !info.label.is_empty()), "{step}");
+        let defaults: Vec<&str> =
+            intents.iter().filter(|info| info.is_default).map(|info| info.intent.name()).collect();
+        assert!(defaults.len() <= 1, "{step}: {defaults:?}");
+        assert!(intents.iter().filter(|info| info.is_default).all(crate::wizard::IntentInfo::is_enabled));
+        assert_eq!(bench.wizard.view().intents, intents);
+    }
+}
