@@ -438,7 +438,8 @@ impl Wizard {
     /// Ends in good order: what is under way is cancelled, the journal is closed.
     fn shut_down(&mut self, cause: String) -> Vec<Effect> {
         if self.ended.is_some() {
-            return Vec::new();
+            // Told a second time, nothing is waited for any more.
+            return vec![Effect::Exit];
         }
         // What is on its way to the disk is waited for: an opened session is closed in good order.
         let has_session = self.session.opened.is_some() || self.writing.is_some();

@@ -44,6 +44,8 @@ pub struct Session {
     pub rows: Vec<Row>,
     /// Plans that were accepted, without their rows.
     pub plan: Option<PlanText>,
+    /// Row of the plan that was measured, skipped or gone to last.
+    pub shown: Option<usize>,
     /// Everything that was measured.
     pub samples: Vec<Sample>,
     /// Measurements that gave no sample.
@@ -203,6 +205,7 @@ impl Session {
                 self.robot = Some(robot(line.number, source, sha256, text)?);
                 self.target = None;
                 self.rows.clear();
+                self.shown = None;
                 self.plan = None;
             }
             Entry::Step(step) => self.step = *step,
@@ -239,13 +242,22 @@ impl Session {
             Entry::Correction(correction) => {
                 self.correct(correction).ok_or_else(|| misfit("a correction of an unknown sample"))?;
             }
+            Entry::Row(row) => {
+                self.rows.get(*row).ok_or_else(|| misfit("a row that is in no plan"))?;
+                self.shown = Some(*row);
+            }
             Entry::Skipped { row, skipped } => {
                 self.rows.get_mut(*row).ok_or_else(|| misfit("a row that is in no plan"))?.skipped = *skipped;
+                self.shown = Some(*row);
             }
             Entry::Note { pose, text } => {
                 self.notes.push(Note { time: line.time, pose: pose.clone(), text: text.clone() });
             }
-            Entry::Identified(result) => self.identified = Some(result.clone()),
+            Entry::Identified(result) => {
+                self.identified = Some(result.clone());
+                // Files of an earlier result are not those of this one.
+                self.delivered.clear();
+            }
             Entry::Delivered { files } => self.delivered.clone_from(files),
             Entry::Resumed { .. } => {
                 self.resumed += 1;
@@ -407,6 +419,7 @@ impl Session {
             return Err("a sample whose joint values do not fit the robot");
         }
         self.measurements = noted.number;
+        self.shown = Some(noted.row);
         for sample in self.samples.iter_mut().filter(|sample| sample.row == noted.row) {
             if matches!(sample.state, SampleState::Counts | SampleState::LeftOut) {
                 sample.state = SampleState::Superseded;
@@ -440,7 +453,10 @@ impl Session {
             // One that does not count anyway stays what it is: it must not come back beside the one that counts instead.
             Decision::LeaveOut if sample.state == SampleState::Counts => sample.state = SampleState::LeftOut,
             Decision::LeaveOut => {}
-            Decision::Undo => sample.state = SampleState::Undone,
+            Decision::Undo => {
+                sample.state = SampleState::Undone;
+                self.shown = Some(sample.row);
+            }
         }
         Some(())
     }

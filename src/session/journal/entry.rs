@@ -67,6 +67,8 @@ pub enum Entry {
     },
     /// A correction of what was noted wrongly.
     Correction(Correction),
+    /// The operator went to this row of the plan, from 0.
+    Row(usize),
     /// A row of the plan will not be measured, or will be after all.
     Skipped {
         /// Row of the plan, from 0.

@@ -191,6 +191,7 @@ fn all_entries() -> Vec<Entry> {
         Entry::Sample(bare),
         Entry::Refused { number: 9, pose: "7".to_owned(), reason: TRICKY.to_owned(), xyz_mm: Some((1.0, 2.0, 3.0)) },
         Entry::Refused { number: 10, pose: String::new(), reason: String::new(), xyz_mm: None },
+        Entry::Row(3),
         Entry::Skipped { row: 3, skipped: true },
         Entry::Skipped { row: 3, skipped: false },
         Entry::Note { pose: Some(TRICKY.to_owned()), text: TRICKY.to_owned() },
@@ -232,6 +233,7 @@ fn variant(entry: &Entry) -> usize {
         Entry::Delivered { .. } => 16,
         Entry::Resumed { .. } => 17,
         Entry::Closed { .. } => 18,
+        Entry::Row(_) => 19,
     }
 }
 
@@ -239,7 +241,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 19);
+    assert_eq!(variants.len(), 20);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

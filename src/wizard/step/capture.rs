@@ -57,10 +57,11 @@ pub(super) fn too_few(session: &Session) -> Option<String> {
 }
 
 impl CaptureStep {
-    /// Begins at the first row that waits to be measured.
+    /// Begins where the operator was last, or at the next row that waits to be measured.
     pub(super) fn enter(session: &Session) -> Self {
+        let last = session.shown.unwrap_or(0);
         let mut step = Self {
-            row: session.open_rows().next(),
+            row: session.open_rows().find(|row| *row >= last).or_else(|| session.open_rows().next()),
             held: None,
             question: None,
             measuring: false,
@@ -153,9 +154,7 @@ impl CaptureStep {
 
     /// Writes a sample with what the checks say about it.
     fn write(mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
-        let earlier = noted.findings.clone();
         noted.findings = checks::findings(cx, &noted);
-        noted.findings.extend(earlier);
         vec![Action::Write(vec![Entry::Sample(noted)])]
     }
 
@@ -170,7 +169,7 @@ impl CaptureStep {
     }
 
     /// Shows a row by the name of its pose: one that waits, else one that is skipped, else one that is done.
-    fn go_to(&mut self, pose: &str, session: &Session) -> Vec<Action> {
+    fn go_to(pose: &str, session: &Session) -> Vec<Action> {
         let named = |row: &usize| {
             session.rows.get(*row).is_some_and(|row| row.planned.pose == pose && row.planned.kind.is_measured())
         };
@@ -184,10 +183,9 @@ impl CaptureStep {
             let pose = crate::session::printable(pose);
             return vec![Action::Say(Notice::error(format!("there is no pose '{pose}' in the plan")))];
         };
-        self.row = Some(row);
-        self.held = None;
         let is_skipped = session.rows.get(row).is_some_and(|row| row.skipped);
-        is_skipped.then(|| Action::Write(vec![Entry::Skipped { row, skipped: false }])).into_iter().collect()
+        let after_all = is_skipped.then_some(Entry::Skipped { row, skipped: false });
+        vec![Action::Write(after_all.into_iter().chain([Entry::Row(row)]).collect())]
     }
 
     fn manual_unit(cx: &Cx<'_>) -> Option<CoordinateUnit> {
@@ -235,12 +233,12 @@ impl StepMachine for CaptureStep {
             .unless(blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()));
         let skip_blocked = no_row.clone().or_else(|| question.clone());
         let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
-            .unless(not_by_hand.or_else(|| blocked.clone()).or(question));
+            .unless(not_by_hand.or(if asked.is_some() { no_instrument.clone() } else { blocked.clone() }));
         let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone());
         let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session));
         let mut intents = vec![
             if has_more && !manual { measure.default_action() } else { measure },
-            if has_more && manual { type_in.default_action() } else { type_in },
+            if manual && (has_more || asked.is_some()) { type_in.default_action() } else { type_in },
             IntentInfo::new(Intent::AcceptReading, "take the reading as it is").unless(not_held),
             IntentInfo::new(Intent::MeasureAgain, "measure again").unless(again_blocked).default_action(),
             IntentInfo::new(Intent::Keep, "keep the sample").unless(no_question.clone()),
@@ -269,20 +267,31 @@ impl StepMachine for CaptureStep {
                 self.row.map_or_else(Vec::new, |row| self.measure(cx, row))
             }
             Intent::TypeReading(text) => match reading::parse(&text, Self::manual_unit(cx).unwrap_or_default()) {
-                Ok(point) => self.take(&reading::typed(point), cx),
+                Ok(point) => {
+                    // While a sample is in question, typing is measuring it again.
+                    let asked = self.question.and_then(|number| session.sample(number)).map(|sample| sample.row);
+                    self.row = asked.or(self.row);
+                    self.take(&reading::typed(point), cx)
+                }
                 Err(message) => vec![Action::Say(Notice::error(message))],
             },
             Intent::AcceptReading => {
                 let Some(Held { mut noted, reason }) = self.held.take() else { return Vec::new() };
-                noted.number = session.measurements + 1;
+                let number = session.measurements + 1;
+                noted.number = number;
+                noted.findings = checks::findings(cx, &noted);
+                // Taking it as it is settles that it scatters; what its distances say is another question.
+                let is_settled = noted.findings.is_empty();
                 noted.findings.push(FindingText {
-                    about: noted.number,
+                    about: number,
                     cause: "not_at_rest".to_owned(),
                     ratio: 0.0,
                     message: reason,
                     remedy: None,
                 });
-                Self::write(noted, cx)
+                let keep = Entry::Decision { sample: number, decision: Decision::Keep };
+                let entries = std::iter::once(Entry::Sample(noted)).chain(is_settled.then_some(keep));
+                vec![Action::Write(entries.collect())]
             }
             Intent::MeasureAgain => {
                 let row = self.question.and_then(|number| session.sample(number)).map(|sample| sample.row);
@@ -305,7 +314,7 @@ impl StepMachine for CaptureStep {
                     last.map(|sample| Entry::Decision { sample: sample.noted.number, decision: Decision::Undo });
                 entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
             }
-            Intent::GoToPose(pose) => self.go_to(&pose, session),
+            Intent::GoToPose(pose) => Self::go_to(&pose, session),
             Intent::Note(text) => {
                 let text = crate::session::printable(text.trim());
                 let pose = self.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.pose.clone());
@@ -372,6 +381,10 @@ impl StepMachine for CaptureStep {
                 self.row = session.open_rows().next();
                 self.ask(session);
                 return vec![Action::Say(Notice::info(corrected(correction)))];
+            }
+            Entry::Row(row) => {
+                self.row = Some(*row);
+                self.held = None;
             }
             Entry::Skipped { skipped: true, .. } => self.advance(session),
             Entry::PlanExtended(_) | Entry::Plan(_) => {

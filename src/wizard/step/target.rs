@@ -61,9 +61,13 @@ impl TargetStep {
         let previous = cx.session.circle_points.last().map(|point| crate::session::journal::from_xyz_mm(point.xyz_mm));
         let sigma = reading.sigma.or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
         let limit = reading::scatter_limit(sigma);
-        let shaky =
-            reading.scatter.filter(|scatter| *scatter > limit).map(|scatter| reading::scatter_message(scatter, limit));
-        if let Some(reason) = reading::gate(&reading.point, previous.as_ref()).or(shaky) {
+        let shaky = reading.scatter.filter(|scatter| scatter.is_nan() || *scatter > limit);
+        let shaky = shaky.map(|scatter| reading::scatter_message(scatter, limit));
+        // As it will be noted: the one before was rounded as well.
+        let xyz_mm = to_xyz_mm(&reading.point, 9);
+        let gate = reading::gate(&crate::session::journal::from_xyz_mm(xyz_mm), previous.as_ref())
+            .or_else(|| reading::foreign_joints(reading, robot.joint_types.len()));
+        if let Some(reason) = gate.or(shaky) {
             let pose = pose_name(robot, next.joint, next.index);
             let notice = Notice::error(reason.clone()).hint("measure again");
             return vec![
@@ -76,7 +80,7 @@ impl TargetStep {
             number,
             joint: next.joint,
             joints: to_edge(joints, &robot.joint_types),
-            xyz_mm: to_xyz_mm(&reading.point, 9),
+            xyz_mm,
         })])]
     }
 }

@@ -151,7 +151,10 @@ fn a_skipped_pose_can_be_measured_after_all() {
     assert_eq!(bench.capture().kind, Some(PoseKind::Drift));
     bench.does(Intent::Measure);
     let effects = bench.intend(go_to("1"));
-    assert_eq!(texts(&effects), ["append 12 row 2 of the plan is to be measured after all"]);
+    assert_eq!(
+        texts(&effects),
+        ["append 13 row 2 of the plan is to be measured after all | 14 went to row 2 of the plan"]
+    );
     bench.settle(effects);
     let view = bench.capture();
     assert_eq!((view.row, view.skipped), (Some(1), 0));

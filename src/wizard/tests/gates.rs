@@ -65,7 +65,10 @@ fn a_link_that_fails_is_noted_with_its_message() {
 fn shots_that_scatter_are_held_back_until_they_are_taken() {
     for scatter in [0.4 * MILLIMETRE, f64::NAN] {
         let mut bench = Bench::at(Step::Capture);
-        assert!(measure(&mut bench, |reading| reading.scatter = Some(scatter)).is_empty(), "nothing is written");
+        let effects = measure(&mut bench, |reading| reading.scatter = Some(scatter));
+        let (_, lines) = appended(&effects);
+        assert!(matches!(lines[0].entry, Entry::Refused { number: 1, .. }), "noted with its reason, no sample");
+        bench.settle(effects);
         assert_eq!(bench.wizard.notice().unwrap().severity, Severity::Attention);
         assert_eq!(bench.capture().held, Some(bench.told()));
         assert_eq!((bench.capture().measured, bench.capture().pose.as_deref()), (0, Some("1")));
@@ -73,7 +76,8 @@ fn shots_that_scatter_are_held_back_until_they_are_taken() {
         let effects = bench.intend(Intent::AcceptReading);
         let (_, lines) = appended(&effects);
         let Entry::Sample(noted) = &lines[0].entry else { panic!() };
-        assert_eq!((noted.number, noted.findings.len(), noted.findings[0].cause.as_str()), (1, 1, "not_at_rest"));
+        assert_eq!((noted.number, noted.findings.len(), noted.findings[0].cause.as_str()), (2, 1, "not_at_rest"));
+        assert!(matches!(lines[1].entry, Entry::Decision { sample: 2, .. }), "that it scatters is decided with it");
         bench.settle(effects);
         assert_eq!((bench.capture().measured, bench.capture().held), (1, None));
     }
@@ -82,13 +86,17 @@ fn shots_that_scatter_are_held_back_until_they_are_taken() {
 #[test]
 fn a_held_reading_gives_way_to_a_better_one_or_another_pose() {
     let mut bench = Bench::at(Step::Capture);
-    measure(&mut bench, |reading| reading.scatter = Some(MILLIMETRE));
+    let hold = |bench: &mut Bench| {
+        let effects = measure(bench, |reading| reading.scatter = Some(MILLIMETRE));
+        bench.settle(effects);
+    };
+    hold(&mut bench);
     assert!(bench.told().starts_with("the shots scatter by 1.000 mm"), "{}", bench.told());
     bench.does(Intent::Measure);
     assert_eq!((bench.capture().held, bench.capture().measured), (None, 1));
     assert_eq!(blocked(&bench.wizard, "AcceptReading"), "no reading is held back");
     for leave in [Intent::GoToPose("4".to_owned()), Intent::Skip] {
-        measure(&mut bench, |reading| reading.scatter = Some(MILLIMETRE));
+        hold(&mut bench);
         assert!(bench.capture().held.is_some());
         bench.does(leave);
         assert_eq!(bench.capture().held, None);
@@ -161,12 +169,17 @@ fn a_whole_session_can_be_typed() {
     assert!(bench.wizard.session().is_current());
 }
 
-/// A session with a sample in question: its shots scattered and were taken all the same.
+/// Measures the pose shown 20 mm beside where it is.
+fn measure_badly(bench: &mut Bench) {
+    let effects = measure(bench, |reading| reading.point.x += 20.0 * MILLIMETRE);
+    bench.settle(effects);
+}
+
+/// A session with a sample in question: pose 13, the 13th measurement.
 fn in_question() -> Bench {
     let mut bench = Bench::at(Step::Capture);
-    bench.measure(2);
-    measure(&mut bench, |reading| reading.scatter = Some(MILLIMETRE));
-    bench.does(Intent::AcceptReading);
+    bench.measure(12);
+    measure_badly(&mut bench);
     bench
 }
 
@@ -175,9 +188,9 @@ fn a_sample_in_question_has_to_be_decided_about() {
     let bench = in_question();
     let view = bench.capture();
     let finding = view.finding.unwrap();
-    assert_eq!((finding.pose.as_str(), finding.measurement, finding.cause.as_str()), ("3", 3, "not_at_rest"));
+    assert_eq!((finding.pose.as_str(), finding.measurement, finding.cause.as_str()), ("13", 13, "unexplained"));
     assert!(!finding.has_remedy);
-    assert_eq!(view.pose.as_deref(), Some("3"), "the pose in question stays on the screen");
+    assert_eq!(view.pose.as_deref(), Some("13"), "the pose in question stays on the screen");
     let first = "decide first about the sample in question: keep it, measure again, or leave it out";
     assert_eq!(blocked(&bench.wizard, "Measure"), first);
     assert_eq!(blocked(&bench.wizard, "Skip"), first);
@@ -196,22 +209,22 @@ fn it_is_kept_left_out_measured_again_or_taken_back() {
         let view = bench.capture();
         assert_eq!(view.finding, None);
         let states: Vec<SampleState> = bench.wizard.session().samples.iter().map(|sample| sample.state).collect();
-        (states[2], view.measured, view.pose.unwrap())
+        (states[12], view.measured, view.pose.unwrap())
     };
-    assert_eq!(decide(Intent::Keep), (SampleState::Counts, 3, "4".to_owned()));
-    assert_eq!(decide(Intent::LeaveOut), (SampleState::LeftOut, 2, "4".to_owned()));
-    assert_eq!(decide(Intent::MeasureAgain), (SampleState::Superseded, 3, "4".to_owned()));
-    assert_eq!(decide(Intent::Undo), (SampleState::Undone, 2, "3".to_owned()));
+    assert_eq!(decide(Intent::Keep), (SampleState::Counts, 13, "14".to_owned()));
+    assert_eq!(decide(Intent::LeaveOut), (SampleState::LeftOut, 12, "14".to_owned()));
+    assert_eq!(decide(Intent::MeasureAgain), (SampleState::Superseded, 13, "14".to_owned()));
+    assert_eq!(decide(Intent::Undo), (SampleState::Undone, 12, "13".to_owned()));
 }
 
 #[test]
 fn a_pose_that_is_left_out_can_be_measured_again() {
     let mut bench = in_question();
     bench.does(Intent::LeaveOut);
-    assert_eq!(bench.capture().rows[2].state, crate::wizard::view::RowState::LeftOut);
-    bench.does(Intent::GoToPose("3".to_owned()));
+    assert_eq!(bench.capture().rows[12].state, crate::wizard::view::RowState::LeftOut);
+    bench.does(Intent::GoToPose("13".to_owned()));
     bench.does(Intent::Measure);
-    assert_eq!(bench.capture().rows[2].state, crate::wizard::view::RowState::Measured);
+    assert_eq!(bench.capture().rows[12].state, crate::wizard::view::RowState::Measured);
 }
 
 #[test]
@@ -256,8 +269,7 @@ fn one_question_after_the_other_is_asked() {
 fn a_question_about_the_last_sample_comes_before_going_on() {
     let mut bench = Bench::at(Step::Capture);
     bench.measure(super::bench::MEASURED - 1);
-    measure(&mut bench, |reading| reading.scatter = Some(MILLIMETRE));
-    bench.does(Intent::AcceptReading);
+    measure_badly(&mut bench);
     let defaults =
         |bench: &Bench| offers(&bench.wizard).into_iter().filter(|offer| offer.contains('*')).collect::<Vec<_>>();
     assert_eq!(defaults(&bench), ["MeasureAgain*"]);

@@ -15,7 +15,7 @@ fn is_over(bench: &mut Bench) {
     assert!(bench.wizard.is_idle());
     assert!(bench.wizard.intents().is_empty());
     let before = state(&bench.wizard);
-    assert!(shut_down(bench).is_empty());
+    assert_eq!(texts(&shut_down(bench)), ["exit"], "told again, it does not wait");
     for intent in [Intent::Quit, Intent::Retry, Intent::Measure, Intent::Next, Intent::Cancel] {
         assert!(bench.intend(intent).is_empty());
     }
@@ -118,12 +118,15 @@ fn a_disk_that_has_failed_before_does_not_hold_it_up() {
 }
 
 #[test]
-fn a_folder_that_is_just_being_made_is_not_waited_for() {
+fn a_folder_that_is_just_being_made_is_opened_and_closed() {
     let mut bench = Bench::new();
     bench.does(Intent::ChooseProfile("soochow".to_owned()));
     let effects = bench.intend(Intent::Next);
     assert_eq!(texts(&effects).len(), 1);
-    assert_eq!(texts(&shut_down(&mut bench)), ["exit"]);
+    assert!(shut_down(&mut bench).is_empty());
+    bench.settle(effects);
+    assert_eq!(bench.exits, 1);
+    assert!(bench.wizard.session().closed);
     is_over(&mut bench);
 }
 

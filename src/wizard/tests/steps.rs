@@ -55,7 +55,7 @@ fn names_that_cannot_be_a_folder_are_refused() {
     for name in ["", "..", "a/b", "-x", "ä", &"x".repeat(65)] {
         bench.does(Intent::NameSession(text(name)));
         let notice = bench.wizard.notice().unwrap();
-        assert_eq!(notice.severity, Severity::Attention, "{name}");
+        assert_eq!(notice.severity, Severity::Error, "{name}");
         assert!(notice.what.contains("cannot be the name"), "{}", notice.what);
     }
     let Content::Profile(view) = bench.wizard.view().content else { panic!() };
