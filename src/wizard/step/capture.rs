@@ -233,7 +233,7 @@ impl StepMachine for CaptureStep {
             .unless(blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()));
         let skip_blocked = no_row.clone().or_else(|| question.clone());
         let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
-            .unless(not_by_hand.or(if asked.is_some() { no_instrument.clone() } else { blocked.clone() }));
+            .unless(not_by_hand.or_else(|| if asked.is_some() { no_instrument.clone() } else { blocked.clone() }));
         let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone());
         let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session));
         let mut intents = vec![

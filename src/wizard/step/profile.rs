@@ -78,17 +78,14 @@ impl StepMachine for ProfileStep {
                 let sha256 = sha256(chosen.text.as_bytes());
                 let profile = Entry::Profile { source: chosen.source.clone(), sha256, text: chosen.text.clone() };
                 let entries = vec![profile, Entry::Step(Step::Instrument)];
-                match (cx.session.opened, self.session_name(cx)) {
-                    (None, Some(name)) => vec![Action::Create { name, entries }],
-                    // An instrument that looked at the robot before does not know this one.
-                    _ => {
-                        let profile = Box::new(chosen.profile.clone());
-                        let instrument = cx.session.instrument.clone();
-                        let connect =
-                            instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
-                        [Action::Write(entries), Action::Disconnect].into_iter().chain(connect).collect()
-                    }
+                if let (None, Some(name)) = (cx.session.opened, self.session_name(cx)) {
+                    return vec![Action::Create { name, entries }];
                 }
+                // An instrument that looked at the robot before does not know this one.
+                let profile = Box::new(chosen.profile.clone());
+                let instrument = cx.session.instrument.clone();
+                let connect = instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
+                [Action::Write(entries), Action::Disconnect].into_iter().chain(connect).collect()
             }
             _ => Vec::new(),
         }
