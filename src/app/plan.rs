@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn without_options_the_command_asks_for_the_default() {
-        let Command::Plan(args) = Cli::parse_from(["trupose", "plan", "--profile", "soochow"]).command else {
+        let Some(Command::Plan(args)) = Cli::parse_from(["trupose", "plan", "--profile", "soochow"]).command else {
             panic!("not the command");
         };
         let profile = load::profile(&args.profile).unwrap().profile;
