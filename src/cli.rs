@@ -17,13 +17,7 @@ use crate::units::from_mm;
 ///
 /// Without a command it opens the guided calibration in the terminal.
 #[derive(Debug, Parser)]
-#[command(
-    name = "trupose",
-    version,
-    about,
-    max_term_width = 80,
-    args_conflicts_with_subcommands = true
-)]
+#[command(name = "trupose", version, about, max_term_width = 80, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]

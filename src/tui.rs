@@ -83,6 +83,7 @@ pub fn run(mut engine: Engine, options: Options) -> io::Result<Exit> {
     if options.forces_colour {
         crossterm::style::force_color_output(true);
     }
+    terminal::note_folder(engine.wizard().folder());
     terminal::install_panic_hook();
     let guard = TerminalGuard::enter(options.has_mouse)?;
     let inputs = input::start(engine.sender())?;
@@ -186,7 +187,7 @@ impl Driver<'_> {
     /// The view as it is now; what changed is to be drawn.
     fn look(&mut self, before: crate::wizard::ViewModel, is_due: &mut bool) -> crate::wizard::ViewModel {
         // Nobody reads them here; they must not pile up.
-        drop(self.engine.happenings().count());
+        self.engine.happenings().for_each(drop);
         let view = self.engine.wizard().view();
         if view == before {
             return before;

@@ -20,7 +20,8 @@ pub(super) fn run<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let terminal = terminal(args)?;
-    let mut engine = Engine::new(options(sessions)).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    let mut engine =
+        Engine::new(options(sessions)).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     if let Some(profile) = profile {
         engine.intend(Intent::ChooseProfile(profile.to_owned()));
     }

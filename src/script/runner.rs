@@ -170,7 +170,11 @@ impl<'a, W: Write> Runner<'a, W> {
     fn perform(&mut self, intent: &Intent) -> Result<(), Stop> {
         match self.offer(intent) {
             None => {
-                return Err(Stop::Failed(format!("{} is not offered here; offered: {}", intent.name(), self.offered())));
+                return Err(Stop::Failed(format!(
+                    "{} is not offered here; offered: {}",
+                    intent.name(),
+                    self.offered()
+                )));
             }
             Some(IntentInfo { blocked: Some(reason), .. }) => {
                 return Err(Stop::Failed(format!("{} is not possible now: {reason}", intent.name())));

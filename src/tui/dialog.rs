@@ -145,7 +145,8 @@ impl Dialog {
         match self {
             Self::Confirm { lines, is_yes, .. } => {
                 let columns = usize::from(area.width);
-                let lines: Vec<String> = lines.iter().flat_map(|line| wrapped(&theme.glyphs.show(line), columns)).collect();
+                let lines: Vec<String> =
+                    lines.iter().flat_map(|line| wrapped(&theme.glyphs.show(line), columns)).collect();
                 let mut row = 0;
                 for line in &lines {
                     let role = if row == 0 { Role::Title } else { Role::Plain };
@@ -238,6 +239,9 @@ mod tests {
     fn a_text_becomes_an_intent() {
         let mut dialog = Dialog::Text { field: TextField::new("Note", ""), intent: Intent::Note };
         dialog.paste(" warm tool ");
-        assert_eq!(dialog.on_key(Key::plain_code(KeyCode::Enter)), Answer::Intend(Intent::Note("warm tool".to_owned())));
+        assert_eq!(
+            dialog.on_key(Key::plain_code(KeyCode::Enter)),
+            Answer::Intend(Intent::Note("warm tool".to_owned()))
+        );
     }
 }

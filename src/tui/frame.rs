@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! trupose · robot                              step 5 of 8: Capture
-//! session demo · tracker answers · 12 samples · 34 min · saved
+//! session demo · saved · 12 samples · 34 min · instrument
 //! ──────────────────────────────────────────────────────────────────
 //! What this step is for.
 //!
@@ -89,16 +89,17 @@ fn header(header: &Header, theme: Theme, area: Rect, buf: &mut Buffer) {
         Some(session) => format!("session {session}"),
         None => "not saved yet: no session".to_owned(),
     }];
-    parts.push(header.instrument.clone().unwrap_or_else(|| "no instrument".to_owned()));
+    if header.session.is_some() {
+        parts.push(if header.is_saving { "saving" } else { "saved" }.to_owned());
+    }
     if header.samples > 0 {
         parts.push(format!("{} {}", header.samples, if header.samples == 1 { "sample" } else { "samples" }));
     }
     if header.elapsed_min >= 1.0 {
         parts.push(format!("{:.0} min", header.elapsed_min));
     }
-    if header.session.is_some() {
-        parts.push(if header.is_saving { "saving" } else { "saved" }.to_owned());
-    }
+    // The longest last: it may be cut off.
+    parts.push(header.instrument.clone().unwrap_or_else(|| "no instrument".to_owned()));
     let line = shortened(&glyphs.show(&parts.join(glyphs.dot())), usize::from(area.width), glyphs);
     paint::text(buf, area, (0, 1), &line, theme.style(Role::Dim));
 }

@@ -33,7 +33,7 @@ fn lines(items: &[Item], theme: Theme, columns: usize) -> Vec<(String, String, R
 }
 
 /// Draws the page from line `scroll` on; gives back how far it can be scrolled.
-pub fn draw(items: &[Item], scroll: usize, theme: Theme, area: Rect, buf: &mut Buffer) -> usize {
+pub(super) fn draw(items: &[Item], scroll: usize, theme: Theme, area: Rect, buf: &mut Buffer) -> usize {
     let lines = lines(items, theme, area.width.into());
     let last = lines.len().saturating_sub(area.height.into());
     for (row, (key, text, role)) in (0..area.height).zip(lines.iter().skip(scroll.min(last))) {

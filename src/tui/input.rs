@@ -34,7 +34,7 @@ pub enum Input {
 ///
 /// # Errors
 /// The system refuses a thread.
-pub fn start(events: Events) -> io::Result<Receiver<Input>> {
+pub(super) fn start(events: Events) -> io::Result<Receiver<Input>> {
     let (sender, inputs) = sync_channel(WAITING);
     thread::Builder::new().name("input".to_owned()).spawn(move || read(&sender, &events))?;
     Ok(inputs)

@@ -46,12 +46,14 @@ impl Key {
             KeyCode::Enter => "Enter".to_owned(),
             KeyCode::Tab => "Tab".to_owned(),
             KeyCode::F(number) => format!("F{number}"),
-            KeyCode::Left | KeyCode::Right | KeyCode::Up | KeyCode::Down if glyphs != Glyphs::Ascii => match self.code {
-                KeyCode::Left => "←".to_owned(),
-                KeyCode::Right => "→".to_owned(),
-                KeyCode::Up => "↑".to_owned(),
-                _ => "↓".to_owned(),
-            },
+            KeyCode::Left | KeyCode::Right | KeyCode::Up | KeyCode::Down if glyphs != Glyphs::Ascii => {
+                match self.code {
+                    KeyCode::Left => "←".to_owned(),
+                    KeyCode::Right => "→".to_owned(),
+                    KeyCode::Up => "↑".to_owned(),
+                    _ => "↓".to_owned(),
+                }
+            }
             code => format!("{code:?}"),
         };
         if self.modifiers.contains(KeyModifiers::CONTROL) { format!("Ctrl-{name}") } else { name }
@@ -217,7 +219,9 @@ pub fn items(offers: &[IntentInfo], glyphs: Glyphs) -> Vec<Item> {
     for binding in &BINDINGS {
         let key = binding.key.name(glyphs);
         match binding.does {
-            Does::Local(_, label) => items.push(Item { key, label: label.to_owned(), blocked: None, rank: binding.rank }),
+            Does::Local(_, label) => {
+                items.push(Item { key, label: label.to_owned(), blocked: None, rank: binding.rank })
+            }
             Does::Default | Does::Offer(_) => {
                 for info in offers.iter().filter(|info| accepts(binding.does, info)) {
                     let is_meant = match meaning(binding.key, offers) {

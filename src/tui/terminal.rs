@@ -29,7 +29,7 @@ static REMARKS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Keeps the terminal in the modes of a full screen until it is dropped.
 #[derive(Debug)]
-pub struct TerminalGuard {
+pub(super) struct TerminalGuard {
     has_mouse: bool,
 }
 
@@ -38,7 +38,7 @@ impl TerminalGuard {
     ///
     /// # Errors
     /// The terminal refuses a mode; those entered before are undone.
-    pub fn enter(has_mouse: bool) -> io::Result<Self> {
+    pub(super) fn enter(has_mouse: bool) -> io::Result<Self> {
         let guard = Self { has_mouse };
         guard.modes_on()?;
         Ok(guard)
@@ -70,14 +70,14 @@ impl TerminalGuard {
     ///
     /// # Errors
     /// The system refuses to stop the process, or the terminal a mode.
-    pub fn suspend(&self) -> io::Result<()> {
+    pub(super) fn suspend(&self) -> io::Result<()> {
         leave();
         signal_hook::low_level::raise(signal_hook::consts::SIGTSTP)?;
         self.modes_on()
     }
 
     /// Leaves the terminal alone for good: it is gone.
-    pub fn abandon(self) {
+    pub(super) fn abandon(self) {
         ENTERED.store(0, Ordering::SeqCst);
         drop(self);
     }
@@ -117,20 +117,20 @@ fn write_leave(out: &mut impl Write, entered: u8) -> io::Result<()> {
 }
 
 /// Tells the panic hook where the session is.
-pub fn note_folder(folder: Option<&str>) {
+pub(super) fn note_folder(folder: Option<&str>) {
     if let Ok(mut held) = FOLDER.lock() {
         *held = folder.map(str::to_owned);
     }
 }
 
 /// What was to be said while the screen was up.
-pub fn take_remarks() -> Vec<String> {
+pub(super) fn take_remarks() -> Vec<String> {
     REMARKS.lock().map(|mut remarks| std::mem::take(&mut *remarks)).unwrap_or_default()
 }
 
 /// From now on a panic gives the terminal back first, then says where it happened and how to go on. A panic of another
 /// thread is noted and leaves the screen alone: whoever waits for that thread is told.
-pub fn install_panic_hook() {
+pub(super) fn install_panic_hook() {
     let owner = thread::current().id();
     panic::set_hook(Box::new(move |info| on_panic(owner, info)));
 }

@@ -190,9 +190,8 @@ mod tests {
         for columns in 0..20 {
             let mut buffer = Buffer::empty(Rect::new(0, 0, columns, 3));
             field.draw(Theme::default(), buffer.area, &mut buffer);
-            let has_cursor = buffer.content.iter().any(|cell| {
-                cell.modifier.contains(ratatui::style::Modifier::REVERSED)
-            });
+            let has_cursor =
+                buffer.content.iter().any(|cell| cell.modifier.contains(ratatui::style::Modifier::REVERSED));
             assert_eq!(has_cursor, columns > 2, "{columns}");
         }
     }

@@ -18,7 +18,7 @@ const FARTHEST_PAN: f64 = 10.0;
 /// Opening of the perspective view (rad), along the height of what is shown.
 const OPENING: f64 = 30.0 * DEGREE;
 /// Part of the area that is used.
-const USED: f64 = 0.94;
+const USED: f64 = 0.88;
 /// Nothing nearer than this is drawn (m).
 const NEAREST: f64 = 1e-3;
 
@@ -117,15 +117,12 @@ impl Camera {
         let right = Vector3::new(-sin_yaw, cos_yaw, 0.0);
         let up = right.cross(&forward);
 
-        let (centre, rho, half) = bounds(shown);
-        // Independent of the yaw, so that circling does not make the picture breathe.
-        let extent_x = 2.0 * rho;
-        let extent_y = 2.0 * (half * cos_pitch + rho * sin_pitch.abs());
+        let (centre, [extent_x, extent_y, deep]) = bounds(shown, &[right, up, forward]);
         let scale = USED * (width / extent_x.max(0.01)).min(height / extent_y.max(0.01));
         let visible = height / scale;
-        let depth = rho.hypot(half).max(0.01);
+        let depth = (deep / 2.0).max(0.01);
         // The whole scene lies before the eye.
-        let distance = (visible.max(extent_x * height / width) / (2.0 * (OPENING / 2.0).tan())).max(1.2 * depth);
+        let distance = (visible.max(extent_x * height / width) / (2.0 * (OPENING / 2.0).tan())).max(1.5 * depth);
         let pan = -right * (self.pan.0 * visible) - up * (self.pan.1 * visible);
         let scale = scale * self.zoom;
         View {
@@ -146,27 +143,27 @@ fn finite(value: f64, otherwise: f64) -> f64 {
     if value.is_finite() { value } else { otherwise }
 }
 
-/// Middle of points with radii, largest horizontal distance from it, and half the height.
-fn bounds(shown: &[(Point3<f64>, f64)]) -> (Point3<f64>, f64, f64) {
-    let usable = |(point, radius): &&(Point3<f64>, f64)| {
-        radius.is_finite() && point.iter().all(|x| x.is_finite() && x.abs() < 1e6)
+/// Middle of points with radii, and how far they extend along three directions.
+fn bounds(shown: &[(Point3<f64>, f64)], along: &[Vector3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
+    let is_usable = |(point, radius): &&(Point3<f64>, f64)| {
+        radius.is_finite() && *radius >= 0.0 && *radius < 1e6 && point.iter().all(|x| x.is_finite() && x.abs() < 1e6)
     };
-    let mut low = Vector3::repeat(f64::INFINITY);
-    let mut high = Vector3::repeat(f64::NEG_INFINITY);
-    for (point, radius) in shown.iter().filter(usable) {
-        low = low.inf(&point.coords.add_scalar(-radius));
-        high = high.sup(&point.coords.add_scalar(*radius));
+    if !shown.iter().any(|point| is_usable(&point)) {
+        return (Point3::origin(), [2.0; 3]);
     }
-    if low.x > high.x {
-        return (Point3::origin(), 1.0, 1.0);
-    }
-    let centre = Point3::from((low + high) / 2.0);
-    let rho = shown
-        .iter()
-        .filter(usable)
-        .map(|(point, radius)| (point - centre).xy().norm() + radius)
-        .fold(0.0, f64::max);
-    (centre, rho, (high.z - low.z) / 2.0)
+    let mut centre = Point3::origin();
+    let extents = along.map(|direction| {
+        let mut low = f64::INFINITY;
+        let mut high = f64::NEG_INFINITY;
+        for (point, radius) in shown.iter().filter(is_usable) {
+            let at = point.coords.dot(&direction);
+            low = low.min(at - radius);
+            high = high.max(at + radius);
+        }
+        centre += direction * f64::midpoint(low, high);
+        high - low
+    });
+    (centre, extents)
 }
 
 /// A camera on an area of dots.

@@ -10,8 +10,8 @@ use crate::tui::theme::Role;
 
 /// What is kept in view around a reflector (m).
 const AROUND_REFLECTOR: f64 = 0.25;
-/// Lines of the floor grid on each side of the base.
-const GRID: i32 = 5;
+/// Most lines of the floor grid on each side of the base.
+const GRID: i32 = 4;
 /// Columns below which words are left out.
 const FEW_COLUMNS: usize = 30;
 
@@ -90,8 +90,10 @@ pub(super) fn scene(scene: &Scene, camera: &Camera, raster: &mut Raster) -> Vec<
     for mark in &scene.marks {
         match mark.kind {
             MarkKind::Left => {
+                // Upright, so that it is no dot of the floor.
                 if let Some(seen) = view.project(&mark.at) {
                     raster.dot(seen.x, seen.y, seen.depth, Material::Left);
+                    raster.dot(seen.x, seen.y + 1.0, seen.depth, Material::Left);
                 }
             }
             MarkKind::Done => blot(&view, &mark.at, Material::Done, raster),
@@ -126,8 +128,9 @@ fn draw_tracker(view: &View, tracker: &Point3<f64>, floor: f64, raster: &mut Ras
 /// Squares of a round size around the base, and the axes x and y.
 fn draw_floor(view: &View, height: f64, radius: f64, raster: &mut Raster) {
     let size = [0.1, 0.25, 0.5, 1.0].into_iter().find(|size| size * f64::from(GRID) >= radius).unwrap_or(2.0);
-    let end = size * f64::from(GRID);
-    for line in -GRID..=GRID {
+    let lines = (1..GRID).find(|lines| size * f64::from(*lines) >= radius).unwrap_or(GRID);
+    let end = size * f64::from(lines);
+    for line in -lines..=lines {
         let at = size * f64::from(line);
         let ends = [(-end, at, end, at), (at, -end, at, end)];
         for (x0, y0, x1, y1) in ends {

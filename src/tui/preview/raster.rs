@@ -18,7 +18,7 @@ const LIGHT: Vector3<f64> = Vector3::new(-0.45, 0.65, 0.61);
 
 /// What a dot belongs to; the later ones win a cell that several share.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Material {
+pub(super) enum Material {
     /// Nothing.
     #[default]
     Empty,
@@ -54,7 +54,7 @@ struct Dot {
 
 /// How a line is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stroke {
+pub(super) enum Stroke {
     /// Solid in front, dotted the wider the farther.
     ByDepth,
     /// Dotted, wider with depth.
@@ -67,20 +67,20 @@ pub enum Stroke {
 
 /// A solid line with a thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solid {
+pub(super) struct Solid {
     /// One end (m).
-    pub from: Point3<f64>,
+    pub(super) from: Point3<f64>,
     /// The other (m).
-    pub to: Point3<f64>,
+    pub(super) to: Point3<f64>,
     /// Distance to the surface (m).
-    pub radius: f64,
+    pub(super) radius: f64,
     /// Nothing of it below this height is seen (m).
-    pub above: f64,
+    pub(super) above: f64,
 }
 
 /// The dots.
 #[derive(Clone, Debug)]
-pub struct Raster {
+pub(super) struct Raster {
     width: usize,
     height: usize,
     depths: Vec<f32>,
@@ -89,18 +89,18 @@ pub struct Raster {
 
 impl Raster {
     /// Empty, `width` × `height` dots.
-    pub fn new(width: usize, height: usize) -> Self {
+    pub(super) fn new(width: usize, height: usize) -> Self {
         let count = width * height;
         Self { width, height, depths: vec![f32::INFINITY; count], dots: vec![Dot::default(); count] }
     }
 
     /// Dots per line.
-    pub const fn width(&self) -> usize {
+    pub(super) const fn width(&self) -> usize {
         self.width
     }
 
     /// Lines.
-    pub const fn height(&self) -> usize {
+    pub(super) const fn height(&self) -> usize {
         self.height
     }
 
@@ -110,12 +110,12 @@ impl Raster {
     }
 
     /// Whether something at this place and depth would be hidden.
-    pub fn is_hidden(&self, x: f64, y: f64, depth: f64) -> bool {
+    pub(super) fn is_hidden(&self, x: f64, y: f64, depth: f64) -> bool {
         self.index(x, y).is_some_and(|index| f64::from(self.depths[index]) < depth - f64::from(CREASE))
     }
 
     /// Lights a dot unless something nearer is there.
-    pub fn dot(&mut self, x: f64, y: f64, depth: f64, material: Material) {
+    pub(super) fn dot(&mut self, x: f64, y: f64, depth: f64, material: Material) {
         let Some(index) = self.index(x, y) else { return };
         let depth = single(depth);
         // On a surface means in front of it.
@@ -126,7 +126,14 @@ impl Raster {
     }
 
     /// Draws a line.
-    pub fn line(&mut self, view: &View, from: &Point3<f64>, to: &Point3<f64>, material: Material, stroke: Stroke) {
+    pub(super) fn line(
+        &mut self,
+        view: &View,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+        material: Material,
+        stroke: Stroke,
+    ) {
         let most = SAMPLES * (self.width + self.height);
         let length = match (view.project(from), view.project(to)) {
             (Some(a), Some(b)) => (a.x - b.x).abs().max((a.y - b.y).abs()),
@@ -150,7 +157,7 @@ impl Raster {
                 Stroke::Thick => true,
                 Stroke::Dashed => drawn % 6.0 < 3.5,
                 Stroke::ByDepth => farness < 0.35 || drawn % (1.0 + 3.0 * farness).round() < 1.0,
-                Stroke::Dotted => drawn % (2.0 + 4.0 * farness).round() < 1.0,
+                Stroke::Dotted => drawn % (3.0 + 3.0 * farness).round() < 1.0,
             };
             if is_lit {
                 self.dot(seen.x, seen.y, seen.depth, material);
@@ -163,7 +170,7 @@ impl Raster {
     }
 
     /// Draws a solid; `part` tells it from its neighbours.
-    pub fn solid(&mut self, view: &View, solid: &Solid, material: Material, part: u16) {
+    pub(super) fn solid(&mut self, view: &View, solid: &Solid, material: Material, part: u16) {
         let Some((left, right, top, bottom)) = self.extent(view, solid) else { return };
         for y in top..bottom {
             for x in left..right {
@@ -231,7 +238,7 @@ impl Raster {
     }
 
     /// What a cell of 2 × 4 dots shows.
-    pub fn cell(&self, column: usize, row: usize) -> CellDots {
+    pub(super) fn cell(&self, column: usize, row: usize) -> CellDots {
         let mut cell = CellDots::default();
         let mut weights = [(Material::Empty, 0_u32); 8];
         for (place, weight) in weights.iter_mut().enumerate() {
@@ -265,15 +272,15 @@ impl Raster {
 
 /// The dots of a cell: bit 2·row + column.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CellDots {
+pub(super) struct CellDots {
     /// All that are lit.
-    pub lit: u8,
+    pub(super) lit: u8,
     /// Those of lines and outlines.
-    pub lines: u8,
+    pub(super) lines: u8,
     /// Sum of the brightness of the rest, 0 … 120.
-    pub tone: u32,
+    pub(super) tone: u32,
     /// What most of it is.
-    pub material: Material,
+    pub(super) material: Material,
 }
 
 /// Depth and outward normal where a ray enters a solid (Ericson, *Real-Time Collision Detection*, 5.3.7).
@@ -347,7 +354,8 @@ mod tests {
     use super::*;
 
     fn flat(width: usize, height: usize) -> View {
-        let camera = Camera { projection: Projection::Orthographic, ..Camera::from_direction(0.0, 0.0) };
+        let mut camera = Camera::from_direction(0.0, 0.0);
+        camera.projection = Projection::Orthographic;
         camera.view(width, height, &[(Point3::origin(), 1.0)])
     }
 

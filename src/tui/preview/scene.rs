@@ -54,7 +54,8 @@ impl Arm {
         let frames = forward.base_from_links(&q);
         let joints: Vec<Point3<f64>> = frames.iter().map(|frame| Point3::from(frame.translation.vector)).collect();
         let bodies = if profile.bodies().is_empty() { slender(&joints) } else { castings(profile, &frames) };
-        let reflector = profile.targets().get(target).map(|target| forward.point_in_base(&q, &target.position_in_flange));
+        let reflector =
+            profile.targets().get(target).map(|target| forward.point_in_base(&q, &target.position_in_flange));
         Self { look, bodies, joints, reflector }
     }
 }
@@ -70,7 +71,8 @@ fn castings(profile: &Profile, frames: &[Isometry3<f64>]) -> Vec<Body> {
 
 /// Bodies along the joints of an arm that has none.
 fn slender(joints: &[Point3<f64>]) -> Vec<Body> {
-    let links = || std::iter::once(&Point3::origin()).chain(joints).copied().zip(joints.iter().copied()).collect::<Vec<_>>();
+    let links =
+        || std::iter::once(&Point3::origin()).chain(joints).copied().zip(joints.iter().copied()).collect::<Vec<_>>();
     let length: f64 = links().iter().map(|(from, to)| (to - from).norm()).sum();
     let base = Body { from: Point3::origin(), to: Point3::origin(), radius: BASE * length };
     let long = links().into_iter().filter(|(from, to)| (to - from).norm() > 1e-6);
@@ -167,7 +169,8 @@ impl Scene {
     pub fn of_session(session: &Session, row: Option<usize>) -> Option<Self> {
         let profile = &session.robot.as_ref()?.profile;
         let shown = row.and_then(|row| session.rows.get(row));
-        let mut scene = shown.map_or_else(|| Self::at_rest(profile), |row| Self::of(profile, &row.planned.configuration));
+        let mut scene =
+            shown.map_or_else(|| Self::at_rest(profile), |row| Self::of(profile, &row.planned.configuration));
         let target = profile.targets().first()?;
         let forward = ForwardKinematics::new(profile.chain());
         let doubts: Vec<usize> = session.doubts().map(|(sample, _)| sample.row).collect();
@@ -221,6 +224,10 @@ impl Scene {
     /// Longest horizontal distance of the arms from the axis of the base.
     pub(super) fn radius(&self) -> f64 {
         let points = self.around_arms();
-        points.iter().map(|(point, radius)| point.coords.xy().norm() + radius).filter(|r| r.is_finite()).fold(0.3, f64::max)
+        points
+            .iter()
+            .map(|(point, radius)| point.coords.xy().norm() + radius)
+            .filter(|r| r.is_finite())
+            .fold(0.3, f64::max)
     }
 }
