@@ -3,6 +3,8 @@
 //! Solids are filled with a dither of their brightness and outlined where something farther begins; lines are dotted the
 //! wider the farther they are. So depth can be read with one colour, and what is near hides what is far.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use super::camera::{Ray, View};
@@ -171,9 +173,12 @@ impl Raster {
 
     /// Draws a solid; `part` tells it from its neighbours.
     pub(super) fn solid(&mut self, view: &View, solid: &Solid, material: Material, part: u16) {
-        let Some((left, right, top, bottom)) = self.extent(view, solid) else { return };
-        for y in top..bottom {
-            for x in left..right {
+        let Some(Extent { columns, rows, band }) = self.extent(view, solid) else { return };
+        for y in rows {
+            for x in columns.clone() {
+                if band.is_some_and(|band| !band.may_cover(x, y)) {
+                    continue;
+                }
                 let Some((depth, normal)) = hit(&view.ray(x, y), solid) else { continue };
                 let index = y * self.width + x;
                 let near = single(depth);
@@ -188,9 +193,10 @@ impl Raster {
         }
     }
 
-    /// Dots that a solid can cover: left, right, top, bottom; the ends excluded.
-    fn extent(&self, view: &View, solid: &Solid) -> Option<(usize, usize, usize, usize)> {
-        let all = (0, self.width, 0, self.height);
+    /// Dots that a solid can cover.
+    fn extent(&self, view: &View, solid: &Solid) -> Option<Extent> {
+        let all = Extent { columns: 0..self.width, rows: 0..self.height, band: None };
+        let mut band = Band { from: (0.0, 0.0), to: (0.0, 0.0), half: 0.0 };
         let mut low = (f64::INFINITY, f64::INFINITY);
         let mut high = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         for end in [&solid.from, &solid.to] {
@@ -202,13 +208,15 @@ impl Raster {
             }
             // Wide enough for a sphere seen askew.
             let around = 1.0 + solid.radius * view.scale_at(nearest) * 1.3;
+            band = Band { from: band.to, to: (seen.x, seen.y), half: around.max(band.half) };
             low = (low.0.min(seen.x - around), low.1.min(seen.y - around));
             high = (high.0.max(seen.x + around), high.1.max(seen.y + around));
         }
         let clamped = |value: f64, size: usize| whole(value.max(0.0)).unwrap_or(size).min(size);
         let (left, right) = (clamped(low.0, self.width), clamped(high.0 + 1.0, self.width));
         let (top, bottom) = (clamped(low.1, self.height), clamped(high.1 + 1.0, self.height));
-        (left < right && top < bottom).then_some((left, right, top, bottom))
+        let extent = Extent { columns: left..right, rows: top..bottom, band: Some(band) };
+        (left < right && top < bottom).then_some(extent)
     }
 
     /// Whether a dot is lit, and whether it belongs to a line or an outline.
@@ -258,6 +266,15 @@ impl Raster {
                 cell.tone += u32::from(dot.tone);
             }
         }
+        if cell.lit == 0 {
+            return cell;
+        }
+        if let Some((first, _)) = weights.iter().find(|(_, weight)| *weight > 0)
+            && weights.iter().all(|(material, weight)| *weight == 0 || material == first)
+        {
+            cell.material = *first;
+            return cell;
+        }
         cell.material = weights
             .iter()
             .map(|(material, _)| *material)
@@ -281,6 +298,35 @@ pub(super) struct CellDots {
     pub(super) tone: u32,
     /// What most of it is.
     pub(super) material: Material,
+}
+
+/// Dots that a solid can cover.
+#[derive(Clone, Debug)]
+struct Extent {
+    columns: Range<usize>,
+    rows: Range<usize>,
+    /// None: anywhere in there.
+    band: Option<Band>,
+}
+
+/// All within a distance of a line, in dots.
+#[derive(Clone, Copy, Debug)]
+struct Band {
+    from: (f64, f64),
+    to: (f64, f64),
+    half: f64,
+}
+
+impl Band {
+    /// Whether the middle of a dot is inside.
+    fn may_cover(&self, x: usize, y: usize) -> bool {
+        let (x, y) = (x as f64 + 0.5 - self.from.0, y as f64 + 0.5 - self.from.1);
+        let (dx, dy) = (self.to.0 - self.from.0, self.to.1 - self.from.1);
+        let length = dx * dx + dy * dy;
+        let along = if length > 0.0 { ((x * dx + y * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
+        let (aside, above) = (x - along * dx, y - along * dy);
+        aside * aside + above * above <= self.half * self.half
+    }
 }
 
 /// Depth and outward normal where a ray enters a solid (Ericson, *Real-Time Collision Detection*, 5.3.7).
@@ -374,14 +420,14 @@ mod tests {
         insta::assert_snapshot!(lit(&raster), @r"
         ............
         ............
+        ............
         ....####....
         ...#....#...
-        ..#......#..
-        ..#......#..
-        ..#......#..
-        ..#......#..
+        ...#....#...
+        ...#....#...
         ...#....#...
         ....####....
+        ............
         ............
         ............
         ");
