@@ -262,3 +262,23 @@ impl Drop for Engine {
         while self.events.try_recv().is_ok() {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_driver_can_be_woken_without_an_event() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options { sessions: folder.path().to_owned(), clock: Clock::System };
+        let mut engine = Engine::new(options).unwrap();
+        let before = engine.wizard().view();
+        assert!(!engine.wait(Duration::ZERO));
+        assert!(engine.sender().wake());
+        assert!(engine.wait(Duration::from_mins(1)));
+        assert_eq!(engine.wizard().view(), before);
+        let sender = engine.sender();
+        drop(engine);
+        assert!(!sender.wake());
+    }
+}

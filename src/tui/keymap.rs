@@ -220,7 +220,7 @@ pub fn items(offers: &[IntentInfo], glyphs: Glyphs) -> Vec<Item> {
         let key = binding.key.name(glyphs);
         match binding.does {
             Does::Local(_, label) => {
-                items.push(Item { key, label: label.to_owned(), blocked: None, rank: binding.rank })
+                items.push(Item { key, label: label.to_owned(), blocked: None, rank: binding.rank });
             }
             Does::Default | Does::Offer(_) => {
                 for info in offers.iter().filter(|info| accepts(binding.does, info)) {

@@ -1,6 +1,9 @@
+use std::time::Duration;
+
 use proptest::prelude::*;
 
 use super::*;
+use crate::runtime::{Clock, Engine, Options};
 use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
 use crate::wizard::view::{BusyView, ProfileCard};
@@ -97,6 +100,71 @@ fn keys_become_intents() {
     assert_eq!(press(Key::ctrl('c')), Wish::None);
     assert_eq!(press(Key::ctrl('c')), Wish::Intend(Intent::Quit));
     assert_eq!(press(Key::ctrl('z')), Wish::Suspend);
+}
+
+/// The terminal's loop without a terminal.
+struct Walk {
+    engine: Engine,
+    ui: Ui,
+}
+
+impl Walk {
+    fn press(&mut self, key: Key) {
+        let view = self.engine.wizard().view();
+        self.ui.refresh(&view, self.engine.wizard().session());
+        if let Wish::Intend(intent) = self.ui.on_input(Input::Key(key), &view) {
+            self.engine.intend(intent);
+        }
+        while !self.engine.wizard().is_idle() {
+            assert!(self.engine.wait(Duration::from_mins(2)), "nothing happens");
+        }
+        let view = self.engine.wizard().view();
+        self.ui.refresh(&view, self.engine.wizard().session());
+        self.every_possible_intent_has_a_key(&view);
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 80, 24));
+        self.ui.draw(&view, buffer.area, &mut buffer);
+    }
+
+    fn every_possible_intent_has_a_key(&self, view: &ViewModel) {
+        let shown = keymap::items(&view.intents, Glyphs::Unicode);
+        for offer in view.intents.iter().filter(|offer| offer.is_enabled()) {
+            let has_key = shown.iter().any(|item| item.label == offer.label && item.blocked.is_none());
+            assert!(has_key, "{offer:?} in the step {}", self.ui.step);
+        }
+    }
+
+    fn is_at(&self, step: Step) {
+        let notice = self.engine.wizard().notice();
+        assert_eq!(self.engine.wizard().view().header.step, step, "{notice:?}");
+    }
+}
+
+#[test]
+fn the_first_steps_are_walked_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let clock = Clock::starting_at(jiff::Timestamp::UNIX_EPOCH);
+    let engine = Engine::new(Options { sessions: folder.path().to_owned(), clock }).unwrap();
+    let mut walk = Walk { engine, ui: Ui::new(themes()[0]) };
+    let enter = Key::plain_code(KeyCode::Enter);
+    walk.press(Key::char('c'));
+    for c in "soo".chars() {
+        walk.press(Key::char(c));
+    }
+    walk.press(enter);
+    walk.press(enter);
+    walk.is_at(Step::Instrument);
+    walk.press(Key::char('c'));
+    walk.press(enter);
+    walk.press(enter);
+    walk.is_at(Step::Target);
+    walk.press(Key::char('p'));
+    walk.press(enter);
+    walk.is_at(Step::Plan);
+    walk.press(Key::char('b'));
+    walk.is_at(Step::Target);
+    walk.press(Key::char('q'));
+    walk.press(Key::char('y'));
+    assert!(walk.engine.has_exited());
 }
 
 fn any_key() -> impl Strategy<Value = Key> {
