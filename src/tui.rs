@@ -9,7 +9,7 @@
 //! - One place to wait: the engine's channel; keys only wake it. Nothing ticks when nothing happens.
 //! - Drawing is a function of the `ViewModel` and of what is local in [`ui::Ui`]; it happens when one of them changed, at most
 //!   twenty times a second.
-//! - The terminal is entered and left in [`terminal`] only. When it goes away, it is left alone, the session is closed and the
+//! - The terminal is entered and left in `tui::terminal` only. When it goes away, it is left alone, the session is closed and the
 //!   process ends with 129.
 //! - Roles instead of colours ([`theme`]), signs with an ASCII form ([`glyphs`]), one table of keys ([`keymap`]).
 
