@@ -32,7 +32,7 @@ const ZOOM: f64 = 1.2;
 const PAN: f64 = 0.08;
 
 /// The keys of the preview with what they do, for footer and help.
-pub const KEYS: [(Key, &str); 12] = [
+pub const KEYS: [(Key, &str); 13] = [
     (Key::plain_code(crossterm::event::KeyCode::Left), "turn left"),
     (Key::plain_code(crossterm::event::KeyCode::Right), "turn right"),
     (Key::plain_code(crossterm::event::KeyCode::Up), "look from higher"),
@@ -44,6 +44,7 @@ pub const KEYS: [(Key, &str); 12] = [
     (Key::char('K'), "move the picture up"),
     (Key::char('J'), "move the picture down"),
     (Key::char('v'), "view: arm, all, reflector"),
+    (Key::char('o'), "perspective or parallel"),
     (Key::char('0'), "first view"),
 ];
 
