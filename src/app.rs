@@ -10,6 +10,7 @@ mod progress;
 mod script;
 mod session;
 mod verify;
+mod wizard;
 
 use std::io::{self, Write};
 
@@ -55,16 +56,16 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
     let Some(command) = cli.command else {
         return match &cli.script {
             Some(file) => script::run(file, &cli.script_args, console),
-            None => Err(Failure::new(ExitStatus::Usage, "nothing to do").hint("see 'trupose --help'")),
+            None => wizard::run(None, &cli.script_args.sessions, cli.terminal, console),
         };
     };
     match command {
         Command::Demo(args) => script::demo(&args, console),
         Command::Resume(args) => match &args.script {
             Some(file) => script::resume(&args.folder, file, &args.script_args, console),
-            None => Err(Failure::new(ExitStatus::Usage, "resuming without a terminal needs a script")
-                .hint("give '--script FILE'")),
+            None => wizard::resume(&args.folder, &args.script_args.sessions, args.terminal, console),
         },
+        Command::Wizard(args) => wizard::run(args.profile.as_deref(), &args.sessions, args.terminal, console),
         Command::Session(command) => session::run(&command, console),
         Command::Identify(args) => identify::run(&args, console),
         Command::Verify(args) => verify::run(&args, console),

@@ -14,15 +14,10 @@ use crate::session::measurements::Layout;
 use crate::units::from_mm;
 
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
+///
+/// Without a command it opens the guided calibration in the terminal.
 #[derive(Debug, Parser)]
-#[command(
-    name = "trupose",
-    version,
-    about,
-    max_term_width = 80,
-    arg_required_else_help = true,
-    args_conflicts_with_subcommands = true
-)]
+#[command(name = "trupose", version, about, max_term_width = 80, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -33,6 +28,82 @@ pub struct Cli {
     /// How to run it.
     #[command(flatten)]
     pub script_args: ScriptArgs,
+    /// How to use the terminal.
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
+}
+
+/// How to use the terminal.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct TerminalArgs {
+    /// Colours: when the terminal has them and NO_COLOR is not set, always, or never
+    #[arg(long, value_enum, default_value_t, value_name = "WHEN")]
+    pub color: ColorArg,
+    /// No characters but ASCII [default: only where the locale is not UTF-8]
+    #[arg(long)]
+    pub ascii: bool,
+    /// Draw with blocks instead of braille, for fonts without it
+    #[arg(long, conflicts_with = "ascii")]
+    pub blocks: bool,
+    /// Take the mouse wheel; the terminal's own selection then needs Shift
+    #[arg(long)]
+    pub mouse: bool,
+}
+
+/// `--color`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ColorArg {
+    /// Unless NO_COLOR is set
+    #[default]
+    Auto,
+    /// Even if NO_COLOR is set
+    Always,
+    /// Never
+    Never,
+}
+
+/// What the environment says about the terminal.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TerminalEnvironment {
+    /// `TERM`.
+    pub term: Option<String>,
+    /// `NO_COLOR` is set and not empty (no-color.org).
+    pub no_color: bool,
+    /// The locale's characters are UTF-8.
+    pub is_utf8: bool,
+}
+
+impl TerminalEnvironment {
+    /// As it is.
+    pub fn read() -> Self {
+        #[expect(clippy::disallowed_methods, reason = "the one place that reads the environment")]
+        let read = |name: &str| std::env::var(name).ok();
+        Self::from_variables(read)
+    }
+
+    fn from_variables(read: impl Fn(&str) -> Option<String>) -> Self {
+        let set = |name: &str| read(name).filter(|value| !value.is_empty());
+        let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default().to_ascii_lowercase();
+        Self {
+            term: set("TERM"),
+            no_color: set("NO_COLOR").is_some(),
+            is_utf8: locale.ends_with("utf-8") || locale.ends_with("utf8"),
+        }
+    }
+}
+
+/// Arguments of `wizard`.
+#[derive(Args, Clone, Debug)]
+pub struct WizardArgs {
+    /// Robot profile to begin with: a file, or the name of a shipped one ('trupose profile list')
+    #[arg(long, value_name = "NAME|FILE")]
+    pub profile: Option<String>,
+    /// Folder in which sessions are made
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    pub sessions: PathBuf,
+    /// How to use the terminal.
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
 }
 
 /// How to run a script.
@@ -75,6 +146,9 @@ pub struct ResumeArgs {
     /// How to run it.
     #[command(flatten)]
     pub script_args: ScriptArgs,
+    /// How to use the terminal.
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
 }
 
 /// What to do with sessions.
@@ -125,6 +199,8 @@ pub enum Command {
     Plan(PlanArgs),
     /// Write a robot program that visits the poses of a plan
     Program(ProgramArgs),
+    /// Guided calibration in the terminal; the same as no command at all
+    Wizard(WizardArgs),
     /// Calibrate a simulated robot from profile to result, without a terminal
     Demo(DemoArgs),
     /// Go on with a session where it ended
@@ -585,6 +661,18 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_environment_decides_about_colour_and_characters() {
+        let with = |variables: &'static [(&str, &str)]| {
+            TerminalEnvironment::from_variables(|name| {
+                variables.iter().find(|(set, _)| *set == name).map(|(_, value)| (*value).to_owned())
+            })
+        };
+        assert!(with(&[("LANG", "de_DE.UTF-8")]).is_utf8 && with(&[("LC_CTYPE", "C.utf8")]).is_utf8);
+        assert!(!with(&[("LANG", "de_DE.UTF-8"), ("LC_ALL", "C")]).is_utf8 && !with(&[]).is_utf8);
+        assert!(with(&[("NO_COLOR", "1")]).no_color && !with(&[("NO_COLOR", "")]).no_color);
     }
 
     #[test]

@@ -14,6 +14,7 @@
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
 //! - [`runtime`], [`error`]: threads for what is pure itself; how a command ends and what the operator is told.
 //! - [`procedure`]: the calibration itself on data in memory, the same for commands and wizard. No files, no clock.
+//! - [`script`], [`tui`]: the two drivers of the [`wizard`], without and with a terminal.
 //! - [`cli`], [`app`]: what was typed, and what is done about it.
 //!
 //! Reference: "A distance error based industrial robot kinematic calibration method", Industrial Robot 41/5 (2014) 439–446,
@@ -36,5 +37,6 @@ pub mod script;
 pub mod search;
 pub mod session;
 pub mod store;
+pub mod tui;
 pub mod units;
 pub mod wizard;

@@ -38,6 +38,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("wizard", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "procedure"]),
     ("runtime", &["profile", "session", "procedure", "error", "link", "store", "wizard"]),
     ("script", &["session", "wizard", "runtime"]),
+    ("tui", &["units", "geometry", "kinematics", "profile", "session", "wizard", "runtime"]),
     ("cli", &["units", "identification", "planning", "profile", "session", "program"]),
     (
         "app",
@@ -56,7 +57,9 @@ const LAYERS: &[(&str, &[&str])] = &[
             "script",
             "session",
             "store",
+            "tui",
             "units",
+            "wizard",
         ],
     ),
 ];

@@ -29,19 +29,34 @@ pub struct Options {
     pub clock: Clock,
 }
 
+/// What ends a wait.
+#[derive(Debug)]
+enum Message {
+    /// For the wizard.
+    Event(Event),
+    /// For the driver: look at what else there is.
+    Wake,
+}
+
 /// Where threads send what has happened.
 #[derive(Clone, Debug)]
-pub struct Events(SyncSender<Event>);
+pub struct Events(SyncSender<Message>);
 
 impl Events {
     /// Sends; waits for room. `false` if the engine is gone.
     pub fn send(&self, event: Event) -> bool {
-        self.0.send(event).is_ok()
+        self.0.send(Message::Event(event)).is_ok()
+    }
+
+    /// Ends the driver's wait without an event: there is something else to look at, such as a key. `false` if the engine is
+    /// gone. Nothing is lost when there is no room: then the driver is not waiting.
+    pub fn wake(&self) -> bool {
+        !matches!(self.0.try_send(Message::Wake), Err(TrySendError::Disconnected(_)))
     }
 
     /// Sends if there is room.
     pub(super) fn offer(&self, event: Event) {
-        match self.0.try_send(event) {
+        match self.0.try_send(Message::Event(event)) {
             // The next report says more than this one.
             Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
         }
@@ -63,7 +78,7 @@ pub struct Engine {
     wizard: Wizard,
     clock: Clock,
     sender: Events,
-    events: Receiver<Event>,
+    events: Receiver<Message>,
     store: StoreThread,
     link: LinkThread,
     /// Flags of the requests under way.
@@ -139,13 +154,19 @@ impl Engine {
         self.take(Event::Intent(intent));
     }
 
-    /// Waits for an event and takes it; `false` after `timeout` without one.
+    /// The program is to end, for a reason that is not the operator's wish.
+    pub fn shut_down(&mut self, cause: &str) {
+        self.take(Event::Shutdown { cause: cause.to_owned() });
+    }
+
+    /// Waits for an event and takes it, or to be woken; `false` after `timeout` without either.
     pub fn wait(&mut self, timeout: Duration) -> bool {
         match self.events.recv_timeout(timeout) {
-            Ok(event) => {
+            Ok(Message::Event(event)) => {
                 self.take(event);
                 true
             }
+            Ok(Message::Wake) => true,
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => false,
         }
     }
@@ -239,5 +260,25 @@ impl Drop for Engine {
         }
         // Room for threads that still want to answer.
         while self.events.try_recv().is_ok() {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_driver_can_be_woken_without_an_event() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options { sessions: folder.path().to_owned(), clock: Clock::System };
+        let mut engine = Engine::new(options).unwrap();
+        let before = engine.wizard().view();
+        assert!(!engine.wait(Duration::ZERO));
+        assert!(engine.sender().wake());
+        assert!(engine.wait(Duration::from_mins(1)));
+        assert_eq!(engine.wizard().view(), before);
+        let sender = engine.sender();
+        drop(engine);
+        assert!(!sender.wake());
     }
 }

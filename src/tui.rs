@@ -1,0 +1,224 @@
+//! The wizard in a terminal: keys become intents, the view becomes characters.
+//!
+//! ```text
+//! input thread ── keys ──┐                        ┌── dialog ── screen ── keymap ── camera
+//! signal thread ─ Event ─┼─► Engine::wait ─► Ui ──┤
+//! work threads ── Event ─┘                        └── frame, content, footer ─► terminal
+//! ```
+//!
+//! - One place to wait: the engine's channel; keys only wake it. Nothing ticks when nothing happens.
+//! - Drawing is a function of the `ViewModel` and of what is local in [`ui::Ui`]; it happens when one of them changed, at most
+//!   twenty times a second.
+//! - The terminal is entered and left in `tui::terminal` only. When it goes away, it is left alone, the session is closed and the
+//!   process ends with 129.
+//! - Roles instead of colours ([`theme`]), signs with an ASCII form ([`glyphs`]), one table of keys ([`keymap`]).
+
+pub mod dialog;
+pub mod form;
+pub mod frame;
+pub mod glyphs;
+mod help;
+mod input;
+pub mod keymap;
+pub mod paint;
+pub mod preview;
+pub mod screen;
+mod terminal;
+pub mod theme;
+pub mod ui;
+
+use std::io::{self, Stdout};
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use ratatui::Terminal;
+use ratatui::backend::{Backend as _, CrosstermBackend};
+use ratatui::layout::{Position, Rect};
+
+use crate::runtime::{Engine, signals};
+use input::Input;
+use terminal::TerminalGuard;
+use theme::Theme;
+use ui::{Ui, Wish};
+
+/// Shortest time between two frames: more would only fill an SSH line.
+const FRAME: Duration = Duration::from_millis(50);
+/// Longest wait when there is nothing to do; something always ends it.
+const IDLE: Duration = Duration::from_hours(1);
+/// Longest wait for the last entry of the journal when the terminal is gone.
+const LAST_ENTRY: Duration = Duration::from_secs(10);
+/// Number of the signal that says so.
+const SIGHUP: i32 = 1;
+
+/// How the terminal is used.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// Colours and signs.
+    pub theme: Theme,
+    /// Whether the mouse is taken from the terminal.
+    pub has_mouse: bool,
+    /// Colours even if the environment is against them.
+    pub forces_colour: bool,
+}
+
+/// Why the program ends.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Exit {
+    /// In words.
+    pub cause: String,
+    /// The signal that asked for it.
+    pub signal: Option<i32>,
+    /// Where the session is.
+    pub folder: Option<String>,
+    /// What could not be said while the screen was up.
+    pub remarks: Vec<String>,
+}
+
+/// Runs the wizard in the terminal until it ends. When the terminal goes away, the process ends here.
+///
+/// # Errors
+/// The terminal cannot be used, or the system refuses a thread.
+pub fn run(mut engine: Engine, options: Options) -> io::Result<Exit> {
+    let received = signals::watch(engine.sender())?;
+    if options.forces_colour {
+        crossterm::style::force_color_output(true);
+    }
+    terminal::note_folder(engine.wizard().folder());
+    terminal::install_panic_hook();
+    let guard = TerminalGuard::enter(options.has_mouse)?;
+    let inputs = input::start(engine.sender())?;
+    let screen = Terminal::new(CrosstermBackend::new(io::stdout()))?;
+    let mut driver = Driver { engine: &mut engine, inputs, screen, guard: &guard, ui: Ui::new(options.theme) };
+    let end = driver.run(&received);
+    // Its drop would write to the terminal once more, which may be gone.
+    let Driver { screen, .. } = driver;
+    std::mem::forget(screen);
+    if end == End::Gone || received.signal() == Some(SIGHUP) {
+        guard.abandon();
+        close_without_terminal(&mut engine);
+    }
+    drop(guard);
+    let wizard = engine.wizard();
+    Ok(Exit {
+        cause: wizard.ended().unwrap_or("ended").to_owned(),
+        signal: received.signal(),
+        folder: wizard.folder().map(str::to_owned),
+        remarks: terminal::take_remarks(),
+    })
+}
+
+/// Closes the session, touches nothing of the terminal, ends the process.
+fn close_without_terminal(engine: &mut Engine) -> ! {
+    engine.shut_down("the terminal went away (SIGHUP)");
+    while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
+    engine.release();
+    #[expect(clippy::exit, reason = "unwinding would write to a terminal that is gone, and abort")]
+    std::process::exit(128 + SIGHUP)
+}
+
+/// How the loop ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Exited,
+    Gone,
+}
+
+struct Driver<'a> {
+    engine: &'a mut Engine,
+    inputs: Receiver<Input>,
+    screen: Terminal<CrosstermBackend<Stdout>>,
+    guard: &'a TerminalGuard,
+    ui: Ui,
+}
+
+impl Driver<'_> {
+    fn run(&mut self, received: &signals::Received) -> End {
+        let mut view = self.engine.wizard().view();
+        self.ui.refresh(&view, self.engine.wizard().session());
+        let mut drawn: Option<Instant> = None;
+        let mut is_due = true;
+        loop {
+            if received.signal() == Some(SIGHUP) {
+                return End::Gone;
+            }
+            if self.engine.has_exited() {
+                return End::Exited;
+            }
+            let early = drawn.map_or(Duration::ZERO, |drawn| FRAME.saturating_sub(since(drawn)));
+            if is_due && early.is_zero() {
+                if self.draw(&view).is_err() {
+                    return End::Gone;
+                }
+                drawn = Some(now());
+                is_due = false;
+            }
+            let timeout = if is_due { early } else { IDLE };
+            if self.engine.wait(timeout) {
+                // One event may have brought others.
+                while !self.engine.has_exited() && self.engine.wait(Duration::ZERO) {}
+            }
+            view = self.look(view, &mut is_due);
+            while let Ok(input) = self.inputs.try_recv() {
+                match self.ui.on_input(input, &view) {
+                    Wish::None => {}
+                    Wish::Intend(intent) => {
+                        self.engine.intend(intent);
+                        view = self.look(view, &mut is_due);
+                    }
+                    Wish::Suspend => {
+                        if self.guard.suspend().is_err() || self.anew().is_err() {
+                            return End::Gone;
+                        }
+                        is_due = true;
+                    }
+                    Wish::Redraw => {
+                        if self.anew().is_err() {
+                            return End::Gone;
+                        }
+                        is_due = true;
+                    }
+                    Wish::Gone => return End::Gone,
+                }
+            }
+            is_due |= self.ui.take_dirty();
+        }
+    }
+
+    /// The view as it is now; what changed is to be drawn.
+    fn look(&mut self, before: crate::wizard::ViewModel, is_due: &mut bool) -> crate::wizard::ViewModel {
+        // Nobody reads them here; they must not pile up.
+        self.engine.happenings().for_each(drop);
+        let view = self.engine.wizard().view();
+        if view == before {
+            return before;
+        }
+        terminal::note_folder(view.header.folder.as_deref());
+        self.ui.refresh(&view, self.engine.wizard().session());
+        *is_due = true;
+        view
+    }
+
+    fn draw(&mut self, view: &crate::wizard::ViewModel) -> io::Result<()> {
+        let ui = &self.ui;
+        self.screen.draw(|frame| {
+            let area = frame.area();
+            ui.draw(view, area, frame.buffer_mut());
+        })?;
+        Ok(())
+    }
+
+    /// Everything is to be drawn anew, without asking the terminal anything.
+    fn anew(&mut self) -> io::Result<()> {
+        let size = self.screen.backend().size()?;
+        self.screen.resize(Rect::from((Position::ORIGIN, size)))
+    }
+}
+
+fn now() -> Instant {
+    #[expect(clippy::disallowed_methods, reason = "the pace of frames; nothing else depends on it")]
+    Instant::now()
+}
+
+fn since(earlier: Instant) -> Duration {
+    now().saturating_duration_since(earlier)
+}

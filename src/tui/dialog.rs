@@ -1,0 +1,247 @@
+//! What is asked before an intent is carried out: its value, or whether it is meant. Drawn over the content of a screen.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::form::{ChoiceList, NumberField, Reaction, TextField};
+use super::glyphs::wrapped;
+use super::keymap::{Item, Key};
+use super::paint;
+use super::theme::{Role, Theme};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
+use crate::session::simulation::{Simulation, Truth};
+use crate::wizard::view::{Content, ViewModel};
+use crate::wizard::{Danger, Intent, IntentInfo};
+
+/// Largest number of poses that can be added at once.
+const MOST_POSES: f64 = 200.0;
+
+/// A question that is open.
+#[derive(Clone, Debug)]
+pub enum Dialog {
+    /// Is it meant? Lines of explanation.
+    Confirm {
+        /// What is done.
+        intent: Intent,
+        /// What it means.
+        lines: Vec<String>,
+        /// The focus is on yes.
+        is_yes: bool,
+    },
+    /// A text becomes an intent.
+    Text {
+        /// The field.
+        field: TextField,
+        /// What the text is for.
+        intent: fn(String) -> Intent,
+    },
+    /// A number becomes an intent.
+    Number {
+        /// The field.
+        field: NumberField,
+        /// What the number is for.
+        intent: fn(f64) -> Intent,
+    },
+    /// One of several intents.
+    Choice {
+        /// The list.
+        list: ChoiceList,
+        /// What each choice does.
+        intents: Vec<Intent>,
+    },
+}
+
+/// What an open question makes of a key.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// It stays open.
+    Open,
+    /// It is closed without anything.
+    Closed,
+    /// It is closed, and this is to be done.
+    Intend(Intent),
+}
+
+impl Dialog {
+    /// The question that an intent on offer needs before it can be done; none: it can be done at once.
+    pub fn before(info: &IntentInfo, view: &ViewModel) -> Option<Self> {
+        let text = |label: &str, value: &str, intent: fn(String) -> Intent| {
+            Some(Self::Text { field: TextField::new(label, value), intent })
+        };
+        match &info.intent {
+            Intent::ChooseProfile(_) => choose_profile(view),
+            Intent::ChooseInstrument(_) => Some(choose_instrument(view)),
+            Intent::NameSession(proposal) => text("Name of the session", proposal, Intent::NameSession),
+            Intent::LoadPlan(proposal) => text("File with the poses (CSV)", proposal, Intent::LoadPlan),
+            Intent::TypeReading(_) => text("Coordinates x y z", "", Intent::TypeReading),
+            Intent::Note(_) => text("Note", "", Intent::Note),
+            Intent::GoToPose(_) => choose_pose(view),
+            Intent::SuggestPoses(count) => {
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
+                let intent = |count: f64| Intent::SuggestPoses(count as usize);
+                let field = NumberField::new("Poses to add", *count as f64, "", (1.0, MOST_POSES)).whole();
+                Some(Self::Number { field, intent })
+            }
+            intent => confirm(intent, info, view),
+        }
+    }
+
+    /// Takes a key.
+    pub fn on_key(&mut self, key: Key) -> Answer {
+        let (reaction, intent) = match self {
+            Self::Confirm { intent, is_yes, .. } => match key.code {
+                KeyCode::Char('y') => (Reaction::Done, Some(intent.clone())),
+                // Asked to leave twice means it.
+                KeyCode::Char('c') if key.has_modifier() && *intent == Intent::Quit => {
+                    (Reaction::Done, Some(intent.clone()))
+                }
+                KeyCode::Enter if *is_yes => (Reaction::Done, Some(intent.clone())),
+                KeyCode::Enter | KeyCode::Esc | KeyCode::Char('n') => (Reaction::Cancelled, None),
+                KeyCode::Tab | KeyCode::BackTab | KeyCode::Left | KeyCode::Right | KeyCode::Up | KeyCode::Down => {
+                    *is_yes = !*is_yes;
+                    (Reaction::Changed, None)
+                }
+                _ => (Reaction::Ignored, None),
+            },
+            Self::Text { field, intent } => (field.on_key(key), Some(intent(field.text().trim().to_owned()))),
+            Self::Number { field, intent } => (field.on_key(key), field.value().ok().map(*intent)),
+            Self::Choice { list, intents } => {
+                (list.on_key(key), list.selected().and_then(|index| intents.get(index).cloned()))
+            }
+        };
+        match (reaction, intent) {
+            (Reaction::Done, Some(intent)) => Answer::Intend(intent),
+            (Reaction::Cancelled, _) => Answer::Closed,
+            _ => Answer::Open,
+        }
+    }
+
+    /// Takes pasted text.
+    pub fn paste(&mut self, text: &str) {
+        match self {
+            Self::Confirm { .. } => {}
+            Self::Text { field, .. } => field.paste(text),
+            Self::Number { field, .. } => field.paste(text),
+            Self::Choice { list, .. } => list.paste(text),
+        }
+    }
+
+    /// Its keys.
+    pub fn items(&self) -> Vec<Item> {
+        let mut items = vec![Item::new("Enter", "take it", 0), Item::new("Esc", "leave it", 1)];
+        match self {
+            Self::Confirm { .. } => {
+                items = vec![Item::new("y", "yes", 1), Item::new("n", "no", 1), Item::new("Tab", "other", 3)];
+            }
+            Self::Choice { .. } => items.push(Item::new("Up/Down", "choose", 2)),
+            Self::Text { .. } | Self::Number { .. } => items.push(Item::new("Ctrl-U", "empty the line", 4)),
+        }
+        items
+    }
+
+    /// Draws it.
+    pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
+        match self {
+            Self::Confirm { lines, is_yes, .. } => {
+                let columns = usize::from(area.width);
+                let lines: Vec<String> =
+                    lines.iter().flat_map(|line| wrapped(&theme.glyphs.show(line), columns)).collect();
+                let mut row = 0;
+                for line in &lines {
+                    let role = if row == 0 { Role::Title } else { Role::Plain };
+                    paint::text(buf, area, (0, row), line, theme.style(role));
+                    row += 1;
+                }
+                let style = |focus: bool| theme.style(if focus { Role::Focus } else { Role::Plain });
+                let column = paint::text(buf, area, (0, row + 1), "[ no ]", style(!is_yes));
+                paint::text(buf, area, (column + 2, row + 1), "[ yes ]", style(*is_yes));
+            }
+            Self::Text { field, .. } => field.draw(theme, area, buf),
+            Self::Number { field, .. } => field.draw(theme, area, buf),
+            Self::Choice { list, .. } => list.draw(theme, area, buf),
+        }
+    }
+}
+
+fn choose_profile(view: &ViewModel) -> Option<Dialog> {
+    let Content::Profile(content) = &view.content else { return None };
+    let chosen = content.chosen.as_ref().and_then(|card| content.profiles.iter().position(|name| *name == card.name));
+    let intents = content.profiles.iter().cloned().map(Intent::ChooseProfile).collect();
+    Some(Dialog::Choice { list: ChoiceList::new("Robot", content.profiles.clone(), chosen.unwrap_or(0)), intents })
+}
+
+/// The instruments that need no further question; the paper's hidden truth fits only its own arm.
+fn choose_instrument(view: &ViewModel) -> Dialog {
+    let mut choices = Vec::new();
+    let simulated = |truth| InstrumentChoice::Simulated(Simulation { truth, ..Simulation::default() });
+    if view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper")) {
+        choices.push(("simulated: the arm of the method paper, table II hidden".to_owned(), simulated(Truth::Paper)));
+    }
+    choices.push(("simulated: an arm with random errors, to rehearse on".to_owned(), simulated(Truth::Drawn)));
+    for unit in CoordinateUnit::ALL {
+        let label = format!("by hand: coordinates typed or pasted, in {}", unit.sign());
+        choices.push((label, InstrumentChoice::Manual { unit }));
+    }
+    let (labels, instruments): (Vec<String>, Vec<InstrumentChoice>) = choices.into_iter().unzip();
+    let intents = instruments.into_iter().map(Intent::ChooseInstrument).collect();
+    Dialog::Choice { list: ChoiceList::new("Instrument", labels, 0), intents }
+}
+
+fn choose_pose(view: &ViewModel) -> Option<Dialog> {
+    let Content::Capture(content) = &view.content else { return None };
+    let labels = content.rows.iter().map(|row| format!("{}  {:?}  {:?}", row.pose, row.kind, row.state)).collect();
+    let shown = content.rows.iter().position(|row| Some(row.row) == content.row);
+    let intents = content.rows.iter().map(|row| Intent::GoToPose(row.pose.clone())).collect();
+    Some(Dialog::Choice { list: ChoiceList::new("Pose", labels, shown.unwrap_or(0)), intents })
+}
+
+fn confirm(intent: &Intent, info: &IntentInfo, view: &ViewModel) -> Option<Dialog> {
+    let lines = match info.danger {
+        Danger::None => return None,
+        Danger::DropsData => vec![
+            format!("{}?", capitalised(&info.label)),
+            "It will not count any more. It stays in the journal; nothing is deleted.".to_owned(),
+        ],
+        Danger::Leaves => match &view.header.folder {
+            Some(folder) => vec![
+                "Leave the program?".to_owned(),
+                format!("{} entries are saved. Go on later with:", view.header.saved_entries),
+                format!("trupose resume {folder}"),
+            ],
+            None => vec!["Leave the program?".to_owned(), "Nothing has been measured yet; nothing is lost.".to_owned()],
+        },
+    };
+    Some(Dialog::Confirm { intent: intent.clone(), lines, is_yes: false })
+}
+
+fn capitalised(text: &str) -> String {
+    let mut characters = text.chars();
+    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_answer_to_a_danger_is_no_unless_meant() {
+        let dialog = || Dialog::Confirm { intent: Intent::Quit, lines: vec!["Leave?".to_owned()], is_yes: false };
+        assert_eq!(dialog().on_key(Key::plain_code(KeyCode::Enter)), Answer::Closed);
+        assert_eq!(dialog().on_key(Key::char('y')), Answer::Intend(Intent::Quit));
+        assert_eq!(dialog().on_key(Key::ctrl('c')), Answer::Intend(Intent::Quit));
+        let mut toggled = dialog();
+        assert_eq!(toggled.on_key(Key::plain_code(KeyCode::Tab)), Answer::Open);
+        assert_eq!(toggled.on_key(Key::plain_code(KeyCode::Enter)), Answer::Intend(Intent::Quit));
+    }
+
+    #[test]
+    fn a_text_becomes_an_intent() {
+        let mut dialog = Dialog::Text { field: TextField::new("Note", ""), intent: Intent::Note };
+        dialog.paste(" warm tool ");
+        assert_eq!(
+            dialog.on_key(Key::plain_code(KeyCode::Enter)),
+            Answer::Intend(Intent::Note("warm tool".to_owned()))
+        );
+    }
+}

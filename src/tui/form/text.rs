@@ -1,0 +1,198 @@
+//! A single line of text.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::Reaction;
+use crate::tui::glyphs::width;
+use crate::tui::keymap::Key;
+use crate::tui::paint;
+use crate::tui::theme::{Role, Theme};
+
+/// Longest text, in characters; a paste beyond it is cut.
+const LONGEST: usize = 4096;
+
+/// Says what is wrong with a text.
+pub type Check = fn(&str) -> Result<(), String>;
+
+/// A single line of text with a cursor.
+#[derive(Clone, Debug)]
+pub struct TextField {
+    label: String,
+    characters: Vec<char>,
+    /// Before which character the cursor stands.
+    cursor: usize,
+    check: Option<Check>,
+}
+
+impl TextField {
+    /// A field with a text to begin with, the cursor behind it.
+    pub fn new(label: impl Into<String>, text: &str) -> Self {
+        let mut field = Self { label: label.into(), characters: Vec::new(), cursor: 0, check: None };
+        field.paste(text);
+        field
+    }
+
+    /// With a check that runs as it is typed.
+    #[must_use]
+    pub const fn checked(mut self, check: Check) -> Self {
+        self.check = Some(check);
+        self
+    }
+
+    /// What it asks for.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// The text.
+    pub fn text(&self) -> String {
+        self.characters.iter().collect()
+    }
+
+    /// Before which character the cursor stands.
+    pub const fn cursor(&self) -> usize {
+        self.cursor
+    }
+
+    /// Empties it.
+    pub fn clear(&mut self) {
+        self.characters.clear();
+        self.cursor = 0;
+    }
+
+    /// What is wrong with the text.
+    pub fn problem(&self) -> Option<String> {
+        self.check.and_then(|check| check(self.text().trim()).err())
+    }
+
+    /// Inserts pasted text: line breaks and tabs become blanks, other control characters go.
+    pub fn paste(&mut self, text: &str) {
+        let blank = |c: char| if matches!(c, '\n' | '\r' | '\t') { ' ' } else { c };
+        let room = LONGEST.saturating_sub(self.characters.len());
+        let text = text.trim_end_matches(['\n', '\r']);
+        let pasted: Vec<char> = text.chars().map(blank).filter(|c| !c.is_control()).take(room).collect();
+        let count = pasted.len();
+        self.characters.splice(self.cursor..self.cursor, pasted);
+        self.cursor += count;
+    }
+
+    /// Takes a key.
+    pub fn on_key(&mut self, key: Key) -> Reaction {
+        match (key.code, key.has_modifier()) {
+            (KeyCode::Enter, _) if self.problem().is_none() => return Reaction::Done,
+            (KeyCode::Enter, _) => {}
+            (KeyCode::Esc, _) => return Reaction::Cancelled,
+            (KeyCode::Char('a'), true) | (KeyCode::Home, _) => self.cursor = 0,
+            (KeyCode::Char('e'), true) | (KeyCode::End, _) => self.cursor = self.characters.len(),
+            (KeyCode::Char('u'), true) => {
+                self.characters.drain(..self.cursor);
+                self.cursor = 0;
+            }
+            (KeyCode::Char('k'), true) => self.characters.truncate(self.cursor),
+            (KeyCode::Char('w'), true) => self.delete_word(),
+            (KeyCode::Char(c), false) if !c.is_control() => self.paste(&c.to_string()),
+            (KeyCode::Left, _) => self.cursor = self.cursor.saturating_sub(1),
+            (KeyCode::Right, _) => self.cursor = (self.cursor + 1).min(self.characters.len()),
+            (KeyCode::Backspace, _) if self.cursor > 0 => {
+                self.cursor -= 1;
+                self.characters.remove(self.cursor);
+            }
+            (KeyCode::Delete, _) if self.cursor < self.characters.len() => {
+                self.characters.remove(self.cursor);
+            }
+            _ => return Reaction::Ignored,
+        }
+        Reaction::Changed
+    }
+
+    /// Takes the word before the cursor away.
+    fn delete_word(&mut self) {
+        let before = self.characters.get(..self.cursor).unwrap_or_default();
+        let blanks = before.iter().rev().take_while(|c| **c == ' ').count();
+        let word = before.iter().rev().skip(blanks).take_while(|c| **c != ' ').count();
+        let start = self.cursor.saturating_sub(blanks + word);
+        self.characters.drain(start..self.cursor);
+        self.cursor = start;
+    }
+
+    /// Draws it: the label, the text with its cursor, what is wrong. Takes three lines.
+    pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
+        paint::text(buf, area, (0, 0), &theme.glyphs.show(&self.label), theme.style(Role::Title));
+        self.draw_line(theme, paint::band(area, 1, 1), buf);
+        if let Some(problem) = self.problem().filter(|_| !self.characters.is_empty()) {
+            paint::text(buf, area, (0, 2), &theme.glyphs.show(&problem), theme.style(Role::Warn));
+        }
+    }
+
+    /// Draws the text alone, so that the cursor is always in view.
+    pub fn draw_line(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
+        let lead = theme.glyphs.pointer();
+        let start = paint::text(buf, area, (0, 0), lead, theme.style(Role::Hint));
+        let room = usize::from(area.width.saturating_sub(start));
+        if room == 0 {
+            return;
+        }
+        let shown = |range: &[char]| theme.glyphs.show(&range.iter().collect::<String>());
+        let mut first = 0;
+        while width(&shown(self.characters.get(first..self.cursor).unwrap_or_default())) >= room {
+            first += 1;
+        }
+        let before = shown(self.characters.get(first..self.cursor).unwrap_or_default());
+        let at = self.characters.get(self.cursor).map_or_else(|| " ".to_owned(), |c| shown(&[*c]));
+        let after = shown(self.characters.get(self.cursor + 1..).unwrap_or_default());
+        let column = paint::text(buf, area, (start, 0), &before, theme.style(Role::Plain));
+        let column = paint::text(buf, area, (column, 0), &at, theme.style(Role::Focus));
+        paint::text(buf, area, (column, 0), &after, theme.style(Role::Plain));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn typed(field: &mut TextField, keys: &[KeyCode]) {
+        for code in keys {
+            field.on_key(Key::plain_code(*code));
+        }
+    }
+
+    #[test]
+    fn typing_moving_and_deleting() {
+        let mut field = TextField::new("note", "SMR");
+        typed(&mut field, &[KeyCode::Home, KeyCode::Char('ü'), KeyCode::Right, KeyCode::Delete, KeyCode::End]);
+        typed(&mut field, &[KeyCode::Char('漢'), KeyCode::Left, KeyCode::Backspace]);
+        assert_eq!((field.text().as_str(), field.cursor()), ("üS漢", 2));
+        field.paste("a\r\nb\u{7}\tc\n");
+        assert_eq!(field.text(), "üSa  b c漢");
+        field.on_key(Key::ctrl('w'));
+        assert_eq!(field.text(), "üSa  b 漢");
+        field.on_key(Key::ctrl('u'));
+        field.on_key(Key::ctrl('k'));
+        assert_eq!(field.text(), "");
+    }
+
+    #[test]
+    fn a_wrong_text_is_not_accepted() {
+        let check: Check = |text| if text.is_empty() { Err("write something".to_owned()) } else { Ok(()) };
+        let mut field = TextField::new("note", "").checked(check);
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Changed);
+        assert_eq!(field.problem().as_deref(), Some("write something"));
+        typed(&mut field, &[KeyCode::Char('x')]);
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Done);
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Esc)), Reaction::Cancelled);
+    }
+
+    #[test]
+    fn the_cursor_stays_in_view_at_any_width() {
+        let field = TextField::new("note", "a long text that does not fit 漢字");
+        for columns in 0..20 {
+            let mut buffer = Buffer::empty(Rect::new(0, 0, columns, 3));
+            field.draw(Theme::default(), buffer.area, &mut buffer);
+            let has_cursor =
+                buffer.content.iter().any(|cell| cell.modifier.contains(ratatui::style::Modifier::REVERSED));
+            assert_eq!(has_cursor, columns > 2, "{columns}");
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Keys, paste and resizing, read on a thread of their own.
+//!
+//! Nobody joins that thread: when the terminal goes away, a read never returns. What it reads goes into a bounded channel, then
+//! the engine is woken, so that the driver waits on one thing only.
+
+use std::io;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use crossterm::event::{self, Event, KeyEventKind, MouseEventKind};
+
+use super::keymap::Key;
+use crate::runtime::Events;
+
+/// Inputs that wait; then the terminal's own buffer holds what is typed.
+const WAITING: usize = 256;
+
+/// Something from the terminal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Input {
+    /// A key.
+    Key(Key),
+    /// Pasted text.
+    Paste(String),
+    /// The wheel: lines, down is positive.
+    Scroll(i16),
+    /// A new size.
+    Resize,
+    /// The terminal cannot be read any more.
+    Gone,
+}
+
+/// Starts reading.
+///
+/// # Errors
+/// The system refuses a thread.
+pub(super) fn start(events: Events) -> io::Result<Receiver<Input>> {
+    let (sender, inputs) = sync_channel(WAITING);
+    thread::Builder::new().name("input".to_owned()).spawn(move || read(&sender, &events))?;
+    Ok(inputs)
+}
+
+fn read(inputs: &SyncSender<Input>, events: &Events) {
+    loop {
+        let input = match event::read() {
+            Ok(event) => input(event),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => None,
+            Err(_gone) => Some(Input::Gone),
+        };
+        let Some(input) = input else { continue };
+        let is_last = input == Input::Gone;
+        if inputs.send(input).is_err() || !events.wake() || is_last {
+            break;
+        }
+    }
+}
+
+/// What an event of the terminal means; movements of the mouse mean nothing.
+fn input(event: Event) -> Option<Input> {
+    match event {
+        Event::Key(key) => (key.kind != KeyEventKind::Release).then(|| Input::Key(Key::from(key))),
+        Event::Paste(text) => Some(Input::Paste(text)),
+        Event::Resize(..) => Some(Input::Resize),
+        Event::Mouse(mouse) => match mouse.kind {
+            MouseEventKind::ScrollUp => Some(Input::Scroll(-3)),
+            MouseEventKind::ScrollDown => Some(Input::Scroll(3)),
+            _ => None,
+        },
+        Event::FocusGained | Event::FocusLost => None,
+    }
+}

@@ -1,0 +1,320 @@
+//! Where the scene is looked at from, and how points of the robot base become dots.
+//!
+//! x of the screen goes to the right, y down; depth is the distance along the view direction (m). Every number that comes in
+//! is made finite and kept in its range, so that nothing that goes out is ever NaN.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Point3, Vector3};
+
+use crate::units::DEGREE;
+
+/// Steepest view (rad): straight down would have no upright.
+const STEEPEST: f64 = FRAC_PI_2 - DEGREE;
+/// Smallest and largest zoom.
+const ZOOM: (f64, f64) = (0.05, 50.0);
+/// Farthest that the view can be moved aside, in sizes of what is shown.
+const FARTHEST_PAN: f64 = 10.0;
+/// Opening of the perspective view (rad), along the height of what is shown.
+const OPENING: f64 = 30.0 * DEGREE;
+/// Part of the area that is used.
+const USED: f64 = 0.88;
+/// Nothing nearer than this is drawn (m).
+const NEAREST: f64 = 1e-3;
+
+/// How depth is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Projection {
+    /// What is farther is smaller.
+    #[default]
+    Perspective,
+    /// Parallel lines stay parallel.
+    Orthographic,
+}
+
+/// What is kept in view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Framing {
+    /// The arm.
+    #[default]
+    Arm,
+    /// Everything: points and tracker too.
+    All,
+    /// The reflector, from near.
+    Reflector,
+}
+
+/// A camera that circles what it looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    yaw: f64,
+    pitch: f64,
+    zoom: f64,
+    pan: (f64, f64),
+    /// How depth is shown.
+    pub projection: Projection,
+    /// What is kept in view.
+    pub framing: Framing,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self {
+            yaw: -55.0 * DEGREE,
+            pitch: 20.0 * DEGREE,
+            zoom: 1.0,
+            pan: (0.0, 0.0),
+            projection: Projection::Perspective,
+            framing: Framing::Arm,
+        }
+    }
+}
+
+impl Camera {
+    /// From this direction: `yaw` about the vertical from the x axis of the base, `pitch` above the horizon (rad).
+    pub fn from_direction(yaw: f64, pitch: f64) -> Self {
+        let mut camera = Self { yaw: 0.0, pitch: 0.0, ..Self::default() };
+        camera.orbit(yaw, pitch);
+        camera
+    }
+
+    /// Direction from which it looks: yaw and pitch (rad).
+    pub const fn direction(&self) -> (f64, f64) {
+        (self.yaw, self.pitch)
+    }
+
+    /// Circles by these angles (rad).
+    pub fn orbit(&mut self, yaw: f64, pitch: f64) {
+        let turned = finite(self.yaw + finite(yaw, 0.0), 0.0);
+        self.yaw = turned - 2.0 * PI * (turned / (2.0 * PI)).round();
+        self.pitch = finite(self.pitch + finite(pitch, 0.0), 0.0).clamp(-STEEPEST, STEEPEST);
+    }
+
+    /// Makes everything larger by a factor.
+    pub fn zoom(&mut self, factor: f64) {
+        if factor > 0.0 {
+            self.zoom = finite(self.zoom * factor, 1.0).clamp(ZOOM.0, ZOOM.1);
+        }
+    }
+
+    /// Moves the picture aside, in parts of its height; right and up are positive.
+    pub fn pan(&mut self, right: f64, up: f64) {
+        let moved = |from: f64, by: f64| finite(from + finite(by, 0.0), 0.0).clamp(-FARTHEST_PAN, FARTHEST_PAN);
+        self.pan = (moved(self.pan.0, right / self.zoom), moved(self.pan.1, up / self.zoom));
+    }
+
+    /// Back to the first view; the kind of projection stays.
+    pub fn reset(&mut self) {
+        *self = Self { projection: self.projection, ..Self::default() };
+    }
+
+    /// The view on an area of so many dots that has all of `shown` (points with a radius, m) in it, before zoom and pan.
+    pub fn view(&self, width: usize, height: usize, shown: &[(Point3<f64>, f64)]) -> View {
+        let (width, height) = (width.max(1) as f64, height.max(1) as f64);
+        let (sin_yaw, cos_yaw) = self.yaw.sin_cos();
+        let (sin_pitch, cos_pitch) = self.pitch.sin_cos();
+        let forward = Vector3::new(-cos_yaw * cos_pitch, -sin_yaw * cos_pitch, -sin_pitch);
+        let right = Vector3::new(-sin_yaw, cos_yaw, 0.0);
+        let up = right.cross(&forward);
+
+        let (centre, [extent_x, extent_y, deep]) = bounds(shown, &[right, up, forward]);
+        let scale = USED * (width / extent_x.max(0.01)).min(height / extent_y.max(0.01));
+        let visible = height / scale;
+        let depth = (deep / 2.0).max(0.01);
+        // The whole scene lies before the eye.
+        let distance = (visible.max(extent_x * height / width) / (2.0 * (OPENING / 2.0).tan())).max(1.5 * depth);
+        let pan = -right * (self.pan.0 * visible) - up * (self.pan.1 * visible);
+        let scale = scale * self.zoom;
+        View {
+            eye: centre + pan - forward * distance,
+            right,
+            up,
+            forward,
+            middle: (width / 2.0, height / 2.0),
+            scale,
+            distance,
+            projection: self.projection,
+            depths: (distance - depth, distance + depth),
+        }
+    }
+}
+
+fn finite(value: f64, otherwise: f64) -> f64 {
+    if value.is_finite() { value } else { otherwise }
+}
+
+/// Middle of points with radii, and how far they extend along three directions.
+fn bounds(shown: &[(Point3<f64>, f64)], along: &[Vector3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
+    let is_usable = |(point, radius): &&(Point3<f64>, f64)| {
+        radius.is_finite() && *radius >= 0.0 && *radius < 1e6 && point.iter().all(|x| x.is_finite() && x.abs() < 1e6)
+    };
+    if !shown.iter().any(|point| is_usable(&point)) {
+        return (Point3::origin(), [2.0; 3]);
+    }
+    let mut centre = Point3::origin();
+    let extents = along.map(|direction| {
+        let mut low = f64::INFINITY;
+        let mut high = f64::NEG_INFINITY;
+        for (point, radius) in shown.iter().filter(is_usable) {
+            let at = point.coords.dot(&direction);
+            low = low.min(at - radius);
+            high = high.max(at + radius);
+        }
+        centre += direction * f64::midpoint(low, high);
+        high - low
+    });
+    (centre, extents)
+}
+
+/// A camera on an area of dots.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    eye: Point3<f64>,
+    right: Vector3<f64>,
+    up: Vector3<f64>,
+    forward: Vector3<f64>,
+    middle: (f64, f64),
+    /// Dots per metre at `distance`.
+    scale: f64,
+    distance: f64,
+    projection: Projection,
+    /// Nearest and farthest depth of what is shown.
+    pub depths: (f64, f64),
+}
+
+/// Where a point is on the screen, in dots, and how far away (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projected {
+    /// To the right.
+    pub x: f64,
+    /// Down.
+    pub y: f64,
+    /// Along the view direction.
+    pub depth: f64,
+}
+
+/// What a dot sees: points `origin + t · direction`, `t` the depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Point3<f64>,
+    /// Along it; its part in the view direction is 1.
+    pub direction: Vector3<f64>,
+}
+
+impl View {
+    /// Where a point is; none behind the eye or when it is no point.
+    pub fn project(&self, point: &Point3<f64>) -> Option<Projected> {
+        let seen = point - self.eye;
+        let depth = seen.dot(&self.forward);
+        if depth.is_nan() || depth <= NEAREST {
+            return None;
+        }
+        let scale = self.scale_at(depth);
+        let x = self.middle.0 + seen.dot(&self.right) * scale;
+        let y = self.middle.1 - seen.dot(&self.up) * scale;
+        (x.is_finite() && y.is_finite()).then_some(Projected { x, y, depth })
+    }
+
+    /// Dots per metre at a depth.
+    pub fn scale_at(&self, depth: f64) -> f64 {
+        match self.projection {
+            Projection::Perspective => self.scale * self.distance / depth.max(NEAREST),
+            Projection::Orthographic => self.scale,
+        }
+    }
+
+    /// What the middle of a dot sees.
+    pub fn ray(&self, x: usize, y: usize) -> Ray {
+        let aside = (x as f64 + 0.5 - self.middle.0) / self.scale;
+        let above = (self.middle.1 - y as f64 - 0.5) / self.scale;
+        match self.projection {
+            Projection::Perspective => Ray {
+                origin: self.eye,
+                direction: self.forward + (self.right * aside + self.up * above) / self.distance,
+            },
+            Projection::Orthographic => {
+                Ray { origin: self.eye + self.right * aside + self.up * above, direction: self.forward }
+            }
+        }
+    }
+
+    /// A direction of the base as the screen has it: right, up, towards the eye.
+    pub fn turned(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(direction.dot(&self.right), direction.dot(&self.up), -direction.dot(&self.forward))
+    }
+
+    /// How far back a depth is in what is shown: 0 in front, 1 at the back.
+    pub fn farness(&self, depth: f64) -> f64 {
+        ((depth - self.depths.0) / (self.depths.1 - self.depths.0)).clamp(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn the_middle_of_what_is_shown_is_in_the_middle() {
+        for projection in [Projection::Perspective, Projection::Orthographic] {
+            let camera = Camera { projection, ..Camera::default() };
+            let shown = [(Point3::new(0.0, 0.0, 0.0), 0.0), (Point3::new(1.0, 1.0, 1.0), 0.0)];
+            let view = camera.view(80, 60, &shown);
+            let seen = view.project(&Point3::new(0.5, 0.5, 0.5)).unwrap();
+            assert!((seen.x - 40.0).abs() < 1e-9 && (seen.y - 30.0).abs() < 1e-9, "{seen:?}");
+        }
+    }
+
+    #[test]
+    fn from_the_front_left_is_left_and_up_is_up() {
+        // Looking from +x to the base, +y of the base is to the right.
+        let view = Camera::from_direction(0.0, 0.0).view(100, 100, &[(Point3::origin(), 1.0)]);
+        let y = view.project(&Point3::new(0.0, 0.5, 0.0)).unwrap();
+        let z = view.project(&Point3::new(0.0, 0.0, 0.5)).unwrap();
+        let x = view.project(&Point3::new(0.5, 0.0, 0.0)).unwrap();
+        let middle = view.project(&Point3::origin()).unwrap();
+        assert!(y.x > middle.x && z.y < middle.y && x.depth < middle.depth);
+    }
+
+    proptest! {
+        #[test]
+        fn rays_go_where_points_are_seen(
+            yaw in -7.0_f64..7.0, pitch in -3.0_f64..3.0, zoom in 0.1_f64..10.0, x in 0_usize..300, y in 0_usize..200,
+            perspective: bool, along in 0.1_f64..5.0,
+        ) {
+            let mut camera = Camera::from_direction(yaw, pitch);
+            camera.projection = if perspective { Projection::Perspective } else { Projection::Orthographic };
+            camera.zoom(zoom);
+            let view = camera.view(300, 200, &[(Point3::new(0.3, -0.2, 0.5), 0.8)]);
+            let ray = view.ray(x, y);
+            let seen = view.project(&(ray.origin + ray.direction * along)).unwrap();
+            prop_assert!((seen.x - x as f64 - 0.5).abs() < 1e-6 && (seen.y - y as f64 - 0.5).abs() < 1e-6);
+            prop_assert!((seen.depth - along).abs() < 1e-9);
+        }
+
+        #[test]
+        fn no_input_makes_a_view_that_is_not_finite(
+            moves in prop::collection::vec((any::<f64>(), any::<f64>(), 0_u8..3), 0..8),
+            points in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()), 0..5),
+            width in 0_usize..400, height in 0_usize..400,
+        ) {
+            let mut camera = Camera::default();
+            for (a, b, kind) in moves {
+                match kind {
+                    0 => camera.orbit(a, b),
+                    1 => camera.pan(a, b),
+                    _ => camera.zoom(a),
+                }
+            }
+            let shown: Vec<_> = points.iter().map(|&(x, y, z, r)| (Point3::new(x, y, z), r)).collect();
+            let view = camera.view(width, height, &shown);
+            let ray = view.ray(0, 0);
+            prop_assert!(ray.origin.iter().chain(ray.direction.iter()).all(|x| x.is_finite()), "{view:?}");
+            if let Some(seen) = view.project(&Point3::new(0.1, 0.2, 0.3)) {
+                prop_assert!(seen.x.is_finite() && seen.y.is_finite());
+            }
+        }
+    }
+}

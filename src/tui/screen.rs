@@ -1,0 +1,66 @@
+//! The content of a step: what a screen gets, how it draws, and how it takes keys.
+//!
+//! A screen keeps only what is local (focus, scroll). It draws from the [`ViewModel`], and the preview from a [`Scene`] that the
+//! driver makes whenever the view changes. Keys go to an open dialog first, then to the screen, then to the table of
+//! [`keymap`](super::keymap), last to the camera of the preview.
+
+mod plain;
+
+use std::fmt;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::dialog::Dialog;
+use super::keymap::{Item, Key};
+use super::preview::{Camera, Scene};
+use super::theme::Theme;
+use crate::session::set_up::Step;
+use crate::wizard::Intent;
+use crate::wizard::view::ViewModel;
+
+/// What a screen sees.
+#[derive(Clone, Copy, Debug)]
+pub struct ScreenCx<'a> {
+    /// What there is to show.
+    pub view: &'a ViewModel,
+    /// The robot at the configuration of this step, if there is one.
+    pub scene: Option<&'a Scene>,
+    /// From where the preview is seen; kept over all steps.
+    pub camera: &'a Camera,
+    /// How to show it.
+    pub theme: Theme,
+}
+
+/// What a screen makes of a key.
+#[derive(Debug)]
+pub enum Reply {
+    /// It has no use for it.
+    Ignored,
+    /// Something local changed.
+    Changed,
+    /// The operator wants this.
+    Intend(Intent),
+    /// This has to be asked first.
+    Ask(Box<Dialog>),
+}
+
+/// The content of a step.
+pub trait Screen: fmt::Debug {
+    /// Its own keys, for footer and help.
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item>;
+
+    /// Takes a key.
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply;
+
+    /// Takes pasted text.
+    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply;
+
+    /// Draws itself; any size must do.
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer);
+}
+
+/// The screen of a step, as it is when the step is entered.
+pub fn of(_step: Step) -> Box<dyn Screen> {
+    Box::new(plain::Plain::default())
+}

@@ -1,0 +1,93 @@
+//! What things look like: roles, never colours, are used elsewhere.
+//!
+//! Only the 16 colours of the terminal's own palette, so that light and dark terminals both work; without colour the same
+//! roles differ by bold, dim, underlined and reversed. No meaning is carried by colour alone: a word or sign stands with it.
+
+use ratatui::style::{Color, Modifier, Style};
+
+use super::glyphs::Glyphs;
+
+/// What a piece of text is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Ordinary text.
+    #[default]
+    Plain,
+    /// Good.
+    Ok,
+    /// To be looked at.
+    Warn,
+    /// Stops the procedure.
+    Alarm,
+    /// What to do.
+    Hint,
+    /// Secondary.
+    Dim,
+    /// What the next key acts on.
+    Focus,
+    /// Headings.
+    Title,
+}
+
+/// How roles and signs are shown. Decided once, from command line and environment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Theme {
+    /// Whether there are colours.
+    pub has_colour: bool,
+    /// Which characters there are.
+    pub glyphs: Glyphs,
+}
+
+impl Theme {
+    /// The style of a role.
+    pub const fn style(self, role: Role) -> Style {
+        let plain = Style::new();
+        let (colour, modifier) = match role {
+            Role::Plain => return plain,
+            Role::Ok => (Some(Color::Green), Modifier::empty()),
+            Role::Warn => (Some(Color::Magenta), Modifier::BOLD),
+            Role::Alarm => (Some(Color::Red), Modifier::BOLD.union(Modifier::REVERSED)),
+            Role::Hint => (Some(Color::Cyan), Modifier::empty()),
+            Role::Dim => (None, Modifier::DIM),
+            Role::Focus => (None, Modifier::REVERSED),
+            Role::Title => (None, Modifier::BOLD),
+        };
+        let modifier = match role {
+            // What colour says, an underline says as well.
+            Role::Hint if !self.has_colour => Modifier::UNDERLINED,
+            _ => modifier,
+        };
+        match colour {
+            Some(colour) if self.has_colour => plain.fg(colour).add_modifier(modifier),
+            _ => plain.add_modifier(modifier),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROLES: [Role; 8] =
+        [Role::Plain, Role::Ok, Role::Warn, Role::Alarm, Role::Hint, Role::Dim, Role::Focus, Role::Title];
+
+    #[test]
+    fn without_colour_no_style_has_one() {
+        let theme = Theme { has_colour: false, glyphs: Glyphs::Ascii };
+        for role in ROLES {
+            let style = theme.style(role);
+            assert_eq!((style.fg, style.bg), (None, None), "{role:?}");
+        }
+    }
+
+    #[test]
+    fn with_colour_roles_differ() {
+        let theme = Theme { has_colour: true, glyphs: Glyphs::Unicode };
+        for (index, a) in ROLES.iter().enumerate() {
+            for b in &ROLES[index + 1..] {
+                assert_ne!(theme.style(*a), theme.style(*b), "{a:?} {b:?}");
+            }
+        }
+        assert!(theme.style(Role::Alarm).add_modifier.contains(Modifier::REVERSED));
+    }
+}

@@ -1,0 +1,219 @@
+//! What the terminal shows and does with keys, without a terminal: screen, dialog, help, camera.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::dialog::{Answer, Dialog};
+use super::input::Input;
+use super::keymap::{self, Item, Key, Local, Meaning};
+use super::preview::{Camera, Scene};
+use super::screen::{self, Reply, Screen, ScreenCx};
+use super::theme::Theme;
+use super::{frame, help};
+use crate::profile::{Profile, builtin};
+use crate::session::set_up::Step;
+use crate::session::state::Session;
+use crate::wizard::Intent;
+use crate::wizard::view::{Content, ViewModel};
+
+/// What the driver is to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Wish {
+    /// Nothing.
+    None,
+    /// Tell the wizard.
+    Intend(Intent),
+    /// Back to the shell for a while.
+    Suspend,
+    /// Draw everything anew.
+    Redraw,
+    /// The terminal is gone.
+    Gone,
+}
+
+/// Everything local.
+#[derive(Debug)]
+pub struct Ui {
+    theme: Theme,
+    step: Step,
+    screen: Box<dyn Screen>,
+    dialog: Option<Dialog>,
+    /// Lines scrolled; none: no help.
+    help: Option<usize>,
+    camera: Camera,
+    scene: Option<Scene>,
+    /// Something local changed since it was drawn.
+    is_dirty: bool,
+}
+
+impl Ui {
+    /// Before anything is known.
+    pub fn new(theme: Theme) -> Self {
+        Self {
+            theme,
+            step: Step::Profile,
+            screen: screen::of(Step::Profile),
+            dialog: None,
+            help: None,
+            camera: Camera::default(),
+            scene: None,
+            is_dirty: true,
+        }
+    }
+
+    /// Takes note of a new view. The session gives the preview its numbers and nothing else.
+    pub fn refresh(&mut self, view: &ViewModel, session: &Session) {
+        if view.header.step != self.step {
+            self.step = view.header.step;
+            self.screen = screen::of(self.step);
+            self.dialog = None;
+            self.help = None;
+        }
+        self.scene = scene(view, session);
+        self.is_dirty = true;
+    }
+
+    /// Whether something local changed since it was asked last.
+    pub fn take_dirty(&mut self) -> bool {
+        std::mem::take(&mut self.is_dirty)
+    }
+
+    /// Takes an input.
+    pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Wish {
+        self.is_dirty = true;
+        match input {
+            Input::Gone => Wish::Gone,
+            Input::Resize => Wish::Redraw,
+            Input::Key(key) => self.on_key(key, view),
+            Input::Paste(text) => {
+                if let Some(dialog) = &mut self.dialog {
+                    dialog.paste(&text);
+                    return Wish::None;
+                }
+                let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
+                let reply = self.screen.on_paste(&text, &cx);
+                self.on_reply(reply).unwrap_or(Wish::None)
+            }
+            Input::Scroll(lines) => {
+                let code = if lines < 0 { KeyCode::PageUp } else { KeyCode::PageDown };
+                self.on_key(Key::plain_code(code), view)
+            }
+        }
+    }
+
+    fn on_key(&mut self, key: Key, view: &ViewModel) -> Wish {
+        if let Some(dialog) = &mut self.dialog {
+            if key == Key::ctrl('z') {
+                return Wish::Suspend;
+            }
+            return match dialog.on_key(key) {
+                Answer::Open => Wish::None,
+                Answer::Closed => {
+                    self.dialog = None;
+                    Wish::None
+                }
+                Answer::Intend(intent) => {
+                    self.dialog = None;
+                    Wish::Intend(intent)
+                }
+            };
+        }
+        if let Some(scroll) = &mut self.help {
+            match key.code {
+                KeyCode::Down | KeyCode::PageDown | KeyCode::Char(' ') => *scroll += 5,
+                KeyCode::Up | KeyCode::PageUp => *scroll = scroll.saturating_sub(5),
+                _ => self.help = None,
+            }
+            return Wish::None;
+        }
+        let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
+        let reply = self.screen.on_key(key, &cx);
+        if let Some(wish) = self.on_reply(reply) {
+            return wish;
+        }
+        match keymap::meaning(key, &view.intents) {
+            Some(Meaning::Offer(info)) => {
+                // What cannot be done now is not asked about: the wizard says why.
+                self.dialog = Dialog::before(&info, view).filter(|_| info.is_enabled());
+                if self.dialog.is_some() { Wish::None } else { Wish::Intend(info.intent) }
+            }
+            Some(Meaning::Local(Local::Help)) => {
+                self.help = Some(0);
+                Wish::None
+            }
+            Some(Meaning::Local(Local::Suspend)) => Wish::Suspend,
+            Some(Meaning::Local(Local::Redraw)) => Wish::Redraw,
+            None => {
+                self.is_dirty = self.scene.is_some() && self.camera.on_key(key);
+                Wish::None
+            }
+        }
+    }
+
+    /// What a screen's reply means; none: it had no use for the input.
+    fn on_reply(&mut self, reply: Reply) -> Option<Wish> {
+        match reply {
+            Reply::Ignored => None,
+            Reply::Changed => Some(Wish::None),
+            Reply::Intend(intent) => Some(Wish::Intend(intent)),
+            Reply::Ask(dialog) => {
+                self.dialog = Some(*dialog);
+                Some(Wish::None)
+            }
+        }
+    }
+
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        match (&self.dialog, self.help) {
+            (Some(dialog), _) => dialog.items(),
+            (None, Some(_)) => {
+                vec![Item::new("any key", "back", 0), Item::new("Up/Down", "scroll", 1)]
+            }
+            (None, None) => self.page_items(cx),
+        }
+    }
+
+    /// Keys of the screen itself.
+    fn page_items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        let mut items = keymap::items(&cx.view.intents, self.theme.glyphs);
+        items.extend(self.screen.items(cx));
+        if self.scene.is_some() {
+            items.push(Item::new(self.theme.glyphs.arrows(), "turn the picture", 8));
+        }
+        items.sort_by_key(|item| item.rank);
+        items
+    }
+
+    /// Draws everything; nothing changes by it.
+    pub fn draw(&self, view: &ViewModel, area: Rect, buf: &mut Buffer) {
+        let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
+        let Some(content) = frame::draw(view, &self.items(&cx), self.theme, area, buf) else { return };
+        match (&self.dialog, self.help) {
+            (Some(dialog), _) => dialog.draw(self.theme, content, buf),
+            (None, Some(scroll)) => {
+                help::draw(&self.page_items(&cx), scroll, self.theme, content, buf);
+            }
+            (None, None) => self.screen.draw(&cx, content, buf),
+        }
+    }
+}
+
+/// What the preview shows in this step.
+fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
+    match &view.content {
+        Content::Profile(content) => {
+            let chosen = content.chosen.as_ref()?;
+            match builtin(&chosen.name).and_then(|text| Profile::parse(text, &chosen.name).ok()) {
+                Some((profile, _)) => Some(Scene::at_rest(&profile)),
+                None => Scene::of_session(session, None),
+            }
+        }
+        Content::Instrument(_) | Content::Target(_) | Content::Plan(_) => Scene::of_session(session, None),
+        Content::Capture(content) => Scene::of_session(session, content.row),
+        Content::Identify(_) | Content::Verify(_) | Content::Deliver(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;

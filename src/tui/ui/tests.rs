@@ -1,0 +1,202 @@
+use std::time::Duration;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::runtime::{Clock, Engine, Options};
+use crate::tui::glyphs::Glyphs;
+use crate::tui::paint;
+use crate::wizard::view::{BusyView, ProfileCard};
+use crate::wizard::{Notice, Wizard};
+
+fn view() -> ViewModel {
+    Wizard::new(jiff::Timestamp::UNIX_EPOCH).view()
+}
+
+fn themes() -> [Theme; 2] {
+    [Theme { has_colour: true, glyphs: Glyphs::Unicode }, Theme { has_colour: false, glyphs: Glyphs::Ascii }]
+}
+
+/// A robot chosen, planning under way, something to say.
+fn crowded() -> ViewModel {
+    let mut view = view();
+    if let Content::Profile(content) = &mut view.content {
+        let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap();
+        content.chosen = Some(ProfileCard {
+            name: "soochow".to_owned(),
+            title: profile.title().to_owned(),
+            source: profile.source().to_owned(),
+            joints: vec!["J1".to_owned(), "J2".to_owned()],
+            free_parameters: 25,
+            instrument: None,
+            target_mm: Some([-1.473, 26.384, 71.991]),
+            warnings: Vec::new(),
+        });
+        view.header.robot = Some(profile.title().to_owned());
+    }
+    view.header.session = Some("soochow-20260105".to_owned());
+    view.header.instrument = Some("simulated tracker, seed 1".to_owned());
+    view.header.samples = 12;
+    view.header.elapsed_min = 34.2;
+    view.busy = Some(BusyView {
+        what: "planning",
+        progress: Some("choosing, start 2 of 3: condition 69.1, predicted error 0.680 sigma".to_owned()),
+        part: Some(0.58),
+        is_cancelled: false,
+    });
+    let notice = Notice::attention("the reflector at pose 12 is 3.2 mm from where it should be: \u{1b}[31m bumped?");
+    view.notice = Some(notice.hint("look at the reflector, then measure again").hint("or keep the sample as it is"));
+    view
+}
+
+fn drawn(view: &ViewModel, theme: Theme, keys: &[Key], width: u16, height: u16) -> Buffer {
+    let mut ui = Ui::new(theme);
+    ui.refresh(view, &Session::default());
+    for key in keys {
+        ui.on_input(Input::Key(*key), view);
+    }
+    let mut buffer = Buffer::empty(Rect::new(0, 0, width, height));
+    ui.draw(view, buffer.area, &mut buffer);
+    buffer
+}
+
+#[test]
+fn the_skeleton_at_80x24() {
+    let [unicode, ascii] = themes();
+    insta::assert_snapshot!("first", paint::snapshot(&drawn(&view(), unicode, &[], 80, 24)));
+    insta::assert_snapshot!("crowded", paint::snapshot(&drawn(&crowded(), unicode, &[], 80, 24)));
+    insta::assert_snapshot!("crowded_ascii", paint::snapshot(&drawn(&crowded(), ascii, &[], 80, 24)));
+    insta::assert_snapshot!("smallest", paint::snapshot(&drawn(&crowded(), unicode, &[], 60, 18)));
+}
+
+#[test]
+fn questions_and_help() {
+    let [unicode, _] = themes();
+    insta::assert_snapshot!("choose", paint::snapshot(&drawn(&view(), unicode, &[Key::char('c')], 80, 24)));
+    insta::assert_snapshot!("quit", paint::snapshot(&drawn(&view(), unicode, &[Key::char('q')], 80, 24)));
+    insta::assert_snapshot!("help", paint::snapshot(&drawn(&view(), unicode, &[Key::char('?')], 80, 24)));
+}
+
+#[test]
+fn too_small_says_what_it_needs() {
+    let [unicode, _] = themes();
+    let shown = paint::snapshot(&drawn(&view(), unicode, &[], 40, 10));
+    assert!(shown.starts_with("terminal 40x10, need 60x18\n"), "{shown}");
+}
+
+#[test]
+fn keys_become_intents() {
+    let view = view();
+    let mut ui = Ui::new(themes()[0]);
+    ui.refresh(&view, &Session::default());
+    let mut press = |key: Key| ui.on_input(Input::Key(key), &view);
+    // Nothing to take yet: the wizard says why.
+    assert_eq!(press(Key::char('n')), Wish::Intend(Intent::Next));
+    assert_eq!(press(Key::char('c')), Wish::None);
+    for c in "ur10e".chars() {
+        assert_eq!(press(Key::char(c)), Wish::None);
+    }
+    assert_eq!(press(Key::plain_code(KeyCode::Enter)), Wish::Intend(Intent::ChooseProfile("ur10e".to_owned())));
+    assert_eq!(press(Key::ctrl('c')), Wish::None);
+    assert_eq!(press(Key::ctrl('c')), Wish::Intend(Intent::Quit));
+    assert_eq!(press(Key::ctrl('z')), Wish::Suspend);
+}
+
+/// The terminal's loop without a terminal.
+struct Walk {
+    engine: Engine,
+    ui: Ui,
+}
+
+impl Walk {
+    fn press(&mut self, key: Key) {
+        let view = self.engine.wizard().view();
+        self.ui.refresh(&view, self.engine.wizard().session());
+        if let Wish::Intend(intent) = self.ui.on_input(Input::Key(key), &view) {
+            self.engine.intend(intent);
+        }
+        while !self.engine.wizard().is_idle() {
+            assert!(self.engine.wait(Duration::from_mins(2)), "nothing happens");
+        }
+        let view = self.engine.wizard().view();
+        self.ui.refresh(&view, self.engine.wizard().session());
+        self.every_possible_intent_has_a_key(&view);
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 80, 24));
+        self.ui.draw(&view, buffer.area, &mut buffer);
+    }
+
+    fn every_possible_intent_has_a_key(&self, view: &ViewModel) {
+        let shown = keymap::items(&view.intents, Glyphs::Unicode);
+        for offer in view.intents.iter().filter(|offer| offer.is_enabled()) {
+            let has_key = shown.iter().any(|item| item.label == offer.label && item.blocked.is_none());
+            assert!(has_key, "{offer:?} in the step {}", self.ui.step);
+        }
+    }
+
+    fn is_at(&self, step: Step) {
+        let notice = self.engine.wizard().notice();
+        assert_eq!(self.engine.wizard().view().header.step, step, "{notice:?}");
+    }
+}
+
+#[test]
+fn the_first_steps_are_walked_by_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let clock = Clock::starting_at(jiff::Timestamp::UNIX_EPOCH);
+    let engine = Engine::new(Options { sessions: folder.path().to_owned(), clock }).unwrap();
+    let mut walk = Walk { engine, ui: Ui::new(themes()[0]) };
+    let enter = Key::plain_code(KeyCode::Enter);
+    walk.press(Key::char('c'));
+    for c in "soo".chars() {
+        walk.press(Key::char(c));
+    }
+    walk.press(enter);
+    walk.press(enter);
+    walk.is_at(Step::Instrument);
+    walk.press(Key::char('c'));
+    walk.press(enter);
+    walk.press(enter);
+    walk.is_at(Step::Target);
+    walk.press(Key::char('p'));
+    walk.press(enter);
+    walk.is_at(Step::Plan);
+    walk.press(Key::char('b'));
+    walk.is_at(Step::Target);
+    walk.press(Key::char('q'));
+    walk.press(Key::char('y'));
+    assert!(walk.engine.has_exited());
+}
+
+fn any_key() -> impl Strategy<Value = Key> {
+    let codes = [
+        KeyCode::Enter,
+        KeyCode::Esc,
+        KeyCode::Tab,
+        KeyCode::Up,
+        KeyCode::Down,
+        KeyCode::Left,
+        KeyCode::Right,
+        KeyCode::PageUp,
+        KeyCode::PageDown,
+        KeyCode::Home,
+        KeyCode::End,
+        KeyCode::Backspace,
+        KeyCode::Delete,
+    ];
+    prop_oneof![
+        prop::sample::select(codes.to_vec()).prop_map(Key::plain_code),
+        any::<char>().prop_map(Key::char),
+        prop::char::range('a', 'z').prop_map(Key::char),
+        prop::char::range('a', 'z').prop_map(Key::ctrl),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn no_key_and_no_size_makes_it_fail(
+        keys in prop::collection::vec(any_key(), 0..25), width in 0_u16..130, height in 0_u16..50, ascii: bool,
+    ) {
+        drawn(&crowded(), themes()[usize::from(ascii)], &keys, width, height);
+    }
+}
