@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::summary::{IdentificationSettings, ParameterSummary, Provenance, SigmaSummary, Verdict, Warning};
-use crate::profile::{Profile, Target};
+use crate::kinematics::KinematicChain;
+use crate::profile::{Level, Profile, Target};
 use crate::units::{from_mm, to_mm};
 
 /// Version of the layout.
@@ -218,6 +219,22 @@ pub enum CalibrationError {
 }
 
 impl Calibration {
+    /// The identified arm of the robot whose nominal `profile` this is.
+    ///
+    /// `None`: a parameter that this robot does not have.
+    pub fn identified_chain(&self, profile: &Profile) -> Option<KinematicChain> {
+        let known = profile.free_parameters(Level::Geometric);
+        let deviations: Option<Vec<_>> = self
+            .parameters
+            .iter()
+            .map(|parameter| {
+                let id = known.iter().map(|free| free.id).find(|id| id.to_string() == parameter.name)?;
+                Some((id, id.quantity().from_edge(parameter.deviation)))
+            })
+            .collect();
+        profile.chain().with_deviations(deviations?).ok()
+    }
+
     /// The text of the file.
     ///
     /// # Errors

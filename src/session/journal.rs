@@ -25,7 +25,7 @@ use thiserror::Error;
 pub use describe::{instrument_text, target_text};
 pub use entry::{
     CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, MeasuredText, PlanText, PlannedText,
-    from_edge, from_xyz_mm, to_edge, to_xyz_mm,
+    PointErrorText, from_edge, from_xyz_mm, to_edge, to_xyz_mm,
 };
 
 /// Version of the layout of journals.

@@ -109,6 +109,7 @@ fn notice_lines(notice: &Notice, theme: Theme, area: Rect) -> Vec<(String, Role)
     let (lead, role) = match notice.severity {
         Severity::Info => ("", Role::Plain),
         Severity::Attention => ("note: ", Role::Warn),
+        Severity::Error => ("not done: ", Role::Warn),
         Severity::Stop => ("STOP: ", Role::Alarm),
     };
     let columns = usize::from(area.width);

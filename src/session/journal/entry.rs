@@ -297,4 +297,20 @@ pub struct IdentifiedText {
     pub summary: IdentificationSummary,
     /// The result file; none where there is no usable solution.
     pub calibration: Option<Calibration>,
+    /// What each sample says about both models, in the order of `samples`.
+    #[serde(default)]
+    pub points: Vec<PointErrorText>,
+}
+
+/// A sample against the models, in the robot base of each model's own registration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PointErrorText {
+    /// Where the identified arm has the SMR.
+    pub at_mm: (f64, f64, f64),
+    /// Measured − predicted by the nominal arm.
+    pub nominal_mm: (f64, f64, f64),
+    /// Measured − predicted by the identified arm. For identification samples it is a residual, never an accuracy.
+    pub identified_mm: (f64, f64, f64),
+    /// The identification left the sample out.
+    pub rejected: bool,
 }

@@ -134,7 +134,14 @@ fn identified() -> IdentifiedText {
     .unwrap();
     assert!(found.summary.verification.is_some() && !found.summary.blind_groups.is_empty());
     assert!(found.calibration.is_some());
-    IdentifiedText { samples: (1..=40).collect(), summary: found.summary, calibration: found.calibration }
+    let point = PointErrorText {
+        at_mm: (1.0, -2.0, 3.5),
+        nominal_mm: (0.25, 0.0, -1.0),
+        identified_mm: (1e-6, 0.0, 0.0),
+        rejected: true,
+    };
+    let samples = (1..=40).collect();
+    IdentifiedText { samples, summary: found.summary, calibration: found.calibration, points: vec![point] }
 }
 
 /// Entries of every variant, with every variant of what they hold.

@@ -1,10 +1,12 @@
 //! Identify and Verify: from samples to a result, and what it is worth on points that it never saw.
 
+use nalgebra::Point3;
+
 use super::{Action, Cx, StepMachine};
 use crate::identification::{PointSample, TargetAt};
 use crate::procedure::EstimationSettings;
-use crate::procedure::identify::{IdentifyRequest, NamedSample};
-use crate::session::journal::{Entry, IdentifiedText};
+use crate::procedure::identify::{Identified, IdentifyRequest, NamedSample};
+use crate::session::journal::{Entry, IdentifiedText, PointErrorText, to_xyz_mm};
 use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::session::state::Session;
@@ -61,6 +63,31 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
     })))
 }
 
+/// What each sample says about both models.
+fn points(identified: &Identified, session: &Session) -> Vec<PointErrorText> {
+    let (found, nominal) = (&identified.found, &identified.nominal);
+    let (Some(of_found), Some(of_nominal)) = (found.base_from_station.first(), nominal.base_from_station.first())
+    else {
+        return Vec::new();
+    };
+    let samples = samples(session, PoseKind::Identification);
+    let judged = samples.len();
+    let all = samples.into_iter().chain(self::samples(session, PoseKind::Verification));
+    all.enumerate()
+        .map(|(index, NamedSample { sample, .. })| {
+            let at = found.model.point_in_base(&sample.at);
+            let error =
+                |measured: Point3<f64>, predicted: Point3<f64>| to_xyz_mm(&Point3::from(measured - predicted), 6);
+            PointErrorText {
+                at_mm: to_xyz_mm(&at, 3),
+                nominal_mm: error(of_nominal * sample.point, nominal.model.point_in_base(&sample.at)),
+                identified_mm: error(of_found * sample.point, at),
+                rejected: index < judged && found.is_rejected(index),
+            }
+        })
+        .collect()
+}
+
 fn result<'a>(cx: &Cx<'a>) -> Option<&'a IdentifiedText> {
     cx.session.identified.as_deref()
 }
@@ -94,7 +121,9 @@ impl StepMachine for IdentifyStep {
         let Answer::Identified(identified) = answer else { return Vec::new() };
         let blocking = identified.summary.warnings.iter().find(|warning| warning.blocks_acceptance);
         let notice = blocking.map(|warning| Notice::attention(warning.message.clone()));
+        let points = points(&identified, cx.session);
         let text = IdentifiedText {
+            points,
             samples: cx.session.basis(),
             summary: identified.summary,
             calibration: identified.calibration,
