@@ -3,7 +3,7 @@
 pub mod session;
 
 use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -33,12 +33,24 @@ pub enum StoreError {
     },
 }
 
+/// Largest file that is read: a million rows are a tenth of it.
+const LARGEST: u64 = 1 << 30;
+
 /// The bytes of a file.
 ///
 /// # Errors
 /// It cannot be read.
 pub fn read(path: &Path) -> Result<Vec<u8>, StoreError> {
-    fs::read(path).map_err(|source| StoreError::Read { path: path.to_owned(), source })
+    let read = || -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        // Pipes are welcome, endless devices are not.
+        File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > LARGEST {
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("larger than {} MiB", LARGEST >> 20)));
+        }
+        Ok(bytes)
+    };
+    read().map_err(|source| StoreError::Read { path: path.to_owned(), source })
 }
 
 /// Makes a folder and those above it.

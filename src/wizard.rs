@@ -125,7 +125,7 @@ impl Wizard {
         ));
         if torn_bytes > 0 {
             notice = notice.hint(format!(
-                "the last entry was not completely on disk ({torn_bytes} bytes) and was dropped: what it held was never shown as saved"
+                "the end of the journal was incomplete or damaged ({torn_bytes} bytes): it was set aside as 'journal.torn-…'. An entry that was not completely on disk was never shown as saved"
             ));
         }
         wizard.actions.push_back(Action::Write(vec![Entry::Resumed { program: program(), torn_bytes }]));

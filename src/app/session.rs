@@ -172,10 +172,12 @@ fn export_tables<O: Write, E: Write>(
     };
     let failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
     store::create_folder(out).map_err(failure)?;
-    for (name, text) in [
+    let tables = [
         ("plan.csv", export::plan_csv(&session, robot)),
         ("measurements.csv", export::measurements_csv(&session, robot)),
-    ] {
+    ];
+    let drift = export::drift_csv(&session, robot).map(|text| ("drift.csv", text));
+    for (name, text) in tables.into_iter().chain(drift) {
         let file = out.join(name);
         store::replace(&file, &text).map_err(failure)?;
         console.print(&format!("written: {}\n", file.display()))?;

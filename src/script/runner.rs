@@ -15,6 +15,8 @@ use crate::wizard::{Intent, IntentInfo, Severity, ViewModel};
 const PATIENCE: Duration = Duration::from_mins(5);
 /// A measurement that fails is tried again so often.
 const TRIES: usize = 3;
+/// Why the wizard ends when the script says so.
+const QUIT: &str = "quit";
 /// Characters of an intent in the transcript.
 const LONGEST_INTENT: usize = 120;
 
@@ -120,6 +122,9 @@ impl<'a, W: Write> Runner<'a, W> {
             let (message, not_saved) = match result {
                 Ok(()) => continue,
                 Err(Stop::Output(error)) => return Err(error),
+                Err(Stop::Ended(cause)) if cause == QUIT && index < script.steps.len() => {
+                    (format!("the program has ended ('{cause}'), {} steps are left", script.steps.len() - index), false)
+                }
                 Err(Stop::Ended(cause)) => return Ok(Outcome::Ended { cause }),
                 Err(Stop::Failed(message)) => (message, false),
                 Err(Stop::NotSaved(message)) => (message, true),
@@ -316,7 +321,13 @@ impl<'a, W: Write> Runner<'a, W> {
             failed = 0;
             taken += 1;
         }
-        Ok(())
+        // A finding that stops capturing is an end as well; too few poses are not.
+        let is_short = count != usize::MAX && taken < count && self.session().open_rows().next().is_none();
+        if is_short {
+            Err(Stop::Failed(format!("only {taken} of {count} poses waited to be measured")))
+        } else {
+            Ok(())
+        }
     }
 
     /// Decides about samples in question; `false`: capturing is to stop.
@@ -360,7 +371,8 @@ impl<'a, W: Write> Runner<'a, W> {
                 return Err(Stop::Failed(format!("no point after {TRIES} tries")));
             }
         }
-        Ok(())
+        let is_complete = Check::Exists.test(&self.view(), "target.circles.result").is_ok();
+        if is_complete { Ok(()) } else { Err(Stop::Failed("the circles have no result".to_owned())) }
     }
 
     /// Ends the program and resumes from disk.

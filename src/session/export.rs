@@ -15,12 +15,23 @@ pub fn plan_csv(session: &Session, robot: &Robot) -> String {
     plan::write(&rows, &robot.joint_types)
 }
 
-/// The samples that count as a table that `trupose identify` reads: identification and drift poses, then verification poses.
-/// A column `kind` tells them apart.
+/// The samples that count as a table that `trupose identify` reads: identification poses, then verification poses. A column
+/// `kind` tells them apart.
 pub fn measurements_csv(session: &Session, robot: &Robot) -> String {
+    table(session, robot, &[PoseKind::Identification, PoseKind::Verification])
+}
+
+/// The repetitions that show a drift; none without repetitions. They are no part of the
+/// measurements: a repeated identification pose is no verification.
+pub fn drift_csv(session: &Session, robot: &Robot) -> Option<String> {
+    session.counted_of(PoseKind::Drift).next()?;
+    Some(table(session, robot, &[PoseKind::Drift]))
+}
+
+fn table(session: &Session, robot: &Robot, of: &[PoseKind]) -> String {
     let mut kinds = vec!["kind"];
     let mut rows = Vec::new();
-    for kind in [PoseKind::Identification, PoseKind::Verification, PoseKind::Drift] {
+    for kind in of.iter().copied() {
         for sample in session.counted_of(kind) {
             kinds.push(kind.name());
             rows.push(MeasuredRow {

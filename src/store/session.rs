@@ -16,6 +16,9 @@ use crate::session::journal::{self, FILE_NAME, Journal, JournalError, Line, Sum}
 /// Name of the file whose lock says that a program works in the folder.
 const LOCK_NAME: &str = ".lock";
 
+/// Incomplete ends of the journal are kept as `journal.torn-1`, `journal.torn-2`, …
+const TORN_NAME: &str = "journal.torn";
+
 /// Folders of one name are told apart by a number up to this.
 const MOST_OF_ONE_NAME: usize = 1000;
 
@@ -200,7 +203,11 @@ impl SessionFolder {
             return Err(SessionError::NotASession { folder: folder.to_owned() });
         }
         let lock = lock(folder)?;
-        let journal = read_journal(folder)?;
+        let bytes = read(&path)?;
+        let journal = journal::read(&bytes).map_err(|source| SessionError::Journal { path: path.clone(), source })?;
+        if journal.torn_bytes > 0 {
+            set_aside(folder, bytes.get(journal.good_bytes..).unwrap_or_default());
+        }
         let file = OpenOptions::new()
             .read(true)
             .write(true)
@@ -272,6 +279,14 @@ fn remove_leftovers(folder: &Path) {
             drop(fs::remove_file(entry.path()));
         }
     }
+}
+
+/// Keeps a copy of what is about to be cut off the journal. It was never acknowledged; where there is no room, it goes.
+fn set_aside(folder: &Path, torn: &[u8]) {
+    let taken = |path: &PathBuf| path.exists();
+    let name = |number: usize| folder.join(format!("{TORN_NAME}-{number}"));
+    let Some(path) = (1..=MOST_OF_ONE_NAME).map(name).find(|path| !taken(path)) else { return };
+    drop(OpenOptions::new().write(true).create_new(true).open(path).and_then(|mut file| file.write_all(torn)));
 }
 
 /// Takes the lock of a folder; the system gives it back when the process ends, however it ends.

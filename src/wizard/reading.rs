@@ -35,8 +35,9 @@ pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
         format!("'{}' can be read in several ways; separate the numbers by blanks or ';'", short(text))
     })?;
     let mut values = Vec::with_capacity(3);
+    let mut axes = String::new();
     for word in separated {
-        let word = strip_name(&word);
+        let word = strip_name(&word, &mut axes);
         if let Some(other) = CoordinateUnit::ALL.iter().find(|other| other.sign() == word) {
             if *other != unit {
                 return Err(format!(
@@ -56,6 +57,9 @@ pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
             return Err(expected());
         }
         values.push(value);
+    }
+    if !axes.is_empty() && axes != "xyz" {
+        return Err(format!("the coordinates are named '{axes}': give x, y and z, in this order"));
     }
     match values[..] {
         [x, y, z] => Ok(Point3::new(x, y, z) * unit.size()),
@@ -84,8 +88,15 @@ fn separate(text: &str) -> Option<Vec<String>> {
         return (!inner).then(|| words(&text.replace(',', " ")));
     }
     if parts.len() >= 3 {
-        // `1,5 2,5 3,5`: decimal commas, if there is no decimal point.
-        return (!text.contains('.')).then(|| words(&text.replace(',', ".")));
+        // `1,5 2,5 3,5`: decimal commas, if there is no decimal point. One comma with three digits behind may mean thousands.
+        let with_comma: Vec<&String> = parts.iter().filter(|part| part.contains(',')).collect();
+        let thousands = match with_comma.as_slice() {
+            [only] => {
+                only.split_once(',').is_some_and(|(_, behind)| behind.chars().filter(char::is_ascii_digit).count() == 3)
+            }
+            _ => false,
+        };
+        return (!text.contains('.') && !thousands).then(|| words(&text.replace(',', ".")));
     }
     // `1.5,2.5,3.5`: separators, if every part can be a number of its own.
     let parts: Vec<&str> = text.split(',').collect();
@@ -93,12 +104,15 @@ fn separate(text: &str) -> Option<Vec<String>> {
         .then(|| words(&text.replace(',', " ")))
 }
 
-/// `x=12`, `X:12`: the name goes.
-fn strip_name(word: &str) -> &str {
-    let rest = word.strip_prefix(['x', 'y', 'z', 'X', 'Y', 'Z']);
-    match rest {
-        Some(rest) => rest.trim_start_matches(['=', ':']),
-        None => word.trim_matches(['=', ':']),
+/// `x=12`, `X:12`: the name goes, to `axes`.
+fn strip_name<'a>(word: &'a str, axes: &mut String) -> &'a str {
+    let name = word.chars().next().map(|c| c.to_ascii_lowercase()).filter(|c| matches!(c, 'x' | 'y' | 'z'));
+    match (name, word.get(1..)) {
+        (Some(name), Some(rest)) => {
+            axes.push(name);
+            rest.trim_start_matches(['=', ':'])
+        }
+        _ => word.trim_matches(['=', ':']),
     }
 }
 
@@ -190,11 +204,14 @@ mod tests {
             ("", "found 0 numbers"),
             ("1 2", "found 2 numbers"),
             ("1 2 3 4", "found 4 numbers"),
-            ("1 2 x", "found 2 numbers"),
+            ("1 2 x", "named 'x'"),
             ("one two three", "is not a point"),
             ("nan 1 2", "is not a point"),
             ("1,2,3", "several ways"),
             ("1,234.5; 2,0; 3", "several ways"),
+            ("1,234 -20 88", "several ways"),
+            ("Z 88 Y -20.1 X 1234.5", "named 'zyx'"),
+            ("x=1 2 3", "named 'x'"),
             ("1 2 3 in", "was chosen in the instrument step"),
         ] {
             let error = mm(text).unwrap_err();

@@ -21,6 +21,7 @@ fn files(cx: &Cx<'_>) -> Result<Vec<(String, String)>, String> {
         ("plan.csv".to_owned(), export::plan_csv(session, robot)),
         ("measurements.csv".to_owned(), export::measurements_csv(session, robot)),
     ];
+    files.extend(export::drift_csv(session, robot).map(|text| ("drift.csv".to_owned(), text)));
     if let Some(calibration) = &result.calibration {
         files.push(("calibration.ron".to_owned(), calibration.to_text().map_err(|error| error.to_string())?));
     }

@@ -5,12 +5,14 @@ use nalgebra::Point3;
 use super::{Action, Cx, StepMachine};
 use crate::identification::{PointSample, TargetAt};
 use crate::procedure::EstimationSettings;
-use crate::procedure::identify::{Identified, IdentifyRequest, NamedSample};
+use crate::procedure::identify::{Identified, IdentifyRequest, NamedSample, SampleSet};
+use crate::session::export::measurements_csv;
 use crate::session::journal::{Entry, IdentifiedText, PointErrorText, to_xyz_mm};
 use crate::session::plan::PoseKind;
-use crate::session::set_up::Step;
-use crate::session::state::Session;
-use crate::session::summary::VerificationMode;
+use crate::session::set_up::{InstrumentChoice, Step};
+use crate::session::sha256;
+use crate::session::state::{Sample, SampleState, Session};
+use crate::session::summary::{InputFile, VerificationMode, Warning};
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::Notice;
@@ -53,14 +55,59 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
         profile_text: robot.text.clone(),
         mounted: cx.session.mounted(),
         created: cx.now.to_string(),
-        inputs: Vec::new(),
+        inputs: vec![InputFile {
+            role: "session".to_owned(),
+            file: "measurements.csv".to_owned(),
+            sha256: sha256(measurements_csv(cx.session, robot).as_bytes()),
+        }],
         settings: EstimationSettings::default(),
-        identification: samples(cx.session, PoseKind::Identification).into(),
-        verification: verification.into(),
+        identification: SampleSet {
+            samples: samples(cx.session, PoseKind::Identification),
+            file: None,
+            warnings: remarks(cx.session),
+        },
+        verification: SampleSet {
+            samples: verification,
+            file: None,
+            warnings: left_out(cx.session, PoseKind::Verification).into_iter().collect(),
+        },
         basis: "the verification poses of this session, same set-up".to_owned(),
         verification_mode: mode,
         layout: None,
     })))
+}
+
+/// What a reader of the result must know about how it was measured.
+fn remarks(session: &Session) -> Vec<Warning> {
+    let simulated = match &session.instrument {
+        Some(InstrumentChoice::Simulated(simulation)) => Some(Warning {
+            code: "simulated".to_owned(),
+            message: format!(
+                "SIMULATED: the points come from the simulated cell (seed {}), not from a robot; this result is for no real arm",
+                simulation.seed
+            ),
+            blocks_acceptance: false,
+        }),
+        _ => None,
+    };
+    simulated.into_iter().chain(left_out(session, PoseKind::Identification)).collect()
+}
+
+/// The samples of a kind that the operator left out and did not measure again.
+fn left_out(session: &Session, kind: PoseKind) -> Option<Warning> {
+    let is_left_out = |sample: &&Sample| sample.state == SampleState::LeftOut && session.kind_of(sample) == kind;
+    let poses: Vec<&str> = session.samples.iter().filter(is_left_out).map(|sample| session.pose_of(sample)).collect();
+    if poses.is_empty() {
+        return None;
+    }
+    // An arm that is only verified where it is good is not verified.
+    let is_verification = kind == PoseKind::Verification;
+    let advice = if is_verification { "; measure them again, or the verification is a choice" } else { "" };
+    Some(Warning {
+        code: "left_out".to_owned(),
+        message: format!("the operator left out {} of the {kind} poses: {}{advice}", poses.len(), poses.join(", ")),
+        blocks_acceptance: is_verification,
+    })
 }
 
 /// What each sample says about both models.
@@ -121,6 +168,12 @@ impl StepMachine for IdentifyStep {
         let Answer::Identified(identified) = answer else { return Vec::new() };
         let blocking = identified.summary.warnings.iter().find(|warning| warning.blocks_acceptance);
         let notice = blocking.map(|warning| Notice::attention(warning.message.clone()));
+        let mut identified = identified;
+        if identified.summary.verification.is_none() {
+            // The commands name their options; here it is the plan.
+            identified.summary.verdict.reasons =
+                vec!["no verification pose is measured: go back, plan some and measure them".to_owned()];
+        }
         let points = points(&identified, cx.session);
         let text = IdentifiedText {
             points,

@@ -21,7 +21,7 @@ impl StepMachine for InstrumentStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let none = match (&cx.session.instrument, cx.connection) {
             (None, _) => Some("choose an instrument first".to_owned()),
-            (Some(_), None) => Some("the instrument does not answer yet".to_owned()),
+            (Some(_), None) => Some("the instrument does not answer: connect again, or choose another".to_owned()),
             (Some(_), Some(_)) => None,
         };
         let nothing_to_retry = match (&cx.session.instrument, cx.connection) {

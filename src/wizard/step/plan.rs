@@ -114,6 +114,9 @@ impl StepMachine for PlanStep {
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
         match intent {
             Intent::MakePlan(settings) => {
+                if let Some(problem) = out_of_range(&settings) {
+                    return vec![Action::Say(Notice::error(problem))];
+                }
                 self.settings = settings;
                 plan_request(cx, &settings).map(Action::Ask).into_iter().collect()
             }
@@ -186,6 +189,18 @@ impl StepMachine for PlanStep {
             measured: cx.session.counted().count(),
         })
     }
+}
+
+/// What is wrong with settings that no search should begin with.
+fn out_of_range(settings: &PlanSettings) -> Option<String> {
+    const MOST_POSES: usize = 10_000;
+    const MOST_CANDIDATES: usize = 1_000_000;
+    let PlanSettings { poses, verification, candidates, .. } = *settings;
+    if poses == 0 || poses + verification > MOST_POSES {
+        return Some(format!("{poses} and {verification} poses cannot be planned; give 1 to {MOST_POSES} in all"));
+    }
+    (!(10..=MOST_CANDIDATES).contains(&candidates))
+        .then(|| format!("{candidates} candidates: give 10 to {MOST_CANDIDATES}"))
 }
 
 /// Rows of the present plan of a kind.

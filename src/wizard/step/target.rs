@@ -200,8 +200,8 @@ impl StepMachine for TargetStep {
                 vec![Action::Say(notice)]
             }
             Intent::StartCircles => {
-                let Some(robot) = cx.robot() else { return Vec::new() };
-                vec![Action::Ask(Request::PlanCircles { profile: Box::new(robot.profile.clone()) })]
+                let Some(profile) = cx.profile() else { return Vec::new() };
+                vec![Action::Ask(Request::PlanCircles { profile: Box::new(profile) })]
             }
             Intent::Measure => {
                 let (Some(next), Some(robot)) = (self.next(session), cx.robot()) else { return Vec::new() };
