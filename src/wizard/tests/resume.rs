@@ -78,7 +78,7 @@ fn every_prefix_can_be_brought_to_the_end() {
                 bench.pass(&simulated());
             }
         }
-        assert_eq!(bench.wizard.session().delivered.len(), 4, "{kept} lines");
+        assert_eq!(bench.wizard.session().delivered.len(), 5, "{kept} lines");
         assert_eq!(*bench.wizard.session(), fold(&bench.journal), "{kept} lines");
         bench.does(Intent::Quit);
         assert_eq!(bench.exits, 1);
@@ -110,7 +110,7 @@ fn bytes_that_were_lost_are_said() {
     assert!(texts(&effects)[0].contains("37 bytes of an incomplete last entry dropped"));
     let (id, _) = super::bench::appended(&effects);
     wizard.update(crate::wizard::Event::Store(crate::wizard::StoreEvent::Written { id }));
-    assert!(wizard.notice().unwrap().hints[0].contains("(37 bytes) and was dropped"));
+    assert!(wizard.notice().unwrap().hints[0].contains("(37 bytes): it was set aside"));
 }
 
 #[test]

@@ -96,7 +96,7 @@ fn instrument_connects_as_soon_as_it_is_chosen() {
         offers(&bench.wizard),
         [
             "Cancel",
-            "Next -- the instrument does not answer yet",
+            "Next -- the instrument does not answer: connect again, or choose another",
             "ChooseInstrument -- connecting is under way",
             "Retry -- connecting is under way",
             "Back -- connecting is under way",
@@ -119,7 +119,7 @@ fn an_instrument_that_does_not_answer_can_be_tried_again() {
     let (id, _) = started(&effects);
     assert!(bench.answer(id, super::bench::failure("no route to host")).is_empty());
     assert_eq!(bench.told(), "no route to host");
-    assert_eq!(blocked(&bench.wizard, "Next"), "the instrument does not answer yet");
+    assert_eq!(blocked(&bench.wizard, "Next"), "the instrument does not answer: connect again, or choose another");
     bench.does(Intent::Retry);
     assert_eq!(bench.wizard.view().header.instrument, Some(text("bench instrument")));
 }
@@ -264,7 +264,7 @@ fn identify_verify_and_deliver_end_in_files() {
     let effects = bench.intend(Intent::Deliver);
     assert_eq!(texts(&effects), ["start writing files"]);
     bench.settle(effects);
-    let files = ["plan.csv", "measurements.csv", "calibration.ron", "report.json"];
+    let files = ["plan.csv", "measurements.csv", "drift.csv", "calibration.ron", "report.json"];
     assert_eq!(bench.wizard.session().delivered, files);
     let Content::Deliver(view) = bench.wizard.view().content else { panic!() };
     assert_eq!(view.files, files);
@@ -280,7 +280,7 @@ fn files_that_cannot_be_written_can_be_written_again() {
     assert_eq!(bench.told(), "disk full");
     assert!(offers(&bench.wizard).contains(&text("Deliver*")));
     bench.does(Intent::Deliver);
-    assert_eq!(bench.wizard.session().delivered.len(), 4);
+    assert_eq!(bench.wizard.session().delivered.len(), 5);
 }
 
 #[test]
