@@ -127,13 +127,17 @@ fn what_is_not_possible_is_a_failure_with_the_reason() {
     for (steps, part) in [
         ("Do(Next)", "Next is not possible now: accept a plan first"),
         ("Do(Measure)", "Measure is not offered here; offered:"),
+        ("Do(LoadPlan(\"none.csv\"))", "LoadPlan failed: cannot read 'none.csv'"),
+        ("Fails(AcceptPlan, \"x\")", "AcceptPlan is not possible now"),
+        ("Fails(Note(\"x\"), \"x\")", "Note is not offered here"),
+        ("Do(Quit), Say(\"never\")", "the program has ended ('quit'), 1 steps are left"),
         ("Expect(\"plan.nonsense\", Exists)", "no 'nonsense' in plan, which has accepted, left, measured"),
         (
             "CaptureAll(Fail), Expect(\"header.step\", Is(\"Capture\"))",
             "expected header.step to be 'Capture'; seen: Plan",
         ),
         (
-            "Do(LoadPlan(\"none.csv\")), Do(AcceptPlan)",
+            "Fails(LoadPlan(\"none.csv\"), \"cannot read\"), Do(AcceptPlan)",
             "AcceptPlan is not possible now: there is no new plan to accept",
         ),
     ] {

@@ -749,6 +749,7 @@ fn exported_tables_are_those_of_the_session_and_identify_the_same_arm() {
     let (found, expected) = (deviations(&report), deviations(&session));
     assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
     for (name, value) in &expected {
-        assert!((found[name] - value).abs() < 1e-6, "{name}: {} and {value}", found[name]);
+        // The table has nanometres, the journal all digits.
+        assert!((found[name] - value).abs() < 1e-5, "{name}: {} and {value}", found[name]);
     }
 }

@@ -151,6 +151,10 @@ fn play<O: Write, E: Write>(
             let status = if not_saved { ExitStatus::Store } else { ExitStatus::NotAccepted };
             Err(Failure::new(status, format!("script step {step}: {message}")))
         }
-        Outcome::Ended { .. } => signalled(has_session).map_or(Ok(ExitStatus::Accepted), Err),
+        Outcome::Ended { cause } => match (signalled(has_session), has_session) {
+            (Some(failure), true) => Err(Failure::new(failure.status, format!("{cause}; the session is saved"))),
+            (Some(failure), false) => Err(Failure::new(failure.status, format!("{cause}; no session was begun"))),
+            (None, _) => Ok(ExitStatus::Accepted),
+        },
     }
 }

@@ -196,7 +196,7 @@ fn out_of_range(settings: &PlanSettings) -> Option<String> {
     const MOST_POSES: usize = 10_000;
     const MOST_CANDIDATES: usize = 1_000_000;
     let PlanSettings { poses, verification, candidates, .. } = *settings;
-    if poses == 0 || poses + verification > MOST_POSES {
+    if poses == 0 || poses.saturating_add(verification) > MOST_POSES {
         return Some(format!("{poses} and {verification} poses cannot be planned; give 1 to {MOST_POSES} in all"));
     }
     (!(10..=MOST_CANDIDATES).contains(&candidates))
