@@ -73,3 +73,6 @@ pub fn of(step: Step) -> Box<dyn Screen> {
         _ => Box::new(plain::Plain::default()),
     }
 }
+
+#[cfg(test)]
+pub(crate) mod bench;
