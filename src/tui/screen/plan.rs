@@ -19,6 +19,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
 use super::{Reply, Screen, ScreenCx};
+use crate::tui::glyphs::wrapped;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::paint;
 use crate::tui::preview::Preview;
@@ -32,13 +33,20 @@ use search::Search;
 /// Content columns from which on the picture stands beside the views (a terminal of 100).
 const WIDE: u16 = 98;
 /// Columns of the views beside the picture.
-const VIEWS: u16 = 70;
+const VIEWS: u16 = 74;
 /// Columns of the settings.
 const SETTINGS: u16 = 34;
 /// Lines of settings and figures.
 const TOP: u16 = 8;
 /// Columns between two parts.
 const GAP: u16 = 2;
+
+/// What happens here.
+const HELP: [&str; 3] = [
+    "1. Configurations are drawn that the robot reaches freely and where the tracker sees the SMR.",
+    "2. Of these the set is chosen that tells most about all parameters; that takes seconds to minutes.",
+    "3. You see what it promises and what it costs, then accept it or change the settings.",
+];
 
 /// The views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -119,6 +127,9 @@ impl Screen for Plan {
             items.push(Item::new("0-9", "type its value", 4));
             items.push(Item::new("+/-", "more or fewer poses", 4));
         }
+        if self.tab == Tab::TradeOff {
+            items.push(Item::new("Up/Down", "number of poses", 3));
+        }
         items.push(Item::new("o", "choose with other seed", 5));
         items
     }
@@ -146,14 +157,19 @@ impl Screen for Plan {
             code if self.tab == Tab::Plan && is_free => {
                 return if self.form.on_key(code) { Reply::Changed } else { Reply::Ignored };
             }
-            KeyCode::Up | KeyCode::PageUp if matches!(self.tab, Tab::TradeOff | Tab::Weak) => {
+            KeyCode::Up | KeyCode::Down if self.tab == Tab::TradeOff && is_free => {
+                let poses = self.form.settings().poses;
+                let to =
+                    content(cx.view).and_then(|content| trade_off::next(content, poses, key.code == KeyCode::Down));
+                if let Some(poses) = to {
+                    self.form.set_poses(poses);
+                }
+            }
+            KeyCode::Up | KeyCode::PageUp if self.tab == Tab::Weak => {
                 self.scroll = self.scroll.saturating_sub(1);
             }
-            KeyCode::Down | KeyCode::PageDown if matches!(self.tab, Tab::TradeOff | Tab::Weak) => {
-                let most = content(cx.view).map_or(0, |content| match self.tab {
-                    Tab::TradeOff => trade_off::count(content),
-                    _ => weak::count(content),
-                });
+            KeyCode::Down | KeyCode::PageDown if self.tab == Tab::Weak => {
+                let most = content(cx.view).map_or(0, weak::count);
                 self.scroll = (self.scroll + 1).min(most.saturating_sub(1));
             }
             _ => return Reply::Ignored,
@@ -176,7 +192,7 @@ impl Screen for Plan {
         let body = paint::band(main, 2, main.height);
         match self.tab {
             Tab::Plan => self.overview(cx, content, body, buf),
-            Tab::TradeOff => trade_off::draw(cx.theme, content, self.form.settings().poses, self.scroll, body, buf),
+            Tab::TradeOff => trade_off::draw(cx.theme, content, self.form.settings().poses, body, buf),
             Tab::Weak => weak::draw(cx.theme, content, self.scroll, body, buf),
             Tab::Picture => {}
         }
@@ -198,16 +214,26 @@ impl Screen for Plan {
     }
 }
 
+/// What choosing poses means, for somebody who has never done it.
+fn what_happens(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+    let lines = HELP.iter().flat_map(|line| wrapped(&cx.theme.glyphs.show(line), usize::from(area.width)));
+    for (row, line) in (0_u16..area.height).zip(lines) {
+        paint::text(buf, area, (0, row), &line, cx.theme.style(Role::Dim));
+    }
+}
+
 impl Plan {
     fn overview(&self, cx: &ScreenCx<'_>, content: &PlanView, area: Rect, buf: &mut Buffer) {
         let settings = Rect { width: SETTINGS.min(area.width), ..paint::band(area, 0, TOP) };
         self.form.draw(cx.theme, settings, buf);
         let left = (SETTINGS + GAP).min(area.width);
         let figures = Rect { x: area.x + left, width: area.width - left, ..paint::band(area, 0, TOP) };
-        figures::draw(cx.theme, content, figures, buf);
+        figures::draw(cx.theme, content, self.search.is_running(), figures, buf);
         let below = paint::band(area, TOP, area.height);
         if self.search.is_running() {
             self.search.draw(cx.theme, below, buf);
+        } else if content.proposal.is_none() && content.accepted.is_none() {
+            what_happens(cx, below, buf);
         } else {
             trade_off::draw_in_short(cx.theme, content, self.form.settings().poses, below, buf);
         }

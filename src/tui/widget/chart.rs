@@ -90,9 +90,8 @@ impl Chart<'_> {
         }
         draw_line(&points, &scale, columns, &mut cells);
         paint_cells(&cells, theme, plot, buf);
-        let marked = self.mark.and_then(|x| points.iter().min_by(|a, b| (a.0 - x).abs().total_cmp(&(b.0 - x).abs())));
-        if let Some((x, y)) = marked {
-            let (across, down) = scale.at(*x, *y);
+        if let Some((x, y)) = self.mark.and_then(|x| on_line(&points, x)) {
+            let (across, down) = scale.at(x, y);
             let at = (across / DOTS.0, down / DOTS.1);
             if let (Ok(column), Ok(row)) = (u16::try_from(at.0), u16::try_from(at.1)) {
                 paint::text(buf, plot, (column, row), theme.glyphs.next(), theme.style(Role::Title));
@@ -114,6 +113,17 @@ impl Chart<'_> {
         if x.1 > x.0 {
             paint::text(buf, area, (u16::try_from(end).unwrap_or(0), row), &last, dim);
         }
+    }
+}
+
+/// The point of the line at `x`; beyond its ends the end.
+fn on_line(points: &[(f64, f64)], x: f64) -> Option<(f64, f64)> {
+    let (first, last) = (points.first()?, points.last()?);
+    let x = if x.is_finite() { x.clamp(first.0, last.0.max(first.0)) } else { last.0 };
+    let pair = points.windows(2).find(|pair| pair.iter().map(|point| point.0 >= x).eq([false, true]));
+    match pair {
+        Some([from, to]) => Some((x, from.1 + (to.1 - from.1) * (x - from.0) / (to.0 - from.0))),
+        _ => points.iter().find(|point| point.0 >= x).copied(),
     }
 }
 

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 
 use super::joints;
 use super::prediction::in_short;
-use crate::tui::glyphs::{shortened, wrapped};
+use crate::tui::glyphs::{shortened, width, wrapped};
 use crate::tui::keymap;
 use crate::tui::paint;
 use crate::tui::screen::ScreenCx;
@@ -15,6 +15,8 @@ use crate::wizard::view::{CaptureView, FindingView};
 
 /// Columns of the names of keys in a list of what can be done.
 const KEYS: usize = 12;
+/// Lines from which on nothing needs to be left out.
+const TALL: u16 = 26;
 /// Lines of a message before it is cut off.
 const MESSAGE: usize = 4;
 
@@ -22,33 +24,53 @@ const MESSAGE: usize = 4;
 pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
     let theme = cx.theme;
     let room = usize::from(area.width);
-    let heading = shortened(&theme.glyphs.show(&heading(content, theme)), room, theme.glyphs);
-    paint::text(buf, area, (0, 0), &heading, theme.style(Role::Title));
-    let count = shortened(&theme.glyphs.show(&count(content, theme)), room, theme.glyphs);
-    paint::text(buf, area, (0, 1), &count, theme.style(Role::Plain));
-    let body = paint::band(area, 2, area.height);
-
-    let panel = panel(cx, content, room);
-    let status = status(content);
+    let is_tall = area.height >= TALL;
+    let mut lines: Vec<(String, Role)> = Vec::new();
+    lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, Role::Title)));
+    lines.extend(joined(&count(content), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
+    lines.extend(panel(cx, content, room));
+    let status: Vec<(String, Role)> = status(content)
+        .into_iter()
+        .flat_map(|(text, role)| {
+            let text = theme.glyphs.show(&text);
+            let parts = if is_tall { wrapped(&text, room) } else { vec![text] };
+            parts.into_iter().map(move |part| (part, role))
+        })
+        .collect();
     // The joints are what matters, but never so large that what is to be decided has no room.
-    let needed = height(panel.len()).saturating_add(u16::from(!status.is_empty()));
-    let layout = joints::layout(&content.joints, body.width, body.height.saturating_sub(needed));
+    let needed = height(lines.len()).saturating_add(u16::from(!status.is_empty()));
+    let layout = joints::layout(&content.joints, area.width, area.height.saturating_sub(needed));
     let mut row = 0;
-    for (text, role) in &panel {
-        paint::text(buf, body, (0, row), &shortened(text, room, theme.glyphs), theme.style(*role));
+    for (text, role) in &lines {
+        paint::text(buf, area, (0, row), &shortened(text, room, theme.glyphs), theme.style(*role));
         row += 1;
     }
-    let left = body.height.saturating_sub(row);
-    let spare = left.saturating_sub(layout.rows.saturating_add(height(status.len())));
+    let spare = area.height.saturating_sub(row).saturating_sub(layout.rows.saturating_add(height(status.len())));
     row += u16::from(spare > 0);
-    let place = paint::band(body, row, layout.rows);
-    joints::draw(&content.joints, layout, theme, place, buf);
+    joints::draw(&content.joints, layout, theme, paint::band(area, row, layout.rows), buf);
     row = row.saturating_add(layout.rows).saturating_add(u16::from(spare > 1));
-    let status_area = paint::band(body, row, body.height);
+    let below = paint::band(area, row, area.height);
     for (row, (text, role)) in (0_u16..).zip(&status) {
-        let text = shortened(&theme.glyphs.show(text), room, theme.glyphs);
-        paint::text(buf, status_area, (0, row), &text, theme.style(*role));
+        paint::text(buf, below, (0, row), &shortened(text, room, theme.glyphs), theme.style(*role));
     }
+}
+
+/// Parts on one line, the last ones left out where there is no room; or on as many lines as they need.
+fn joined(parts: &[String], theme: Theme, room: usize, is_tall: bool) -> Vec<String> {
+    let glyphs = theme.glyphs;
+    let mut lines: Vec<String> = Vec::new();
+    for part in parts {
+        let part = glyphs.show(part);
+        match lines.last_mut() {
+            Some(line) if width(line) + width(glyphs.dot()) + width(&part) <= room => {
+                line.push_str(glyphs.dot());
+                line.push_str(&part);
+            }
+            Some(_) if !is_tall => break,
+            _ => lines.push(shortened(&part, room, glyphs)),
+        }
+    }
+    lines
 }
 
 fn height(lines: usize) -> u16 {
@@ -56,8 +78,11 @@ fn height(lines: usize) -> u16 {
 }
 
 /// Where to go, and through which poses.
-fn heading(content: &CaptureView, theme: Theme) -> String {
-    let Some(pose) = &content.pose else { return "All poses of the plan are measured.".to_owned() };
+fn heading(content: &CaptureView) -> Vec<String> {
+    if let Some(finding) = &content.finding {
+        return vec![format!("Pose {} is in question: decide before going on", finding.pose)];
+    }
+    let Some(pose) = &content.pose else { return vec!["All poses of the plan are measured.".to_owned()] };
     let mut parts = vec![format!("Go to pose {pose}")];
     parts.extend(content.kind.map(|kind| kind.name().to_owned()));
     if !content.on_the_way.is_empty() {
@@ -65,19 +90,19 @@ fn heading(content: &CaptureView, theme: Theme) -> String {
     }
     let most = content.joints.iter().find(|joint| joint.moves_most);
     parts.extend(most.map(|joint| format!("{} moves most: {:.1} {}", joint.name, joint.moves, joint.unit)));
-    parts.join(theme.glyphs.dot())
+    parts
 }
 
-fn count(content: &CaptureView, theme: Theme) -> String {
+fn count(content: &CaptureView) -> Vec<String> {
     let all = content.measured + content.open;
     let mut parts = vec![format!("{} of {all} measured", content.measured), format!("{} open", content.open)];
     if content.skipped > 0 {
         parts.push(format!("{} skipped", content.skipped));
     }
     if content.open > 0 {
-        parts.extend(content.minutes_left.map(|minutes| format!("about {minutes:.0} min left")));
+        parts.extend(content.minutes_left.map(|minutes| format!("about {:.0} min left", minutes.ceil())));
     }
-    parts.join(theme.glyphs.dot())
+    parts
 }
 
 /// What has to be decided, with the keys for it.
@@ -106,12 +131,8 @@ fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, 
 
 fn question(cx: &ScreenCx<'_>, finding: &FindingView, room: usize) -> Vec<(String, Role)> {
     let cause = finding.cause.replace('_', " ");
-    let title = format!(
-        "{}Pose {}, measurement {}, is in question: {cause}",
-        cx.theme.glyphs.pointer(),
-        finding.pose,
-        finding.measurement
-    );
+    let title =
+        format!("{}Pose {}, measurement {}: {cause}", cx.theme.glyphs.pointer(), finding.pose, finding.measurement);
     let mut lines = vec![(cx.theme.glyphs.show(&title), Role::Warn)];
     lines.extend(message(cx, &finding.message, room));
     if finding.has_remedy {

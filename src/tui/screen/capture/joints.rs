@@ -9,8 +9,10 @@ use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::digits;
 use crate::wizard::view::JointShown;
 
-/// Columns of name and unit beside large digits.
-const LABEL: u16 = 8;
+/// Columns of the name of a joint at least, and at most.
+const NAME: (usize, usize) = (4, 10);
+/// Columns around a name: sign before, gap behind.
+const AROUND_NAME: u16 = 3;
 /// Columns of a line with a joint.
 const LINE: u16 = 36;
 
@@ -21,18 +23,27 @@ pub(super) struct Layout {
     columns: u16,
     /// Lines from one joint to the next.
     pitch: u16,
+    /// Columns of name and unit.
+    label: u16,
     /// Lines in all.
     pub(super) rows: u16,
+}
+
+/// Columns that names and units of `joints` take.
+fn label(joints: &[JointShown]) -> u16 {
+    let widest = joints.iter().map(|joint| width(&joint.name)).max().unwrap_or(0).clamp(NAME.0, NAME.1);
+    u16::try_from(widest).unwrap_or(0) + AROUND_NAME
 }
 
 /// The largest way to show `joints` in `columns` × `rows`.
 pub(super) fn layout(joints: &[JointShown], columns: u16, rows: u16) -> Layout {
     let count = u16::try_from(joints.len()).unwrap_or(u16::MAX);
-    let large = LABEL + joints.iter().map(|joint| digits::columns(&number(joint))).max().unwrap_or(0);
+    let label = label(joints);
+    let large = label + joints.iter().map(|joint| digits::columns(&number(joint))).max().unwrap_or(0);
     let of = |is_large, columns: u16, pitch| {
         let lines = count.div_ceil(columns);
         let used = if is_large { lines.saturating_mul(pitch).saturating_sub(pitch - digits::HEIGHT) } else { lines };
-        Layout { is_large, columns, pitch, rows: used }
+        Layout { is_large, columns, pitch, label, rows: used }
     };
     let two = large.saturating_mul(2) <= columns;
     let candidates = [
@@ -66,9 +77,9 @@ pub(super) fn draw(joints: &[JointShown], layout: Layout, theme: Theme, area: Re
             paint::band(area, row.saturating_mul(layout.pitch), if layout.is_large { digits::HEIGHT } else { 1 });
         let cell = Rect { x: cell.x + x, width: columns.min(cell.width - x), ..cell };
         if layout.is_large {
-            draw_large(joint, theme, cell, buf);
+            draw_large(joint, layout.label, theme, cell, buf);
         } else {
-            draw_line(joint, theme, cell, buf);
+            draw_line(joint, layout.label, theme, cell, buf);
         }
     }
 }
@@ -77,10 +88,10 @@ fn lead(joint: &JointShown, glyphs: Glyphs) -> &'static str {
     if joint.moves_most { glyphs.pointer() } else { "  " }
 }
 
-fn draw_large(joint: &JointShown, theme: Theme, cell: Rect, buf: &mut Buffer) {
+fn draw_large(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut Buffer) {
     let glyphs = theme.glyphs;
     let column = paint::text(buf, cell, (0, 0), lead(joint, glyphs), theme.style(Role::Hint));
-    let name = shortened(&glyphs.show(&joint.name), usize::from(LABEL - 3), glyphs);
+    let name = shortened(&glyphs.show(&joint.name), usize::from(label - AROUND_NAME), glyphs);
     let role = if joint.moves_most { Role::Focus } else { Role::Title };
     paint::text(buf, cell, (column, 0), &name, theme.style(role));
     paint::text(buf, cell, (column, 1), &glyphs.show(&joint.unit), theme.style(Role::Dim));
@@ -89,20 +100,20 @@ fn draw_large(joint: &JointShown, theme: Theme, cell: Rect, buf: &mut Buffer) {
     }
     let text = number(joint);
     // Right-aligned, so that the points stand below each other; at most as far right as the widest angle needs.
-    let right = cell.width.saturating_sub(1).min(LABEL + digits::columns("-360.000").max(digits::columns(&text)));
+    let right = cell.width.saturating_sub(1).min(label + digits::columns("-360.000").max(digits::columns(&text)));
     let start = right.saturating_sub(digits::columns(&text));
     let place = Rect { x: cell.x + start, width: cell.width - start, ..cell };
     digits::draw(&text, glyphs, theme.style(Role::Title), place, buf);
 }
 
-fn draw_line(joint: &JointShown, theme: Theme, cell: Rect, buf: &mut Buffer) {
+fn draw_line(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut Buffer) {
     let glyphs = theme.glyphs;
     let column = paint::text(buf, cell, (0, 0), lead(joint, glyphs), theme.style(Role::Hint));
-    let name = shortened(&glyphs.show(&joint.name), usize::from(LABEL - 2), glyphs);
+    let name = shortened(&glyphs.show(&joint.name), usize::from(label - AROUND_NAME), glyphs);
     let role = if joint.moves_most { Role::Focus } else { Role::Title };
     paint::text(buf, cell, (column, 0), &name, theme.style(role));
     let text = number(joint);
-    let start = usize::from(LABEL) + 10_usize.saturating_sub(width(&text));
+    let start = usize::from(label) + 10_usize.saturating_sub(width(&text));
     let column = paint::text(buf, cell, (u16::try_from(start).unwrap_or(0), 0), &text, theme.style(Role::Title));
     let column = paint::text(buf, cell, (column + 1, 0), &glyphs.show(&joint.unit), theme.style(Role::Dim));
     if joint.moves_most {

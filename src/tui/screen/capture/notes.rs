@@ -17,23 +17,23 @@ fn lines(content: &CaptureView) -> Vec<(Role, String)> {
     let mut lines = vec![(Role::Title, "Notes (w writes one to the pose shown)".to_owned())];
     lines.extend(content.notes.iter().rev().map(|(pose, text)| {
         let pose = pose.as_ref().map_or_else(|| "no pose".to_owned(), |pose| format!("pose {pose}"));
-        (Role::Plain, format!("  {pose}: {text}"))
+        (Role::Plain, format!("- {pose}: {text}"))
     }));
     if content.notes.is_empty() {
-        lines.push((Role::Dim, "  none".to_owned()));
+        lines.push((Role::Dim, "- none".to_owned()));
     }
     lines.push((Role::Title, "Drift: how far a repeated pose has moved".to_owned()));
     lines.extend(content.drift.iter().rev().map(|drift| {
         let (pose, measurement, moved) = (&drift.pose, drift.measurement, drift.moved_mm);
-        (Role::Plain, format!("  pose {pose}, measurement {measurement}: {moved:.3} mm"))
+        (Role::Plain, format!("- pose {pose}, measurement {measurement}: {moved:.3} mm"))
     }));
     if content.drift.is_empty() {
-        lines.push((Role::Dim, "  not repeated yet".to_owned()));
+        lines.push((Role::Dim, "- not repeated yet".to_owned()));
     }
     lines.push((Role::Title, "Measurements that gave no sample".to_owned()));
-    lines.extend(content.refused.iter().rev().map(|(pose, reason)| (Role::Plain, format!("  pose {pose}: {reason}"))));
+    lines.extend(content.refused.iter().rev().map(|(pose, reason)| (Role::Plain, format!("- pose {pose}: {reason}"))));
     if content.refused.is_empty() {
-        lines.push((Role::Dim, "  none".to_owned()));
+        lines.push((Role::Dim, "- none".to_owned()));
     }
     lines
 }

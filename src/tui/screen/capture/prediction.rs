@@ -20,18 +20,14 @@ fn error(sigma: f64, mm: Option<f64>) -> String {
 
 /// Whether the rest is worth its time.
 fn verdict(prediction: &PredictionView) -> &'static str {
-    if prediction.is_enough {
-        "enough: the rest improves it by less than 5 %"
-    } else {
-        "not enough yet: go on measuring"
-    }
+    if prediction.is_enough { "enough (the rest gains less than 5 %)" } else { "not enough yet" }
 }
 
 /// The prediction in a line.
 pub(super) fn in_short(prediction: &PredictionView) -> String {
     let now = error(prediction.now_sigma, prediction.now_mm);
     let all = prediction.with_all_sigma.map(|sigma| error(sigma, prediction.with_all_mm));
-    let all = all.map_or_else(String::new, |all| format!(", with all poses {all}"));
+    let all = all.map_or_else(String::new, |all| format!(", {all} with all"));
     format!("predicted error {now}{all}: {}", verdict(prediction))
 }
 

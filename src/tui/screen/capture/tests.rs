@@ -108,6 +108,8 @@ fn of(content: CaptureView) -> ViewModel {
 fn in_question() -> ViewModel {
     let message = "pose 14 does not fit the other poses: its point fits pose 15; was the robot at another pose?";
     let mut view = of(CaptureView {
+        row: Some(14),
+        pose: Some("14".to_owned()),
         finding: Some(FindingView {
             pose: "14".to_owned(),
             measurement: 16,

@@ -11,6 +11,10 @@ use crate::wizard::view::{PlanFigures, PlanView};
 
 /// Columns of the names of the numbers.
 const NAMES: usize = 16;
+/// Said where there is no plan.
+const NO_PLAN: &str = "No plan yet. Enter chooses poses with the settings beside; l takes the poses of a file.";
+/// Said while one is made.
+const SEARCHING: &str = "Choosing poses. Esc stops; nothing is measured before you accept.";
 
 /// Hours and minutes, as a shift is planned.
 pub(super) fn time(minutes: f64) -> String {
@@ -21,7 +25,7 @@ pub(super) fn time(minutes: f64) -> String {
 }
 
 /// Draws the proposal, else the plan that is being measured, else what to do.
-pub(super) fn draw(theme: Theme, content: &PlanView, area: Rect, buf: &mut Buffer) {
+pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: Rect, buf: &mut Buffer) {
     let mut lines = match (&content.proposal, &content.accepted) {
         (Some(figures), _) => {
             let mut lines = vec![(Role::Title, "Proposed, not accepted yet".to_owned())];
@@ -35,7 +39,7 @@ pub(super) fn draw(theme: Theme, content: &PlanView, area: Rect, buf: &mut Buffe
             lines
         }
         (None, None) => {
-            let text = "No plan yet. Enter chooses poses with the settings beside; l takes the poses of a file.";
+            let text = if is_searching { SEARCHING } else { NO_PLAN };
             let lines = wrapped(text, usize::from(area.width));
             lines.into_iter().map(|line| (Role::Plain, line)).collect()
         }
@@ -56,7 +60,7 @@ fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, S
     if let Some(condition) = figures.condition_number {
         let random = summary.map_or_else(String::new, |summary| {
             let random = &summary.random.condition_number;
-            format!(" (random {:.1}, best {:.1})", random.median, random.best)
+            format!(" (random {:.1})", random.median)
         });
         lines.push(named("condition number", &format!("{condition:.1}{random}")));
     }
@@ -74,10 +78,10 @@ fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, S
         lines.push(named("time", &format!("about {}", time(minutes))));
     }
     if let Some(summary) = summary {
-        lines.push(named("of the optimum", &format!("at least {:.0} % (D-efficiency)", 100.0 * summary.d_efficiency)));
+        lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
         let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
         if weak + warnings > 0 {
-            lines.push((Role::Warn, format!("{weak} weak parameters, {warnings} warnings: see Tab")));
+            lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: see Tab")));
         }
     } else {
         lines.push((Role::Dim, figures.origin.clone()));

@@ -34,8 +34,8 @@ const FIELDS: [Field; 5] = [
 
 /// What each setting means.
 const MEANING: [&str; 5] = [
-    "measured, the arm comes from them",
-    "measured, only to check the result",
+    "the arm is identified from them",
+    "only to check the result with",
     "random poses to choose from",
     "other seed, other candidates",
     "0: no pose is repeated",
@@ -78,6 +78,12 @@ impl Form {
     pub(super) fn with_other_seed(&self) -> PlanSettings {
         let settings = self.settings();
         PlanSettings { seed: settings.seed.wrapping_add(1) % 1_000_000_000, ..settings }
+    }
+
+    /// So many identification poses.
+    pub(super) fn set_poses(&mut self, poses: usize) {
+        self.commit();
+        self.set(0, poses);
     }
 
     fn value(&self, index: usize) -> usize {

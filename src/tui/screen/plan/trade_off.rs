@@ -5,20 +5,21 @@ use ratatui::layout::Rect;
 
 use super::figures::time;
 use crate::session::plan_summary::TradeOffSummary;
-use crate::tui::glyphs::shortened;
+use crate::tui::glyphs::width;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::{Chart, Column, Table};
 use crate::wizard::view::PlanView;
 
 /// Columns of the table.
-const TABLE: u16 = 38;
+const TABLE: u16 = 40;
 /// Said where there is nothing to draw.
 const NOTHING: &str = "The trade-off is known when poses have been chosen (Enter or p).";
 
-/// Rows of the table.
-pub(super) fn count(content: &PlanView) -> usize {
-    options(content).len()
+/// The number of poses of the option after `poses`, or before.
+pub(super) fn next(content: &PlanView, poses: usize, is_more: bool) -> Option<usize> {
+    let mut numbers = options(content).iter().map(|option| option.poses);
+    if is_more { numbers.find(|number| *number > poses) } else { numbers.rfind(|number| *number < poses) }
 }
 
 fn options(content: &PlanView) -> &[TradeOffSummary] {
@@ -28,8 +29,8 @@ fn options(content: &PlanView) -> &[TradeOffSummary] {
 /// Points in mm where the instrument is known, else in σ; with the unit.
 fn points(options: &[TradeOffSummary]) -> (Vec<(f64, f64)>, bool) {
     let has_mm = options.iter().all(|option| option.predicted_rms_mm.is_some());
-    let error = |option: &TradeOffSummary| option.predicted_rms_mm.unwrap_or(option.predicted_error_sigma);
-    let error = |option: &TradeOffSummary| if has_mm { error(option) } else { option.predicted_error_sigma };
+    let error =
+        |option: &TradeOffSummary| option.predicted_rms_mm.filter(|_| has_mm).unwrap_or(option.predicted_error_sigma);
     (options.iter().map(|option| (option.poses as f64, error(option))).collect(), has_mm)
 }
 
@@ -63,22 +64,26 @@ fn in_words(option: &TradeOffSummary) -> String {
 pub(super) fn draw_in_short(theme: Theme, content: &PlanView, poses: usize, area: Rect, buf: &mut Buffer) {
     let options = options(content);
     let Some(index) = nearest(options, poses) else { return };
-    let near: Vec<String> = [index.checked_sub(1), Some(index), Some(index + 1)]
-        .into_iter()
-        .flatten()
-        .filter_map(|place| Some((place, options.get(place)?)))
-        .map(|(place, option)| {
-            let lead = if place == index { theme.glyphs.next() } else { "" };
-            format!("{lead}{}", in_words(option))
-        })
-        .collect();
-    let line = shortened(&near.join(theme.glyphs.dot()), usize::from(area.width), theme.glyphs);
-    paint::text(buf, area, (0, 0), &theme.glyphs.show(&line), theme.style(Role::Title));
+    let room = usize::from(area.width);
+    let exact = options.get(index).is_some_and(|option| option.poses == poses);
+    // The next larger one is what one asks about; the next smaller one where there is room.
+    let above = options.iter().find(|option| option.poses > poses);
+    let below = options.iter().rfind(|option| option.poses < poses);
+    let here = options.get(index).filter(|_| exact);
+    let mut line = here.map_or_else(String::new, |option| format!("{} {}", theme.glyphs.next(), in_words(option)));
+    for option in [above, below].into_iter().flatten() {
+        let dot = if line.is_empty() { "" } else { theme.glyphs.dot() };
+        let longer = format!("{line}{dot}{}", in_words(option));
+        if width(&longer) <= room {
+            line = longer;
+        }
+    }
+    paint::text(buf, area, (0, 0), &line, theme.style(Role::Title));
     chart(theme, options, poses, paint::band(area, 1, area.height), buf);
 }
 
 /// Draws table and line.
-pub(super) fn draw(theme: Theme, content: &PlanView, poses: usize, scroll: usize, area: Rect, buf: &mut Buffer) {
+pub(super) fn draw(theme: Theme, content: &PlanView, poses: usize, area: Rect, buf: &mut Buffer) {
     let options = options(content);
     if options.is_empty() {
         paint::text(buf, area, (0, 0), NOTHING, theme.style(Role::Hint));
@@ -103,7 +108,7 @@ pub(super) fn draw(theme: Theme, content: &PlanView, poses: usize, scroll: usize
         })
         .collect();
     let table = Rect { width: TABLE.min(area.width), ..area };
-    Table { columns: &columns, rows: &rows, selected: None, first: scroll }.draw(theme, table, buf);
+    Table { columns: &columns, rows: &rows, selected: current, first: 0 }.draw(theme, table, buf);
     let left = (TABLE + 2).min(area.width);
     chart(theme, options, poses, Rect { x: area.x + left, width: area.width - left, ..area }, buf);
 }
