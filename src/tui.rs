@@ -26,6 +26,7 @@ pub mod screen;
 mod terminal;
 pub mod theme;
 pub mod ui;
+pub mod widget;
 
 use std::io::{self, Stdout};
 use std::sync::mpsc::Receiver;

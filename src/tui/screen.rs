@@ -4,7 +4,9 @@
 //! driver makes whenever the view changes. Keys go to an open dialog first, then to the screen, then to the table of
 //! [`keymap`](super::keymap), last to the camera of the preview.
 
+mod capture;
 mod plain;
+mod plan;
 
 use std::fmt;
 
@@ -47,7 +49,10 @@ pub enum Reply {
 
 /// The content of a step.
 pub trait Screen: fmt::Debug {
-    /// Its own keys, for footer and help.
+    /// Takes note of a new view, for what a screen remembers of earlier ones.
+    fn see(&mut self, _view: &ViewModel) {}
+
+    /// Its own keys, for footer and help; they stand for the same keys of the table.
     fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item>;
 
     /// Takes a key.
@@ -61,6 +66,13 @@ pub trait Screen: fmt::Debug {
 }
 
 /// The screen of a step, as it is when the step is entered.
-pub fn of(_step: Step) -> Box<dyn Screen> {
-    Box::new(plain::Plain::default())
+pub fn of(step: Step) -> Box<dyn Screen> {
+    match step {
+        Step::Capture => Box::new(capture::Capture::default()),
+        Step::Plan => Box::new(plan::Plan::default()),
+        _ => Box::new(plain::Plain::default()),
+    }
 }
+
+#[cfg(test)]
+pub(crate) mod bench;

@@ -70,6 +70,7 @@ impl Ui {
             self.dialog = None;
             self.help = None;
         }
+        self.screen.see(view);
         self.scene = scene(view, session);
         self.is_dirty = true;
     }
@@ -177,7 +178,9 @@ impl Ui {
     /// Keys of the screen itself.
     fn page_items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
         let mut items = keymap::items(&cx.view.intents, self.theme.glyphs);
-        items.extend(self.screen.items(cx));
+        let own = self.screen.items(cx);
+        items.retain(|item| !own.iter().any(|own| own.key == item.key));
+        items.extend(own);
         if self.scene.is_some() {
             items.push(Item::new(self.theme.glyphs.arrows(), "turn the picture", 8));
         }
@@ -209,7 +212,14 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
                 None => Scene::of_session(session, None),
             }
         }
-        Content::Instrument(_) | Content::Target(_) | Content::Plan(_) => Scene::of_session(session, None),
+        Content::Plan(content) => {
+            let scene = Scene::of_session(session, None)?;
+            Some(match &content.summary {
+                Some(summary) => scene.with_points(summary.poses.iter().filter_map(|pose| pose.point_in_base_mm)),
+                None => scene,
+            })
+        }
+        Content::Instrument(_) | Content::Target(_) => Scene::of_session(session, None),
         Content::Capture(content) => Scene::of_session(session, content.row),
         Content::Identify(_) | Content::Verify(_) | Content::Deliver(_) => None,
     }

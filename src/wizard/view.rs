@@ -71,6 +71,10 @@ pub struct BusyView {
     pub progress: Option<String>,
     /// Part done, 0 … 1, where it can be told.
     pub part: Option<f64>,
+    /// Condition number of the pose set that a search has just looked at.
+    pub condition_number: Option<f64>,
+    /// Its predicted error, per σ.
+    pub predicted_error: Option<f64>,
     /// It is being cancelled.
     pub is_cancelled: bool,
 }
@@ -310,6 +314,8 @@ pub struct CaptureView {
     pub drift: Vec<DriftView>,
     /// How good a calibration from the samples so far would be.
     pub prediction: Option<PredictionView>,
+    /// Unit of the coordinates, where they are typed in.
+    pub typed_unit: Option<String>,
     /// Why it is too early to identify.
     pub too_few: Option<String>,
     /// All measured rows of the plan.
@@ -474,6 +480,8 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
             what: busy.what,
             progress: busy.progress.as_ref().map(progress_text),
             part: busy.progress.as_ref().and_then(part_done),
+            condition_number: busy.progress.as_ref().and_then(sweep).map(|found| found.condition_number),
+            predicted_error: busy.progress.as_ref().and_then(sweep).map(|found| found.predicted_error),
             is_cancelled: busy.cancelled,
         }),
         notice: wizard.notice.clone(),
@@ -516,6 +524,14 @@ fn progress_text(progress: &Progress) -> String {
         Progress::Solver(iteration) => {
             format!("cost {:.6e}, largest change {:.1e} expected deviations", iteration.cost, iteration.step)
         }
+    }
+}
+
+/// What a search has just looked at.
+const fn sweep(progress: &Progress) -> Option<&crate::planning::Progress> {
+    match progress {
+        Progress::Search(plan::Progress::Sweep { found, .. }) => Some(found),
+        Progress::Search(_) | Progress::Solver(_) => None,
     }
 }
 

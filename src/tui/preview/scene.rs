@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::kinematics::{ForwardKinematics, KinematicChain};
 use crate::profile::{KeepOut, Profile};
 use crate::session::state::Session;
+use crate::units::from_mm;
 
 /// Thickness of an arm whose profile has no bodies, as a part of its length.
 const SLENDER: f64 = 0.035;
@@ -192,6 +193,14 @@ impl Scene {
     #[must_use]
     pub fn with_identified(mut self, profile: &Profile, identified: &KinematicChain, q: &[f64]) -> Self {
         self.arms.push(Arm::new(profile, identified, q, 0, Look::Dashed));
+        self
+    }
+
+    /// The same cell with other points (mm, in the base), all of them to be measured.
+    #[must_use]
+    pub fn with_points(mut self, points_mm: impl Iterator<Item = [f64; 3]>) -> Self {
+        let at = |point: [f64; 3]| Point3::from(point.map(from_mm));
+        self.marks = points_mm.map(|point| Mark { at: at(point), kind: MarkKind::Left }).collect();
         self
     }
 

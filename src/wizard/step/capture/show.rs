@@ -43,6 +43,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         }),
         drift: drift(session),
         prediction: prediction(step, session),
+        typed_unit: CaptureStep::manual_unit(cx).map(|unit| unit.sign().to_owned()),
         too_few: too_few(session),
         rows,
         notes: session.notes.iter().map(|note| (note.pose.clone(), note.text.clone())).collect(),

@@ -1,0 +1,231 @@
+//! Capture: where a technician spends two hours. What to do now stands in large digits; everything else is one Tab away.
+//!
+//! ```text
+//! Go to       configuration in large digits; or the sample in question with what can be done
+//! Poses       all poses with what became of them; Enter goes to one
+//! Prediction  how good the result would be, and whether the rest is worth its time
+//! Notes       remarks, and measurements that gave no sample
+//! Picture     the arm, where it is not beside the other views anyway
+//! ```
+
+mod go_to;
+mod joints;
+mod notes;
+mod poses;
+mod prediction;
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::Widget as _;
+
+use super::{Reply, Screen, ScreenCx};
+use crate::tui::dialog::Dialog;
+use crate::tui::form::TextField;
+use crate::tui::keymap::{Item, Key};
+use crate::tui::paint;
+use crate::tui::preview::Preview;
+use crate::tui::theme::Role;
+use crate::tui::widget::tabs;
+use crate::wizard::Intent;
+use crate::wizard::view::{CaptureView, Content, ViewModel};
+
+/// Content columns from which on the picture stands beside the views (a terminal of 100).
+const WIDE: u16 = 98;
+/// Columns of the views beside the picture: two joints side by side, and one.
+const VIEWS: [u16; 2] = [72, 46];
+/// Rows that the "go to" view needs besides the joints.
+const AROUND_JOINTS: u16 = 7;
+/// Columns between view and picture.
+const GAP: u16 = 2;
+/// Rows that PgUp and PgDn pass over.
+const PAGE: usize = 8;
+
+/// The views.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Tab {
+    #[default]
+    GoTo,
+    Poses,
+    Prediction,
+    Notes,
+    Picture,
+}
+
+impl Tab {
+    const ALL: [Self; 5] = [Self::GoTo, Self::Poses, Self::Prediction, Self::Notes, Self::Picture];
+    const NAMES: [&'static str; 5] = ["Go to", "Poses", "Prediction", "Notes", "Picture"];
+
+    fn index(self) -> usize {
+        Self::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
+    }
+
+    /// The view so many places on.
+    fn turned(self, by: usize) -> Self {
+        Self::ALL.get((self.index() + by) % Self::ALL.len()).copied().unwrap_or_default()
+    }
+}
+
+/// Which view is shown, and where in it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Capture {
+    tab: Tab,
+    /// Row of the list that has the focus; none: the pose shown.
+    cursor: Option<usize>,
+    /// Lines of the notes that are scrolled away.
+    scroll: usize,
+}
+
+fn content(view: &ViewModel) -> Option<&CaptureView> {
+    match &view.content {
+        Content::Capture(content) => Some(content),
+        _ => None,
+    }
+}
+
+/// Whether coordinates can be typed in now.
+fn takes_typing(view: &ViewModel) -> bool {
+    view.intents.iter().any(|info| matches!(info.intent, Intent::TypeReading(_)) && info.is_enabled())
+}
+
+/// The question for coordinates, begun with what was typed or pasted.
+fn reading_dialog(content: &CaptureView, begun: &str) -> Reply {
+    let unit = content.typed_unit.as_deref().unwrap_or("mm");
+    let pose = content.finding.as_ref().map(|finding| finding.pose.as_str()).or(content.pose.as_deref());
+    let label = format!("Coordinates x y z of the SMR at pose {} ({unit})", pose.unwrap_or("?"));
+    Reply::Ask(Box::new(Dialog::Text { field: TextField::new(label, begun), intent: Intent::TypeReading }))
+}
+
+impl Capture {
+    /// The row of the list that has the focus.
+    fn selected(&self, content: &CaptureView) -> usize {
+        let shown = || content.rows.iter().position(|row| Some(row.row) == content.row).unwrap_or(0);
+        self.cursor.unwrap_or_else(shown).min(content.rows.len().saturating_sub(1))
+    }
+
+    fn on_list_key(&mut self, code: KeyCode, content: &CaptureView) -> Reply {
+        let selected = self.selected(content);
+        let last = content.rows.len().saturating_sub(1);
+        let to = match code {
+            KeyCode::Up => selected.saturating_sub(1),
+            KeyCode::Down => (selected + 1).min(last),
+            KeyCode::PageUp => selected.saturating_sub(PAGE),
+            KeyCode::PageDown => (selected + PAGE).min(last),
+            KeyCode::Home => 0,
+            KeyCode::End => last,
+            KeyCode::Enter => {
+                let Some(row) = content.rows.get(selected) else { return Reply::Ignored };
+                self.tab = Tab::GoTo;
+                self.cursor = None;
+                return Reply::Intend(Intent::GoToPose(row.pose.clone()));
+            }
+            _ => return Reply::Ignored,
+        };
+        self.cursor = Some(to);
+        Reply::Changed
+    }
+
+    fn on_notes_key(&mut self, code: KeyCode, content: &CaptureView) -> Reply {
+        let last = notes::count(content).saturating_sub(1);
+        self.scroll = match code {
+            KeyCode::Up => self.scroll.saturating_sub(1),
+            KeyCode::Down => (self.scroll + 1).min(last),
+            KeyCode::PageUp => self.scroll.saturating_sub(PAGE),
+            KeyCode::PageDown => (self.scroll + PAGE).min(last),
+            KeyCode::Home => 0,
+            KeyCode::End => last,
+            _ => return Reply::Ignored,
+        };
+        Reply::Changed
+    }
+}
+
+impl Screen for Capture {
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        let next = Tab::NAMES.get(self.tab.turned(1).index()).copied().unwrap_or("other view");
+        let mut items = vec![Item::new("Tab", next.to_lowercase(), 4)];
+        match self.tab {
+            Tab::Poses => {
+                items.push(Item::new("Enter", "go to this pose", 0));
+                items.push(Item::new("Up/Down", "choose", 1));
+            }
+            Tab::Notes => items.push(Item::new("Up/Down", "scroll", 7)),
+            Tab::GoTo | Tab::Prediction | Tab::Picture => {}
+        }
+        if takes_typing(cx.view) && self.tab != Tab::Picture {
+            items.push(Item::new("0-9, paste", "coordinates", 3));
+        }
+        items
+    }
+
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+        let Some(content) = content(cx.view) else { return Reply::Ignored };
+        match key.code {
+            _ if key.has_modifier() => return Reply::Ignored,
+            KeyCode::Tab => self.tab = self.tab.turned(1),
+            KeyCode::BackTab => self.tab = self.tab.turned(Tab::ALL.len() - 1),
+            KeyCode::Char(c @ ('0'..='9' | '-' | '+' | '.' | ','))
+                if self.tab != Tab::Picture && takes_typing(cx.view) =>
+            {
+                return reading_dialog(content, &c.to_string());
+            }
+            code => {
+                return match self.tab {
+                    Tab::Poses => self.on_list_key(code, content),
+                    Tab::Notes => self.on_notes_key(code, content),
+                    Tab::GoTo | Tab::Prediction | Tab::Picture => Reply::Ignored,
+                };
+            }
+        }
+        self.cursor = None;
+        Reply::Changed
+    }
+
+    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply {
+        match content(cx.view) {
+            Some(content) if takes_typing(cx.view) => reading_dialog(content, text.trim()),
+            _ => Reply::Ignored,
+        }
+    }
+
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        let Some(content) = content(cx.view) else { return };
+        let (main, beside) = parts(cx, content, area);
+        tabs(cx.theme, &Tab::NAMES, self.tab.index(), paint::band(main, 0, 1), buf);
+        let body = paint::band(main, 1, main.height);
+        match self.tab {
+            Tab::GoTo => go_to::draw(cx, content, body, buf),
+            Tab::Poses => poses::draw(cx.theme, content, self.selected(content), body, buf),
+            Tab::Prediction => prediction::draw(cx.theme, content, body, buf),
+            Tab::Notes => notes::draw(cx.theme, content, self.scroll, body, buf),
+            Tab::Picture => {}
+        }
+        let picture = if self.tab == Tab::Picture { Some(paint::band(area, 1, area.height)) } else { beside };
+        match (cx.scene, picture) {
+            (Some(scene), Some(picture)) => {
+                Preview { scene, camera: cx.camera, theme: cx.theme }.render(picture, buf);
+            }
+            (None, Some(picture)) => {
+                paint::text(buf, picture, (0, 1), "there is no robot to show", cx.theme.style(Role::Dim));
+            }
+            (_, None) => {}
+        }
+    }
+}
+
+/// Where the views go, and the picture beside them.
+fn parts(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect) -> (Rect, Option<Rect>) {
+    if area.width < WIDE || cx.scene.is_none() {
+        return (area, None);
+    }
+    let joints = u16::try_from(content.joints.len()).unwrap_or(u16::MAX);
+    let fits_in_one = area.height >= joints.saturating_mul(3).saturating_add(AROUND_JOINTS);
+    let [two, one] = VIEWS;
+    let columns = if fits_in_one { one.max(area.width * 2 / 5) } else { two };
+    let main = Rect { width: columns, ..area };
+    let left = columns + GAP;
+    (main, Some(Rect { x: area.x + left, width: area.width - left, ..area }))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,196 @@
+//! What to do now: go to a configuration, decide about a sample, or go on.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::joints;
+use super::prediction::in_short;
+use crate::tui::glyphs::{shortened, width, wrapped};
+use crate::tui::keymap;
+use crate::tui::paint;
+use crate::tui::screen::ScreenCx;
+use crate::tui::theme::{Role, Theme};
+use crate::wizard::Intent;
+use crate::wizard::view::{CaptureView, FindingView};
+
+/// Columns of the names of keys in a list of what can be done.
+const KEYS: usize = 12;
+/// Lines from which on nothing needs to be left out.
+const TALL: u16 = 26;
+/// Lines of a message before it is cut off.
+const MESSAGE: usize = 4;
+
+/// Draws it.
+pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
+    let theme = cx.theme;
+    let room = usize::from(area.width);
+    let is_tall = area.height >= TALL;
+    let mut lines: Vec<(String, Role)> = Vec::new();
+    lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, Role::Title)));
+    lines.extend(joined(&count(content), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
+    lines.extend(panel(cx, content, room));
+    let status: Vec<(String, Role)> = status(content)
+        .into_iter()
+        .flat_map(|(text, role)| {
+            let text = theme.glyphs.show(&text);
+            let parts = if is_tall { wrapped(&text, room) } else { vec![text] };
+            parts.into_iter().map(move |part| (part, role))
+        })
+        .collect();
+    // The joints are what matters, but never so large that what is to be decided has no room.
+    let needed = height(lines.len()).saturating_add(u16::from(!status.is_empty()));
+    let layout = joints::layout(&content.joints, area.width, area.height.saturating_sub(needed));
+    let mut row = 0;
+    for (text, role) in &lines {
+        paint::text(buf, area, (0, row), &shortened(text, room, theme.glyphs), theme.style(*role));
+        row += 1;
+    }
+    let spare = area.height.saturating_sub(row).saturating_sub(layout.rows.saturating_add(height(status.len())));
+    row += u16::from(spare > 0);
+    joints::draw(&content.joints, layout, theme, paint::band(area, row, layout.rows), buf);
+    row = row.saturating_add(layout.rows).saturating_add(u16::from(spare > 1));
+    let below = paint::band(area, row, area.height);
+    for (row, (text, role)) in (0_u16..).zip(&status) {
+        paint::text(buf, below, (0, row), &shortened(text, room, theme.glyphs), theme.style(*role));
+    }
+}
+
+/// Parts on one line, the last ones left out where there is no room; or on as many lines as they need.
+fn joined(parts: &[String], theme: Theme, room: usize, is_tall: bool) -> Vec<String> {
+    let glyphs = theme.glyphs;
+    let mut lines: Vec<String> = Vec::new();
+    for part in parts {
+        let part = glyphs.show(part);
+        match lines.last_mut() {
+            Some(line) if width(line) + width(glyphs.dot()) + width(&part) <= room => {
+                line.push_str(glyphs.dot());
+                line.push_str(&part);
+            }
+            Some(_) if !is_tall => break,
+            _ => lines.push(shortened(&part, room, glyphs)),
+        }
+    }
+    lines
+}
+
+fn height(lines: usize) -> u16 {
+    u16::try_from(lines).unwrap_or(u16::MAX)
+}
+
+/// Where to go, and through which poses.
+fn heading(content: &CaptureView) -> Vec<String> {
+    if let Some(finding) = &content.finding {
+        return vec![format!("Pose {} is in question: decide before going on", finding.pose)];
+    }
+    let Some(pose) = &content.pose else { return vec!["All poses of the plan are measured.".to_owned()] };
+    let mut parts = vec![format!("Go to pose {pose}")];
+    parts.extend(content.kind.map(|kind| kind.name().to_owned()));
+    if !content.on_the_way.is_empty() {
+        parts.push(format!("pass through {} first", content.on_the_way.join(", ")));
+    }
+    let most = content.joints.iter().find(|joint| joint.moves_most);
+    parts.extend(most.map(|joint| format!("{} moves most: {:.1} {}", joint.name, joint.moves, joint.unit)));
+    parts
+}
+
+fn count(content: &CaptureView) -> Vec<String> {
+    let all = content.measured + content.open;
+    let mut parts = vec![format!("{} of {all} measured", content.measured), format!("{} open", content.open)];
+    if content.skipped > 0 {
+        parts.push(format!("{} skipped", content.skipped));
+    }
+    if content.open > 0 {
+        parts.extend(content.minutes_left.map(|minutes| format!("about {:.0} min left", minutes.ceil())));
+    }
+    parts
+}
+
+/// What has to be decided, with the keys for it.
+fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, Role)> {
+    let theme = cx.theme;
+    let mut lines = Vec::new();
+    if let Some(finding) = &content.finding {
+        lines.extend(question(cx, finding, room));
+    } else if let Some(reason) = &content.held {
+        lines.push((format!("{}Reading held back, not counted yet", theme.glyphs.pointer()), Role::Warn));
+        lines.extend(message(cx, reason, room));
+        lines.extend(choice(cx, "measure again at rest", |intent| {
+            matches!(intent, Intent::Measure | Intent::TypeReading(_))
+        }));
+        lines.extend(choice(cx, "take it as it is", |intent| *intent == Intent::AcceptReading));
+        lines.extend(choice(cx, "skip this pose", |intent| *intent == Intent::Skip));
+    } else if content.pose.is_none() {
+        if let Some(reason) = &content.too_few {
+            lines.push((theme.glyphs.show(reason), Role::Warn));
+        }
+        lines.extend(choice(cx, "go on: identify the arm", |intent| *intent == Intent::Next));
+        lines.extend(choice(cx, "add the poses that tell most", |intent| matches!(intent, Intent::SuggestPoses(_))));
+    }
+    lines
+}
+
+fn question(cx: &ScreenCx<'_>, finding: &FindingView, room: usize) -> Vec<(String, Role)> {
+    let cause = finding.cause.replace('_', " ");
+    let title =
+        format!("{}Pose {}, measurement {}: {cause}", cx.theme.glyphs.pointer(), finding.pose, finding.measurement);
+    let mut lines = vec![(cx.theme.glyphs.show(&title), Role::Warn)];
+    lines.extend(message(cx, &finding.message, room));
+    if finding.has_remedy {
+        lines.extend(choice(cx, "correct it as proposed", |intent| *intent == Intent::ApplyRemedy));
+    }
+    lines.extend(choice(cx, "measure this pose again", |intent| {
+        matches!(intent, Intent::MeasureAgain | Intent::TypeReading(_))
+    }));
+    lines.extend(choice(cx, "keep it: it counts as it is", |intent| *intent == Intent::Keep));
+    lines.extend(choice(cx, "leave it out; it stays in the journal", |intent| *intent == Intent::LeaveOut));
+    lines
+}
+
+/// A message, unless it stands in the line of messages anyway.
+fn message(cx: &ScreenCx<'_>, text: &str, room: usize) -> Vec<(String, Role)> {
+    if cx.view.notice.as_ref().is_some_and(|notice| notice.what == text) {
+        return Vec::new();
+    }
+    let lines = wrapped(&cx.theme.glyphs.show(text), room);
+    lines.into_iter().take(MESSAGE).map(|line| (line, Role::Plain)).collect()
+}
+
+/// What can be done, with its keys; none where it cannot be done now.
+fn choice(cx: &ScreenCx<'_>, label: &str, accepts: impl Fn(&Intent) -> bool) -> Option<(String, Role)> {
+    let glyphs = cx.theme.glyphs;
+    let info = cx.view.intents.iter().find(|info| info.is_enabled() && accepts(&info.intent))?;
+    let items = keymap::items(&cx.view.intents, glyphs);
+    let keys: Vec<&str> = items
+        .iter()
+        .filter(|item| item.blocked.is_none() && item.label == info.label)
+        .map(|item| item.key.as_str())
+        .take(2)
+        .collect();
+    (!keys.is_empty()).then(|| (format!("  {:<KEYS$} {label}", keys.join(" or ")), Role::Plain))
+}
+
+/// Last reading, drift and prediction in a line each.
+fn status(content: &CaptureView) -> Vec<(String, Role)> {
+    let mut lines = Vec::new();
+    if let Some(last) = &content.last {
+        let scatter = last.scatter_mm.map_or_else(String::new, |scatter| format!(", scatter {scatter:.3} mm"));
+        let [x, y, z] = last.xyz_mm;
+        let is_out = if last.counts { "" } else { " (does not count)" };
+        let text = format!("last: pose {}{is_out}{scatter}, x {x:.3}  y {y:.3}  z {z:.3} mm", last.pose);
+        lines.push((text, Role::Plain));
+    }
+    if let Some(prediction) = &content.prediction {
+        let role = if prediction.is_enough { Role::Ok } else { Role::Plain };
+        lines.push((in_short(prediction), role));
+    }
+    if let Some(drift) = content.drift.last() {
+        let text = format!(
+            "drift: pose {} has moved {:.3} mm since it was measured first (checked {} times)",
+            drift.pose,
+            drift.moved_mm,
+            content.drift.len()
+        );
+        lines.push((text, Role::Plain));
+    }
+    lines
+}

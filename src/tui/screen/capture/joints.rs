@@ -1,0 +1,122 @@
+//! The configuration to go to, as large as there is room.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use crate::tui::glyphs::{Glyphs, shortened, width};
+use crate::tui::paint;
+use crate::tui::theme::{Role, Theme};
+use crate::tui::widget::digits;
+use crate::wizard::view::JointShown;
+
+/// Columns of the name of a joint at least, and at most.
+const NAME: (usize, usize) = (4, 10);
+/// Columns around a name: sign before, gap behind.
+const AROUND_NAME: u16 = 3;
+/// Columns of a line with a joint.
+const LINE: u16 = 36;
+
+/// How the joints are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Layout {
+    is_large: bool,
+    columns: u16,
+    /// Lines from one joint to the next.
+    pitch: u16,
+    /// Columns of name and unit.
+    label: u16,
+    /// Lines in all.
+    pub(super) rows: u16,
+}
+
+/// Columns that names and units of `joints` take.
+fn label(joints: &[JointShown]) -> u16 {
+    let widest = joints.iter().map(|joint| width(&joint.name)).max().unwrap_or(0).clamp(NAME.0, NAME.1);
+    u16::try_from(widest).unwrap_or(0) + AROUND_NAME
+}
+
+/// The largest way to show `joints` in `columns` × `rows`.
+pub(super) fn layout(joints: &[JointShown], columns: u16, rows: u16) -> Layout {
+    let count = u16::try_from(joints.len()).unwrap_or(u16::MAX);
+    let label = label(joints);
+    let large = label + joints.iter().map(|joint| digits::columns(&number(joint))).max().unwrap_or(0);
+    let of = |is_large, columns: u16, pitch| {
+        let lines = count.div_ceil(columns);
+        let used = if is_large { lines.saturating_mul(pitch).saturating_sub(pitch - digits::HEIGHT) } else { lines };
+        Layout { is_large, columns, pitch, label, rows: used }
+    };
+    let two = large.saturating_mul(2) <= columns;
+    let candidates = [
+        (large <= columns, of(true, 1, digits::HEIGHT + 1)),
+        (large <= columns, of(true, 1, digits::HEIGHT)),
+        (two, of(true, 2, digits::HEIGHT + 1)),
+        (two, of(true, 2, digits::HEIGHT)),
+        (true, of(false, 1, 1)),
+    ];
+    let fallback = of(false, (columns / LINE).max(1), 1);
+    candidates.into_iter().find(|(fits, layout)| *fits && layout.rows <= rows).map_or(fallback, |(_, layout)| layout)
+}
+
+fn number(joint: &JointShown) -> String {
+    // Without a minus before a zero.
+    let text = format!("{:.3}", joint.value);
+    if text.trim_start_matches('-').bytes().all(|byte| matches!(byte, b'0' | b'.')) {
+        return text.trim_start_matches('-').to_owned();
+    }
+    text
+}
+
+/// Draws the joints column by column, as a pendant lists them.
+pub(super) fn draw(joints: &[JointShown], layout: Layout, theme: Theme, area: Rect, buf: &mut Buffer) {
+    let per_column = u16::try_from(joints.len()).unwrap_or(u16::MAX).div_ceil(layout.columns).max(1);
+    let columns = if layout.is_large { area.width / layout.columns } else { LINE.min(area.width) };
+    for (index, joint) in (0_u16..).zip(joints) {
+        let (column, row) = (index / per_column, index % per_column);
+        let x = column.saturating_mul(columns).min(area.width);
+        let cell =
+            paint::band(area, row.saturating_mul(layout.pitch), if layout.is_large { digits::HEIGHT } else { 1 });
+        let cell = Rect { x: cell.x + x, width: columns.min(cell.width - x), ..cell };
+        if layout.is_large {
+            draw_large(joint, layout.label, theme, cell, buf);
+        } else {
+            draw_line(joint, layout.label, theme, cell, buf);
+        }
+    }
+}
+
+fn lead(joint: &JointShown, glyphs: Glyphs) -> &'static str {
+    if joint.moves_most { glyphs.pointer() } else { "  " }
+}
+
+fn draw_large(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut Buffer) {
+    let glyphs = theme.glyphs;
+    let column = paint::text(buf, cell, (0, 0), lead(joint, glyphs), theme.style(Role::Hint));
+    let name = shortened(&glyphs.show(&joint.name), usize::from(label - AROUND_NAME), glyphs);
+    let role = if joint.moves_most { Role::Focus } else { Role::Title };
+    paint::text(buf, cell, (column, 0), &name, theme.style(role));
+    paint::text(buf, cell, (column, 1), &glyphs.show(&joint.unit), theme.style(Role::Dim));
+    if joint.moves_most {
+        paint::text(buf, cell, (column, 2), "most", theme.style(Role::Hint));
+    }
+    let text = number(joint);
+    // Right-aligned, so that the points stand below each other; at most as far right as the widest angle needs.
+    let right = cell.width.saturating_sub(1).min(label + digits::columns("-360.000").max(digits::columns(&text)));
+    let start = right.saturating_sub(digits::columns(&text));
+    let place = Rect { x: cell.x + start, width: cell.width - start, ..cell };
+    digits::draw(&text, glyphs, theme.style(Role::Title), place, buf);
+}
+
+fn draw_line(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut Buffer) {
+    let glyphs = theme.glyphs;
+    let column = paint::text(buf, cell, (0, 0), lead(joint, glyphs), theme.style(Role::Hint));
+    let name = shortened(&glyphs.show(&joint.name), usize::from(label - AROUND_NAME), glyphs);
+    let role = if joint.moves_most { Role::Focus } else { Role::Title };
+    paint::text(buf, cell, (column, 0), &name, theme.style(role));
+    let text = number(joint);
+    let start = usize::from(label) + 10_usize.saturating_sub(width(&text));
+    let column = paint::text(buf, cell, (u16::try_from(start).unwrap_or(0), 0), &text, theme.style(Role::Title));
+    let column = paint::text(buf, cell, (column + 1, 0), &glyphs.show(&joint.unit), theme.style(Role::Dim));
+    if joint.moves_most {
+        paint::text(buf, cell, (column + 1, 0), "moves most", theme.style(Role::Hint));
+    }
+}

@@ -1,0 +1,80 @@
+//! How good a calibration from the samples so far would be.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use crate::tui::glyphs::wrapped;
+use crate::tui::paint;
+use crate::tui::theme::{Role, Theme};
+use crate::tui::widget::Chart;
+use crate::wizard::view::{CaptureView, PredictionView};
+
+/// What the number is and what it is not.
+const MEANING: &str = "RMS position error that the noise of the instrument alone would leave in the identified arm. \
+    What no kinematic model can express comes on top; only Verify measures the real error.";
+
+/// An error with its unit: mm where the profile knows its instrument, else multiples of its σ.
+fn error(sigma: f64, mm: Option<f64>) -> String {
+    mm.map_or_else(|| format!("{sigma:.3} sigma"), |mm| format!("{mm:.4} mm"))
+}
+
+/// Whether the rest is worth its time.
+fn verdict(prediction: &PredictionView) -> &'static str {
+    if prediction.is_enough { "enough (the rest gains less than 5 %)" } else { "not enough yet" }
+}
+
+/// The prediction in a line.
+pub(super) fn in_short(prediction: &PredictionView) -> String {
+    let now = error(prediction.now_sigma, prediction.now_mm);
+    let all = prediction.with_all_sigma.map(|sigma| error(sigma, prediction.with_all_mm));
+    let all = all.map_or_else(String::new, |all| format!(", {all} with all"));
+    format!("predicted error {now}{all}: {}", verdict(prediction))
+}
+
+/// Draws the curve with what it means.
+pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Buffer) {
+    let room = usize::from(area.width);
+    let mut lines: Vec<(String, Role)> = Vec::new();
+    let Some(prediction) = &content.prediction else {
+        lines.push(("No prediction yet: too few poses to determine all parameters.".to_owned(), Role::Title));
+        lines.extend(content.too_few.iter().map(|reason| (reason.clone(), Role::Plain)));
+        text(theme, &lines, room, area, buf);
+        return;
+    };
+    let now = error(prediction.now_sigma, prediction.now_mm);
+    lines.push((format!("now, {} identification poses: {now}", content.identification), Role::Title));
+    if let Some(sigma) = prediction.with_all_sigma {
+        lines.push((format!("with all poses of the plan: {}", error(sigma, prediction.with_all_mm)), Role::Plain));
+    }
+    let role = if prediction.is_enough { Role::Ok } else { Role::Hint };
+    lines.push((verdict(prediction).to_owned(), role));
+    lines.push((MEANING.to_owned(), Role::Dim));
+    let used = text(theme, &lines, room, area, buf);
+
+    // mm where they are known: both are multiples of σ.
+    let mm = prediction.now_mm.map(|mm| mm / prediction.now_sigma).filter(|mm| mm.is_finite());
+    let factor = mm.unwrap_or(1.0);
+    let points: Vec<(f64, f64)> =
+        prediction.curve_sigma.iter().map(|(poses, sigma)| (*poses as f64, sigma * factor)).collect();
+    let chart = Chart {
+        points: &points,
+        level: prediction.with_all_sigma.map(|sigma| sigma * factor),
+        mark: points.last().map(|point| point.0),
+        y_title: if mm.is_some() { "predicted error (mm); dotted: with all poses" } else { "predicted error (sigma)" },
+        x_title: "identification poses",
+        digits: if mm.is_some() { 4 } else { 3 },
+    };
+    chart.draw(theme, paint::band(area, used + 1, area.height), buf);
+}
+
+/// Draws lines, wrapped; gives back how many they are.
+fn text(theme: Theme, lines: &[(String, Role)], room: usize, area: Rect, buf: &mut Buffer) -> u16 {
+    let mut row = 0;
+    for (line, role) in lines {
+        for part in wrapped(&theme.glyphs.show(line), room) {
+            paint::text(buf, area, (0, row), &part, theme.style(*role));
+            row += 1;
+        }
+    }
+    row
+}

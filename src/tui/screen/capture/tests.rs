@@ -1,0 +1,233 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::session::plan::PoseKind;
+use crate::session::set_up::Step;
+use crate::tui::dialog::Answer;
+use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
+use crate::wizard::view::{DriftView, FindingView, JointShown, PredictionView, RowState, RowView, SampleView};
+use crate::wizard::{IntentInfo, Notice};
+
+fn joints() -> Vec<JointShown> {
+    let values = [-12.345, 48.0, -117.25, 179.999, -90.5, 0.0];
+    let joint = |(number, value): (usize, f64)| JointShown {
+        name: format!("J{number}"),
+        value,
+        unit: "deg".to_owned(),
+        moves: if number == 4 { 121.4 } else { 12.0 },
+        moves_most: number == 4,
+    };
+    (1..).zip(values).map(joint).collect()
+}
+
+fn rows() -> Vec<RowView> {
+    let row = |row: usize| RowView {
+        row,
+        pose: row.to_string(),
+        kind: if row > 30 { PoseKind::Verification } else { PoseKind::Identification },
+        state: match row {
+            5 => RowState::Skipped,
+            7 => RowState::LeftOut,
+            1..=14 => RowState::Measured,
+            _ => RowState::Open,
+        },
+    };
+    (1..=40).map(row).collect()
+}
+
+fn normal() -> CaptureView {
+    CaptureView {
+        row: Some(15),
+        pose: Some("15".to_owned()),
+        kind: Some(PoseKind::Identification),
+        joints: joints(),
+        on_the_way: vec!["via3".to_owned()],
+        predicted_point_in_base_mm: None,
+        measured: 12,
+        open: 26,
+        skipped: 1,
+        identification: 12,
+        verification: 0,
+        minutes_left: Some(38.4),
+        last: Some(SampleView {
+            measurement: 16,
+            pose: "14".to_owned(),
+            xyz_mm: [1234.5678, -345.6789, 987.6543],
+            scatter_mm: Some(0.008),
+            counts: true,
+        }),
+        held: None,
+        finding: None,
+        drift: vec![DriftView { pose: "1".to_owned(), measurement: 13, moved_mm: 0.004 }],
+        prediction: Some(PredictionView {
+            curve_sigma: (9..=12).map(|n| (n, 20.0 / n as f64)).collect(),
+            now_sigma: 20.0 / 12.0,
+            now_mm: Some(0.0250),
+            with_all_sigma: Some(0.8),
+            with_all_mm: Some(0.0120),
+            is_enough: false,
+        }),
+        typed_unit: None,
+        too_few: None,
+        rows: rows(),
+        notes: vec![(Some("3".to_owned()), "cable touched the arm".to_owned())],
+        refused: vec![("6".to_owned(), "the beam was interrupted".to_owned())],
+    }
+}
+
+fn offers(content: &CaptureView) -> Vec<IntentInfo> {
+    let no = |is: bool| is.then(|| "not now".to_owned());
+    let (asked, manual) = (content.finding.is_some(), content.typed_unit.is_some());
+    let none = content.pose.is_none();
+    let measure = IntentInfo::new(Intent::Measure, "measure").unless(no(asked || manual || none));
+    let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
+        .unless(no(!manual || (none && !asked)));
+    vec![
+        measure.default_action(),
+        if manual { type_in.default_action() } else { type_in },
+        IntentInfo::new(Intent::AcceptReading, "take the reading as it is").unless(no(content.held.is_none())),
+        IntentInfo::new(Intent::MeasureAgain, "measure again").unless(no(!asked || manual)).default_action(),
+        IntentInfo::new(Intent::Keep, "keep the sample").unless(no(!asked)),
+        IntentInfo::new(Intent::LeaveOut, "leave the sample out").unless(no(!asked)),
+        IntentInfo::new(Intent::ApplyRemedy, "correct it as proposed").unless(no(!asked)),
+        IntentInfo::new(Intent::Skip, "skip this pose").unless(no(none || asked)),
+        IntentInfo::new(Intent::Undo, "take the last sample back"),
+        IntentInfo::new(Intent::GoToPose(String::new()), "show another pose"),
+        IntentInfo::new(Intent::Note(String::new()), "write a note"),
+        IntentInfo::new(Intent::SuggestPoses(5), "add the next best poses"),
+        IntentInfo::new(Intent::Next, "go on to identify").unless(no(!none)).default_action(),
+        IntentInfo::new(Intent::Quit, "quit"),
+    ]
+}
+
+fn of(content: CaptureView) -> ViewModel {
+    let intents = offers(&content);
+    view(Step::Capture, Content::Capture(Box::new(content)), intents)
+}
+
+fn in_question() -> ViewModel {
+    let message = "pose 14 does not fit the other poses: its point fits pose 15; was the robot at another pose?";
+    let mut view = of(CaptureView {
+        row: Some(14),
+        pose: Some("14".to_owned()),
+        finding: Some(FindingView {
+            pose: "14".to_owned(),
+            measurement: 16,
+            cause: "wrong_pose".to_owned(),
+            message: message.to_owned(),
+            has_remedy: true,
+        }),
+        ..normal()
+    });
+    view.notice = Some(Notice::attention(message));
+    view
+}
+
+fn held() -> ViewModel {
+    let reason = "the shots scatter by 0.412 mm, more than 0.080 mm";
+    of(CaptureView { held: Some(reason.to_owned()), ..normal() })
+}
+
+fn all_measured() -> ViewModel {
+    let mut content = CaptureView {
+        row: None,
+        pose: None,
+        kind: None,
+        joints: Vec::new(),
+        on_the_way: Vec::new(),
+        measured: 38,
+        open: 0,
+        ..normal()
+    };
+    if let Some(prediction) = &mut content.prediction {
+        prediction.is_enough = true;
+    }
+    of(content)
+}
+
+fn manual() -> ViewModel {
+    of(CaptureView { typed_unit: Some("in".to_owned()), ..normal() })
+}
+
+fn on(tab: Tab) -> Capture {
+    Capture { tab, ..Capture::default() }
+}
+
+#[test]
+fn states_at_80x24() {
+    let [unicode, ascii] = themes();
+    let go_to = on(Tab::GoTo);
+    for (name, view) in [
+        ("normal", of(normal())),
+        ("in_question", in_question()),
+        ("held", held()),
+        ("all_measured", all_measured()),
+        ("manual", manual()),
+    ] {
+        insta::assert_snapshot!(name, shown(&drawn(&go_to, &view, unicode, (80, 24))));
+    }
+    insta::assert_snapshot!("normal_ascii", shown(&drawn(&go_to, &of(normal()), ascii, (80, 24))));
+    insta::assert_snapshot!("smallest", shown(&drawn(&go_to, &in_question(), unicode, (60, 18))));
+}
+
+#[test]
+fn other_views() {
+    let [unicode, _] = themes();
+    for (name, tab) in
+        [("poses", Tab::Poses), ("prediction", Tab::Prediction), ("notes", Tab::Notes), ("picture", Tab::Picture)]
+    {
+        insta::assert_snapshot!(name, shown(&drawn(&on(tab), &of(normal()), unicode, (80, 24))));
+    }
+    insta::assert_snapshot!("large", shown(&drawn(&on(Tab::GoTo), &of(normal()), unicode, (120, 40))));
+    insta::assert_snapshot!("large_question", shown(&drawn(&on(Tab::GoTo), &in_question(), unicode, (120, 40))));
+    insta::assert_snapshot!("at_100x24", shown(&drawn(&on(Tab::GoTo), &of(normal()), unicode, (100, 24))));
+}
+
+#[test]
+fn digits_and_paste_open_the_question_for_coordinates() {
+    let view = manual();
+    let mut screen = on(Tab::GoTo);
+    let Reply::Ask(mut dialog) = press(&mut screen, &view, Key::char('1')) else { panic!("no question") };
+    dialog.paste("0.5 20 30");
+    let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
+    assert_eq!(answer, Answer::Intend(Intent::TypeReading("10.5 20 30".to_owned())));
+    let Reply::Ask(mut dialog) = paste(&mut screen, &view, " 1.5\t2\t3\n") else { panic!("no question") };
+    let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
+    assert_eq!(answer, Answer::Intend(Intent::TypeReading("1.5 2 3".to_owned())));
+    // An instrument that measures by itself takes no numbers.
+    assert!(matches!(press(&mut screen, &of(normal()), Key::char('1')), Reply::Ignored));
+    assert!(matches!(paste(&mut screen, &of(normal()), "1 2 3"), Reply::Ignored));
+}
+
+#[test]
+fn a_pose_is_chosen_from_the_list() {
+    let view = of(normal());
+    let mut screen = on(Tab::GoTo);
+    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Enter)), Reply::Ignored));
+    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Tab)), Reply::Changed));
+    for _ in 0..2 {
+        press(&mut screen, &view, Key::plain_code(KeyCode::Down));
+    }
+    match press(&mut screen, &view, Key::plain_code(KeyCode::Enter)) {
+        Reply::Intend(intent) => assert_eq!(intent, Intent::GoToPose("17".to_owned())),
+        reply => panic!("{reply:?}"),
+    }
+    assert_eq!(screen.tab, Tab::GoTo);
+    press(&mut screen, &view, Key::plain_code(KeyCode::BackTab));
+    assert_eq!(screen.tab, Tab::Picture);
+    // There the arrows turn the picture.
+    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Up)), Reply::Ignored));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+    #[test]
+    fn nothing_is_drawn_outside(
+        x in 0_u16..60, y in 0_u16..30, width in 0_u16..140, height in 0_u16..50,
+        tab in 0_usize..5, state in 0_usize..5, ascii: bool,
+    ) {
+        let view = [|| of(normal()), in_question, held, all_measured, manual][state]();
+        let theme = themes()[usize::from(ascii)];
+        prop_assert!(!leaks(&on(Tab::ALL[tab]), &view, theme, Rect::new(x, y, width, height)));
+    }
+}

@@ -1,0 +1,244 @@
+//! Plan: how many poses, what they would give, and what they would cost.
+//!
+//! ```text
+//! Plan       settings, what is proposed or being measured, search or trade-off
+//! Trade-off  number of poses against predicted error and time
+//! Weak       parameters that the plan tells little about, and warnings
+//! Picture    where the points are
+//! ```
+
+mod figures;
+mod form;
+mod search;
+mod trade_off;
+mod weak;
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::Widget as _;
+
+use super::{Reply, Screen, ScreenCx};
+use crate::tui::glyphs::wrapped;
+use crate::tui::keymap::{Item, Key};
+use crate::tui::paint;
+use crate::tui::preview::Preview;
+use crate::tui::theme::Role;
+use crate::tui::widget::tabs;
+use crate::wizard::view::{Content, PlanView, ViewModel};
+use crate::wizard::{Intent, PlanSettings};
+use form::Form;
+use search::Search;
+
+/// Content columns from which on the picture stands beside the views (a terminal of 100).
+const WIDE: u16 = 98;
+/// Columns of the views beside the picture.
+const VIEWS: u16 = 74;
+/// Columns of the settings.
+const SETTINGS: u16 = 34;
+/// Lines of settings and figures.
+const TOP: u16 = 8;
+/// Columns between two parts.
+const GAP: u16 = 2;
+
+/// What happens here.
+const HELP: [&str; 3] = [
+    "1. Configurations are drawn that the robot reaches freely and where the tracker sees the SMR.",
+    "2. Of these the set is chosen that tells most about all parameters; that takes seconds to minutes.",
+    "3. You see what it promises and what it costs, then accept it or change the settings.",
+];
+
+/// The views.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Tab {
+    #[default]
+    Plan,
+    TradeOff,
+    Weak,
+    Picture,
+}
+
+impl Tab {
+    const ALL: [Self; 4] = [Self::Plan, Self::TradeOff, Self::Weak, Self::Picture];
+    const NAMES: [&'static str; 4] = ["Plan", "Trade-off", "Weak parameters", "Picture"];
+
+    fn index(self) -> usize {
+        Self::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
+    }
+
+    fn turned(self, by: usize) -> Self {
+        Self::ALL.get((self.index() + by) % Self::ALL.len()).copied().unwrap_or_default()
+    }
+}
+
+/// Settings that are not sent yet, and what the search has shown so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plan {
+    tab: Tab,
+    form: Form,
+    search: Search,
+    /// Lines scrolled away.
+    scroll: usize,
+}
+
+fn content(view: &ViewModel) -> Option<&PlanView> {
+    match &view.content {
+        Content::Plan(content) => Some(content),
+        _ => None,
+    }
+}
+
+/// Whether choosing poses is what Enter is for.
+fn makes_by_default(view: &ViewModel) -> bool {
+    view.intents.iter().any(|info| info.is_default && matches!(info.intent, Intent::MakePlan(_)))
+}
+
+/// Why poses cannot be chosen now; none: they can.
+fn can_make(view: &ViewModel) -> bool {
+    view.intents.iter().any(|info| info.is_enabled() && matches!(info.intent, Intent::MakePlan(_)))
+}
+
+impl Plan {
+    fn make(&mut self, settings: PlanSettings) -> Reply {
+        self.tab = Tab::Plan;
+        Reply::Intend(Intent::MakePlan(settings))
+    }
+}
+
+impl Screen for Plan {
+    fn see(&mut self, view: &ViewModel) {
+        if let Some(content) = content(view) {
+            self.form.follow(content.settings);
+        }
+        self.search.see(view.busy.as_ref());
+    }
+
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        let next = Tab::NAMES.get(self.tab.turned(1).index()).copied().unwrap_or("other view");
+        let mut items = vec![Item::new("Tab", next.to_lowercase(), 5)];
+        if !can_make(cx.view) {
+            return items;
+        }
+        if self.form.is_changed() {
+            items.push(Item::new("Enter", "choose poses with these settings", 0));
+        }
+        if self.tab == Tab::Plan {
+            items.push(Item::new("Up/Down", "setting", 4));
+            items.push(Item::new("0-9", "type its value", 4));
+            items.push(Item::new("+/-", "more or fewer poses", 4));
+        }
+        if self.tab == Tab::TradeOff {
+            items.push(Item::new("Up/Down", "number of poses", 3));
+        }
+        items.push(Item::new("o", "choose with other seed", 5));
+        items
+    }
+
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+        if key.has_modifier() || content(cx.view).is_none() {
+            return Reply::Ignored;
+        }
+        let is_free = can_make(cx.view);
+        match key.code {
+            KeyCode::Tab => self.tab = self.tab.turned(1),
+            KeyCode::BackTab => self.tab = self.tab.turned(Tab::ALL.len() - 1),
+            KeyCode::Enter if is_free && (self.form.is_changed() || makes_by_default(cx.view)) => {
+                let settings = self.form.settings();
+                return self.make(settings);
+            }
+            KeyCode::Char('p') if is_free => {
+                let settings = self.form.settings();
+                return self.make(settings);
+            }
+            KeyCode::Char('o') if is_free && self.tab != Tab::Picture => {
+                let settings = self.form.with_other_seed();
+                return self.make(settings);
+            }
+            code if self.tab == Tab::Plan && is_free => {
+                return if self.form.on_key(code) { Reply::Changed } else { Reply::Ignored };
+            }
+            KeyCode::Up | KeyCode::Down if self.tab == Tab::TradeOff && is_free => {
+                let poses = self.form.settings().poses;
+                let to =
+                    content(cx.view).and_then(|content| trade_off::next(content, poses, key.code == KeyCode::Down));
+                if let Some(poses) = to {
+                    self.form.set_poses(poses);
+                }
+            }
+            KeyCode::Up | KeyCode::PageUp if self.tab == Tab::Weak => {
+                self.scroll = self.scroll.saturating_sub(1);
+            }
+            KeyCode::Down | KeyCode::PageDown if self.tab == Tab::Weak => {
+                let most = content(cx.view).map_or(0, weak::count);
+                self.scroll = (self.scroll + 1).min(most.saturating_sub(1));
+            }
+            _ => return Reply::Ignored,
+        }
+        if matches!(key.code, KeyCode::Tab | KeyCode::BackTab) {
+            self.scroll = 0;
+        }
+        Reply::Changed
+    }
+
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
+        Reply::Ignored
+    }
+
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        let Some(content) = content(cx.view) else { return };
+        let is_wide = area.width >= WIDE && cx.scene.is_some();
+        let main = Rect { width: if is_wide { VIEWS.max(area.width / 2) } else { area.width }, ..area };
+        tabs(cx.theme, &Tab::NAMES, self.tab.index(), paint::band(main, 0, 1), buf);
+        let body = paint::band(main, 2, main.height);
+        match self.tab {
+            Tab::Plan => self.overview(cx, content, body, buf),
+            Tab::TradeOff => trade_off::draw(cx.theme, content, self.form.settings().poses, body, buf),
+            Tab::Weak => weak::draw(cx.theme, content, self.scroll, body, buf),
+            Tab::Picture => {}
+        }
+        let beside = || {
+            let left = main.width + GAP;
+            Rect { x: area.x + left, width: area.width - left, ..area }
+        };
+        let picture = match self.tab {
+            Tab::Picture => Some(paint::band(area, 1, area.height)),
+            _ => is_wide.then(beside),
+        };
+        match (cx.scene, picture) {
+            (Some(scene), Some(picture)) => Preview { scene, camera: cx.camera, theme: cx.theme }.render(picture, buf),
+            (None, Some(picture)) => {
+                paint::text(buf, picture, (0, 1), "there is no robot to show", cx.theme.style(Role::Dim));
+            }
+            (_, None) => {}
+        }
+    }
+}
+
+/// What choosing poses means, for somebody who has never done it.
+fn what_happens(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+    let lines = HELP.iter().flat_map(|line| wrapped(&cx.theme.glyphs.show(line), usize::from(area.width)));
+    for (row, line) in (0_u16..area.height).zip(lines) {
+        paint::text(buf, area, (0, row), &line, cx.theme.style(Role::Dim));
+    }
+}
+
+impl Plan {
+    fn overview(&self, cx: &ScreenCx<'_>, content: &PlanView, area: Rect, buf: &mut Buffer) {
+        let settings = Rect { width: SETTINGS.min(area.width), ..paint::band(area, 0, TOP) };
+        self.form.draw(cx.theme, settings, buf);
+        let left = (SETTINGS + GAP).min(area.width);
+        let figures = Rect { x: area.x + left, width: area.width - left, ..paint::band(area, 0, TOP) };
+        figures::draw(cx.theme, content, self.search.is_running(), figures, buf);
+        let below = paint::band(area, TOP, area.height);
+        if self.search.is_running() {
+            self.search.draw(cx.theme, below, buf);
+        } else if content.proposal.is_none() && content.accepted.is_none() {
+            what_happens(cx, below, buf);
+        } else {
+            trade_off::draw_in_short(cx.theme, content, self.form.settings().poses, below, buf);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
