@@ -132,6 +132,9 @@ impl Preview<'_> {
         if self.scene.arms.iter().any(|arm| arm.look == Look::Dashed) {
             said.push("dashed: identified arm".to_owned());
         }
+        if self.scene.magnified > 1.0 {
+            said.push(format!("difference {:.0} times larger", self.scene.magnified));
+        }
         let last = area.height.saturating_sub(1);
         paint::text(buf, area, (0, last), &said.join(", "), self.theme.style(Role::Dim));
     }

@@ -4,7 +4,15 @@
 //! driver makes whenever the view changes. Keys go to an open dialog first, then to the screen, then to the table of
 //! [`keymap`](super::keymap), last to the camera of the preview.
 
+mod deliver;
+mod identify;
+mod instrument;
+mod menu;
+mod page;
 mod plain;
+mod profile;
+mod target;
+mod verify;
 
 use std::fmt;
 
@@ -61,6 +69,14 @@ pub trait Screen: fmt::Debug {
 }
 
 /// The screen of a step, as it is when the step is entered.
-pub fn of(_step: Step) -> Box<dyn Screen> {
-    Box::new(plain::Plain::default())
+pub fn of(step: Step) -> Box<dyn Screen> {
+    match step {
+        Step::Profile => Box::new(profile::ProfileScreen::default()),
+        Step::Instrument => Box::new(instrument::InstrumentScreen::default()),
+        Step::Target => Box::new(target::TargetScreen::default()),
+        Step::Identify => Box::new(identify::IdentifyScreen::default()),
+        Step::Verify => Box::new(verify::VerifyScreen::default()),
+        Step::Deliver => Box::new(deliver::DeliverScreen::default()),
+        Step::Plan | Step::Capture => Box::new(plain::Plain::default()),
+    }
 }

@@ -176,8 +176,11 @@ impl Ui {
 
     /// Keys of the screen itself.
     fn page_items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        let own = self.screen.items(cx);
         let mut items = keymap::items(&cx.view.intents, self.theme.glyphs);
-        items.extend(self.screen.items(cx));
+        // The screen is asked first: its keys hide those of the table.
+        items.retain(|item| !own.iter().any(|one| one.key == item.key));
+        items.extend(own);
         if self.scene.is_some() {
             items.push(Item::new(self.theme.glyphs.arrows(), "turn the picture", 8));
         }
@@ -211,7 +214,9 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
         }
         Content::Instrument(_) | Content::Target(_) | Content::Plan(_) => Scene::of_session(session, None),
         Content::Capture(content) => Scene::of_session(session, content.row),
-        Content::Identify(_) | Content::Verify(_) | Content::Deliver(_) => None,
+        Content::Identify(_) => Scene::of_identified(session, false),
+        Content::Verify(_) => Scene::of_identified(session, true),
+        Content::Deliver(_) => None,
     }
 }
 
