@@ -18,7 +18,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget;
 
 pub use camera::{Camera, Framing, Projection};
-pub use scene::{Arm, Beam, Body, ErrorVector, Look, Mark, MarkKind, Scene};
+pub use scene::{Arm, Beam, Body, Checked, ErrorVector, Look, Mark, MarkKind, Scene};
 
 use super::keymap::Key;
 use super::paint;

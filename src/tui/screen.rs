@@ -80,3 +80,6 @@ pub fn of(step: Step) -> Box<dyn Screen> {
         Step::Plan | Step::Capture => Box::new(plain::Plain::default()),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -14,8 +14,9 @@ use super::{frame, help};
 use crate::profile::{Profile, builtin};
 use crate::session::set_up::Step;
 use crate::session::state::Session;
+use crate::units::{DEGREE, MILLIMETRE};
 use crate::wizard::Intent;
-use crate::wizard::view::{Content, ViewModel};
+use crate::wizard::view::{Content, TargetView, ViewModel};
 
 /// What the driver is to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -211,6 +212,12 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
                 Some((profile, _)) => Some(Scene::at_rest(&profile)),
                 None => Scene::of_session(session, None),
             }
+        }
+        Content::Target(TargetView { circles: Some(circles), .. }) if !circles.joints.is_empty() => {
+            let profile = &session.robot.as_ref()?.profile;
+            let size = |unit: &str| if unit == "deg" { DEGREE } else { MILLIMETRE };
+            let q: Vec<f64> = circles.joints.iter().map(|joint| joint.value * size(&joint.unit)).collect();
+            (q.len() == profile.chain().dof()).then(|| Scene::of(profile, &q))
         }
         Content::Instrument(_) | Content::Target(_) | Content::Plan(_) => Scene::of_session(session, None),
         Content::Capture(content) => Scene::of_session(session, content.row),

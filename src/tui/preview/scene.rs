@@ -10,6 +10,8 @@ use crate::session::state::Session;
 
 /// Thickness of an arm whose profile has no bodies, as a part of its length.
 const SLENDER: f64 = 0.035;
+/// Thickness of an arm that is compared with another, as a part of its reach.
+const THIN: f64 = 0.008;
 /// Size of a base without bodies, as a part of the arm's length.
 const BASE: f64 = 0.09;
 
@@ -89,6 +91,13 @@ fn castings(profile: &Profile, frames: &[Isometry3<f64>]) -> Vec<Body> {
         Some(Body { from: frame * body.from, to: frame * body.to, radius: body.radius })
     };
     profile.bodies().iter().filter_map(place).collect()
+}
+
+/// Thin bodies along the joints.
+fn thin(joints: &[Point3<f64>]) -> Vec<Body> {
+    let reach = joints.last().map_or(1.0, |last| last.coords.norm());
+    let from = std::iter::once(&Point3::origin()).chain(joints).copied().collect::<Vec<_>>();
+    from.into_iter().zip(joints).map(|(from, to)| Body { from, to: *to, radius: THIN * reach }).collect()
 }
 
 /// Bodies along the joints of an arm that has none.
@@ -230,6 +239,8 @@ impl Scene {
         let Some(result) = session.identified.as_deref() else { return Some(scene) };
         let chain = result.calibration.as_ref().and_then(|calibration| calibration.identified_chain(&profile));
         if let (Some(chain), false) = (&chain, with_errors) {
+            // Castings would hide the other arm.
+            scene.arms.iter_mut().for_each(|arm| arm.bodies = thin(&arm.joints));
             scene = scene.with_identified(&profile, chain, &rest(&profile));
             scene.magnify();
         }

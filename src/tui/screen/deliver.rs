@@ -12,6 +12,9 @@ use crate::tui::theme::Role;
 use crate::wizard::Intent;
 use crate::wizard::view::{Content, DeliverView};
 
+/// Rows that it takes to say of each file what is in it.
+const EXPLAINED: u16 = 22;
+
 /// How far it is scrolled.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct DeliverScreen {
@@ -46,7 +49,7 @@ fn about(file: &str) -> &'static str {
     }
 }
 
-fn page(cx: &ScreenCx<'_>, columns: u16) -> Page {
+fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
     let mut page = Page::new(cx.theme, columns);
     let Some(content) = content(cx) else { return page };
     if !content.is_current {
@@ -73,7 +76,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16) -> Page {
         page.title("Written");
         for file in &content.files {
             page.paragraph(&path(file), Role::Plain);
-            if !about(file).is_empty() {
+            if rows >= EXPLAINED && !about(file).is_empty() {
                 page.marked(("    ", Role::Dim), about(file), Role::Dim);
             }
         }
@@ -110,7 +113,7 @@ impl Screen for DeliverScreen {
             }
             return Reply::Ask(Box::new(Dialog::Confirm { intent: Intent::Quit, lines, is_yes: true }));
         }
-        let lines = page(cx, 78).len();
+        let lines = page(cx, 78, 0).len();
         if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
     }
 
@@ -119,6 +122,6 @@ impl Screen for DeliverScreen {
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
-        page(cx, area.width).draw(self.scroll.0, area, buf);
+        page(cx, area.width, area.height).draw(self.scroll.0, area, buf);
     }
 }

@@ -17,9 +17,11 @@ use crate::wizard::view::{Content, ProfileCard, ProfileView};
 /// Columns of the list.
 const LIST: u16 = 26;
 /// Columns of the card.
-const CARD: u16 = 50;
+const CARD: u16 = 46;
 /// Rows that the picture needs below the card.
 const PICTURE_ROWS: u16 = 9;
+/// Columns for list, card and picture side by side.
+const ALL: u16 = 106;
 /// The entry behind the shipped profiles.
 const FILE: &str = "file...";
 
@@ -60,9 +62,14 @@ impl ProfileScreen {
         self.cursor.or(chosen).unwrap_or(0).min(entries.len().saturating_sub(1))
     }
 
+    /// Whether the operator looks for another robot.
+    const fn is_browsing(&self) -> bool {
+        self.is_typing || self.cursor.is_some()
+    }
+
     /// Whether Enter takes what is under the cursor instead of going on.
     fn loads(&self, content: &ProfileView) -> bool {
-        !content.is_fixed && (self.is_typing || self.cursor.is_some() || content.chosen.is_none())
+        !content.is_fixed && (self.is_browsing() || content.chosen.is_none())
     }
 
     fn load(&mut self, content: &ProfileView) -> Reply {
@@ -142,7 +149,10 @@ impl Screen for ProfileScreen {
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let Some(content) = content(cx) else { return };
-        let (list, right) = if content.is_fixed { (Rect::ZERO, area) } else { columns(area) };
+        let (list, right) = match &content.chosen {
+            Some(_) if content.is_fixed || !self.is_browsing() && area.width < ALL => (Rect::ZERO, area),
+            _ => columns(area),
+        };
         self.draw_list(content, cx, list, buf);
         let Some(card) = &content.chosen else { return introduction(cx, right, buf) };
         let (text, side) = split(right, CARD, cx.scene.is_some());
@@ -223,6 +233,9 @@ fn card_page(card: &ProfileCard, content: &ProfileView, cx: &ScreenCx<'_>, colum
     if content.is_fixed {
         page.gap();
         page.paragraph("Something is measured already: this session keeps its robot.", Role::Dim);
+    } else {
+        page.gap();
+        page.paragraph("Enter takes this robot; Up/Down: the others.", Role::Hint);
     }
     page
 }
