@@ -53,7 +53,7 @@ pub fn simulated(is_paper: bool) -> Dialog {
 
 fn simulation(values: &[String]) -> Result<Intent, String> {
     let [seed, truth, noise, faults] = values else { return Err("four values are needed".to_owned()) };
-    let seed = seed.parse().map_err(|_| format!("'{seed}' is not a whole number"))?;
+    let seed = seed.parse().ok().ok_or_else(|| format!("'{seed}' is not a whole number"))?;
     let truth = TRUTH_WORDS.iter().zip(TRUTHS).find(|(word, _)| *word == truth).map_or(Truth::Drawn, |(_, one)| one);
     let noise_mm = if noise.is_empty() { None } else { Some(number("noise", noise)?) };
     if noise_mm.is_some_and(|noise| !(0.0..=100.0).contains(&noise)) {
@@ -111,9 +111,14 @@ fn replay(values: &[String]) -> Result<Intent, String> {
 fn set(file: &str, rows: &str, layout: &str, kind: PoseKind) -> Result<RecordedSet, String> {
     let rows = match rows {
         "" => None,
-        rows => Some(Filter::parse(rows).map(|_| rows.to_owned()).map_err(|error| error.to_string())?),
+        rows => Some(Filter::parse(rows).map(|_| rows.to_owned()).map_err(|error| first_line(&error.to_string()))?),
     };
     Ok(RecordedSet { file: file.to_owned(), kind, rows, layout: layout.to_owned() })
+}
+
+/// What is wrong, without the picture of where.
+fn first_line(text: &str) -> String {
+    text.lines().next().unwrap_or_default().to_owned()
 }
 
 /// A number; a decimal comma is a point.

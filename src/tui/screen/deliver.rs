@@ -81,16 +81,13 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             }
         }
         page.title("What to do next");
-        page.marked(("1 ", Role::Dim), "Apply: put the identified constants into the controller or the offline program; calibration.ron names each with its unit.", Role::Plain);
-        page.marked(("2 ", Role::Dim), "Verify later, after a collision or a repair, on some new points:", Role::Plain);
-        page.paragraph(
-            &format!("trupose verify --calibration {} --measurements NEW.csv", path("calibration.ron")),
-            Role::Plain,
-        );
-        page.marked(("3 ", Role::Dim), "Go on with this session, to measure more:", Role::Plain);
+        page.marked(("1 ", Role::Dim), "apply calibration.ron to the controller or the offline program", Role::Plain);
+        page.marked(("2 ", Role::Dim), "verify on new points, later or after a collision:", Role::Plain);
+        let verify = format!("trupose verify --calibration {} --measurements NEW.csv", path("calibration.ron"));
+        page.paragraph(&verify, Role::Plain);
+        page.marked(("3 ", Role::Dim), "measure more:", Role::Plain);
         page.paragraph(&format!("trupose resume {folder}"), Role::Plain);
     }
-    page.gap();
     page.paragraph("Quitting is safe: every measurement is in the journal already.", Role::Ok);
     page
 }
