@@ -1,8 +1,13 @@
 //! What is asked before an intent is carried out: its value, or whether it is meant. Drawn over the content of a screen.
 
+pub mod ask;
+mod form;
+
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
+
+pub use form::{Build, Form};
 
 use super::form::{ChoiceList, NumberField, Reaction, TextField};
 use super::glyphs::wrapped;
@@ -50,6 +55,8 @@ pub enum Dialog {
         /// What each choice does.
         intents: Vec<Intent>,
     },
+    /// Several fields become an intent.
+    Form(Form),
 }
 
 /// What an open question makes of a key.
@@ -106,6 +113,7 @@ impl Dialog {
             },
             Self::Text { field, intent } => (field.on_key(key), Some(intent(field.text().trim().to_owned()))),
             Self::Number { field, intent } => (field.on_key(key), field.value().ok().map(*intent)),
+            Self::Form(form) => (form.on_key(key), form.value().ok()),
             Self::Choice { list, intents } => {
                 (list.on_key(key), list.selected().and_then(|index| intents.get(index).cloned()))
             }
@@ -124,6 +132,7 @@ impl Dialog {
             Self::Text { field, .. } => field.paste(text),
             Self::Number { field, .. } => field.paste(text),
             Self::Choice { list, .. } => list.paste(text),
+            Self::Form(form) => form.paste(text),
         }
     }
 
@@ -135,6 +144,10 @@ impl Dialog {
                 items = vec![Item::new("y", "yes", 1), Item::new("n", "no", 1), Item::new("Tab", "other", 3)];
             }
             Self::Choice { .. } => items.push(Item::new("Up/Down", "choose", 2)),
+            Self::Form(_) => {
+                items.push(Item::new("Tab", "next field", 2));
+                items.push(Item::new("Ctrl-U", "empty the line", 4));
+            }
             Self::Text { .. } | Self::Number { .. } => items.push(Item::new("Ctrl-U", "empty the line", 4)),
         }
         items
@@ -160,6 +173,7 @@ impl Dialog {
             Self::Text { field, .. } => field.draw(theme, area, buf),
             Self::Number { field, .. } => field.draw(theme, area, buf),
             Self::Choice { list, .. } => list.draw(theme, area, buf),
+            Self::Form(form) => form.draw(theme, area, buf),
         }
     }
 }

@@ -18,7 +18,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget;
 
 pub use camera::{Camera, Framing, Projection};
-pub use scene::{Arm, Beam, Body, ErrorVector, Look, Mark, MarkKind, Scene};
+pub use scene::{Arm, Beam, Body, Checked, ErrorVector, Look, Mark, MarkKind, Scene};
 
 use super::keymap::Key;
 use super::paint;
@@ -131,6 +131,9 @@ impl Preview<'_> {
         }
         if self.scene.arms.iter().any(|arm| arm.look == Look::Dashed) {
             said.push("dashed: identified arm".to_owned());
+        }
+        if self.scene.magnified > 1.0 {
+            said.push(format!("difference {:.0} times larger", self.scene.magnified));
         }
         let last = area.height.saturating_sub(1);
         paint::text(buf, area, (0, last), &said.join(", "), self.theme.style(Role::Dim));

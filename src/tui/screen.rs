@@ -5,8 +5,15 @@
 //! [`keymap`](super::keymap), last to the camera of the preview.
 
 mod capture;
-mod plain;
+mod deliver;
+mod identify;
+mod instrument;
+mod menu;
+mod page;
 mod plan;
+mod profile;
+mod target;
+mod verify;
 
 use std::fmt;
 
@@ -68,11 +75,18 @@ pub trait Screen: fmt::Debug {
 /// The screen of a step, as it is when the step is entered.
 pub fn of(step: Step) -> Box<dyn Screen> {
     match step {
-        Step::Capture => Box::new(capture::Capture::default()),
+        Step::Profile => Box::new(profile::ProfileScreen::default()),
+        Step::Instrument => Box::new(instrument::InstrumentScreen::default()),
+        Step::Target => Box::new(target::TargetScreen::default()),
         Step::Plan => Box::new(plan::Plan::default()),
-        _ => Box::new(plain::Plain::default()),
+        Step::Capture => Box::new(capture::Capture::default()),
+        Step::Identify => Box::new(identify::IdentifyScreen::default()),
+        Step::Verify => Box::new(verify::VerifyScreen::default()),
+        Step::Deliver => Box::new(deliver::DeliverScreen::default()),
     }
 }
 
 #[cfg(test)]
 pub(crate) mod bench;
+#[cfg(test)]
+mod tests;

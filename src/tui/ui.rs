@@ -14,8 +14,9 @@ use super::{frame, help};
 use crate::profile::{Profile, builtin};
 use crate::session::set_up::Step;
 use crate::session::state::Session;
+use crate::units::{DEGREE, MILLIMETRE};
 use crate::wizard::Intent;
-use crate::wizard::view::{Content, ViewModel};
+use crate::wizard::view::{Content, TargetView, ViewModel};
 
 /// What the driver is to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,9 +178,10 @@ impl Ui {
 
     /// Keys of the screen itself.
     fn page_items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
-        let mut items = keymap::items(&cx.view.intents, self.theme.glyphs);
         let own = self.screen.items(cx);
-        items.retain(|item| !own.iter().any(|own| own.key == item.key));
+        let mut items = keymap::items(&cx.view.intents, self.theme.glyphs);
+        // The screen is asked first: its keys hide those of the table.
+        items.retain(|item| !own.iter().any(|one| one.key == item.key));
         items.extend(own);
         if self.scene.is_some() {
             items.push(Item::new(self.theme.glyphs.arrows(), "turn the picture", 8));
@@ -219,9 +221,17 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
                 None => scene,
             })
         }
+        Content::Target(TargetView { circles: Some(circles), .. }) if !circles.joints.is_empty() => {
+            let profile = &session.robot.as_ref()?.profile;
+            let size = |unit: &str| if unit == "deg" { DEGREE } else { MILLIMETRE };
+            let q: Vec<f64> = circles.joints.iter().map(|joint| joint.value * size(&joint.unit)).collect();
+            (q.len() == profile.chain().dof()).then(|| Scene::of(profile, &q))
+        }
         Content::Instrument(_) | Content::Target(_) => Scene::of_session(session, None),
         Content::Capture(content) => Scene::of_session(session, content.row),
-        Content::Identify(_) | Content::Verify(_) | Content::Deliver(_) => None,
+        Content::Identify(_) => Scene::of_identified(session, false),
+        Content::Verify(_) => Scene::of_identified(session, true),
+        Content::Deliver(_) => None,
     }
 }
 

@@ -4,13 +4,37 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::kinematics::{ForwardKinematics, KinematicChain};
 use crate::profile::{KeepOut, Profile};
+use crate::session::journal::from_xyz_mm;
+use crate::session::plan::PoseKind;
 use crate::session::state::Session;
 use crate::units::from_mm;
 
 /// Thickness of an arm whose profile has no bodies, as a part of its length.
 const SLENDER: f64 = 0.035;
+/// Thickness of an arm that is compared with another, as a part of its reach.
+const THIN: f64 = 0.008;
 /// Size of a base without bodies, as a part of the arm's length.
 const BASE: f64 = 0.09;
+
+/// Longest error or difference as a part of the arm's reach.
+const LONGEST_ERROR: f64 = 0.15;
+
+/// A factor that is said easily: 1, 2 or 5 times a power of ten, not above `factor` and at least 1.
+fn round_factor(factor: f64) -> f64 {
+    if !factor.is_finite() || factor < 1.0 {
+        return 1.0;
+    }
+    let power = 10_f64.powf(factor.log10().floor());
+    [5.0, 2.0].into_iter().map(|step| step * power).find(|round| *round <= factor).unwrap_or(power)
+}
+
+/// The middle of each range (rad) or (m).
+fn rest(profile: &Profile) -> Vec<f64> {
+    let middle = |range: &crate::profile::JointRange| {
+        range.planning_limits.or(range.limits).map_or(0.0, |(low, high)| f64::midpoint(low, high))
+    };
+    profile.joints().iter().map(middle).collect()
+}
 
 /// How an arm is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +92,13 @@ fn castings(profile: &Profile, frames: &[Isometry3<f64>]) -> Vec<Body> {
         Some(Body { from: frame * body.from, to: frame * body.to, radius: body.radius })
     };
     profile.bodies().iter().filter_map(place).collect()
+}
+
+/// Thin bodies along the joints.
+fn thin(joints: &[Point3<f64>]) -> Vec<Body> {
+    let reach = joints.last().map_or(1.0, |last| last.coords.norm());
+    let from = std::iter::once(&Point3::origin()).chain(joints).copied().collect::<Vec<_>>();
+    from.into_iter().zip(joints).map(|(from, to)| Body { from, to: *to, radius: THIN * reach }).collect()
 }
 
 /// Bodies along the joints of an arm that has none.
@@ -139,6 +170,23 @@ pub struct Scene {
     pub errors: Vec<ErrorVector>,
     /// Errors are drawn so many times longer than they are.
     pub exaggeration: f64,
+    /// The difference of the second arm from the first is drawn so many times larger than it is; up to 1: as it is.
+    pub magnified: f64,
+    /// Verification samples with what they say about both arms.
+    pub checked: Vec<Checked>,
+}
+
+/// A verification sample against both arms, in the registration of each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checked {
+    /// Name of the pose.
+    pub pose: String,
+    /// Where the identified arm has the reflector.
+    pub at: Point3<f64>,
+    /// Measured less predicted by the nominal arm (m).
+    pub nominal: Vector3<f64>,
+    /// Measured less predicted by the identified arm (m).
+    pub identified: Vector3<f64>,
 }
 
 impl Scene {
@@ -159,11 +207,7 @@ impl Scene {
 
     /// The robot of `profile` in a configuration in which its shape is seen: the middle of each range, elbow bent.
     pub fn at_rest(profile: &Profile) -> Self {
-        let middle = |range: &crate::profile::JointRange| {
-            range.planning_limits.or(range.limits).map_or(0.0, |(low, high)| f64::midpoint(low, high))
-        };
-        let q: Vec<f64> = profile.joints().iter().map(middle).collect();
-        Self::of(profile, &q)
+        Self::of(profile, &rest(profile))
     }
 
     /// The robot of a session at row `row` of its plan, with all points of the plan and what has become of them.
@@ -187,6 +231,57 @@ impl Scene {
             scene.marks.push(Mark { at: forward.point_in_base(&q, &target.position_in_flange), kind });
         }
         Some(scene)
+    }
+
+    /// Both arms of a session that is identified; `with_errors`: with what the verification samples say.
+    pub fn of_identified(session: &Session, with_errors: bool) -> Option<Self> {
+        let profile = session.mounted_profile()?;
+        let mut scene = Self::at_rest(&profile);
+        let Some(result) = session.identified.as_deref() else { return Some(scene) };
+        let chain = result.calibration.as_ref().and_then(|calibration| calibration.identified_chain(&profile));
+        if let (Some(chain), false) = (&chain, with_errors) {
+            // Castings would hide the other arm.
+            scene.arms.iter_mut().for_each(|arm| arm.bodies = thin(&arm.joints));
+            scene = scene.with_identified(&profile, chain, &rest(&profile));
+            scene.magnify();
+        }
+        if with_errors {
+            for (number, point) in result.samples.iter().zip(&result.points) {
+                let Some(sample) = session.sample(*number) else { continue };
+                if session.kind_of(sample) == PoseKind::Verification {
+                    scene.checked.push(Checked {
+                        pose: session.pose_of(sample).to_owned(),
+                        at: from_xyz_mm(point.at_mm),
+                        nominal: from_xyz_mm(point.nominal_mm).coords,
+                        identified: from_xyz_mm(point.identified_mm).coords,
+                    });
+                }
+            }
+            scene.show_errors(true);
+        }
+        Some(scene)
+    }
+
+    /// Shows the errors of the identified or of the nominal arm, each so much longer that the largest is well seen.
+    pub fn show_errors(&mut self, of_identified: bool) {
+        let pick = |one: &Checked| if of_identified { one.identified } else { one.nominal };
+        self.errors = self.checked.iter().map(|one| ErrorVector { at: one.at, error: pick(one) }).collect();
+        let largest = self.errors.iter().map(|vector| vector.error.norm()).fold(0.0, f64::max);
+        self.exaggeration = round_factor(LONGEST_ERROR * self.radius() / largest);
+    }
+
+    /// Moves the second arm away from the first until the difference is seen.
+    fn magnify(&mut self) {
+        let room = LONGEST_ERROR * self.radius();
+        let [nominal, identified] = self.arms.as_mut_slice() else { return };
+        let points = || nominal.joints.iter().chain(&nominal.reflector);
+        let others = identified.joints.iter().chain(&identified.reflector);
+        let largest = points().zip(others).map(|(one, other)| (other - one).norm()).fold(0.0, f64::max);
+        let factor = round_factor(room / largest);
+        for (one, other) in points().zip(identified.joints.iter_mut().chain(&mut identified.reflector)) {
+            *other = one + (*other - one) * factor;
+        }
+        self.magnified = factor;
     }
 
     /// Adds the arm with other link constants, drawn dashed.

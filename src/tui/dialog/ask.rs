@@ -1,0 +1,169 @@
+//! The forms that screens ask with: a known target, a simulated cell, recorded measurements.
+
+use super::{Dialog, Form};
+use crate::session::filter::Filter;
+use crate::session::plan::PoseKind;
+use crate::session::set_up::{InstrumentChoice, RecordedSet, TargetChoice};
+use crate::session::simulation::{Fault, Simulation, Truth};
+use crate::wizard::Intent;
+
+/// Words for [`Truth`], in the order of [`TRUTHS`].
+const TRUTH_WORDS: &[&str] = &["random", "paper", "nominal"];
+const TRUTHS: [Truth; 3] = [Truth::Drawn, Truth::Paper, Truth::Nominal];
+/// Layouts of tables.
+const LAYOUTS: &[&str] = &["named", "robodk", "delmia"];
+
+/// Where the SMR is known to be.
+pub fn known_target(nominal_mm: [f64; 3]) -> Dialog {
+    let [x, y, z] = nominal_mm.map(|value| format!("{value:.3}"));
+    Dialog::Form(
+        Form::new("Centre of the SMR in the flange frame", known)
+            .text("x (mm)", &x, "As measured on the flange adapter, for example with a CMM; to the centre of the SMR.")
+            .text("y (mm)", &y, "Along the y axis of the flange as the profile defines it.")
+            .text("z (mm)", &z, "Along the flange axis, away from the arm.")
+            .text(
+                "sigma (mm)",
+                "0.1",
+                "How well it is known, one standard deviation per coordinate; 0: exact, it is not identified.",
+            ),
+    )
+}
+
+fn known(values: &[String]) -> Result<Intent, String> {
+    let [x, y, z, sigma] = values else { return Err("four numbers are needed".to_owned()) };
+    let sigma_mm = number("sigma", sigma)?;
+    if sigma_mm < 0.0 {
+        return Err("sigma cannot be negative".to_owned());
+    }
+    let xyz_mm = (number("x", x)?, number("y", y)?, number("z", z)?);
+    Ok(Intent::ChooseTarget(TargetChoice::Known { xyz_mm, sigma_mm }))
+}
+
+/// A cell that exists in the program only.
+pub fn simulated(is_paper: bool) -> Dialog {
+    let truth = usize::from(is_paper);
+    Dialog::Form(
+        Form::new("Simulated cell, to rehearse on", simulation)
+            .text("seed", "1", "The same seed gives the same errors and noise again.")
+            .pick("hidden errors of the arm", TRUTH_WORDS, truth, "Left/Right. random: drawn by seed; paper: table II of the method paper (only its own arm); nominal: none.")
+            .text("noise (mm)", "", "Standard deviation of a coordinate; empty: as the profile's instrument.")
+            .text("faults", "", "What goes wrong, separated by commas: wrong-pose@12, outlier@9:3mm, target-bumped@20:5mm, beam-break@7-9. Empty: nothing."),
+    )
+}
+
+fn simulation(values: &[String]) -> Result<Intent, String> {
+    let [seed, truth, noise, faults] = values else { return Err("four values are needed".to_owned()) };
+    let seed = seed.parse().ok().ok_or_else(|| format!("'{seed}' is not a whole number"))?;
+    let truth = TRUTH_WORDS.iter().zip(TRUTHS).find(|(word, _)| *word == truth).map_or(Truth::Drawn, |(_, one)| one);
+    let noise_mm = if noise.is_empty() { None } else { Some(number("noise", noise)?) };
+    if noise_mm.is_some_and(|noise| !(0.0..=100.0).contains(&noise)) {
+        return Err("noise must be from 0 to 100 mm".to_owned());
+    }
+    let faults = faults.split([',', ';']).map(str::trim).filter(|text| !text.is_empty());
+    let faults =
+        faults.map(|text| text.parse::<Fault>().map_err(|error| error.to_string())).collect::<Result<_, _>>()?;
+    Ok(Intent::ChooseInstrument(InstrumentChoice::Simulated(Simulation { seed, truth, noise_mm, faults })))
+}
+
+/// Tables of earlier days.
+pub fn recorded() -> Dialog {
+    let rows = "A condition on the columns, such as: pose % 5 != 0. Empty: all rows.";
+    Dialog::Form(
+        Form::new("Recorded measurements, played as if they were captured now", replay)
+            .text(
+                "table to identify from",
+                "",
+                "Path of a CSV file with joint values and measured points, units in its header.",
+            )
+            .text("rows of it", "", rows)
+            .text(
+                "table to verify with",
+                "",
+                "Path; it may be the same file with other rows. Empty: nothing is kept for verification.",
+            )
+            .text("rows of it", "", rows)
+            .pick(
+                "layout",
+                LAYOUTS,
+                0,
+                "Left/Right. named: header with names and units; robodk, delmia: exported by those programs.",
+            ),
+    )
+}
+
+fn replay(values: &[String]) -> Result<Intent, String> {
+    let [first, first_rows, second, second_rows, layout] = values else {
+        return Err("five values are needed".to_owned());
+    };
+    if first.is_empty() {
+        return Err("give the table to identify from".to_owned());
+    }
+    if second.is_empty() && !second_rows.is_empty() {
+        return Err("there are rows to verify with, but no table".to_owned());
+    }
+    let mut sets = vec![set(first, first_rows, layout, PoseKind::Identification)?];
+    if !second.is_empty() {
+        sets.push(set(second, second_rows, layout, PoseKind::Verification)?);
+    }
+    Ok(Intent::ChooseInstrument(InstrumentChoice::Replay { sets }))
+}
+
+fn set(file: &str, rows: &str, layout: &str, kind: PoseKind) -> Result<RecordedSet, String> {
+    let rows = match rows {
+        "" => None,
+        rows => Some(Filter::parse(rows).map(|_| rows.to_owned()).map_err(|error| first_line(&error.to_string()))?),
+    };
+    Ok(RecordedSet { file: file.to_owned(), kind, rows, layout: layout.to_owned() })
+}
+
+/// What is wrong, without the picture of where.
+fn first_line(text: &str) -> String {
+    text.lines().next().unwrap_or_default().to_owned()
+}
+
+/// A number; a decimal comma is a point.
+fn number(name: &str, text: &str) -> Result<f64, String> {
+    let value = text.replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite());
+    value.ok_or_else(|| format!("{name}: '{text}' is not a number"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(texts: &[&str]) -> Vec<String> {
+        texts.iter().map(|text| (*text).to_owned()).collect()
+    }
+
+    #[test]
+    fn a_known_target_needs_four_numbers() {
+        let target = TargetChoice::Known { xyz_mm: (1.5, -2.0, 70.0), sigma_mm: 0.0 };
+        assert_eq!(known(&values(&["1,5", "-2", "70", "0"])), Ok(Intent::ChooseTarget(target)));
+        assert_eq!(known(&values(&["1", "x", "70", "0"])), Err("y: 'x' is not a number".to_owned()));
+        assert_eq!(known(&values(&["1", "2", "70", "-1"])), Err("sigma cannot be negative".to_owned()));
+    }
+
+    #[test]
+    fn faults_are_checked() {
+        let cell = simulation(&values(&["7", "paper", "", "wrong-pose@12, outlier@9:3mm"])).unwrap();
+        let Intent::ChooseInstrument(InstrumentChoice::Simulated(cell)) = cell else { panic!("{cell:?}") };
+        assert_eq!((cell.seed, cell.truth, cell.noise_mm, cell.faults.len()), (7, Truth::Paper, None, 2));
+        assert!(simulation(&values(&["7", "paper", "", "earthquake@3"])).is_err());
+        assert!(simulation(&values(&["x", "paper", "", ""])).is_err());
+    }
+
+    #[test]
+    fn recorded_tables_have_their_use() {
+        let Ok(Intent::ChooseInstrument(InstrumentChoice::Replay { sets })) =
+            replay(&values(&["a.csv", "pose % 5 != 0", "a.csv", "pose % 5 == 0", "named"]))
+        else {
+            panic!()
+        };
+        assert_eq!(
+            sets.iter().map(|set| set.kind).collect::<Vec<_>>(),
+            [PoseKind::Identification, PoseKind::Verification]
+        );
+        assert!(replay(&values(&["", "", "", "", "named"])).is_err());
+        assert!(replay(&values(&["a.csv", "pose %%", "", "", "named"])).is_err());
+    }
+}

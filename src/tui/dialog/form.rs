@@ -1,0 +1,172 @@
+//! Several fields that together become an intent.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use crate::tui::form::{Reaction, TextField};
+use crate::tui::glyphs::wrapped;
+use crate::tui::keymap::Key;
+use crate::tui::paint;
+use crate::tui::theme::{Role, Theme};
+use crate::wizard::Intent;
+
+/// Columns of the labels.
+const LABELS: u16 = 24;
+
+/// What the values of the fields mean, or what is wrong with them.
+pub type Build = fn(&[String]) -> Result<Intent, String>;
+
+/// Several fields, one line each.
+#[derive(Clone, Debug)]
+pub struct Form {
+    title: String,
+    fields: Vec<Field>,
+    focus: usize,
+    build: Build,
+    /// The values were meant although they are wrong: from then on it is said.
+    is_tried: bool,
+}
+
+/// A field with a line that explains it.
+#[derive(Clone, Debug)]
+struct Field {
+    label: &'static str,
+    about: &'static str,
+    value: Value,
+}
+
+#[derive(Clone, Debug)]
+enum Value {
+    Text(TextField),
+    Pick { options: &'static [&'static str], at: usize },
+}
+
+impl Value {
+    fn text(&self) -> String {
+        match self {
+            Self::Text(field) => field.text().trim().to_owned(),
+            Self::Pick { options, at } => options.get(*at).copied().unwrap_or_default().to_owned(),
+        }
+    }
+}
+
+impl Form {
+    /// A form without fields.
+    pub fn new(title: impl Into<String>, build: Build) -> Self {
+        Self { title: title.into(), fields: Vec::new(), focus: 0, build, is_tried: false }
+    }
+
+    /// With a line of text.
+    #[must_use]
+    pub fn text(mut self, label: &'static str, value: &str, about: &'static str) -> Self {
+        self.fields.push(Field { label, about, value: Value::Text(TextField::new(label, value)) });
+        self
+    }
+
+    /// With one of some words.
+    #[must_use]
+    pub fn pick(
+        mut self,
+        label: &'static str,
+        options: &'static [&'static str],
+        at: usize,
+        about: &'static str,
+    ) -> Self {
+        self.fields.push(Field { label, about, value: Value::Pick { options, at } });
+        self
+    }
+
+    /// The intent, or what is wrong.
+    ///
+    /// # Errors
+    /// A field cannot be understood.
+    pub fn value(&self) -> Result<Intent, String> {
+        let values: Vec<String> = self.fields.iter().map(|field| field.value.text()).collect();
+        (self.build)(&values)
+    }
+
+    /// Takes a key.
+    pub fn on_key(&mut self, key: Key) -> Reaction {
+        let count = self.fields.len().max(1);
+        match key.code {
+            KeyCode::Enter => {
+                self.is_tried = true;
+                return if self.value().is_ok() { Reaction::Done } else { Reaction::Changed };
+            }
+            KeyCode::Esc => return Reaction::Cancelled,
+            KeyCode::Tab | KeyCode::Down => self.focus = (self.focus + 1) % count,
+            KeyCode::BackTab | KeyCode::Up => self.focus = (self.focus + count - 1) % count,
+            _ => {
+                return match self.fields.get_mut(self.focus).map(|field| &mut field.value) {
+                    Some(Value::Text(field)) => field.on_key(key),
+                    Some(Value::Pick { options, at }) => picked(options.len().max(1), at, key),
+                    None => Reaction::Ignored,
+                };
+            }
+        }
+        Reaction::Changed
+    }
+
+    /// Inserts pasted text into the field in focus.
+    pub fn paste(&mut self, text: &str) {
+        if let Some(Value::Text(field)) = self.fields.get_mut(self.focus).map(|field| &mut field.value) {
+            field.paste(text);
+        }
+    }
+
+    /// Draws it: title, fields, what the one in focus is for, what is wrong.
+    pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
+        paint::text(buf, area, (0, 0), &theme.glyphs.show(&self.title), theme.style(Role::Title));
+        let mut row = 2;
+        for (index, field) in self.fields.iter().enumerate() {
+            let has_focus = index == self.focus;
+            let role = if has_focus { Role::Title } else { Role::Dim };
+            paint::text(buf, area, (0, row), field.label, theme.style(role));
+            let column = LABELS.min(area.width);
+            let place = paint::band(Rect { x: area.x + column, width: area.width - column, ..area }, row, 1);
+            match &field.value {
+                Value::Text(text) if has_focus => text.draw_line(theme, place, buf),
+                Value::Text(text) => {
+                    paint::text(buf, place, (2, 0), &theme.glyphs.show(&text.text()), theme.style(Role::Plain));
+                }
+                Value::Pick { options, at } => {
+                    let mut column = 2;
+                    for (number, option) in options.iter().enumerate() {
+                        let is_chosen = number == *at;
+                        let shown = if is_chosen { format!("[{option}]") } else { format!(" {option} ") };
+                        let role = match (is_chosen, has_focus) {
+                            (true, true) => Role::Focus,
+                            (true, false) => Role::Plain,
+                            (false, _) => Role::Dim,
+                        };
+                        column = paint::text(buf, place, (column, 0), &shown, theme.style(role)) + 1;
+                    }
+                }
+            }
+            row += 1;
+        }
+        row += 1;
+        let columns = usize::from(area.width);
+        let about = self.fields.get(self.focus).map_or("", |field| field.about);
+        for line in wrapped(&theme.glyphs.show(about), columns) {
+            paint::text(buf, area, (0, row), &line, theme.style(Role::Hint));
+            row += 1;
+        }
+        if let (true, Err(problem)) = (self.is_tried, self.value()) {
+            for line in wrapped(&theme.glyphs.show(&format!("not yet: {problem}")), columns) {
+                paint::text(buf, area, (0, row), &line, theme.style(Role::Warn));
+                row += 1;
+            }
+        }
+    }
+}
+
+fn picked(count: usize, at: &mut usize, key: Key) -> Reaction {
+    *at = match key.code {
+        KeyCode::Right | KeyCode::Char(' ') => (*at + 1) % count,
+        KeyCode::Left => (*at + count - 1) % count,
+        _ => return Reaction::Ignored,
+    };
+    Reaction::Changed
+}

@@ -1,0 +1,124 @@
+//! Deliver: what was written where, and what to do with it.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::page::{Page, Scroll};
+use super::{Reply, Screen, ScreenCx, verify};
+use crate::tui::dialog::Dialog;
+use crate::tui::keymap::{Item, Key};
+use crate::tui::theme::Role;
+use crate::wizard::Intent;
+use crate::wizard::view::{Content, DeliverView};
+
+/// Rows that it takes to say of each file what is in it.
+const EXPLAINED: u16 = 22;
+
+/// How far it is scrolled.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DeliverScreen {
+    scroll: Scroll,
+}
+
+const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a DeliverView> {
+    match &cx.view.content {
+        Content::Deliver(content) => Some(content),
+        _ => None,
+    }
+}
+
+/// Whether there is nothing left but to leave.
+fn is_done(cx: &ScreenCx<'_>) -> bool {
+    content(cx).is_some_and(|content| !content.files.is_empty() && content.is_current)
+        && !cx.view.intents.iter().any(|info| info.is_default)
+        && cx.view.busy.is_none()
+}
+
+/// What is in a file.
+fn about(file: &str) -> &'static str {
+    match file.rsplit(['/', '\\']).next().unwrap_or(file) {
+        "plan.csv" => "the poses that were planned",
+        "measurements.csv" => "everything measured, to be identified again by any program",
+        "calibration.ron" => "the identified arm: the result to apply",
+        "report.json" => "all numbers of this session, for other programs",
+        "report.html" => "all numbers of this session, to read and print",
+        "corrected.urdf" => "the identified arm for robot software",
+        "recording.rrd" => "the session as a 3D recording",
+        _ => "",
+    }
+}
+
+fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
+    let mut page = Page::new(cx.theme, columns);
+    let Some(content) = content(cx) else { return page };
+    if !content.is_current {
+        page.marked(
+            ("OUT OF DATE: ", Role::Warn),
+            "the samples have changed since: go back and identify again.",
+            Role::Plain,
+        );
+    }
+    match &content.verdict {
+        Some(verdict) => verify::status(verdict, &mut page),
+        None => page.paragraph("There is no result yet: go back and identify.", Role::Warn),
+    }
+    let folder = cx.view.header.folder.as_deref().unwrap_or(".");
+    let path = |file: &str| {
+        if file.starts_with('/') { file.to_owned() } else { format!("{}/{file}", folder.trim_end_matches('/')) }
+    };
+    if content.files.is_empty() {
+        page.title("Nothing is written yet. Enter writes the results into:");
+        page.paragraph(folder, Role::Plain);
+        page.gap();
+        page.paragraph("calibration.ron is the identified arm; report.json has all numbers; plan.csv and measurements.csv are the data.", Role::Plain);
+    } else {
+        page.title("Written");
+        for file in &content.files {
+            page.paragraph(&path(file), Role::Plain);
+            if rows >= EXPLAINED && !about(file).is_empty() {
+                page.marked(("    ", Role::Dim), about(file), Role::Dim);
+            }
+        }
+        page.title("What to do next");
+        page.marked(("1 ", Role::Dim), "apply calibration.ron to the controller or the offline program", Role::Plain);
+        page.marked(("2 ", Role::Dim), "verify on new points, later or after a collision:", Role::Plain);
+        let verify = format!("trupose verify --calibration {} --measurements NEW.csv", path("calibration.ron"));
+        page.paragraph(&verify, Role::Plain);
+        page.marked(("3 ", Role::Dim), "measure more:", Role::Plain);
+        page.paragraph(&format!("trupose resume {folder}"), Role::Plain);
+    }
+    page.paragraph("Quitting is safe: every measurement is in the journal already.", Role::Ok);
+    page
+}
+
+impl Screen for DeliverScreen {
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        let mut items = vec![Scroll::item()];
+        if is_done(cx) {
+            items.push(Item::new("Enter", "done: quit", 0));
+        }
+        items
+    }
+
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+        if key.code == KeyCode::Enter && is_done(cx) {
+            let mut lines = vec!["Done. Leave the program?".to_owned(), "Everything is saved.".to_owned()];
+            if let Some(folder) = &cx.view.header.folder {
+                lines.push("Go on later with:".to_owned());
+                lines.push(format!("trupose resume {folder}"));
+            }
+            return Reply::Ask(Box::new(Dialog::Confirm { intent: Intent::Quit, lines, is_yes: true }));
+        }
+        let lines = page(cx, 78, 0).len();
+        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+    }
+
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
+        Reply::Ignored
+    }
+
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        page(cx, area.width, area.height).draw(self.scroll.0, area, buf);
+    }
+}

@@ -1,0 +1,87 @@
+//! Identify: what the samples say about the arm. No number here is an accuracy.
+
+mod pages;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::page::{Page, Scroll, Tabs, picture, split};
+use super::{Reply, Screen, ScreenCx};
+use crate::tui::keymap::{Item, Key};
+use crate::wizard::view::{Content, IdentifyView};
+
+/// Columns of the text beside the picture.
+const TEXT: u16 = 66;
+/// Where the picture alone is.
+const PICTURE: usize = 3;
+
+/// Which page, and how far it is scrolled.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct IdentifyScreen {
+    tabs: Tabs,
+    scroll: Scroll,
+}
+
+impl Default for IdentifyScreen {
+    fn default() -> Self {
+        Self { tabs: Tabs::new(&["result", "parameters", "limits of the data", "arms"]), scroll: Scroll::default() }
+    }
+}
+
+const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a IdentifyView> {
+    match &cx.view.content {
+        Content::Identify(content) => Some(content),
+        _ => None,
+    }
+}
+
+impl IdentifyScreen {
+    fn page(self, cx: &ScreenCx<'_>, columns: u16) -> Page {
+        let mut page = Page::new(cx.theme, columns);
+        let Some(content) = content(cx) else { return page };
+        match (&content.summary, self.tabs.at) {
+            (None, _) => pages::before(content, &mut page),
+            (Some(summary), 0 | PICTURE) => pages::result(content, summary, &mut page),
+            (Some(summary), 1) => pages::parameters(summary, &mut page),
+            (Some(summary), _) => pages::limits(summary, &mut page),
+        }
+        page
+    }
+}
+
+fn has_result(cx: &ScreenCx<'_>) -> bool {
+    content(cx).is_some_and(|content| content.summary.is_some())
+}
+
+impl Screen for IdentifyScreen {
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        if has_result(cx) { vec![self.tabs.item(), Scroll::item()] } else { Vec::new() }
+    }
+
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+        if has_result(cx) && self.tabs.on_key(key) {
+            self.scroll = Scroll::default();
+            return Reply::Changed;
+        }
+        let lines = self.page(cx, TEXT).len();
+        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+    }
+
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
+        Reply::Ignored
+    }
+
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        let area = if has_result(cx) { self.tabs.draw(cx.theme, area, buf) } else { area };
+        let (text, side) = split(area, TEXT, cx.scene.is_some());
+        match (cx.scene, side) {
+            (Some(scene), None) if has_result(cx) && self.tabs.at == PICTURE => picture(cx, scene, area, buf),
+            (scene, side) => {
+                self.page(cx, text.width).draw(self.scroll.0, text, buf);
+                if let (Some(scene), Some(side)) = (scene, side) {
+                    picture(cx, scene, side, buf);
+                }
+            }
+        }
+    }
+}

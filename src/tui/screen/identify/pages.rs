@@ -1,0 +1,170 @@
+//! The pages of the identification.
+
+use crate::session::summary::{IdentificationSummary, ParameterSummary, SigmaOrigin, Termination};
+use crate::tui::screen::page::{Page, counted, decimals_for, fixed};
+use crate::tui::theme::Role;
+use crate::wizard::view::IdentifyView;
+
+/// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
+const WEAK: f64 = 0.5;
+
+/// Nothing is identified yet.
+pub(super) fn before(content: &IdentifyView, page: &mut Page) {
+    page.pair("samples", &format!("{} to identify from", counted(content.samples, "pose")));
+    page.gap();
+    page.title("What is identified");
+    page.marked(
+        ("- ", Role::Dim),
+        "the constants of every link: lengths, offsets and angles as the profile frees them",
+        Role::Plain,
+    );
+    page.marked(
+        ("- ", Role::Dim),
+        "where the tracker stands, and the SMR as it was chosen in the step Target",
+        Role::Plain,
+    );
+    page.gap();
+    page.paragraph(
+        "Samples that contradict all others are found, named and left out. The verification poses are not used here.",
+        Role::Plain,
+    );
+    page.gap();
+    page.paragraph("Enter begins; it takes some seconds.", Role::Hint);
+}
+
+/// Warnings first, then what the result rests on.
+pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, page: &mut Page) {
+    if !content.is_current {
+        page.marked(
+            ("OUT OF DATE: ", Role::Warn),
+            "the samples have changed since; press i to identify again.",
+            Role::Plain,
+        );
+    }
+    if !content.is_usable {
+        page.marked(
+            ("NOT USABLE: ", Role::Alarm),
+            "there is no solution that could be applied; see the warnings.",
+            Role::Plain,
+        );
+    }
+    for warning in &summary.warnings {
+        let mark = if warning.blocks_acceptance { ("WARNING ", Role::Warn) } else { ("note    ", Role::Title) };
+        page.marked(mark, &warning.message, Role::Plain);
+    }
+    if summary.warnings.is_empty() && content.is_current && content.is_usable {
+        page.line(vec![("identified, no warnings".to_owned(), Role::Ok)]);
+    }
+    page.gap();
+    let rejected = match summary.rejected.len() {
+        0 => "none rejected".to_owned(),
+        some => format!("{some} REJECTED, see page 3"),
+    };
+    page.pair("samples", &format!("{} ({rejected})", summary.samples));
+    let tied = summary.parameters.iter().filter(|parameter| !parameter.identifiable).count();
+    let weak = summary.parameters.iter().filter(|parameter| found(parameter) == "weakly").count();
+    let alone = summary.parameters.len().saturating_sub(tied + weak);
+    page.pair(
+        "parameters",
+        &format!("{}: {alone} found, {weak} weakly, {tied} only combined", summary.parameter_count),
+    );
+    let rank = summary.rank.map_or_else(
+        || "not clear from these samples".to_owned(),
+        |rank| format!("{rank} of {} combinations are determined", summary.parameter_count),
+    );
+    page.pair("rank", &rank);
+    if let Some(condition) = summary.condition_number {
+        let raw = summary
+            .condition_number_mm_rad
+            .map_or_else(String::new, |raw| format!("; {} in mm and rad", fixed(raw, 0)));
+        page.pair("condition", &format!("{} in expected deviations{raw}", fixed(condition, 1)));
+    }
+    let source = match summary.sigma.source {
+        SigmaOrigin::Readings => "given with the readings",
+        SigmaOrigin::Option => "given on the command line",
+        SigmaOrigin::Instrument => "of the profile's instrument",
+        SigmaOrigin::Residuals => "estimated from the residuals",
+        SigmaOrigin::Assumed => "ASSUMED, for want of data to estimate it",
+    };
+    page.pair("sigma", &format!("{} mm per coordinate, {source}", fixed(summary.sigma.used_mm, 4)));
+    if let Some(said) = summary.sigma.from_residuals_mm.filter(|_| summary.sigma.source != SigmaOrigin::Residuals) {
+        page.pair("", &format!("{} mm is what the residuals say", fixed(said, 4)));
+    }
+    let ended = match summary.termination {
+        Termination::Converged => "converged",
+        Termination::IterationLimit => "STOPPED at the iteration limit",
+        Termination::NoImprovement => "no further improvement",
+        Termination::NonFinite => "FAILED: numbers that are not finite",
+    };
+    page.pair("solver", &format!("{ended} after {}", counted(summary.iterations.len(), "step")));
+    page.gap();
+    page.paragraph(
+        "How accurate the arm is now: in the next step, on poses that the identification never saw.",
+        Role::Dim,
+    );
+}
+
+/// How well a parameter is found.
+fn found(parameter: &ParameterSummary) -> &'static str {
+    if !parameter.identifiable {
+        "only combined"
+    } else if parameter.sigma.is_none_or(|sigma| sigma > WEAK * parameter.expected) {
+        "weakly"
+    } else {
+        "yes"
+    }
+}
+
+/// Every parameter.
+pub(super) fn parameters(summary: &IdentificationSummary, page: &mut Page) {
+    let head =
+        format!("{:<10}{:>4}{:>12}{:>12}{:>11}  {}", "parameter", "unit", "nominal", "deviation", "sigma", "found");
+    page.line(vec![(head, Role::Dim)]);
+    for parameter in &summary.parameters {
+        let decimals = parameter.sigma.map_or(4, decimals_for);
+        let sigma = parameter.sigma.map_or_else(|| "-".to_owned(), |sigma| fixed(sigma, decimals));
+        let found = found(parameter);
+        let line = format!(
+            "{:<10}{:>4}{:>12}{:>12}{sigma:>11}  ",
+            parameter.name,
+            parameter.unit,
+            fixed(parameter.nominal, 4),
+            fixed(parameter.deviation, decimals),
+        );
+        let role = match found {
+            "yes" => Role::Ok,
+            "weakly" => Role::Warn,
+            _ => Role::Dim,
+        };
+        page.line(vec![(line, Role::Plain), (found.to_owned(), role)]);
+    }
+    page.gap();
+    page.paragraph("deviation: identified less nominal. sigma: standard deviation of it. weakly: sigma above half of what was expected before measuring. only combined: see page 3.", Role::Dim);
+}
+
+/// Rejected samples, and what the data cannot tell.
+pub(super) fn limits(summary: &IdentificationSummary, page: &mut Page) {
+    page.title(&format!("Rejected samples: {} of {}", summary.rejected.len(), summary.samples));
+    for rejected in &summary.rejected {
+        let off = fixed(rejected.residual_mm, 3);
+        page.marked(
+            ("- ", Role::Warn),
+            &format!("pose {}: {off} mm off, {}", rejected.pose, rejected.reason),
+            Role::Plain,
+        );
+    }
+    page.title("What these samples cannot tell");
+    if summary.blind_groups.is_empty() {
+        page.paragraph("nothing: every parameter is found on its own", Role::Plain);
+    }
+    for group in &summary.blind_groups {
+        page.marked(("- ", Role::Dim), &group.description, Role::Plain);
+    }
+    if !summary.correlations.is_empty() {
+        page.title("Strongly correlated (not told apart well)");
+        for pair in &summary.correlations {
+            let [first, second] = &pair.parameters;
+            page.line(vec![(format!("- {first} and {second}: {:+.2}", pair.correlation), Role::Plain)]);
+        }
+    }
+}

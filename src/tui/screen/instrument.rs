@@ -1,0 +1,147 @@
+//! Instrument: what measures, as a list of ways with what each means.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::menu::Menu;
+use super::page::{Page, Scroll, counted, picture, split};
+use super::{Reply, Screen, ScreenCx};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
+use crate::tui::dialog::ask;
+use crate::tui::keymap::{Item, Key};
+use crate::tui::theme::Role;
+use crate::wizard::Intent;
+use crate::wizard::view::{Content, InstrumentView};
+
+/// Columns of the text beside the picture.
+const TEXT: u16 = 62;
+/// The ways, with what each means.
+const WAYS: [(&str, &str); 5] = [
+    ("by hand, in mm", "you read x y z off the instrument and type or paste them"),
+    ("by hand, in m", "the same, the instrument counts in metres"),
+    ("by hand, in inch", "the same, the instrument counts in inches"),
+    ("simulated cell ...", "an arm with hidden errors: rehearse the whole procedure"),
+    ("recorded measurements ...", "tables of earlier days, played as if captured now"),
+];
+const UNITS: [CoordinateUnit; 3] = [CoordinateUnit::Millimetre, CoordinateUnit::Metre, CoordinateUnit::Inch];
+
+/// The focus in the list.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct InstrumentScreen {
+    menu: Menu,
+    scroll: Scroll,
+}
+
+const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a InstrumentView> {
+    match &cx.view.content {
+        Content::Instrument(content) => Some(content),
+        _ => None,
+    }
+}
+
+/// Why another instrument cannot be chosen.
+fn is_fixed(cx: &ScreenCx<'_>) -> bool {
+    let mut offers = cx.view.intents.iter().filter(|info| matches!(info.intent, Intent::ChooseInstrument(_)));
+    offers.all(|info| !info.is_enabled()) && cx.view.busy.is_none()
+}
+
+impl InstrumentScreen {
+    /// Whether Enter chooses instead of going on.
+    fn chooses(&self, cx: &ScreenCx<'_>) -> bool {
+        !is_fixed(cx) && content(cx).is_some_and(|content| self.menu.at.is_some() || content.choice.is_none())
+    }
+
+    fn choose(&mut self, cx: &ScreenCx<'_>) -> Reply {
+        let at = self.menu.at.take().unwrap_or(0);
+        match UNITS.get(at) {
+            Some(unit) => Reply::Intend(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
+            None if at == UNITS.len() => {
+                let is_paper = cx.view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper"));
+                Reply::Ask(Box::new(ask::simulated(is_paper)))
+            }
+            None => Reply::Ask(Box::new(ask::recorded())),
+        }
+    }
+
+    fn page(&self, cx: &ScreenCx<'_>, columns: u16) -> Page {
+        let mut page = Page::new(cx.theme, columns);
+        let Some(content) = content(cx) else { return page };
+        state(content, cx, &mut page);
+        page.gap();
+        if is_fixed(cx) {
+            page.paragraph(
+                "Something is measured already: points of another instrument cannot be mixed in.",
+                Role::Dim,
+            );
+            return page;
+        }
+        self.menu.write(&mut page, cx.theme.glyphs.pointer(), &WAYS, self.chooses(cx));
+        page
+    }
+}
+
+/// What is chosen, who answers, how well it measures.
+fn state(content: &InstrumentView, cx: &ScreenCx<'_>, page: &mut Page) {
+    let robot = "none stated; then sigma is estimated from the residuals";
+    page.pair("profile", content.stated_sigma.as_deref().unwrap_or(robot));
+    let Some(choice) = &content.choice else {
+        page.pair("chosen", "nothing yet: what measures the SMR?");
+        return;
+    };
+    page.pair("chosen", choice);
+    match (&content.identity, &cx.view.busy) {
+        (Some(identity), _) => page.pair_as("answers", identity, Role::Ok),
+        (None, Some(_)) => page.pair("answers", "connecting ..."),
+        (None, None) => page.pair_as("answers", "NO ANSWER: press r to try again, or choose another", Role::Warn),
+    }
+    if content.recorded_poses > 0 {
+        page.pair("recorded", &counted(content.recorded_poses, "pose"));
+    }
+}
+
+impl Screen for InstrumentScreen {
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        if is_fixed(cx) {
+            return vec![Scroll::item()];
+        }
+        let mut items = vec![Item::new("Up/Down", "choose", 2), Scroll::item()];
+        if self.chooses(cx) {
+            items.push(Item::new("Enter", "take this instrument", 0));
+        }
+        items
+    }
+
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+        if key.has_modifier() {
+            return Reply::Ignored;
+        }
+        let lines = self.page(cx, TEXT).len();
+        if !is_fixed(cx) {
+            if self.menu.on_key(key, WAYS.len()) {
+                return Reply::Changed;
+            }
+            match key.code {
+                KeyCode::Enter if self.chooses(cx) => return self.choose(cx),
+                KeyCode::Char('c') => {
+                    self.menu.at.get_or_insert(0);
+                    return Reply::Changed;
+                }
+                _ => {}
+            }
+        }
+        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+    }
+
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
+        Reply::Ignored
+    }
+
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        let (text, side) = split(area, TEXT, cx.scene.is_some());
+        self.page(cx, text.width).draw(self.scroll.0, text, buf);
+        if let (Some(side), Some(scene)) = (side, cx.scene) {
+            picture(cx, scene, side, buf);
+        }
+    }
+}

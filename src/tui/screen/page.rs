@@ -1,0 +1,223 @@
+//! Lines of text for a screen: made for a width, scrolled, drawn; with tabs where there is more than one page.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use crate::tui::glyphs::{shortened, width, wrapped};
+use crate::tui::keymap::{Item, Key};
+use crate::tui::paint;
+use crate::tui::preview::{Preview, Scene};
+use crate::tui::screen::ScreenCx;
+use crate::tui::theme::{Role, Theme};
+
+/// Rows that one key passes over.
+const PAGE: usize = 8;
+/// Rows that stay in view at the end.
+const KEPT: usize = 4;
+/// Columns that a picture needs to say anything.
+const PICTURE: u16 = 26;
+/// Columns of the names in [`Page::pair`].
+const NAMES: usize = 12;
+
+/// Lines of text.
+#[derive(Clone, Debug)]
+pub(super) struct Page {
+    theme: Theme,
+    columns: usize,
+    lines: Vec<Vec<(String, Role)>>,
+}
+
+impl Page {
+    /// An empty page of so many columns.
+    pub(super) const fn new(theme: Theme, columns: u16) -> Self {
+        Self { theme, columns: columns as usize, lines: Vec::new() }
+    }
+
+    /// Number of lines.
+    pub(super) const fn len(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// Columns of a line.
+    pub(super) const fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// An empty line, unless the page begins or there is one.
+    pub(super) fn gap(&mut self) {
+        if self.lines.last().is_some_and(|line| !line.is_empty()) {
+            self.lines.push(Vec::new());
+        }
+    }
+
+    /// A line of parts; what does not fit is cut off.
+    pub(super) fn line(&mut self, parts: Vec<(String, Role)>) {
+        let mut room = self.columns;
+        let mut line = Vec::new();
+        for (text, role) in parts {
+            let text = shortened(&self.theme.glyphs.show(&text), room, self.theme.glyphs);
+            room -= width(&text).min(room);
+            line.push((text, role));
+        }
+        self.lines.push(line);
+    }
+
+    /// A heading.
+    pub(super) fn title(&mut self, text: &str) {
+        self.gap();
+        self.line(vec![(text.to_owned(), Role::Title)]);
+    }
+
+    /// A paragraph behind a mark; further lines stand below its text.
+    pub(super) fn marked(&mut self, mark: (&str, Role), text: &str, role: Role) {
+        let lead = width(mark.0);
+        let room = self.columns.saturating_sub(lead).max(1);
+        for (index, line) in wrapped(&self.theme.glyphs.show(text), room).into_iter().enumerate() {
+            let first = if index == 0 { mark.0.to_owned() } else { " ".repeat(lead) };
+            self.lines.push(vec![(first, mark.1), (line, role)]);
+        }
+    }
+
+    /// A paragraph.
+    pub(super) fn paragraph(&mut self, text: &str, role: Role) {
+        self.marked(("", role), text, role);
+    }
+
+    /// A name with its value, wrapped.
+    pub(super) fn pair(&mut self, name: &str, value: &str) {
+        self.pair_as(name, value, Role::Plain);
+    }
+
+    /// A name with its value in a role.
+    pub(super) fn pair_as(&mut self, name: &str, value: &str, role: Role) {
+        self.marked((&format!("{name:<NAMES$} "), Role::Dim), value, role);
+    }
+
+    /// Draws the lines from `first` on; where some are left out, the last row says so.
+    pub(super) fn draw(&self, first: usize, area: Rect, buf: &mut Buffer) {
+        let rows = usize::from(area.height);
+        let first = if self.len() <= rows { 0 } else { first.min(self.len().saturating_sub(KEPT)) };
+        for (row, line) in (0..area.height).zip(self.lines.iter().skip(first)) {
+            let mut column = 0;
+            for (text, role) in line {
+                column = paint::text(buf, area, (column, row), text, self.theme.style(*role));
+            }
+        }
+        if self.len() > first + rows && rows > 0 {
+            let last = area.height - 1;
+            paint::text(buf, area, (0, last), &" ".repeat(self.columns), self.theme.style(Role::Plain));
+            let said = format!("({} more lines: PgDn)", self.len() + 1 - first - rows);
+            paint::text(buf, area, (0, last), &said, self.theme.style(Role::Hint));
+        }
+    }
+}
+
+/// How far a page is scrolled.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Scroll(pub(super) usize);
+
+impl Scroll {
+    /// Takes a key for a page of so many lines; `false`: it is none for it.
+    pub(super) fn on_key(&mut self, key: Key, lines: usize) -> bool {
+        let last = lines.saturating_sub(KEPT);
+        self.0 = match key.code {
+            KeyCode::PageDown => (self.0 + PAGE).min(last),
+            KeyCode::PageUp => self.0.min(last).saturating_sub(PAGE),
+            KeyCode::Home => 0,
+            KeyCode::End => last,
+            _ => return false,
+        };
+        true
+    }
+
+    /// Its keys.
+    pub(super) fn item() -> Item {
+        Item::new("PgUp/PgDn", "scroll", 6)
+    }
+}
+
+/// Pages of one screen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tabs {
+    titles: &'static [&'static str],
+    /// The one that is shown.
+    pub(super) at: usize,
+}
+
+impl Tabs {
+    /// The first page of some.
+    pub(super) const fn new(titles: &'static [&'static str]) -> Self {
+        Self { titles, at: 0 }
+    }
+
+    /// Takes a key; `false`: it is none for it.
+    pub(super) fn on_key(&mut self, key: Key) -> bool {
+        let count = self.titles.len().max(1);
+        self.at = match key.code {
+            KeyCode::Tab => (self.at + 1) % count,
+            KeyCode::BackTab => (self.at + count - 1) % count,
+            KeyCode::Char(c @ '1'..='9') if !key.has_modifier() => match c.to_digit(10) {
+                Some(digit) if (digit as usize) <= count => digit as usize - 1,
+                _ => return false,
+            },
+            _ => return false,
+        };
+        true
+    }
+
+    /// Its keys.
+    pub(super) fn item(&self) -> Item {
+        Item::new(format!("Tab or 1-{}", self.titles.len()), "other page", 4)
+    }
+
+    /// Draws the titles in one line and gives back the rest.
+    pub(super) fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) -> Rect {
+        let mut column = 0;
+        for (index, title) in self.titles.iter().enumerate() {
+            let (text, role) = if index == self.at {
+                (format!("[{} {title}]", index + 1), Role::Title)
+            } else {
+                (format!(" {} {title} ", index + 1), Role::Dim)
+            };
+            column = paint::text(buf, area, (column, 0), &text, theme.style(role)) + 1;
+        }
+        paint::band(area, 1, area.height)
+    }
+}
+
+/// `area` in a part for text of `wanted` columns and one for a picture, if both have room.
+pub(super) const fn split(area: Rect, wanted: u16, has_picture: bool) -> (Rect, Option<Rect>) {
+    let left = wanted + 2;
+    if !has_picture || area.width < left.saturating_add(PICTURE) {
+        return (area, None);
+    }
+    let text = Rect { x: area.x, y: area.y, width: wanted, height: area.height };
+    (text, Some(Rect { x: area.x + left, y: area.y, width: area.width - left, height: area.height }))
+}
+
+/// Draws the preview.
+pub(super) fn picture(cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Buffer) {
+    use ratatui::widgets::Widget as _;
+    Preview { scene, camera: cx.camera, theme: cx.theme }.render(area, buf);
+}
+
+/// A number with fixed decimals; no negative zero, and an exponent above 1e9.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    if value.abs() > 1e9 {
+        return format!("{value:.3e}");
+    }
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+/// Decimals that show two significant digits of an uncertainty, between 1 and 6.
+pub(super) fn decimals_for(sigma: f64) -> usize {
+    (1..=6_u8).find(|&decimals| sigma * 10_f64.powi(i32::from(decimals)) >= 9.95).map_or(6, usize::from)
+}
+
+/// `n sample`, `n samples`.
+pub(super) fn counted(count: usize, one: &str) -> String {
+    if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
+}

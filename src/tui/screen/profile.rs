@@ -1,0 +1,241 @@
+//! Profile: a list that typing narrows, and the robot that is looked at.
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::page::{Page, picture, split};
+use super::{Reply, Screen, ScreenCx};
+use crate::tui::dialog::Dialog;
+use crate::tui::form::TextField;
+use crate::tui::keymap::{Item, Key};
+use crate::tui::paint;
+use crate::tui::theme::Role;
+use crate::wizard::Intent;
+use crate::wizard::view::{Content, ProfileCard, ProfileView};
+
+/// Columns of the list.
+const LIST: u16 = 26;
+/// Columns of the card.
+const CARD: u16 = 46;
+/// Rows that the picture needs below the card.
+const PICTURE_ROWS: u16 = 9;
+/// Columns for list, card and picture side by side.
+const ALL: u16 = 106;
+/// The entry behind the shipped profiles.
+const FILE: &str = "file...";
+
+/// Cursor and search.
+#[derive(Clone, Debug)]
+pub(super) struct ProfileScreen {
+    /// Entry among those that the search leaves; none: the operator has not moved it.
+    cursor: Option<usize>,
+    search: TextField,
+    is_typing: bool,
+}
+
+impl Default for ProfileScreen {
+    fn default() -> Self {
+        Self { cursor: None, search: TextField::new("", ""), is_typing: false }
+    }
+}
+
+const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a ProfileView> {
+    match &cx.view.content {
+        Content::Profile(content) => Some(content),
+        _ => None,
+    }
+}
+
+impl ProfileScreen {
+    /// Names that contain every word that was typed, and the entry for a file.
+    fn entries<'a>(&self, content: &'a ProfileView) -> Vec<&'a str> {
+        let wanted = self.search.text().to_lowercase();
+        let fits = |name: &&str| wanted.split_whitespace().all(|word| name.to_lowercase().contains(word));
+        content.profiles.iter().map(String::as_str).filter(fits).chain([FILE]).collect()
+    }
+
+    /// Place of the cursor.
+    fn place(&self, content: &ProfileView) -> usize {
+        let entries = self.entries(content);
+        let chosen = content.chosen.as_ref().and_then(|card| entries.iter().position(|name| *name == card.name));
+        self.cursor.or(chosen).unwrap_or(0).min(entries.len().saturating_sub(1))
+    }
+
+    /// Whether the operator looks for another robot.
+    const fn is_browsing(&self) -> bool {
+        self.is_typing || self.cursor.is_some()
+    }
+
+    /// Whether Enter takes what is under the cursor instead of going on.
+    fn loads(&self, content: &ProfileView) -> bool {
+        !content.is_fixed && (self.is_browsing() || content.chosen.is_none())
+    }
+
+    fn load(&mut self, content: &ProfileView) -> Reply {
+        let place = self.place(content);
+        let entry = self.entries(content).get(place).copied().unwrap_or(FILE).to_owned();
+        *self = Self::default();
+        if entry == FILE { file() } else { Reply::Intend(Intent::ChooseProfile(entry)) }
+    }
+
+    fn type_key(&mut self, key: Key) -> bool {
+        match key.code {
+            KeyCode::Esc => *self = Self::default(),
+            KeyCode::Char(_) | KeyCode::Backspace | KeyCode::Delete | KeyCode::Left | KeyCode::Right => {
+                self.search.on_key(key);
+                self.cursor = Some(0);
+            }
+            _ => return false,
+        }
+        true
+    }
+}
+
+/// Asks for the path of a profile.
+fn file() -> Reply {
+    let field = TextField::new("Path of the profile (RON)", "");
+    Reply::Ask(Box::new(Dialog::Text { field, intent: Intent::ChooseProfile }))
+}
+
+impl Screen for ProfileScreen {
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        let Some(content) = content(cx).filter(|content| !content.is_fixed) else { return Vec::new() };
+        let mut items = vec![Item::new("Up/Down", "choose", 2)];
+        if self.loads(content) {
+            items.push(Item::new("Enter", "look at this robot", 0));
+        }
+        if self.is_typing {
+            items.push(Item::new("Esc", "all robots", 1));
+        } else {
+            items.push(Item::new("c", "search by name", 3));
+            items.push(Item::new("f", "profile from a file", 4));
+        }
+        items
+    }
+
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+        let Some(content) = content(cx) else { return Reply::Ignored };
+        if content.is_fixed || key.has_modifier() {
+            return Reply::Ignored;
+        }
+        let last = self.entries(content).len().saturating_sub(1);
+        let place = self.place(content);
+        match key.code {
+            KeyCode::Up => self.cursor = Some(place.saturating_sub(1)),
+            KeyCode::Down => self.cursor = Some((place + 1).min(last)),
+            KeyCode::Home => self.cursor = Some(0),
+            KeyCode::End => self.cursor = Some(last),
+            KeyCode::PageUp => self.cursor = Some(place.saturating_sub(5)),
+            KeyCode::PageDown => self.cursor = Some((place + 5).min(last)),
+            KeyCode::Enter if self.loads(content) => return self.load(content),
+            _ if self.is_typing && self.type_key(key) => {}
+            KeyCode::Char('c' | '/') => self.is_typing = true,
+            KeyCode::Char('f') => return file(),
+            _ => return Reply::Ignored,
+        }
+        Reply::Changed
+    }
+
+    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply {
+        if content(cx).is_none_or(|content| content.is_fixed) {
+            return Reply::Ignored;
+        }
+        self.is_typing = true;
+        self.search.paste(text);
+        self.cursor = Some(0);
+        Reply::Changed
+    }
+
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        let Some(content) = content(cx) else { return };
+        let (list, right) = match &content.chosen {
+            Some(_) if content.is_fixed || !self.is_browsing() && area.width < ALL => (Rect::ZERO, area),
+            _ => columns(area),
+        };
+        self.draw_list(content, cx, list, buf);
+        let Some(card) = &content.chosen else { return introduction(cx, right, buf) };
+        let (text, side) = split(right, CARD, cx.scene.is_some());
+        let page = card_page(card, content, cx, text.width);
+        page.draw(0, text, buf);
+        let Some(scene) = cx.scene else { return };
+        let used = u16::try_from(page.len()).unwrap_or(u16::MAX).saturating_add(1);
+        match side {
+            Some(side) => picture(cx, scene, side, buf),
+            None if text.height >= used.saturating_add(PICTURE_ROWS) => {
+                picture(cx, scene, paint::band(text, used, text.height), buf);
+            }
+            None => {}
+        }
+    }
+}
+
+/// The list and the rest.
+const fn columns(area: Rect) -> (Rect, Rect) {
+    let width = if area.width < LIST { area.width } else { LIST };
+    let list = Rect { x: area.x, y: area.y, width, height: area.height };
+    (list, Rect { x: area.x + width, y: area.y, width: area.width - width, height: area.height })
+}
+
+impl ProfileScreen {
+    fn draw_list(&self, content: &ProfileView, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        let theme = cx.theme;
+        let area = Rect { width: area.width.saturating_sub(2), ..area };
+        let column = paint::text(buf, area, (0, 0), "Robot ", theme.style(Role::Title));
+        if self.is_typing {
+            let field = Rect { x: area.x + column, width: area.width.saturating_sub(column), ..area };
+            self.search.draw_line(theme, paint::band(field, 0, 1), buf);
+        }
+        let list = paint::band(area, 1, area.height);
+        let (entries, place) = (self.entries(content), self.place(content));
+        let rows = usize::from(list.height);
+        let first = place.saturating_sub(rows / 2).min(entries.len().saturating_sub(rows));
+        for (row, (index, name)) in (0..list.height).zip(entries.iter().enumerate().skip(first)) {
+            let has_focus = index == place;
+            let lead = if has_focus { theme.glyphs.pointer() } else { "  " };
+            let column = paint::text(buf, list, (0, row), lead, theme.style(Role::Hint));
+            let role = if has_focus { Role::Focus } else { Role::Plain };
+            paint::text(buf, list, (column, row), &theme.glyphs.show(name), theme.style(role));
+        }
+    }
+}
+
+fn introduction(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+    let mut page = Page::new(cx.theme, area.width);
+    page.paragraph("A profile says how the arm is built, what measures it and which errors are allowed.", Role::Plain);
+    page.gap();
+    page.paragraph("Move to your robot, press Enter to look at it, and Enter again to take it.", Role::Plain);
+    page.gap();
+    page.paragraph("Your robot is not in the list? 'file...' takes a profile that you have written: 'trupose profile show NAME' prints one to begin with.", Role::Dim);
+    page.gap();
+    page.paragraph(
+        "To rehearse without hardware take soochow, the arm of the method paper, then the simulated cell.",
+        Role::Dim,
+    );
+    page.draw(0, area, buf);
+}
+
+fn card_page(card: &ProfileCard, content: &ProfileView, cx: &ScreenCx<'_>, columns: u16) -> Page {
+    let mut page = Page::new(cx.theme, columns);
+    page.paragraph(&card.title, Role::Title);
+    for warning in &card.warnings {
+        page.marked(("warning: ", Role::Warn), warning, Role::Warn);
+    }
+    page.pair("session", &content.session);
+    page.pair("profile", &card.name);
+    page.pair("joints", &format!("{}: {}", card.joints.len(), card.joints.join(" ")));
+    page.pair("identified", &format!("{} parameters", card.free_parameters));
+    page.pair("instrument", card.instrument.as_deref().unwrap_or("none stated"));
+    if let Some([x, y, z]) = card.target_mm {
+        page.pair("SMR", &format!("({x:.3}, {y:.3}, {z:.3}) mm in the flange"));
+    }
+    page.pair("source", &card.source);
+    if content.is_fixed {
+        page.gap();
+        page.paragraph("Something is measured already: this session keeps its robot.", Role::Dim);
+    } else {
+        page.gap();
+        page.paragraph("Enter takes this robot; Up/Down: the others.", Role::Hint);
+    }
+    page
+}

@@ -1,0 +1,536 @@
+//! The screens of the steps around planning and measuring: what they show and what their keys mean.
+
+use std::sync::LazyLock;
+
+use crossterm::event::KeyCode;
+use nalgebra::{Point3, Vector3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::profile::{Profile, builtin};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice, TargetChoice};
+use crate::session::state::Session;
+use crate::session::summary::Verdict;
+use crate::session::summary::{
+    AxisSummary, BlindGroupSummary, EstimatorName, IdentificationSettings, IdentificationSummary, JointBin,
+    JointSummary, LimitCheck, ModelSummary, ParameterSummary, Provenance, RejectedSummary, SigmaOrigin, SigmaSummary,
+    StatisticsSummary, Termination, VerdictStatus, VerificationMode, VerificationSummary, Warning,
+};
+use crate::tui::glyphs::Glyphs;
+use crate::tui::paint;
+use crate::tui::preview::Checked;
+use crate::tui::ui::{Ui, Wish};
+use crate::wizard::view::{
+    CircleView, CirclesResult, CirclesView, Content, DeliverView, IdentifyView, InstrumentView, JointShown,
+    ProfileCard, TargetView, VerifyView,
+};
+use crate::wizard::{IntentInfo, Notice, Wizard};
+
+static SOOCHOW: LazyLock<Profile> = LazyLock::new(|| Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap().0);
+
+/// A view of a step with the offers that it has.
+fn view(step: Step, content: Content, offers: Vec<IntentInfo>) -> ViewModel {
+    let mut view = Wizard::new(jiff::Timestamp::UNIX_EPOCH).view();
+    view.header.step = step;
+    view.header.number = step.number();
+    view.header.robot = Some(SOOCHOW.title().to_owned());
+    view.header.session = Some("demo".to_owned());
+    view.header.folder = Some("/home/op/sessions/demo".to_owned());
+    view.content = content;
+    view.intents = offers;
+    view.intents.push(IntentInfo::new(Intent::Quit, "quit"));
+    if step != Step::Profile {
+        view.intents.push(IntentInfo::new(Intent::Back, "back"));
+    }
+    view
+}
+
+fn profile(has_card: bool) -> ViewModel {
+    let mut view = Wizard::new(jiff::Timestamp::UNIX_EPOCH).view();
+    let Content::Profile(content) = &mut view.content else { panic!() };
+    if has_card {
+        content.chosen = Some(ProfileCard {
+            name: "soochow".to_owned(),
+            title: SOOCHOW.title().to_owned(),
+            source: SOOCHOW.source().to_owned(),
+            joints: ["J1", "J2", "J3", "J4", "J5", "J6"].map(str::to_owned).to_vec(),
+            free_parameters: 25,
+            instrument: Some("Leica AT901-B".to_owned()),
+            target_mm: Some([-1.473, 26.384, 71.991]),
+            warnings: vec!["no bodies for link 3: \u{1b}[31m".to_owned()],
+        });
+        content.session = "soochow-20260105-0800".to_owned();
+        view.intents = vec![IntentInfo::new(Intent::Next, "take this robot").default_action()];
+    }
+    view
+}
+
+fn instrument(choice: Option<&str>, identity: Option<&str>) -> ViewModel {
+    let content = Content::Instrument(InstrumentView {
+        choice: choice.map(str::to_owned),
+        identity: identity.map(str::to_owned),
+        recorded_poses: 0,
+        stated_sigma: Some("Leica AT901-B: 0.015 mm + 6 um/m (one sigma)".to_owned()),
+    });
+    let proposal = InstrumentChoice::Manual { unit: CoordinateUnit::Millimetre };
+    let wait = identity.is_none().then(|| "the instrument does not answer yet".to_owned());
+    let offers = vec![
+        IntentInfo::new(Intent::Next, "measure with this").unless(wait).default_action(),
+        IntentInfo::new(Intent::ChooseInstrument(proposal), "choose an instrument"),
+        IntentInfo::new(Intent::Retry, "connect again").unless(identity.map(|_| "it answers".to_owned())),
+    ];
+    view(Step::Instrument, content, offers)
+}
+
+fn target(choice: Option<&str>, circles: Option<CirclesView>) -> ViewModel {
+    let is_complete = circles.as_ref().is_some_and(|circles| circles.result.is_some());
+    let content = Content::Target(TargetView {
+        nominal_mm: [-1.473, 26.384, 71.991],
+        nominal_sigma_mm: 0.5,
+        choice: choice.map(str::to_owned),
+        circles,
+    });
+    let unusable = (!is_complete).then(|| "the circles are not complete".to_owned());
+    let offers = vec![
+        IntentInfo::new(Intent::ChooseTarget(TargetChoice::Profile), "as the profile says").default_action(),
+        IntentInfo::new(Intent::ChooseTarget(TargetChoice::Free { sigma_mm: 50.0 }), "leave it free"),
+        IntentInfo::new(Intent::StartCircles, "find it by circles"),
+        IntentInfo::new(Intent::UseCircles, "take the result of the circles").unless(unusable),
+    ];
+    view(Step::Target, content, offers)
+}
+
+fn circles(is_complete: bool) -> CirclesView {
+    let joint = |name: &str, value: f64, moves_most: bool| JointShown {
+        name: name.to_owned(),
+        value,
+        unit: "deg".to_owned(),
+        moves: 0.0,
+        moves_most,
+    };
+    let fit = |name: &str, radius_mm: f64| CircleView {
+        joint: name.to_owned(),
+        points: 6,
+        centre_mm: [1234.5678, -345.6789, 890.1234],
+        axis: [0.0, 0.0, 1.0],
+        radius_mm,
+        residual_rms_mm: 0.0123,
+        arc_deg: 300.0,
+    };
+    CirclesView {
+        joint: (!is_complete).then(|| "J6".to_owned()),
+        joints: if is_complete {
+            Vec::new()
+        } else {
+            vec![
+                joint("J1", 0.0, false),
+                joint("J2", 11.459, false),
+                joint("J3", -11.459, false),
+                joint("J4", 17.189, false),
+                joint("J5", 34.377, false),
+                joint("J6", -120.0, true),
+            ]
+        },
+        measured: if is_complete { 12 } else { 3 },
+        of: 12,
+        fits: if is_complete { vec![fit("J6", 26.425), fit("J5", 159.327)] } else { Vec::new() },
+        result: is_complete.then_some(CirclesResult {
+            xyz_mm: [-1.4712, 26.3821, 71.9903],
+            sigma_mm: [0.0051, 0.0049, 0.0112],
+            residual_rms_mm: 0.0118,
+        }),
+        problem: None,
+    }
+}
+
+fn parameter(name: &str, unit: &str, deviation: f64, sigma: Option<f64>, identifiable: bool) -> ParameterSummary {
+    let expected = if unit == "mm" { 1.0 } else { 0.114 };
+    ParameterSummary {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        nominal: 170.0,
+        deviation,
+        sigma,
+        expected,
+        identifiable,
+    }
+}
+
+fn verdict(status: VerdictStatus) -> Verdict {
+    let is_met = status == VerdictStatus::Accepted;
+    let check = |quantity: &str, value: f64, limit_mm: f64| LimitCheck {
+        quantity: quantity.to_owned(),
+        value_mm: Some(value),
+        limit_mm,
+        met: Some(value <= limit_mm),
+    };
+    Verdict {
+        status,
+        reasons: vec![
+            if is_met { "both limits are met" } else { "position max is 1.2000 mm, allowed is 1.000 mm" }.to_owned(),
+        ],
+        checks: vec![
+            check("position_mean", 0.0103, 0.4),
+            check("position_max", if is_met { 0.0199 } else { 1.2 }, 1.0),
+        ],
+    }
+}
+
+fn model(factor: f64) -> ModelSummary {
+    let statistics = |count, mean: f64| StatisticsSummary {
+        count,
+        mean: factor * mean,
+        rms: factor * 1.1 * mean,
+        p95: factor * 1.6 * mean,
+        max: factor * 2.4 * mean,
+    };
+    ModelSummary {
+        position_mm: Some(statistics(20, 0.0103)),
+        axis_mm: Some(AxisSummary { mean: [0.003 * factor; 3], max: [0.01 * factor; 3] }),
+        distance_mm: Some(statistics(190, 0.0072)),
+        seat_mm: None,
+    }
+}
+
+fn verification() -> VerificationSummary {
+    let joint = |name: &str, explained: f64| JointSummary {
+        joint: name.to_owned(),
+        unit: "deg".to_owned(),
+        explained,
+        bins: (0..5)
+            .map(|n: u8| JointBin {
+                from: -80.0 + 32.0 * f64::from(n),
+                to: -48.0 + 32.0 * f64::from(n),
+                count: usize::from(n),
+                mean_mm: 0.004 + 0.003 * f64::from(n),
+            })
+            .collect(),
+    };
+    VerificationSummary {
+        samples: 20,
+        basis: "the verification poses of this session, same set-up".to_owned(),
+        independent: true,
+        refit: "none".to_owned(),
+        nominal: model(980.0),
+        identified: model(1.0),
+        residual_by_joint: vec![joint("J1", 0.05), joint("J2", 0.62), joint("J3", 0.0)],
+    }
+}
+
+fn warning(blocks_acceptance: bool) -> Warning {
+    Warning {
+        code: "few_data".to_owned(),
+        message: "the verification poses cover 40 % of the range of J4: nothing is said about the rest of it"
+            .to_owned(),
+        blocks_acceptance,
+    }
+}
+
+fn summary(is_good: bool) -> IdentificationSummary {
+    let created = "2026-01-05T08:13:04Z".to_owned();
+    IdentificationSummary {
+        schema: 1,
+        provenance: Provenance {
+            program: "trupose 0.1.0".to_owned(),
+            created,
+            profile: "soochow".to_owned(),
+            robot: SOOCHOW.title().to_owned(),
+            profile_sha256: String::new(),
+            inputs: Vec::new(),
+        },
+        settings: IdentificationSettings {
+            level: "geometric".to_owned(),
+            weighting: "covariance".to_owned(),
+            prior: "expected".to_owned(),
+            estimator: EstimatorName::Robust,
+            iterations: 50,
+            filter: None,
+            expected_length_mm: None,
+            expected_angle_deg: None,
+            layout: None,
+            socket_distance_mm: None,
+            socket_distance_sigma_mm: None,
+            verification: VerificationMode::Session,
+        },
+        warnings: if is_good { Vec::new() } else { vec![warning(true), warning(false)] },
+        verdict: verdict(VerdictStatus::Accepted),
+        verification: None,
+        samples: 56,
+        parameter_count: 25,
+        rank: is_good.then_some(21),
+        singular_value_gap: 3e7,
+        condition_number: Some(167.8),
+        condition_number_mm_rad: Some(1433.0),
+        condition_number_points: 56,
+        sigma: SigmaSummary { used_mm: 0.00577, source: SigmaOrigin::Readings, from_residuals_mm: Some(0.00592) },
+        parameters: (1..=6)
+            .flat_map(|n| {
+                [
+                    parameter(&format!("a{n}"), "mm", -0.388_43, Some(0.0013), true),
+                    parameter(&format!("d{n}"), "mm", 0.1, Some(0.7), true),
+                    parameter(&format!("theta{n}"), "deg", -0.051_72, None, false),
+                ]
+            })
+            .collect(),
+        blind_groups: vec![BlindGroupSummary {
+            parameters: vec!["d1".to_owned()],
+            blind: 1,
+            description: "d1: cannot be found from distances, it only moves the robot's base frame".to_owned(),
+        }],
+        correlations: Vec::new(),
+        rejected: if is_good {
+            Vec::new()
+        } else {
+            vec![RejectedSummary {
+                pose: "12".to_owned(),
+                line: 12,
+                residual_mm: 3.2,
+                ratio: 420.0,
+                reason: "it contradicts all others".to_owned(),
+            }]
+        },
+        termination: Termination::Converged,
+        iterations: Vec::new(),
+        written: Vec::new(),
+    }
+}
+
+fn identify(summary: Option<IdentificationSummary>, is_current: bool) -> ViewModel {
+    let has_result = summary.is_some();
+    let content = Content::Identify(IdentifyView {
+        samples: 56,
+        is_current,
+        summary: summary.map(Box::new),
+        is_usable: has_result,
+    });
+    let next = IntentInfo::new(Intent::Next, "go on to verify");
+    let offers = vec![IntentInfo::new(Intent::Identify, "identify the arm").default_action(), next];
+    view(Step::Identify, content, offers)
+}
+
+fn verify(verdict: Option<Verdict>) -> ViewModel {
+    let is_good = verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
+    let has_any = verdict.is_some();
+    let content = Content::Verify(VerifyView {
+        samples: if has_any { 20 } else { 0 },
+        is_current: true,
+        too_few: (!has_any).then(|| "there are no verification poses: nothing can be said about accuracy".to_owned()),
+        verification: has_any.then(|| Box::new(verification())),
+        verdict: verdict.map(Box::new),
+        warnings: if is_good { Vec::new() } else { vec![warning(true)] },
+    });
+    view(Step::Verify, content, vec![IntentInfo::new(Intent::Next, "go on to deliver").default_action()])
+}
+
+fn deliver(files: &[&str]) -> ViewModel {
+    let content = Content::Deliver(DeliverView {
+        files: files.iter().map(|file| (*file).to_owned()).collect(),
+        verdict: Some(Box::new(verdict(VerdictStatus::Accepted))),
+        is_current: true,
+    });
+    let deliver = IntentInfo::new(Intent::Deliver, "write the files");
+    view(Step::Deliver, content, vec![if files.is_empty() { deliver.default_action() } else { deliver }])
+}
+
+const FILES: [&str; 4] = ["plan.csv", "measurements.csv", "calibration.ron", "report.json"];
+
+/// Twenty verification samples about the arm.
+fn checked() -> Scene {
+    let mut scene = Scene::at_rest(&SOOCHOW);
+    for n in 0..20_u8 {
+        let (sin, cos) = f64::from(n).sin_cos();
+        let error = Vector3::new(sin, cos, 0.5) * (1.0 + 0.05 * f64::from(n));
+        let at = Point3::new(0.9 + 0.3 * cos, 0.6 * sin, 0.5 + 0.04 * f64::from(n));
+        scene.checked.push(Checked {
+            pose: format!("{}", n + 57),
+            at,
+            nominal: error * 0.01,
+            identified: error * 1e-5,
+        });
+    }
+    scene
+}
+
+fn theme(is_ascii: bool) -> Theme {
+    Theme { has_colour: !is_ascii, glyphs: if is_ascii { Glyphs::Ascii } else { Glyphs::Unicode } }
+}
+
+/// The screen of a step after some keys, without frame.
+fn drawn(view: &ViewModel, scene: Option<&Scene>, keys: &[Key], theme: Theme, (width, height): (u16, u16)) -> Buffer {
+    let camera = Camera::default();
+    let cx = ScreenCx { view, scene, camera: &camera, theme };
+    let mut screen = of(view.header.step);
+    for key in keys {
+        screen.on_key(*key, &cx);
+    }
+    let mut buffer = Buffer::empty(Rect::new(0, 0, width + 4, height + 4));
+    screen.draw(&cx, Rect::new(2, 2, width, height), &mut buffer);
+    for y in 0..height + 4 {
+        for x in 0..width + 4 {
+            let is_inside = (2..2 + width).contains(&x) && (2..2 + height).contains(&y);
+            assert!(is_inside || buffer[(x, y)].symbol() == " ", "drawn outside at {x}, {y}");
+        }
+    }
+    screen.items(&cx);
+    buffer
+}
+
+/// The whole terminal after some keys.
+fn whole(view: &ViewModel, keys: &[Key], (width, height): (u16, u16)) -> String {
+    let mut ui = Ui::new(theme(false));
+    ui.refresh(view, &Session::default());
+    for key in keys {
+        ui.on_input(crate::tui::input::Input::Key(*key), view);
+    }
+    let mut buffer = Buffer::empty(Rect::new(0, 0, width, height));
+    ui.draw(view, buffer.area, &mut buffer);
+    paint::snapshot(&buffer)
+}
+
+const SMALL: (u16, u16) = (80, 24);
+const LARGE: (u16, u16) = (120, 40);
+
+fn tabs(times: usize) -> Vec<Key> {
+    vec![Key::plain_code(KeyCode::Tab); times]
+}
+
+fn failed(mut view: ViewModel) -> ViewModel {
+    view.notice = Some(Notice::error("the file 'x.csv' has no units").hint("write q1_deg, x_mm and so on"));
+    view
+}
+
+#[test]
+fn before_measuring_at_80x24() {
+    insta::assert_snapshot!("profile_first", whole(&profile(false), &[], SMALL));
+    insta::assert_snapshot!("profile_chosen", whole(&profile(true), &[], SMALL));
+    let search = [Key::char('c'), Key::char('u'), Key::char('r'), Key::plain_code(KeyCode::Down)];
+    insta::assert_snapshot!("profile_search_error", whole(&failed(profile(true)), &search, SMALL));
+    insta::assert_snapshot!("instrument_first", whole(&instrument(None, None), &[], SMALL));
+    let answers = instrument(Some("simulated cell, seed 1"), Some("simulated tracker, seed 1"));
+    insta::assert_snapshot!("instrument_answers", whole(&answers, &[], SMALL));
+    let silent = failed(instrument(Some("recorded measurements: x.csv"), None));
+    insta::assert_snapshot!("instrument_silent", whole(&silent, &[], SMALL));
+    let down = |times| vec![Key::plain_code(KeyCode::Down); times];
+    let enter = Key::plain_code(KeyCode::Enter);
+    insta::assert_snapshot!("instrument_simulated", whole(&answers, &[down(3), vec![enter]].concat(), SMALL));
+    let wrong = [down(4), vec![enter, Key::char('a'), Key::plain_code(KeyCode::Down), Key::char('%'), enter]].concat();
+    insta::assert_snapshot!("instrument_recorded_wrong", whole(&answers, &wrong, SMALL));
+    insta::assert_snapshot!("target_first", whole(&target(None, None), &[], SMALL));
+    insta::assert_snapshot!(
+        "target_known",
+        whole(&target(Some("as the profile says"), None), &[Key::char('k')], SMALL)
+    );
+    insta::assert_snapshot!("target_circles", whole(&target(None, Some(circles(false))), &[], SMALL));
+    insta::assert_snapshot!("target_result", whole(&target(None, Some(circles(true))), &[], SMALL));
+    let problem = CirclesView { problem: Some("the axes are parallel".to_owned()), ..circles(true) };
+    insta::assert_snapshot!("target_problem", whole(&failed(target(None, Some(problem))), &[], SMALL));
+}
+
+#[test]
+fn the_identification() {
+    insta::assert_snapshot!("identify_before", whole(&identify(None, false), &[], SMALL));
+    let good = identify(Some(summary(true)), true);
+    insta::assert_snapshot!("identify_result", whole(&good, &[], SMALL));
+    insta::assert_snapshot!("identify_parameters", whole(&good, &tabs(1), SMALL));
+    let bad = failed(identify(Some(summary(false)), false));
+    insta::assert_snapshot!("identify_bad", whole(&bad, &[], SMALL));
+    insta::assert_snapshot!("identify_limits", whole(&bad, &tabs(2), SMALL));
+    insta::assert_snapshot!("identify_large", whole(&good, &tabs(1), LARGE));
+}
+
+#[test]
+fn the_verification() {
+    let accepted = verify(Some(verdict(VerdictStatus::Accepted)));
+    insta::assert_snapshot!("verify_accepted", whole(&accepted, &[], SMALL));
+    insta::assert_snapshot!("verify_joints", whole(&accepted, &tabs(2), SMALL));
+    insta::assert_snapshot!("verify_refused", whole(&verify(Some(verdict(VerdictStatus::NotAccepted))), &[], SMALL));
+    insta::assert_snapshot!("verify_none", whole(&failed(verify(None)), &[], SMALL));
+    let scene = checked();
+    let page = |tab: usize, size: (u16, u16), is_ascii| {
+        paint::snapshot(&drawn(&accepted, Some(&scene), &tabs(tab), theme(is_ascii), size))
+    };
+    insta::assert_snapshot!("verify_poses", page(1, (78, 15), false));
+    insta::assert_snapshot!("verify_poses_ascii", page(1, (78, 15), true));
+    insta::assert_snapshot!("verify_picture", page(3, (78, 15), false));
+    insta::assert_snapshot!("verify_large", page(0, (118, 32), false));
+    let before = [tabs(3), vec![Key::char('m')]].concat();
+    let buffer = drawn(&accepted, Some(&scene), &before, theme(false), (78, 15));
+    assert!(paint::snapshot(&buffer).contains("BEFORE: nominal arm's errors (m: identified)"));
+}
+
+#[test]
+fn the_delivery() {
+    insta::assert_snapshot!("deliver_before", whole(&deliver(&[]), &[], SMALL));
+    insta::assert_snapshot!("deliver_written", whole(&deliver(&FILES), &[], SMALL));
+    insta::assert_snapshot!("deliver_error", whole(&failed(deliver(&[])), &[], SMALL));
+    insta::assert_snapshot!("deliver_quit", whole(&deliver(&FILES), &[Key::plain_code(KeyCode::Enter)], SMALL));
+}
+
+/// What the last of some keys is worth.
+fn pressed(view: &ViewModel, keys: &[KeyCode]) -> Wish {
+    let mut ui = Ui::new(theme(false));
+    ui.refresh(view, &Session::default());
+    let mut wish = Wish::None;
+    for code in keys {
+        wish = ui.on_input(crate::tui::input::Input::Key(Key::plain_code(*code)), view);
+    }
+    wish
+}
+
+#[test]
+fn keys_become_intents() {
+    use KeyCode::{Char, Down, Enter, Esc, Up};
+    let is = |view: &ViewModel, keys: &[KeyCode], intent: Intent| assert_eq!(pressed(view, keys), Wish::Intend(intent));
+    let robot = |name: &str| Intent::ChooseProfile(name.to_owned());
+    is(&profile(false), &[Down, Down, Up, Enter], robot("abb_irb1600_6_145"));
+    is(&profile(true), &[Enter], Intent::Next);
+    is(&profile(true), &[Down, Enter], robot("staubli_tx2_60"));
+    is(&profile(true), &[Down, Char('c'), Esc, Enter], Intent::Next);
+    is(&profile(false), &[Char('/'), Char('q'), Esc, Char('f'), Char('p'), Enter], robot("p"));
+    let by_hand = |unit| Intent::ChooseInstrument(InstrumentChoice::Manual { unit });
+    is(&instrument(None, None), &[Enter], by_hand(CoordinateUnit::Millimetre));
+    is(&instrument(None, None), &[Down, Down, Enter], by_hand(CoordinateUnit::Inch));
+    is(&instrument(Some("x"), Some("y")), &[Enter], Intent::Next);
+    is(&instrument(Some("x"), None), &[Char('r')], Intent::Retry);
+    let simulated = pressed(&instrument(None, None), &[Down, Down, Down, Enter, Enter]);
+    assert!(
+        matches!(simulated, Wish::Intend(Intent::ChooseInstrument(InstrumentChoice::Simulated(_)))),
+        "{simulated:?}"
+    );
+    is(&target(None, None), &[Enter], Intent::ChooseTarget(TargetChoice::Profile));
+    is(&target(None, None), &[Down, Down, Enter], Intent::ChooseTarget(TargetChoice::Free { sigma_mm: 50.0 }));
+    is(&target(None, None), &[Down, Down, Down, Down, Enter], Intent::StartCircles);
+    let known = TargetChoice::Known { xyz_mm: (-1.473, 26.384, 71.991), sigma_mm: 0.1 };
+    is(&target(None, None), &[Char('k'), Enter], Intent::ChooseTarget(known));
+    is(&target(None, Some(circles(true))), &[Enter], Intent::UseCircles);
+    is(&identify(None, false), &[Enter], Intent::Identify);
+    is(&deliver(&[]), &[Enter], Intent::Deliver);
+    is(&deliver(&FILES), &[Enter, Enter], Intent::Quit);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn nothing_is_drawn_outside_at_any_size(
+        which in 0_usize..12, tab in 0_usize..4, down in 0_usize..6,
+        width in 0_u16..210, height in 0_u16..60, is_ascii: bool, has_scene: bool,
+    ) {
+        let view = match which {
+            0 => profile(false),
+            1 => profile(true),
+            2 => instrument(Some("x"), None),
+            3 => target(None, None),
+            4 => target(None, Some(circles(false))),
+            5 => target(None, Some(circles(true))),
+            6 => identify(None, false),
+            7 => identify(Some(summary(false)), true),
+            8 => verify(Some(verdict(VerdictStatus::NotAccepted))),
+            9 => verify(None),
+            10 => deliver(&[]),
+            _ => deliver(&FILES),
+        };
+        let keys = [tabs(tab), vec![Key::plain_code(KeyCode::PageDown); down]].concat();
+        let scene = has_scene.then(checked);
+        drawn(&view, scene.as_ref(), &keys, theme(is_ascii), (width, height));
+    }
+}

@@ -1,0 +1,114 @@
+//! Verify: how accurate the arm is, on verification samples only; the verdict first.
+
+mod pages;
+mod poses;
+
+pub(super) use pages::status;
+
+use crossterm::event::KeyCode;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::page::{Page, Scroll, Tabs, picture, split};
+use super::{Reply, Screen, ScreenCx};
+use crate::tui::keymap::{Item, Key};
+use crate::tui::paint;
+use crate::tui::preview::Scene;
+use crate::tui::theme::Role;
+use crate::wizard::view::{Content, VerifyView};
+
+/// Columns of the text beside the picture.
+const TEXT: u16 = 66;
+/// Where the picture alone is.
+const PICTURE: usize = 3;
+
+/// Which page, how far it is scrolled, whose errors the picture shows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VerifyScreen {
+    tabs: Tabs,
+    scroll: Scroll,
+    is_nominal: bool,
+}
+
+impl Default for VerifyScreen {
+    fn default() -> Self {
+        let tabs = Tabs::new(&["accuracy", "poses", "joints", "picture"]);
+        Self { tabs, scroll: Scroll::default(), is_nominal: false }
+    }
+}
+
+const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a VerifyView> {
+    match &cx.view.content {
+        Content::Verify(content) => Some(content),
+        _ => None,
+    }
+}
+
+impl VerifyScreen {
+    fn page(self, cx: &ScreenCx<'_>, columns: u16) -> Page {
+        let mut page = Page::new(cx.theme, columns);
+        let Some(content) = content(cx) else { return page };
+        match self.tabs.at {
+            1 => poses::poses(content, cx.scene, cx.theme.glyphs, &mut page),
+            2 => pages::joints(content, &mut page),
+            _ => pages::accuracy(content, &mut page),
+        }
+        page
+    }
+
+    /// The picture with whose errors it shows.
+    fn picture(self, cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Buffer) {
+        let mut shown = scene.clone();
+        shown.show_errors(!self.is_nominal);
+        let (whose, other) =
+            if self.is_nominal { ("BEFORE: nominal", "identified") } else { ("AFTER: identified", "nominal") };
+        let said = if shown.checked.is_empty() {
+            "no verification samples to draw".to_owned()
+        } else {
+            format!("{whose} arm's errors (m: {other})")
+        };
+        paint::text(buf, area, (0, 0), &said, cx.theme.style(Role::Title));
+        picture(cx, &shown, paint::band(area, 1, area.height), buf);
+    }
+}
+
+impl Screen for VerifyScreen {
+    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+        let mut items = vec![self.tabs.item(), Scroll::item()];
+        if cx.scene.is_some_and(|scene| !scene.checked.is_empty()) {
+            items.push(Item::new("m", "errors before/after", 5));
+        }
+        items
+    }
+
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+        if self.tabs.on_key(key) {
+            self.scroll = Scroll::default();
+            return Reply::Changed;
+        }
+        if key == Key::plain_code(KeyCode::Char('m')) {
+            self.is_nominal = !self.is_nominal;
+            return Reply::Changed;
+        }
+        let lines = self.page(cx, TEXT).len();
+        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+    }
+
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
+        Reply::Ignored
+    }
+
+    fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+        let area = self.tabs.draw(cx.theme, area, buf);
+        let (text, side) = split(area, TEXT, cx.scene.is_some());
+        match (cx.scene, side) {
+            (Some(scene), None) if self.tabs.at == PICTURE => self.picture(cx, scene, area, buf),
+            (scene, side) => {
+                self.page(cx, text.width).draw(self.scroll.0, text, buf);
+                if let (Some(scene), Some(side)) = (scene, side) {
+                    self.picture(cx, scene, side, buf);
+                }
+            }
+        }
+    }
+}

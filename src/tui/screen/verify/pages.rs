@@ -1,0 +1,147 @@
+//! Verdict and tables of the verification.
+
+use crate::session::summary::{ModelSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationSummary};
+use crate::tui::screen::page::{Page, fixed};
+use crate::tui::theme::Role;
+use crate::wizard::view::VerifyView;
+
+/// A joint is only named if it explains this share of what is left …
+const WORTH_NAMING: f64 = 0.1;
+/// … and this over the number of samples: about four standard deviations of what chance explains.
+const CHANCE: f64 = 4.0;
+
+/// Verdict, limits, warnings, tables.
+pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
+    if !content.is_current {
+        page.marked(
+            ("OUT OF DATE: ", Role::Warn),
+            "the samples have changed since: go back and identify again.",
+            Role::Plain,
+        );
+    }
+    if let Some(too_few) = &content.too_few {
+        page.marked(("UNKNOWN: ", Role::Warn), too_few, Role::Plain);
+    }
+    if let Some(verdict) = &content.verdict {
+        status(verdict, page);
+        limits(verdict, page);
+    }
+    for warning in &content.warnings {
+        let mark = if warning.blocks_acceptance { ("WARNING ", Role::Warn) } else { ("note    ", Role::Title) };
+        page.marked(mark, &warning.message, Role::Plain);
+    }
+    if let Some(verification) = &content.verification {
+        tables(verification, page);
+    }
+}
+
+/// The verdict in words.
+pub(in crate::tui::screen) fn status(verdict: &Verdict, page: &mut Page) {
+    let (mark, role) = match verdict.status {
+        VerdictStatus::Accepted => ("ACCEPTED: ", Role::Ok),
+        VerdictStatus::NotAccepted => ("NOT ACCEPTED: ", Role::Alarm),
+        VerdictStatus::NotEvaluated => ("NOT EVALUATED: ", Role::Warn),
+    };
+    page.marked((mark, role), &verdict.reasons.join("; "), Role::Plain);
+}
+
+fn limits(verdict: &Verdict, page: &mut Page) {
+    for check in &verdict.checks {
+        let (sign, result, role) = match check.met {
+            Some(true) => ("<=", "met", Role::Ok),
+            Some(false) => ("> ", "NOT MET", Role::Warn),
+            None => ("  ", "NOT EVALUATED", Role::Warn),
+        };
+        let value = check.value_mm.map_or_else(|| "-".to_owned(), |value| fixed(value, 4));
+        let quantity = check.quantity.replace('_', " ");
+        let line = format!("  {quantity:<16}{value:>9} mm  {sign} {:>7} mm  ", fixed(check.limit_mm, 3));
+        page.line(vec![(line, Role::Plain), (result.to_owned(), role)]);
+    }
+}
+
+/// Picks one kind of error of a model.
+type Pick = fn(&ModelSummary) -> Option<StatisticsSummary>;
+
+/// Before and after: tables III and IV of the method paper.
+fn tables(verification: &VerificationSummary, page: &mut Page) {
+    let VerificationSummary { samples, basis, independent, nominal, identified, .. } = verification;
+    page.gap();
+    let which = if *independent { "the identification never saw" } else { "the identification SAW, in part or all" };
+    page.paragraph(&format!("Errors at {samples} poses that {which}: {basis}."), Role::Plain);
+    page.line(vec![(format!("{:<32}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
+    let pairs: [(&str, Pick); 3] = [
+        ("position error", |model| model.position_mm),
+        ("distance error", |model| model.distance_mm),
+        ("off the shared point", |model| model.seat_mm),
+    ];
+    for (name, pick) in pairs {
+        let (Some(before), Some(after)) = (pick(nominal), pick(identified)) else { continue };
+        row(page, &format!("{name}, mean of {}", after.count), before.mean, after.mean);
+        row(page, "  rms", before.rms, after.rms);
+        row(page, "  95 %", before.p95, after.p95);
+        row(page, "  max", before.max, after.max);
+    }
+    if let (Some(before), Some(after)) = (&nominal.axis_mm, &identified.axis_mm) {
+        for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
+            let [from, to] = [before, after].map(|model| (model.mean.get(axis), model.max.get(axis)));
+            if let ((Some(mean), Some(max)), (Some(mean_after), Some(max_after))) = (from, to) {
+                row(page, &format!("along {name}, mean of absolute"), *mean, *mean_after);
+                row(page, "  largest", *max, *max_after);
+            }
+        }
+    }
+    page.paragraph("before: nominal model; after: identified model. Distance errors need no frame.", Role::Dim);
+}
+
+fn row(page: &mut Page, name: &str, before: f64, after: f64) {
+    let ratio = before / after;
+    let (better, role) = match ratio {
+        ratio if !ratio.is_finite() => ("-".to_owned(), Role::Plain),
+        ratio if ratio < 1.0 => ("WORSE".to_owned(), Role::Warn),
+        ratio if ratio < 10.0 => (format!("{ratio:.1} x"), Role::Plain),
+        ratio => (format!("{ratio:.0} x"), Role::Plain),
+    };
+    let line = format!("{name:<32}{:>10}{:>10}", fixed(before, 4), fixed(after, 4));
+    page.line(vec![(line, Role::Plain), (format!("{better:>9}"), role)]);
+}
+
+/// Mean error over each joint's range.
+pub(super) fn joints(content: &VerifyView, page: &mut Page) {
+    let joints = content.verification.as_ref().map_or(&[][..], |verification| &verification.residual_by_joint);
+    if joints.iter().all(|joint| joint.bins.is_empty()) {
+        page.paragraph("There are no verification samples to tell.", Role::Plain);
+        return;
+    }
+    page.paragraph("Mean error of the identified arm (mm) over fifths of each joint's range. A pattern means an error that the model does not have, such as a bent gear or a soft link.", Role::Plain);
+    page.gap();
+    page.line(vec![(
+        format!(
+            "{:<6}{:<18}{:>7}{:>7}{:>7}{:>7}{:>7}{:>7}",
+            "joint", "range", "1/5", "2/5", "3/5", "4/5", "5/5", "share"
+        ),
+        Role::Dim,
+    )]);
+    for joint in joints {
+        let (Some(first), Some(last)) = (joint.bins.first(), joint.bins.last()) else { continue };
+        let range = format!("{:>5.0} ..{:>5.0} {}", first.from, last.to, joint.unit);
+        let decimals = |value: f64| if value < 100.0 { 3 } else { 1 };
+        let bins: String = joint
+            .bins
+            .iter()
+            .map(|bin| match bin.count {
+                0 => format!("{:>7}", "-"),
+                _ => format!("{:>7}", fixed(bin.mean_mm, decimals(bin.mean_mm))),
+            })
+            .collect();
+        let count: usize = joint.bins.iter().map(|bin| bin.count).sum();
+        let follows = joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64);
+        let (share, role) = if follows {
+            (format!("{:.0} %", 100.0 * joint.explained), Role::Warn)
+        } else {
+            ("-".to_owned(), Role::Dim)
+        };
+        page.line(vec![(format!("{:<6}{range:<18}{bins}", joint.joint), Role::Plain), (format!("{share:>7}"), role)]);
+    }
+    page.gap();
+    page.paragraph("share: how much of the square error follows the joint, where chance does not explain it. A dash in a fifth: no verification pose there.", Role::Dim);
+}
