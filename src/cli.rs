@@ -48,6 +48,9 @@ pub struct TerminalArgs {
     /// Take the mouse wheel; the terminal's own selection then needs Shift
     #[arg(long)]
     pub mouse: bool,
+    /// Plain lines instead of a full screen [default: only where TERM is 'dumb']
+    #[arg(long)]
+    pub plain: bool,
 }
 
 /// `--color`.
@@ -101,6 +104,9 @@ pub struct WizardArgs {
     /// Folder in which sessions are made
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
+    /// Write what was done as a script
+    #[arg(long, value_name = "FILE")]
+    pub record_script: Option<PathBuf>,
     /// How to use the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
@@ -146,6 +152,26 @@ pub struct ResumeArgs {
     /// How to run it.
     #[command(flatten)]
     pub script_args: ScriptArgs,
+    /// How to use the terminal.
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
+}
+
+/// Arguments of `replay`.
+#[derive(Args, Clone, Debug)]
+pub struct ReplayArgs {
+    /// Folder of the session
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Entry of the journal to begin with [default: the first; with '--print' and '--csv' the last]
+    #[arg(long, value_name = "N")]
+    pub entry: Option<u64>,
+    /// Print the entries and the points up to there, without a terminal
+    #[arg(long)]
+    pub print: bool,
+    /// Print the measurements that count there as CSV, without a terminal
+    #[arg(long, conflicts_with = "print")]
+    pub csv: bool,
     /// How to use the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
@@ -205,6 +231,8 @@ pub enum Command {
     Demo(DemoArgs),
     /// Go on with a session where it ended
     Resume(ResumeArgs),
+    /// Look at a session again, entry by entry; nothing of it is changed
+    Replay(ReplayArgs),
     /// List, show or export sessions
     #[command(subcommand)]
     Session(SessionCommand),

@@ -1,7 +1,7 @@
 //! Keys, paste and resizing, read on a thread of their own.
 //!
 //! Nobody joins that thread: when the terminal goes away, a read never returns. What it reads goes into a bounded channel, then
-//! the engine is woken, so that the driver waits on one thing only.
+//! whoever waits is woken, so that the driver waits on one thing only.
 
 use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -10,7 +10,6 @@ use std::thread;
 use crossterm::event::{self, Event, KeyEventKind, MouseEventKind};
 
 use super::keymap::Key;
-use crate::runtime::Events;
 
 /// Inputs that wait; then the terminal's own buffer holds what is typed.
 const WAITING: usize = 256;
@@ -30,17 +29,17 @@ pub enum Input {
     Gone,
 }
 
-/// Starts reading.
+/// Starts reading; `wake` tells whoever waits that there is something, `false` if nobody does.
 ///
 /// # Errors
 /// The system refuses a thread.
-pub(super) fn start(events: Events) -> io::Result<Receiver<Input>> {
+pub(super) fn start(wake: impl Fn() -> bool + Send + 'static) -> io::Result<Receiver<Input>> {
     let (sender, inputs) = sync_channel(WAITING);
-    thread::Builder::new().name("input".to_owned()).spawn(move || read(&sender, &events))?;
+    thread::Builder::new().name("input".to_owned()).spawn(move || read(&sender, &wake))?;
     Ok(inputs)
 }
 
-fn read(inputs: &SyncSender<Input>, events: &Events) {
+fn read(inputs: &SyncSender<Input>, wake: &impl Fn() -> bool) {
     loop {
         let input = match event::read() {
             Ok(event) => input(event),
@@ -49,7 +48,7 @@ fn read(inputs: &SyncSender<Input>, events: &Events) {
         };
         let Some(input) = input else { continue };
         let is_last = input == Input::Gone;
-        if inputs.send(input).is_err() || !events.wake() || is_last {
+        if inputs.send(input).is_err() || !wake() || is_last {
             break;
         }
     }

@@ -275,7 +275,7 @@ impl Drop for Terminal {
     }
 }
 
-pub(crate) fn signal(process: u32, name: &str) {
+fn signal(process: u32, name: &str) {
     assert!(Command::new("kill").args(["-s", name, &process.to_string()]).status().unwrap().success());
 }
 
