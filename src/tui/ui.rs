@@ -81,7 +81,14 @@ impl Ui {
 
     /// Takes an input.
     pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Wish {
-        self.is_dirty = true;
+        let was_dirty = std::mem::replace(&mut self.is_dirty, true);
+        let wish = self.take_input(input, view);
+        // A key without effect does not take back what one before it has changed.
+        self.is_dirty |= was_dirty;
+        wish
+    }
+
+    fn take_input(&mut self, input: Input, view: &ViewModel) -> Wish {
         match input {
             Input::Gone => Wish::Gone,
             Input::Resize => Wish::Redraw,
