@@ -35,6 +35,7 @@ pub struct Cli {
 
 /// How to use the terminal.
 #[derive(Args, Clone, Copy, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub struct TerminalArgs {
     /// Colours: when the terminal has them and NO_COLOR is not set, always, or never
     #[arg(long, value_enum, default_value_t, value_name = "WHEN")]

@@ -187,6 +187,7 @@ impl Driver<'_> {
                         is_due = true;
                     }
                     Wish::Gone => return End::Gone,
+                    Wish::End => self.engine.shut_down("the keys cannot be read any more"),
                 }
             }
             is_due |= self.ui.take_dirty();

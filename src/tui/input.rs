@@ -4,6 +4,7 @@
 //! whoever waits is woken, so that the driver waits on one thing only.
 
 use std::io;
+use std::panic;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
@@ -27,6 +28,8 @@ pub enum Input {
     Resize,
     /// The terminal cannot be read any more.
     Gone,
+    /// Reading it has failed by a defect: what was sent made no sense to it.
+    Broken,
 }
 
 /// Starts reading; `wake` tells whoever waits that there is something, `false` if nobody does.
@@ -41,13 +44,16 @@ pub(super) fn start(wake: impl Fn() -> bool + Send + 'static) -> io::Result<Rece
 
 fn read(inputs: &SyncSender<Input>, wake: &impl Fn() -> bool) {
     loop {
-        let input = match event::read() {
-            Ok(event) => input(event),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => None,
-            Err(_gone) => Some(Input::Gone),
+        // A malformed mouse sequence makes the parser of crossterm 0.29 panic where overflows are checked, then again at every
+        // byte.
+        let input = match panic::catch_unwind(event::read) {
+            Ok(Ok(event)) => input(event),
+            Ok(Err(error)) if error.kind() == io::ErrorKind::Interrupted => None,
+            Ok(Err(_gone)) => Some(Input::Gone),
+            Err(_panic) => Some(Input::Broken),
         };
         let Some(input) = input else { continue };
-        let is_last = input == Input::Gone;
+        let is_last = matches!(input, Input::Gone | Input::Broken);
         if inputs.send(input).is_err() || !wake() || is_last {
             break;
         }

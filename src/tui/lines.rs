@@ -3,7 +3,7 @@
 //! What there is to see is printed, then a line is read: a number from the list, with a value behind it where one is needed, or
 //! an intent as scripts have it. The next line is read when nothing is under way any more, so that lines can come from a file.
 
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io::{self, BufRead as _, BufReader, Read, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::thread;
 
@@ -151,9 +151,7 @@ impl<W: Write> Talk<'_, W> {
         let lines = page(view, has_all);
         let text: Vec<String> = lines.iter().map(|line| self.glyphs.show(line) + "\n").collect();
         write!(self.out, "{}> ", text.concat())?;
-        self.out.flush()?;
-        // What is read is not echoed by a pipe; the next page begins on a line of its own.
-        writeln!(self.out)
+        self.out.flush()
     }
 }
 

@@ -186,14 +186,14 @@ impl Replay {
         if self.camera.on_key(key) { After::Draw } else { After::Nothing }
     }
 
-    fn on_input(&mut self, input: Input) -> After {
-        match input {
+    fn on_input(&mut self, input: &Input) -> After {
+        match *input {
             Input::Key(key) => self.on_key(key),
             Input::Resize => After::Redraw,
             Input::Scroll(lines) if lines < 0 => self.on_key(Key::plain_code(KeyCode::PageUp)),
             Input::Scroll(_) => self.on_key(Key::plain_code(KeyCode::PageDown)),
             Input::Paste(_) => After::Nothing,
-            Input::Gone => After::Leave,
+            Input::Gone | Input::Broken => After::Leave,
         }
     }
 
@@ -246,7 +246,7 @@ pub fn run(mut replay: Replay, options: Options) -> io::Result<Option<i32>> {
             is_due = false;
         }
         let after = match inputs.try_recv() {
-            Ok(input) => replay.on_input(input),
+            Ok(input) => replay.on_input(&input),
             Err(_) => match woken.recv_timeout(replay.pause().map_or(IDLE, |pause| pause.max(FRAME))) {
                 Err(RecvTimeoutError::Timeout) if replay.pause().is_some() => {
                     replay.tick();

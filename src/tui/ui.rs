@@ -30,6 +30,8 @@ pub enum Wish {
     Redraw,
     /// The terminal is gone.
     Gone,
+    /// End: no key can be read any more.
+    End,
 }
 
 /// Everything local.
@@ -91,6 +93,7 @@ impl Ui {
     fn take_input(&mut self, input: Input, view: &ViewModel) -> Wish {
         match input {
             Input::Gone => Wish::Gone,
+            Input::Broken => Wish::End,
             Input::Resize => Wish::Redraw,
             Input::Key(key) => self.on_key(key, view),
             Input::Paste(text) => {
