@@ -5,7 +5,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::disallowed_methods,
-    clippy::indexing_slicing,
+    clippy::panic,
     reason = "a failure of a test is a panic; deadlines need a clock; test files need no atomic writes"
 )]
 #![cfg(target_os = "linux")]
