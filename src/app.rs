@@ -7,6 +7,7 @@ mod plan;
 mod profile;
 mod program;
 mod progress;
+mod replay;
 mod script;
 mod session;
 mod verify;
@@ -14,7 +15,7 @@ mod wizard;
 
 use std::io::{self, Write};
 
-use crate::cli::{Cli, Command, EstimationArgs};
+use crate::cli::{Cli, Command, EstimationArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::Weighting;
 use crate::procedure::EstimationSettings;
@@ -56,16 +57,25 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
     let Some(command) = cli.command else {
         return match &cli.script {
             Some(file) => script::run(file, &cli.script_args, console),
-            None => wizard::run(None, &cli.script_args.sessions, cli.terminal, console),
+            None => wizard::run(None, &cli.script_args, cli.terminal, console),
         };
     };
     match command {
         Command::Demo(args) => script::demo(&args, console),
         Command::Resume(args) => match &args.script {
             Some(file) => script::resume(&args.folder, file, &args.script_args, console),
-            None => wizard::resume(&args.folder, &args.script_args.sessions, args.terminal, console),
+            None => wizard::resume(&args.folder, &args.script_args, args.terminal, console),
         },
-        Command::Wizard(args) => wizard::run(args.profile.as_deref(), &args.sessions, args.terminal, console),
+        Command::Wizard(args) => {
+            let place = ScriptArgs {
+                values: Vec::new(),
+                sessions: args.sessions,
+                json: false,
+                record_script: args.record_script,
+            };
+            wizard::run(args.profile.as_deref(), &place, args.terminal, console)
+        }
+        Command::Replay(args) => replay::run(&args, console),
         Command::Session(command) => session::run(&command, console),
         Command::Identify(args) => identify::run(&args, console),
         Command::Verify(args) => verify::run(&args, console),

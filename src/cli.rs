@@ -35,6 +35,7 @@ pub struct Cli {
 
 /// How to use the terminal.
 #[derive(Args, Clone, Copy, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub struct TerminalArgs {
     /// Colours: when the terminal has them and NO_COLOR is not set, always, or never
     #[arg(long, value_enum, default_value_t, value_name = "WHEN")]
@@ -48,6 +49,9 @@ pub struct TerminalArgs {
     /// Take the mouse wheel; the terminal's own selection then needs Shift
     #[arg(long)]
     pub mouse: bool,
+    /// Plain lines instead of a full screen [default: only where TERM is 'dumb']
+    #[arg(long)]
+    pub plain: bool,
 }
 
 /// `--color`.
@@ -101,6 +105,9 @@ pub struct WizardArgs {
     /// Folder in which sessions are made
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
+    /// Write what was done as a script
+    #[arg(long, value_name = "FILE")]
+    pub record_script: Option<PathBuf>,
     /// How to use the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
@@ -146,6 +153,26 @@ pub struct ResumeArgs {
     /// How to run it.
     #[command(flatten)]
     pub script_args: ScriptArgs,
+    /// How to use the terminal.
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
+}
+
+/// Arguments of `replay`.
+#[derive(Args, Clone, Debug)]
+pub struct ReplayArgs {
+    /// Folder of the session
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Entry of the journal to begin with [default: the first; with '--print' and '--csv' the last]
+    #[arg(long, value_name = "N")]
+    pub entry: Option<u64>,
+    /// Print the entries and the points up to there, without a terminal
+    #[arg(long)]
+    pub print: bool,
+    /// Print the measurements that count there as CSV, without a terminal
+    #[arg(long, conflicts_with = "print")]
+    pub csv: bool,
     /// How to use the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
@@ -205,6 +232,8 @@ pub enum Command {
     Demo(DemoArgs),
     /// Go on with a session where it ended
     Resume(ResumeArgs),
+    /// Look at a session again, entry by entry; nothing of it is changed
+    Replay(ReplayArgs),
     /// List, show or export sessions
     #[command(subcommand)]
     Session(SessionCommand),
@@ -653,39 +682,4 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use clap::CommandFactory as _;
-
-    use super::*;
-
-    #[test]
-    fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn the_environment_decides_about_colour_and_characters() {
-        let with = |variables: &'static [(&str, &str)]| {
-            TerminalEnvironment::from_variables(|name| {
-                variables.iter().find(|(set, _)| *set == name).map(|(_, value)| (*value).to_owned())
-            })
-        };
-        assert!(with(&[("LANG", "de_DE.UTF-8")]).is_utf8 && with(&[("LC_CTYPE", "C.utf8")]).is_utf8);
-        assert!(!with(&[("LANG", "de_DE.UTF-8"), ("LC_ALL", "C")]).is_utf8 && !with(&[]).is_utf8);
-        assert!(with(&[("NO_COLOR", "1")]).no_color && !with(&[("NO_COLOR", "")]).no_color);
-    }
-
-    #[test]
-    fn limits_and_boxes_are_ranges() {
-        let limit: JointLimit = "j2=-30..60".parse().unwrap();
-        assert_eq!(limit, JointLimit { joint: "j2".to_owned(), low: -30.0, high: 60.0 });
-        let space: BoxMm = "500..1500,-800..800,200..1600".parse().unwrap();
-        assert_eq!(space.ranges, [(500.0, 1500.0), (-800.0, 800.0), (200.0, 1600.0)]);
-        for wrong in ["j2", "j2=1", "j2=60..-30", "=1..2", "j2=nan..3"] {
-            assert!(wrong.parse::<JointLimit>().is_err(), "{wrong}");
-        }
-        for wrong in ["1..2,3..4", "1..2,3..4,6..5", "a..b,1..2,3..4"] {
-            assert!(wrong.parse::<BoxMm>().is_err(), "{wrong}");
-        }
-    }
-}
+mod tests;

@@ -17,4 +17,4 @@ pub mod signals;
 mod store_thread;
 
 pub use clock::Clock;
-pub use engine::{Engine, Events, Happening, Options};
+pub use engine::{Deed, Engine, Events, Happening, Options};

@@ -20,12 +20,15 @@ pub mod glyphs;
 mod help;
 mod input;
 pub mod keymap;
+pub mod lines;
 pub mod paint;
 pub mod preview;
+pub mod replay;
 pub mod screen;
 mod terminal;
 pub mod theme;
 pub mod ui;
+mod values;
 pub mod widget;
 
 use std::io::{self, Stdout};
@@ -36,7 +39,7 @@ use ratatui::Terminal;
 use ratatui::backend::{Backend as _, CrosstermBackend};
 use ratatui::layout::{Position, Rect};
 
-use crate::runtime::{Engine, signals};
+use crate::runtime::{Deed, Engine, signals};
 use input::Input;
 use terminal::TerminalGuard;
 use theme::Theme;
@@ -75,11 +78,14 @@ pub struct Exit {
     pub remarks: Vec<String>,
 }
 
+/// What is done with the operator's deeds before the program ends, however it ends.
+pub type AtEnd<'a> = &'a mut dyn FnMut(&[Deed]);
+
 /// Runs the wizard in the terminal until it ends. When the terminal goes away, the process ends here.
 ///
 /// # Errors
 /// The terminal cannot be used, or the system refuses a thread.
-pub fn run(mut engine: Engine, options: Options) -> io::Result<Exit> {
+pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Result<Exit> {
     let received = signals::watch(engine.sender())?;
     if options.forces_colour {
         crossterm::style::force_color_output(true);
@@ -87,7 +93,8 @@ pub fn run(mut engine: Engine, options: Options) -> io::Result<Exit> {
     terminal::note_folder(engine.wizard().folder());
     terminal::install_panic_hook();
     let guard = TerminalGuard::enter(options.has_mouse)?;
-    let inputs = input::start(engine.sender())?;
+    let events = engine.sender();
+    let inputs = input::start(move || events.wake())?;
     let screen = Terminal::new(CrosstermBackend::new(io::stdout()))?;
     let mut driver = Driver { engine: &mut engine, inputs, screen, guard: &guard, ui: Ui::new(options.theme) };
     let end = driver.run(&received);
@@ -96,9 +103,10 @@ pub fn run(mut engine: Engine, options: Options) -> io::Result<Exit> {
     std::mem::forget(screen);
     if end == End::Gone || received.signal() == Some(SIGHUP) {
         guard.abandon();
-        close_without_terminal(&mut engine);
+        close_without_terminal(&mut engine, at_end);
     }
     drop(guard);
+    at_end(engine.deeds());
     let wizard = engine.wizard();
     Ok(Exit {
         cause: wizard.ended().unwrap_or("ended").to_owned(),
@@ -109,10 +117,11 @@ pub fn run(mut engine: Engine, options: Options) -> io::Result<Exit> {
 }
 
 /// Closes the session, touches nothing of the terminal, ends the process.
-fn close_without_terminal(engine: &mut Engine) -> ! {
+fn close_without_terminal(engine: &mut Engine, at_end: AtEnd<'_>) -> ! {
     engine.shut_down("the terminal went away (SIGHUP)");
     while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
     engine.release();
+    at_end(engine.deeds());
     #[expect(clippy::exit, reason = "unwinding would write to a terminal that is gone, and abort")]
     std::process::exit(128 + SIGHUP)
 }
@@ -179,6 +188,7 @@ impl Driver<'_> {
                         is_due = true;
                     }
                     Wish::Gone => return End::Gone,
+                    Wish::End => self.engine.shut_down("the keys cannot be read any more"),
                 }
             }
             is_due |= self.ui.take_dirty();

@@ -4,9 +4,11 @@ use std::io::{IsTerminal as _, Write, stdin, stdout};
 use std::path::Path;
 
 use super::{Console, script};
-use crate::cli::{ColorArg, TerminalArgs, TerminalEnvironment};
+use crate::cli::{ColorArg, ScriptArgs, TerminalArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
-use crate::runtime::{Clock, Engine, Options};
+use crate::runtime::{Clock, Deed, Engine, Options};
+use crate::script::{Script, ScriptStep};
+use crate::store;
 use crate::tui;
 use crate::tui::glyphs::Glyphs;
 use crate::tui::theme::Theme;
@@ -15,50 +17,63 @@ use crate::wizard::Intent;
 /// Begins a calibration, with a profile if one is given.
 pub(super) fn run<O: Write, E: Write>(
     profile: Option<&str>,
-    sessions: &Path,
-    args: TerminalArgs,
+    args: &ScriptArgs,
+    terminal: TerminalArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let terminal = terminal(args)?;
-    let mut engine =
-        Engine::new(options(sessions)).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    let surface = surface(terminal)?;
+    let mut engine = Engine::new(options(args)).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     if let Some(profile) = profile {
         engine.intend(Intent::ChooseProfile(profile.to_owned()));
     }
-    play(engine, terminal, console)
+    play(engine, surface, args.record_script.as_deref(), console)
 }
 
 /// Goes on with a session.
 pub(super) fn resume<O: Write, E: Write>(
     folder: &Path,
-    sessions: &Path,
-    args: TerminalArgs,
+    args: &ScriptArgs,
+    terminal: TerminalArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let terminal = terminal(args)?;
-    let engine = script::open(folder, options(sessions))?;
-    play(engine, terminal, console)
+    let surface = surface(terminal)?;
+    let engine = script::open(folder, options(args))?;
+    play(engine, surface, args.record_script.as_deref(), console)
 }
 
-fn options(sessions: &Path) -> Options {
-    Options { sessions: sessions.to_owned(), clock: Clock::System }
+fn options(args: &ScriptArgs) -> Options {
+    Options { sessions: args.sessions.clone(), clock: Clock::System }
+}
+
+/// What the wizard is shown on.
+#[derive(Clone, Copy, Debug)]
+enum Surface {
+    Screen(tui::Options),
+    Lines(Glyphs),
+}
+
+fn surface(args: TerminalArgs) -> Result<Surface, Failure> {
+    let environment = TerminalEnvironment::read();
+    if args.plain || environment.term.as_deref() == Some("dumb") {
+        return Ok(Surface::Lines(tui_options(args, &environment).theme.glyphs));
+    }
+    screen(args, &environment).map(Surface::Screen)
 }
 
 /// How the terminal is used, if there is one that will do.
-fn terminal(args: TerminalArgs) -> Result<tui::Options, Failure> {
+pub(super) fn screen(args: TerminalArgs, environment: &TerminalEnvironment) -> Result<tui::Options, Failure> {
     let refused = |message: &str| {
         Err(Failure::new(ExitStatus::Usage, message)
-            .hint("without one, run a script: 'trupose --script FILE', or 'trupose demo'")
+            .hint("without one, use '--plain' for plain lines, or run a script: 'trupose --script FILE', or 'trupose demo'")
             .hint("single commands need none either: see 'trupose --help'"))
     };
     if !stdout().is_terminal() || !stdin().is_terminal() {
         return refused("the guided calibration needs a terminal");
     }
-    let environment = TerminalEnvironment::read();
     if environment.term.as_deref().is_none_or(|term| term == "dumb") {
         return refused("the guided calibration needs a terminal that can move its cursor; TERM says it cannot");
     }
-    Ok(tui_options(args, &environment))
+    Ok(tui_options(args, environment))
 }
 
 fn tui_options(args: TerminalArgs, environment: &TerminalEnvironment) -> tui::Options {
@@ -78,11 +93,18 @@ fn tui_options(args: TerminalArgs, environment: &TerminalEnvironment) -> tui::Op
 
 fn play<O: Write, E: Write>(
     engine: Engine,
-    terminal: tui::Options,
+    surface: Surface,
+    record: Option<&Path>,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let exit = tui::run(engine, terminal)
-        .map_err(|error| Failure::new(ExitStatus::Internal, format!("the terminal cannot be used: {error}")))?;
+    let mut recorded = Ok(());
+    let mut at_end = |deeds: &[Deed]| recorded = record.map_or(Ok(()), |file| write_script(file, deeds));
+    let exit = match surface {
+        Surface::Screen(options) => tui::run(engine, options, &mut at_end),
+        Surface::Lines(glyphs) => tui::lines::run(engine, stdin(), &mut console.out, glyphs, &mut at_end),
+    };
+    let exit =
+        exit.map_err(|error| Failure::new(ExitStatus::Internal, format!("the terminal cannot be used: {error}")))?;
     for remark in &exit.remarks {
         console.remark(remark);
     }
@@ -92,13 +114,25 @@ fn play<O: Write, E: Write>(
             if let Some(saved) = saved {
                 console.remark(&saved);
             }
-            Ok(ExitStatus::Accepted)
+            recorded.map(|()| ExitStatus::Accepted)
         }
         Some(signal) => {
             let failure = Failure::new(ExitStatus::Signal(signal), exit.cause);
             Err(saved.into_iter().fold(failure, Failure::hint))
         }
     }
+}
+
+/// Writes what was done as a script.
+fn write_script(file: &Path, deeds: &[Deed]) -> Result<(), Failure> {
+    let step = |deed: &Deed| match &deed.failure {
+        None => ScriptStep::Do(deed.intent.clone()),
+        Some(message) => ScriptStep::Fails(deed.intent.clone(), message.clone()),
+    };
+    let steps = deeds.iter().map(step).collect();
+    let script = Script { title: "recorded in the terminal".to_owned(), clock: None, steps };
+    let text = script.to_text().map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    store::replace(file, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use super::store_thread::{Command, StoreThread};
 use crate::session::journal::Line;
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
-use crate::wizard::{Answer, Effect, Event, Intent, Notice, Request, RequestId, StoreEvent, Wizard};
+use crate::wizard::{Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard};
 
 /// Events that wait; answers wait at their thread when it is full, progress reports are dropped.
 const WAITING: usize = 256;
@@ -72,6 +72,15 @@ pub enum Happening {
     Told(Notice),
 }
 
+/// An intent that was carried out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deed {
+    /// The intent.
+    pub intent: Intent,
+    /// What was said if it failed.
+    pub failure: Option<String>,
+}
+
 /// The wizard with its threads.
 #[derive(Debug)]
 pub struct Engine {
@@ -87,6 +96,9 @@ pub struct Engine {
     writing: BTreeMap<RequestId, Vec<Line>>,
     happenings: VecDeque<Happening>,
     told: Option<Notice>,
+    deeds: Vec<Deed>,
+    /// The last intent, until it is known whether it failed.
+    pending: Option<Intent>,
     has_exited: bool,
 }
 
@@ -130,6 +142,8 @@ impl Engine {
             writing: BTreeMap::new(),
             happenings: VecDeque::new(),
             told: None,
+            deeds: Vec::new(),
+            pending: None,
             has_exited: false,
         })
     }
@@ -151,7 +165,34 @@ impl Engine {
 
     /// The operator wants something.
     pub fn intend(&mut self, intent: Intent) {
+        self.record(&intent);
         self.take(Event::Intent(intent));
+    }
+
+    /// What the operator had done, in order. Without what was refused, what only stopped something, and the end.
+    pub fn deeds(&mut self) -> &[Deed] {
+        self.settle_deed();
+        &self.deeds
+    }
+
+    /// Takes note of an intent that will be carried out.
+    fn record(&mut self, intent: &Intent) {
+        let offers = self.wizard.intents();
+        let is_possible = offers.iter().any(|offer| offer.intent.name() == intent.name() && offer.is_enabled());
+        if is_possible && !matches!(intent, Intent::Cancel | Intent::Quit) {
+            self.settle_deed();
+            self.pending = Some(intent.clone());
+        } else if self.wizard.is_idle() {
+            // What is said next is about an intent that is no deed.
+            self.settle_deed();
+        }
+    }
+
+    fn settle_deed(&mut self) {
+        if let Some(intent) = self.pending.take() {
+            let notice = self.wizard.notice().filter(|notice| notice.severity == Severity::Error);
+            self.deeds.push(Deed { intent, failure: notice.map(|notice| notice.what.clone()) });
+        }
     }
 
     /// The program is to end, for a reason that is not the operator's wish.
@@ -266,6 +307,24 @@ impl Drop for Engine {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_done_is_known_and_what_was_refused_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut engine = Engine::new(Options { sessions: folder.path().to_owned(), clock: Clock::System }).unwrap();
+        // No robot to go on with; a robot that is not there; one that is.
+        engine.intend(Intent::Next);
+        for profile in ["missing", "soochow"] {
+            engine.intend(Intent::ChooseProfile(profile.to_owned()));
+            while !engine.wizard().is_idle() {
+                assert!(engine.wait(Duration::from_mins(1)));
+            }
+        }
+        engine.intend(Intent::Quit);
+        let deeds: Vec<(&str, bool)> =
+            engine.deeds().iter().map(|deed| (deed.intent.name(), deed.failure.is_some())).collect();
+        assert_eq!(deeds, [("ChooseProfile", true), ("ChooseProfile", false)]);
+    }
 
     #[test]
     fn a_driver_can_be_woken_without_an_event() {

@@ -54,13 +54,20 @@ impl Received {
 /// The system refuses.
 pub fn watch(events: Events) -> io::Result<Received> {
     let received = Received { number: Arc::default(), engine: Arc::new(Mutex::new(events)) };
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     let noted = received.clone();
-    thread::Builder::new().name("signals".to_owned()).spawn(move || {
-        for signal in signals.forever() {
-            noted.number.store(signal, Ordering::SeqCst);
-            noted.tell(signal);
-        }
+    each(move |signal| {
+        noted.number.store(signal, Ordering::SeqCst);
+        noted.tell(signal);
     })?;
     Ok(received)
+}
+
+/// Has every SIGINT, SIGTERM and SIGHUP told, on a thread of its own.
+///
+/// # Errors
+/// The system refuses.
+pub fn each(tell: impl Fn(i32) + Send + 'static) -> io::Result<()> {
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(tell))?;
+    Ok(())
 }

@@ -43,9 +43,7 @@ pub const fn fits(area: Rect) -> bool {
 /// Draws everything but the content; gives back where that goes. None: the terminal is too small, which is said.
 pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut Buffer) -> Option<Rect> {
     if !fits(area) {
-        let (columns, rows) = SMALLEST;
-        let said = format!("terminal {}x{}, need {columns}x{rows}", area.width, area.height);
-        paint::text(buf, area, (0, 0), &said, theme.style(Role::Warn));
+        say_too_small(theme, area, buf);
         return None;
     }
     let area = paint::inset(area, 1);
@@ -54,15 +52,9 @@ pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut
     rule(buf, 2);
     paint::text(buf, area, (0, 3), view.purpose, theme.style(Role::Hint));
 
-    let footer = footer_lines(keys, usize::from(area.width), MOST_FOOTER);
     let notice = view.notice.as_ref().map_or_else(Vec::new, |notice| notice_lines(notice, theme, area));
     let below = |lines: usize| u16::try_from(lines).unwrap_or(0);
-    let mut bottom = area.height - below(footer.len());
-    for (row, line) in (bottom..).zip(&footer) {
-        draw_footer_line(line, theme, (area, row), buf);
-    }
-    bottom -= 1;
-    rule(buf, bottom);
+    let mut bottom = footer(keys, theme, area, buf);
     bottom = bottom.saturating_sub(below(notice.len()));
     for (row, (text, role)) in (bottom..).zip(&notice) {
         paint::text(buf, area, (0, row), text, theme.style(*role));
@@ -73,6 +65,25 @@ pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut
     }
     let top = 5;
     Some(paint::band(area, top, bottom.saturating_sub(top)))
+}
+
+/// Says how large a terminal has to be.
+pub(super) fn say_too_small(theme: Theme, area: Rect, buf: &mut Buffer) {
+    let (columns, rows) = SMALLEST;
+    let said = format!("terminal {}x{}, need {columns}x{rows}", area.width, area.height);
+    paint::text(buf, area, (0, 0), &said, theme.style(Role::Warn));
+}
+
+/// Draws the keys below a rule; gives back the row of the rule.
+pub(super) fn footer(keys: &[Item], theme: Theme, area: Rect, buf: &mut Buffer) -> u16 {
+    let lines = footer_lines(keys, usize::from(area.width), MOST_FOOTER);
+    let top = area.height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
+    for (row, line) in (top..).zip(&lines) {
+        draw_footer_line(line, theme, (area, row), buf);
+    }
+    let rule = top.saturating_sub(1);
+    paint::rule(buf, area, rule, theme.glyphs.rule(), theme.style(Role::Dim));
+    rule
 }
 
 fn header(header: &Header, theme: Theme, area: Rect, buf: &mut Buffer) {

@@ -1,16 +1,16 @@
 //! Keys, paste and resizing, read on a thread of their own.
 //!
 //! Nobody joins that thread: when the terminal goes away, a read never returns. What it reads goes into a bounded channel, then
-//! the engine is woken, so that the driver waits on one thing only.
+//! whoever waits is woken, so that the driver waits on one thing only.
 
 use std::io;
+use std::panic;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use crossterm::event::{self, Event, KeyEventKind, MouseEventKind};
 
 use super::keymap::Key;
-use crate::runtime::Events;
 
 /// Inputs that wait; then the terminal's own buffer holds what is typed.
 const WAITING: usize = 256;
@@ -28,28 +28,33 @@ pub enum Input {
     Resize,
     /// The terminal cannot be read any more.
     Gone,
+    /// Reading it has failed by a defect: what was sent made no sense to it.
+    Broken,
 }
 
-/// Starts reading.
+/// Starts reading; `wake` tells whoever waits that there is something, `false` if nobody does.
 ///
 /// # Errors
 /// The system refuses a thread.
-pub(super) fn start(events: Events) -> io::Result<Receiver<Input>> {
+pub(super) fn start(wake: impl Fn() -> bool + Send + 'static) -> io::Result<Receiver<Input>> {
     let (sender, inputs) = sync_channel(WAITING);
-    thread::Builder::new().name("input".to_owned()).spawn(move || read(&sender, &events))?;
+    thread::Builder::new().name("input".to_owned()).spawn(move || read(&sender, &wake))?;
     Ok(inputs)
 }
 
-fn read(inputs: &SyncSender<Input>, events: &Events) {
+fn read(inputs: &SyncSender<Input>, wake: &impl Fn() -> bool) {
     loop {
-        let input = match event::read() {
-            Ok(event) => input(event),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => None,
-            Err(_gone) => Some(Input::Gone),
+        // A malformed mouse sequence makes the parser of crossterm 0.29 panic where overflows are checked, then again at every
+        // byte.
+        let input = match panic::catch_unwind(event::read) {
+            Ok(Ok(event)) => input(event),
+            Ok(Err(error)) if error.kind() == io::ErrorKind::Interrupted => None,
+            Ok(Err(_gone)) => Some(Input::Gone),
+            Err(_panic) => Some(Input::Broken),
         };
         let Some(input) = input else { continue };
-        let is_last = input == Input::Gone;
-        if inputs.send(input).is_err() || !events.wake() || is_last {
+        let is_last = matches!(input, Input::Gone | Input::Broken);
+        if inputs.send(input).is_err() || !wake() || is_last {
             break;
         }
     }

@@ -31,6 +31,8 @@ pub enum Wish {
     Redraw,
     /// The terminal is gone.
     Gone,
+    /// End: no key can be read any more.
+    End,
 }
 
 /// Everything local.
@@ -83,9 +85,17 @@ impl Ui {
 
     /// Takes an input.
     pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Wish {
-        self.is_dirty = true;
+        let was_dirty = std::mem::replace(&mut self.is_dirty, true);
+        let wish = self.take_input(input, view);
+        // A key without effect does not take back what one before it has changed.
+        self.is_dirty |= was_dirty;
+        wish
+    }
+
+    fn take_input(&mut self, input: Input, view: &ViewModel) -> Wish {
         match input {
             Input::Gone => Wish::Gone,
+            Input::Broken => Wish::End,
             Input::Resize => Wish::Redraw,
             Input::Key(key) => self.on_key(key, view),
             Input::Paste(text) => {

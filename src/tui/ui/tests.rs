@@ -104,6 +104,21 @@ fn keys_become_intents() {
     assert_eq!(press(Key::ctrl('z')), Wish::Suspend);
 }
 
+#[test]
+fn a_key_without_effect_hides_no_change() {
+    let view = view();
+    let mut ui = Ui::new(themes()[0]);
+    ui.refresh(&view, &Session::default());
+    assert!(ui.take_dirty());
+    // Both before it is drawn again.
+    ui.on_input(Input::Key(Key::char('?')), &view);
+    ui.on_input(Input::Key(Key::char('?')), &view);
+    ui.on_input(Input::Key(Key::char('@')), &view);
+    assert!(ui.take_dirty());
+    ui.on_input(Input::Key(Key::char('@')), &view);
+    assert!(!ui.take_dirty());
+}
+
 /// The terminal's loop without a terminal.
 struct Walk {
     engine: Engine,

@@ -1,0 +1,36 @@
+//! The command line and the environment.
+
+use clap::CommandFactory as _;
+
+use super::*;
+
+#[test]
+fn the_command_line_is_consistent() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn the_environment_decides_about_colour_and_characters() {
+    let with = |variables: &'static [(&str, &str)]| {
+        TerminalEnvironment::from_variables(|name| {
+            variables.iter().find(|(set, _)| *set == name).map(|(_, value)| (*value).to_owned())
+        })
+    };
+    assert!(with(&[("LANG", "de_DE.UTF-8")]).is_utf8 && with(&[("LC_CTYPE", "C.utf8")]).is_utf8);
+    assert!(!with(&[("LANG", "de_DE.UTF-8"), ("LC_ALL", "C")]).is_utf8 && !with(&[]).is_utf8);
+    assert!(with(&[("NO_COLOR", "1")]).no_color && !with(&[("NO_COLOR", "")]).no_color);
+}
+
+#[test]
+fn limits_and_boxes_are_ranges() {
+    let limit: JointLimit = "j2=-30..60".parse().unwrap();
+    assert_eq!(limit, JointLimit { joint: "j2".to_owned(), low: -30.0, high: 60.0 });
+    let space: BoxMm = "500..1500,-800..800,200..1600".parse().unwrap();
+    assert_eq!(space.ranges, [(500.0, 1500.0), (-800.0, 800.0), (200.0, 1600.0)]);
+    for wrong in ["j2", "j2=1", "j2=60..-30", "=1..2", "j2=nan..3"] {
+        assert!(wrong.parse::<JointLimit>().is_err(), "{wrong}");
+    }
+    for wrong in ["1..2,3..4", "1..2,3..4,6..5", "a..b,1..2,3..4"] {
+        assert!(wrong.parse::<BoxMm>().is_err(), "{wrong}");
+    }
+}

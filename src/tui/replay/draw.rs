@@ -1,0 +1,192 @@
+//! What a replay looks like.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::Widget as _;
+
+use super::{Page, Replay, SPEEDS};
+use crate::session::plan::PoseKind;
+use crate::session::state::{Sample, SampleState};
+use crate::tui::glyphs::{shortened, width, wrapped};
+use crate::tui::keymap::Item;
+use crate::tui::preview::Preview;
+use crate::tui::theme::Role;
+use crate::tui::{frame, paint};
+use crate::units::to_mm;
+
+/// Lines for the entry in words.
+const MOST_WORDS: usize = 4;
+/// Entries before the one that is shown.
+const BEFORE: usize = 3;
+/// Columns that the entries need before the preview gets any.
+const ENTRIES: u16 = 36;
+
+impl Replay {
+    /// Draws it; any size must do.
+    pub fn draw(&self, area: Rect, buf: &mut Buffer) {
+        let theme = self.theme;
+        if !frame::fits(area) {
+            frame::say_too_small(theme, area, buf);
+            return;
+        }
+        let area = paint::inset(area, 1);
+        self.header(area, buf);
+        paint::rule(buf, area, 2, theme.glyphs.rule(), theme.style(Role::Dim));
+        let bottom = frame::footer(&self.items(), theme, area, buf);
+        self.timeline(area, buf);
+        let mut row = 4;
+        for line in wrapped(&self.words(self.place), area.width.into()).iter().take(MOST_WORDS) {
+            paint::text(buf, area, (0, row), line, theme.style(Role::Title));
+            row += 1;
+        }
+        let content = paint::band(area, row + 1, bottom.saturating_sub(row + 1));
+        match self.page {
+            Page::Robot => self.robot(content, buf),
+            Page::Samples | Page::Result => {
+                for (row, line) in (0..content.height).zip(self.page_lines().iter().skip(self.scroll)) {
+                    let style = theme.style(Role::Plain);
+                    let line = shortened(&theme.glyphs.show(line), content.width.into(), theme.glyphs);
+                    paint::text(buf, content, (0, row), &line, style);
+                }
+            }
+        }
+    }
+
+    fn items(&self) -> Vec<Item> {
+        let next = match self.page {
+            Page::Robot => "samples",
+            Page::Samples => "result",
+            Page::Result => "robot",
+        };
+        let mut items = vec![
+            Item::new("Space", if self.is_playing { "pause" } else { "play" }, 0),
+            Item::new("Left/Right", "step", 1),
+            Item::new("Home/End", "first, last", 3),
+            Item::new("+/-", "speed", 4),
+            Item::new("Tab", next, 2),
+            Item::new("q", "leave", 1),
+        ];
+        match self.page {
+            Page::Robot => items.push(Item::new("< > Up/Down z v", "turn the picture", 6)),
+            Page::Samples | Page::Result => items.push(Item::new("PgUp/PgDn", "scroll", 5)),
+        }
+        items
+    }
+
+    fn header(&self, area: Rect, buf: &mut Buffer) {
+        let (theme, glyphs) = (self.theme, self.theme.glyphs);
+        let place = format!("entry {} of {}", self.place + 1, self.lines.len());
+        let robot = self.session.robot.as_ref().map_or("no robot yet", |robot| robot.profile.title());
+        let title = glyphs.show(&["replay", &self.session.name, robot].join(glyphs.dot()));
+        let room = usize::from(area.width).saturating_sub(width(&place) + 2);
+        paint::text(buf, area, (0, 0), &shortened(&title, room, glyphs), theme.style(Role::Title));
+        let column = u16::try_from(usize::from(area.width).saturating_sub(width(&place))).unwrap_or(0);
+        paint::text(buf, area, (column, 0), &place, theme.style(Role::Title));
+
+        let samples = self.session.counted().count();
+        let mut parts = vec![
+            self.lines.get(self.place).map_or_else(String::new, |line| format!("{:.0}", line.time)),
+            format!("{samples} {}", if samples == 1 { "sample" } else { "samples" }),
+        ];
+        parts.push(format!("step {} of 8: {}", self.session.step.number(), self.session.step));
+        if self.session.identified.is_some() {
+            parts.push(if self.session.is_current() { "identified" } else { "result out of date" }.to_owned());
+        }
+        let line = shortened(&glyphs.show(&parts.join(glyphs.dot())), area.width.into(), glyphs);
+        paint::text(buf, area, (0, 1), &line, theme.style(Role::Dim));
+    }
+
+    fn timeline(&self, area: Rect, buf: &mut Buffer) {
+        let (theme, glyphs) = (self.theme, self.theme.glyphs);
+        let speed = SPEEDS.get(self.speed).copied().unwrap_or(1.0);
+        let state = format!("{} {speed}/s", if self.is_playing { "playing" } else { "paused" });
+        let columns = usize::from(area.width).saturating_sub(width(&state) + 2);
+        // A session of one entry is at its end.
+        let done = match self.lines.len().saturating_sub(1) {
+            0 => columns,
+            last => (columns * self.place).div_ceil(last).min(columns),
+        };
+        let column = paint::text(buf, area, (0, 3), &glyphs.bar_done().repeat(done), theme.style(Role::Ok));
+        let column =
+            paint::text(buf, area, (column, 3), &glyphs.bar_left().repeat(columns - done), theme.style(Role::Dim));
+        paint::text(buf, area, (column + 2, 3), &state, theme.style(Role::Dim));
+    }
+
+    /// An entry with its number, in words.
+    fn words(&self, place: usize) -> String {
+        self.lines.get(place).map_or_else(String::new, |line| {
+            let text = line.entry.describe();
+            self.theme.glyphs.show(&format!("{} {}", line.number, text.replace('\n', " ")))
+        })
+    }
+
+    fn robot(&self, area: Rect, buf: &mut Buffer) {
+        let theme = self.theme;
+        let scene = self.scene();
+        let left = if scene.is_some() { (area.width * 2 / 5).max(ENTRIES).min(area.width) } else { area.width };
+        let list = Rect { width: left, ..area };
+        let rows = usize::from(area.height);
+        let first = self.place.saturating_sub(BEFORE).min(self.lines.len().saturating_sub(rows));
+        for (row, place) in (0..area.height).zip(first..self.lines.len()) {
+            let style = match place.cmp(&self.place) {
+                std::cmp::Ordering::Less => theme.style(Role::Plain),
+                std::cmp::Ordering::Equal => theme.style(Role::Focus),
+                std::cmp::Ordering::Greater => theme.style(Role::Dim),
+            };
+            let mark = if place == self.place { ">" } else { " " };
+            let room = usize::from(left.saturating_sub(4));
+            let line = format!("{mark} {}", shortened(&self.words(place), room, theme.glyphs));
+            paint::text(buf, list, (0, row), &line, style);
+        }
+        if let Some(scene) = &scene {
+            let right = Rect { x: area.x + left, width: area.width - left, ..area };
+            Preview { scene, camera: &self.camera, theme }.render(right, buf);
+        }
+    }
+
+    /// Lines of a page of text.
+    fn page_lines(&self) -> Vec<String> {
+        match self.page {
+            Page::Robot => Vec::new(),
+            Page::Samples => self.sample_lines(),
+            Page::Result => match &self.session.identified {
+                None => vec!["Not identified yet.".to_owned()],
+                Some(result) => (self.tables)(&result.summary).lines().map(str::to_owned).collect(),
+            },
+        }
+    }
+
+    /// Last line that can be the first one shown.
+    pub(super) fn last_line(&self) -> usize {
+        self.page_lines().len().saturating_sub(1)
+    }
+
+    /// The samples so far as a table, latest first.
+    fn sample_lines(&self) -> Vec<String> {
+        let head = format!(
+            "{:>4}  {:<8} {:<14} {:<10} {:>10} {:>10} {:>10}",
+            "no.", "pose", "for", "state", "x mm", "y mm", "z mm"
+        );
+        let lines = self.session.samples.iter().rev().map(|sample| self.sample_line(sample));
+        std::iter::once(head).chain(lines).collect()
+    }
+
+    fn sample_line(&self, sample: &Sample) -> String {
+        let kind = match self.session.kind_of(sample) {
+            PoseKind::Identification => "identification",
+            PoseKind::Verification => "verification",
+            PoseKind::Drift => "drift",
+            PoseKind::Home | PoseKind::Via => "on the way",
+        };
+        let state = match sample.state {
+            SampleState::Counts => "counts",
+            SampleState::Superseded => "again",
+            SampleState::LeftOut => "left out",
+            SampleState::Undone => "taken back",
+        };
+        let [x, y, z] = self.session.point_of(sample).coords.map(to_mm).into();
+        let pose = self.session.pose_of(sample);
+        let number = sample.noted.number;
+        format!("{number:>4}  {pose:<8} {kind:<14} {state:<10} {x:>10.3} {y:>10.3} {z:>10.3}")
+    }
+}

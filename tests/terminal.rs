@@ -1,0 +1,333 @@
+//! The wizard in a real terminal: walked by keys, resized, suspended, flooded, and abandoned in every step.
+//!
+//! What is looked for is stable: the step in the header, `saved`, what a key does.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    clippy::panic,
+    reason = "a failure of a test is a panic; deadlines need a clock; test files need no atomic writes"
+)]
+#![cfg(target_os = "linux")]
+
+#[path = "support/pty.rs"]
+#[expect(dead_code, reason = "some of it is for the benchmark")]
+mod pty;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::Duration;
+
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+use pty::{CTRL_U, CTRL_Z, ENTER, PATIENCE, Terminal, processor_seconds};
+use trupose::session::journal::Entry;
+use trupose::session::set_up::Step;
+use trupose::session::state::Session;
+use trupose::store::session::read_journal;
+
+/// A terminal that went away is noticed within this.
+const GONE: Duration = Duration::from_secs(1);
+/// Processor time (s) that closing a session may take.
+const CLOSING: f64 = 0.3;
+const SIZE: (u16, u16) = (80, 24);
+const POSES: usize = 18;
+
+/// Steps of a script that end in each step of the wizard.
+const SCRIPT: [&str; 7] = [
+    "Do(ChooseProfile(\"soochow\")), Do(NameSession(\"s\")), Do(Next)",
+    "Do(ChooseInstrument(Simulated((seed: 1, truth: Paper)))), Do(Next)",
+    "Do(ChooseTarget(Profile)), Do(Next)",
+    "Do(LoadPlan(\"plan.csv\")), Do(AcceptPlan)",
+    "CaptureAll(Fail), Do(Next)",
+    "Do(Identify), Do(Next)",
+    "Do(Next)",
+];
+
+/// A folder in which the program runs.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("plan.csv"), include_str!("sessions/plan.csv")).unwrap();
+        Self(folder)
+    }
+
+    fn session(&self) -> PathBuf {
+        self.0.path().join("sessions/s")
+    }
+
+    /// A session that is in `step`.
+    fn session_in(&self, step: Step) {
+        let steps = SCRIPT[..step.number() - 1].join(", ");
+        let script = format!("(title: \"test\", steps: [{steps}])");
+        fs::write(self.0.path().join("to.script.ron"), script).unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
+        let output = command.current_dir(self.0.path()).args(["--script", "to.script.ron"]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+
+    /// The wizard in a terminal, with the first step shown.
+    fn wizard(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Terminal {
+        let arguments = [&["wizard", "--profile", "soochow"], arguments].concat();
+        let program = env!("CARGO_BIN_EXE_trupose");
+        let terminal = Terminal::start_with(self.0.path(), program, &arguments, SIZE, variables);
+        terminal.wait_for_step(1);
+        terminal
+    }
+
+    /// The wizard with a session in `step`.
+    fn resumed(&self, step: Step) -> Terminal {
+        self.session_in(step);
+        let terminal = Terminal::start(self.0.path(), &["resume", "sessions/s"], SIZE);
+        terminal.wait_for_step(u32::try_from(step.number()).unwrap());
+        terminal.wait_for_text("· saved ·");
+        terminal
+    }
+
+    /// The journal makes a session and ends in good order.
+    #[track_caller]
+    fn is_closed(&self) -> Session {
+        let journal = read_journal(&self.session()).unwrap();
+        let last = journal.lines.last().unwrap();
+        assert!(matches!(last.entry, Entry::Closed { .. }), "{last:?}");
+        assert_eq!(journal.torn_bytes, 0);
+        Session::of(&journal).unwrap()
+    }
+}
+
+/// What is written when the terminal is given back, in this order.
+#[track_caller]
+fn is_given_back(terminal: &Terminal) {
+    let raw = String::from_utf8_lossy(&terminal.raw()).into_owned();
+    let place = |code: &str| raw.rfind(code).unwrap_or_else(|| panic!("{code:?} was not written"));
+    assert!(place("\u{1b}[?25h") > place("\u{1b}[?25l"), "the cursor is hidden");
+    assert!(place("\u{1b}[?2004l") > place("\u{1b}[?2004h"), "paste is bracketed");
+    assert!(place("\u{1b}[?1049l") > place("\u{1b}[?1049h"), "the other screen is shown");
+    assert!(place("\u{1b}[?1049l") > place("\u{1b}[?25h"), "not in reverse order");
+    terminal.look(|shown| {
+        assert!(!shown.screen().alternate_screen() && !shown.screen().hide_cursor());
+        assert!(!shown.screen().bracketed_paste());
+    });
+}
+
+#[test]
+fn the_whole_calibration_is_walked_by_keys() {
+    let place = Place::new();
+    // The program sees the modes as the shell has set them: so they must be when it has ended.
+    let program = env!("CARGO_BIN_EXE_trupose");
+    let line = format!("stty -a; '{program}' wizard --profile soochow; echo \"code $?\"; stty -a; echo over");
+    let mut terminal = Terminal::start_with(place.0.path(), "bash", &["-c", &line], SIZE, &[]);
+    terminal.wait_for_step(1);
+    assert!(terminal.look(|shown| shown.screen().alternate_screen() && shown.screen().hide_cursor()));
+    terminal.wait_for("the robot", |shown| shown.has("not saved yet"));
+    terminal.send(ENTER);
+    terminal.wait_for_step(2);
+    terminal.send("c");
+    terminal.send(ENTER);
+    terminal.wait_for("the instrument", |shown| shown.has("simulated") && !shown.has("no instrument"));
+    terminal.send_until("n", "step 3", |shown| shown.step() == Some(3));
+    terminal.send("p");
+    terminal.send_until("n", "step 4", |shown| shown.step() == Some(4));
+    terminal.send("l");
+    terminal.send(&format!("{CTRL_U}plan.csv{ENTER}"));
+    terminal.send_until("a", "step 5", |shown| shown.step() == Some(5));
+    for pose in 1..=POSES {
+        terminal.send("m");
+        terminal.wait_for(&format!("sample {pose}"), |shown| shown.samples() == pose && shown.has("· saved ·"));
+    }
+    terminal.send_until("n", "step 6", |shown| shown.step() == Some(6));
+    terminal.send("i");
+    terminal.send_until("n", "step 7", |shown| shown.step() >= Some(7));
+    terminal.send_until("n", "step 8", |shown| shown.step() == Some(8));
+    terminal.send("d");
+    let folder = fs::read_dir(place.0.path().join("sessions")).unwrap().next().unwrap().unwrap().path();
+    terminal.wait_for("the files", |_| folder.join("calibration.ron").exists());
+    terminal.wait_for("what was done is saved", |shown| shown.has("· saved ·"));
+    terminal.send("q");
+    terminal.send("y");
+    terminal.wait_for_text("over");
+    assert_eq!(terminal.end(PATIENCE, 0.0).0, 0);
+    let raw = String::from_utf8(terminal.raw()).unwrap();
+    assert!(raw.contains("code 0\r\n"), "{raw}");
+    let (before, rest) = raw.split_once("\u{1b}[?1049h").unwrap();
+    let (_, after) = rest.split_once("code 0\r\n").unwrap();
+    assert!(before.contains(" echo ") && before.contains(" icanon "), "{before}");
+    assert_eq!(after.replace("over\r\n", ""), before);
+    is_given_back(&terminal);
+    let session = Session::of(&read_journal(&folder).unwrap()).unwrap();
+    assert!(session.closed && session.delivered.iter().any(|file| file.contains("calibration.ron")));
+    assert_eq!(session.counted().count(), POSES);
+}
+
+#[test]
+fn a_terminal_that_goes_away_in_any_step_ends_the_program_in_good_order() {
+    for step in Step::ALL {
+        for hangs_up in [true, false] {
+            let place = Place::new();
+            let mut terminal = if step == Step::Profile { place.wizard(&[], &[]) } else { place.resumed(step) };
+            let used = processor_seconds(terminal.process());
+            if hangs_up {
+                terminal.hang_up();
+            } else {
+                terminal.signal("HUP");
+            }
+            let (code, used) = terminal.end(GONE, used);
+            assert_eq!(code, 129, "{step}");
+            assert!(used < CLOSING, "{step}: {used} s of processor time");
+            if step == Step::Profile && !hangs_up {
+                assert!(!place.session().exists());
+            } else if step != Step::Profile {
+                assert!(place.is_closed().closed);
+            }
+        }
+    }
+}
+
+#[test]
+fn sigterm_closes_the_session_and_gives_the_terminal_back() {
+    let place = Place::new();
+    let mut terminal = place.resumed(Step::Capture);
+    terminal.signal("TERM");
+    assert_eq!(terminal.end(PATIENCE, 0.0).0, 143);
+    terminal.wait_for("what it says", |shown| shown.has("trupose resume sessions/s"));
+    is_given_back(&terminal);
+    assert!(terminal.modes().contains("ICANON") && terminal.modes().contains("ECHO"), "{}", terminal.modes());
+    assert_eq!(place.is_closed().step, Step::Capture);
+}
+
+#[test]
+fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
+    let place = Place::new();
+    let program = env!("CARGO_BIN_EXE_trupose");
+    let line = format!(
+        "set -m; '{program}' wizard --profile soochow; echo stopped; stty -a; read answer; fg >/dev/null; echo \"code $?\"; stty -a"
+    );
+    let mut terminal = Terminal::start_with(place.0.path(), "bash", &["-c", &line], SIZE, &[]);
+    terminal.wait_for_step(1);
+    terminal.send(CTRL_Z);
+    terminal.wait_for("the shell", |shown| shown.has("stopped") && shown.has(" icanon "));
+    is_given_back(&terminal);
+    terminal.send("go\n");
+    terminal.wait_for("all of it again", |shown| {
+        shown.step() == Some(1) && shown.screen().alternate_screen() && shown.has("quit")
+    });
+    // It takes keys again.
+    terminal.send("?");
+    terminal.wait_for_text("the picture of the robot");
+    // The last key means nothing any more; what the others did is drawn all the same.
+    terminal.send(" q\u{1b}");
+    terminal.wait_for("no help", |shown| !shown.has("the picture of the robot"));
+    terminal.send("q");
+    terminal.send_until("y", "the end", |shown| shown.has("code 0"));
+    assert_eq!(terminal.end(PATIENCE, 0.0).0, 0);
+    is_given_back(&terminal);
+}
+
+#[test]
+fn any_size_will_do_and_a_small_one_says_what_it_needs() {
+    let place = Place::new();
+    let mut terminal = place.wizard(&[], &[]);
+    terminal.resize((40, 10));
+    terminal.wait_for_text("terminal 40x10, need 60x18");
+    terminal.resize(SIZE);
+    terminal.wait_for("the step again", |shown| shown.step() == Some(1) && shown.has("quit"));
+    terminal.resize((0, 0));
+    // Keys are still taken: the help page is open when there is room again.
+    terminal.send("?");
+    terminal.resize((1, 1));
+    terminal.resize(SIZE);
+    terminal.wait_for_text("the picture of the robot");
+    terminal.resize((200, 50));
+    terminal.wait_for("all of it, large", |shown| shown.step() == Some(1) && shown.text().lines().count() >= 49);
+    terminal.resize((0, 0));
+    terminal.signal("TERM");
+    assert_eq!(terminal.end(PATIENCE, 0.0).0, 143);
+}
+
+/// Codes of all `ESC [ … m` that were written.
+fn looks(raw: &[u8]) -> Vec<u32> {
+    let text = String::from_utf8_lossy(raw).into_owned();
+    let sequences = text.split("\u{1b}[").skip(1).filter_map(|rest| {
+        let end = rest.find(|c: char| c.is_ascii_alphabetic())?;
+        (rest.get(end..=end) == Some("m")).then(|| rest.get(..end).unwrap_or_default().to_owned())
+    });
+    sequences.flat_map(|codes| codes.split(';').map(|code| code.parse().unwrap_or(0)).collect::<Vec<_>>()).collect()
+}
+
+const fn is_colour(code: u32) -> bool {
+    matches!(code, 30..=49 | 90..=107)
+}
+
+/// Everything that is written on the way through the first steps.
+fn written_on_a_walk(arguments: &[&str], variables: &[(&str, &str)]) -> Vec<u8> {
+    let place = Place::new();
+    let mut terminal = place.wizard(arguments, variables);
+    terminal.send("?");
+    terminal.wait_for_text("the picture of the robot");
+    terminal.send("\u{1b}");
+    terminal.wait_for("the step", |shown| !shown.has("the picture of the robot"));
+    terminal.send_until("n", "step 2", |shown| shown.step() == Some(2));
+    terminal.send("n");
+    terminal.send_until("b", "step 1", |shown| shown.step() == Some(1));
+    terminal.signal("TERM");
+    terminal.end(PATIENCE, 0.0);
+    terminal.raw()
+}
+
+#[test]
+fn no_color_and_ascii_are_kept_to() {
+    let usual = written_on_a_walk(&[], &[]);
+    assert!(looks(&usual).into_iter().any(|code| is_colour(code) && !matches!(code, 39 | 49)));
+    assert!(!usual.is_ascii());
+    for variables in [&[("NO_COLOR", "1")][..], &[]] {
+        let arguments: &[&str] = if variables.is_empty() { &["--color", "never"] } else { &[] };
+        let colours: Vec<u32> =
+            looks(&written_on_a_walk(arguments, variables)).into_iter().filter(|code| is_colour(*code)).collect();
+        let allowed: &[u32] = if variables.is_empty() { &[39, 49] } else { &[] };
+        assert!(colours.iter().all(|code| allowed.contains(code)), "{arguments:?}: {colours:?}");
+    }
+    for (arguments, variables) in [(&["--ascii"][..], &[][..]), (&[], &[("LANG", "C")])] {
+        let written = written_on_a_walk(arguments, variables);
+        assert!(written.is_ascii(), "{}", String::from_utf8_lossy(&written));
+    }
+}
+
+/// Bytes as a broken line or a cat on the keyboard sends them, without what makes the program give the terminal back: then
+/// such bytes are signals.
+fn garbage() -> impl Strategy<Value = Vec<u8>> {
+    let piece = prop_oneof![
+        prop::collection::vec(any::<u8>(), 1..12),
+        "\u{1b}\\[[0-9;?<>]{0,12}[@-~]".prop_map(String::into_bytes),
+        "\u{1b}[OPN\\]_^][ -~]{0,6}".prop_map(String::into_bytes),
+        "\u{1b}\\[200~[ -~\u{1b}\r\n]{0,40}\u{1b}\\[201~".prop_map(String::into_bytes),
+    ];
+    let harmless = |byte: u8| if matches!(byte, b'q' | 0x03 | 0x1a | 0x1c) { b'x' } else { byte };
+    prop::collection::vec(piece, 600..700).prop_map(move |pieces| pieces.concat().into_iter().map(harmless).collect())
+}
+
+#[test]
+fn garbage_does_not_make_it_fail() {
+    let settings = Config { cases: 4, max_shrink_iters: 0, failure_persistence: None, ..Config::default() };
+    let outcome = TestRunner::new(settings).run(&garbage(), |bytes| {
+        let place = Place::new();
+        let mut terminal = place.wizard(&[], &[]);
+        let bytes: Vec<u8> = bytes.iter().copied().cycle().take(10_000).collect();
+        for piece in bytes.chunks(1000) {
+            terminal.send_bytes(piece);
+            // What is pasted must end, or all the rest is a part of it.
+            terminal.send("\u{1b}[201~");
+        }
+        // What is drawn anew has been drawn after all of it.
+        terminal.resize((81, 24));
+        terminal.wait_for("a step", |shown| shown.step().is_some());
+        terminal.signal("TERM");
+        let (code, _) = terminal.end(PATIENCE, 0.0);
+        let said = String::from_utf8_lossy(&terminal.raw()).into_owned();
+        assert!(code == 143 && !said.contains("defect"), "{code}: {}", terminal.text());
+        Ok(())
+    });
+    outcome.unwrap();
+}
