@@ -239,7 +239,8 @@ fn any_size_will_do_and_a_small_one_says_what_it_needs() {
     terminal.send("?");
     terminal.resize((1, 1));
     terminal.resize(SIZE);
-    terminal.wait_for_text("the picture of the robot");
+    // crossterm 0.29 leaves a key that comes together with a new size unread until the next one: Up only scrolls.
+    terminal.send_until("\u{1b}[A", "help", |shown| shown.has("the picture of the robot"));
     terminal.resize((200, 50));
     terminal.wait_for("all of it, large", |shown| shown.step() == Some(1) && shown.text().lines().count() >= 49);
     terminal.resize((0, 0));
