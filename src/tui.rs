@@ -47,6 +47,8 @@ use ui::{Ui, Wish};
 
 /// Shortest time between two frames: more would only fill an SSH line.
 const FRAME: Duration = Duration::from_millis(50);
+/// What is under way gets this long to end before the change is drawn: saving an entry is shown only where it takes longer.
+const SETTLE: Duration = Duration::from_millis(15);
 /// Longest wait when there is nothing to do; something always ends it.
 const IDLE: Duration = Duration::from_hours(1);
 /// Longest wait for the last entry of the journal when the terminal is gone.
@@ -146,6 +148,7 @@ impl Driver<'_> {
         let mut view = self.engine.wizard().view();
         self.ui.refresh(&view, self.engine.wizard().session());
         let mut drawn: Option<Instant> = None;
+        let mut changed: Option<Instant> = None;
         let mut is_due = true;
         loop {
             if received.signal() == Some(SIGHUP) {
@@ -154,7 +157,13 @@ impl Driver<'_> {
             if self.engine.has_exited() {
                 return End::Exited;
             }
-            let early = drawn.map_or(Duration::ZERO, |drawn| FRAME.saturating_sub(since(drawn)));
+            if !is_due {
+                changed = None;
+            }
+            let mut early = drawn.map_or(Duration::ZERO, |drawn| FRAME.saturating_sub(since(drawn)));
+            if is_due && !self.engine.wizard().is_idle() {
+                early = early.max(SETTLE.saturating_sub(since(*changed.get_or_insert_with(now))));
+            }
             if is_due && early.is_zero() {
                 if self.draw(&view).is_err() {
                     return End::Gone;
