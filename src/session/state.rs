@@ -19,6 +19,9 @@ use crate::kinematics::JointType;
 use crate::profile::Profile;
 use crate::units::from_mm;
 
+/// A longer time between two entries (s) is a break, or a clock that was set.
+const LONGEST_STEP: f64 = 3600.0;
+
 /// A session.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Session {
@@ -30,6 +33,10 @@ pub struct Session {
     pub opened: Option<Timestamp>,
     /// Time of the latest entry (clocks may jump back: this is the largest).
     pub latest: Option<Timestamp>,
+    /// Time of the last entry, as its clock had it.
+    pub last: Option<Timestamp>,
+    /// Time of work (s): from entry to entry, without the pauses between programs, and without leaps of the clock.
+    pub worked: f64,
     /// Entries so far.
     pub lines: u64,
     /// The robot.
@@ -265,6 +272,11 @@ impl Session {
             }
             Entry::Closed { .. } => self.closed = true,
         }
+        if let (Some(before), false) = (self.last, matches!(line.entry, Entry::Resumed { .. })) {
+            let seconds = line.time.duration_since(before).as_secs_f64();
+            self.worked += if (0.0..LONGEST_STEP).contains(&seconds) { seconds } else { 0.0 };
+        }
+        self.last = Some(line.time);
         self.lines = line.number;
         self.latest = self.latest.max(Some(line.time));
         Ok(())

@@ -54,7 +54,7 @@ pub struct Header {
     pub instrument: Option<String>,
     /// Samples that count.
     pub samples: usize,
-    /// Minutes from the first to the latest entry.
+    /// Minutes of work, breaks not counted.
     pub elapsed_min: f64,
     /// Entries of the journal that are safely on disk.
     pub saved_entries: u64,
@@ -456,10 +456,7 @@ pub struct DeliverView {
 pub(super) fn build(wizard: &Wizard) -> ViewModel {
     let session = &wizard.session;
     let step = wizard.phase.step();
-    let elapsed = match (session.opened, session.latest) {
-        (Some(opened), Some(latest)) => (latest.as_millisecond() - opened.as_millisecond()).max(0) as f64 / 60_000.0,
-        _ => 0.0,
-    };
+    let elapsed = session.worked / 60.0;
     ViewModel {
         header: Header {
             robot: session.robot.as_ref().map(|robot| robot.profile.title().to_owned()),
