@@ -48,7 +48,7 @@ use ui::{Ui, Wish};
 /// Shortest time between two frames: more would only fill an SSH line.
 const FRAME: Duration = Duration::from_millis(50);
 /// What is under way gets this long to end before the change is drawn: saving an entry is shown only where it takes longer.
-const SETTLE: Duration = Duration::from_millis(15);
+const SETTLE: Duration = Duration::from_millis(40);
 /// Longest wait when there is nothing to do; something always ends it.
 const IDLE: Duration = Duration::from_hours(1);
 /// Longest wait for the last entry of the journal when the terminal is gone.
