@@ -157,9 +157,6 @@ impl Driver<'_> {
             if self.engine.has_exited() {
                 return End::Exited;
             }
-            if !is_due {
-                changed = None;
-            }
             let mut early = drawn.map_or(Duration::ZERO, |drawn| FRAME.saturating_sub(since(drawn)));
             if is_due && !self.engine.wizard().is_idle() {
                 early = early.max(SETTLE.saturating_sub(since(*changed.get_or_insert_with(now))));
@@ -169,6 +166,7 @@ impl Driver<'_> {
                     return End::Gone;
                 }
                 drawn = Some(now());
+                changed = None;
                 is_due = false;
             }
             let timeout = if is_due { early } else { IDLE };
