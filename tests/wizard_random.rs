@@ -30,9 +30,9 @@ use trupose::wizard::{
 };
 
 /// Streams of events.
-const SEEDS: u64 = 64;
+const SEEDS: u64 = 16;
 /// Events of a stream.
-const EVENTS: usize = 2000;
+const EVENTS: usize = 10_000;
 
 /// A wizard, what it waits for, and what is true about it.
 struct Cell {
