@@ -12,8 +12,10 @@
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
-//! - [`runtime`], [`error`]: threads for what is pure itself; how a command ends and what the operator is told.
+//! - [`search`], [`error`]: a pose search on several threads; how a command ends and what the operator is told.
 //! - [`procedure`]: the calibration itself on data in memory, the same for commands and wizard. No files, no clock.
+//! - [`wizard`]: the guided calibration as a pure state machine.
+//! - [`runtime`]: turns its effects into work on threads, and answers into events.
 //! - [`script`], [`tui`]: the two drivers of the [`wizard`], without and with a terminal.
 //! - [`cli`], [`app`]: what was typed, and what is done about it.
 //!
