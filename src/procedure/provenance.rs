@@ -1,8 +1,7 @@
 //! Where results come from: program, profile and inputs with their hashes.
 
-use sha2::{Digest as _, Sha256};
-
 use crate::profile::Profile;
+use crate::session::sha256;
 use crate::session::summary::{InputFile, Provenance};
 
 /// The record of an input that was read from `file` in the role of `identification`, `verification`, `calibration` or `plan`.
@@ -20,9 +19,4 @@ pub(crate) fn provenance(profile: &Profile, profile_text: &str, created: String,
         profile_sha256: sha256(profile_text.as_bytes()),
         inputs,
     }
-}
-
-/// SHA-256 in hexadecimal.
-fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
 }

@@ -223,7 +223,11 @@ impl Calibration {
     ///
     /// `None`: a parameter that this robot does not have.
     pub fn identified_chain(&self, profile: &Profile) -> Option<KinematicChain> {
-        let known = profile.free_parameters(Level::Geometric);
+        // A target that was left free only here has coordinates among the parameters.
+        let known = self
+            .mounted
+            .map_or_else(|| profile.clone(), |mounted| mounted.on(profile))
+            .free_parameters(Level::Geometric);
         let deviations: Option<Vec<_>> = self
             .parameters
             .iter()
