@@ -7,6 +7,7 @@ mod plan;
 mod profile;
 mod program;
 mod progress;
+mod record;
 mod replay;
 mod script;
 mod session;
@@ -72,6 +73,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
                 sessions: args.sessions,
                 json: false,
                 record_script: args.record_script,
+                recording: args.recording,
             };
             wizard::run(args.profile.as_deref(), &place, args.terminal, console)
         }
@@ -82,6 +84,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Constraints(args) => constraints::run(&args, console),
         Command::Plan(args) => plan::run(&args, console),
         Command::Program(args) => program::run(&args, console),
+        Command::Record(command) => record::run(&command, console),
         Command::Profile(command) => profile::run(&command, console),
     }
 }

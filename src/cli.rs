@@ -1,4 +1,7 @@
-//! The command line: what was typed. The only reader of the environment is clap.
+//! The command line: what was typed. The only reader of the environment is clap, but for what concerns the terminal.
+
+mod recording;
+mod terminal;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -12,6 +15,9 @@ use crate::profile::{ExpectedDeviation, Level};
 use crate::program::{DEFAULT_DWELL, Dialect, MAX_SPEED};
 use crate::session::measurements::Layout;
 use crate::units::from_mm;
+
+pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
+pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
 
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
 ///
@@ -33,69 +39,6 @@ pub struct Cli {
     pub terminal: TerminalArgs,
 }
 
-/// How to use the terminal.
-#[derive(Args, Clone, Copy, Debug, Default)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
-pub struct TerminalArgs {
-    /// Colours: when the terminal has them and NO_COLOR is not set, always, or never
-    #[arg(long, value_enum, default_value_t, value_name = "WHEN")]
-    pub color: ColorArg,
-    /// No characters but ASCII [default: only where the locale is not UTF-8]
-    #[arg(long)]
-    pub ascii: bool,
-    /// Draw with blocks instead of braille, for fonts without it
-    #[arg(long, conflicts_with = "ascii")]
-    pub blocks: bool,
-    /// Take the mouse wheel; the terminal's own selection then needs Shift
-    #[arg(long)]
-    pub mouse: bool,
-    /// Plain lines instead of a full screen [default: only where TERM is 'dumb']
-    #[arg(long)]
-    pub plain: bool,
-}
-
-/// `--color`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum ColorArg {
-    /// Unless NO_COLOR is set
-    #[default]
-    Auto,
-    /// Even if NO_COLOR is set
-    Always,
-    /// Never
-    Never,
-}
-
-/// What the environment says about the terminal.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct TerminalEnvironment {
-    /// `TERM`.
-    pub term: Option<String>,
-    /// `NO_COLOR` is set and not empty (no-color.org).
-    pub no_color: bool,
-    /// The locale's characters are UTF-8.
-    pub is_utf8: bool,
-}
-
-impl TerminalEnvironment {
-    /// As it is.
-    pub fn read() -> Self {
-        #[expect(clippy::disallowed_methods, reason = "the one place that reads the environment")]
-        let read = |name: &str| std::env::var(name).ok();
-        Self::from_variables(read)
-    }
-
-    fn from_variables(read: impl Fn(&str) -> Option<String>) -> Self {
-        let set = |name: &str| read(name).filter(|value| !value.is_empty());
-        let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default().to_ascii_lowercase();
-        Self {
-            term: set("TERM"),
-            no_color: set("NO_COLOR").is_some(),
-            is_utf8: locale.ends_with("utf-8") || locale.ends_with("utf8"),
-        }
-    }
-}
-
 /// Arguments of `wizard`.
 #[derive(Args, Clone, Debug)]
 pub struct WizardArgs {
@@ -108,6 +51,9 @@ pub struct WizardArgs {
     /// Write what was done as a script
     #[arg(long, value_name = "FILE")]
     pub record_script: Option<PathBuf>,
+    /// What is recorded.
+    #[command(flatten)]
+    pub recording: RecordingArgs,
     /// How to use the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
@@ -128,6 +74,9 @@ pub struct ScriptArgs {
     /// Write what was done as a script
     #[arg(long, value_name = "FILE")]
     pub record_script: Option<PathBuf>,
+    /// What is recorded.
+    #[command(flatten)]
+    pub recording: RecordingArgs,
 }
 
 /// Arguments of `demo`.
@@ -161,8 +110,8 @@ pub struct ResumeArgs {
 /// Arguments of `replay`.
 #[derive(Args, Clone, Debug)]
 pub struct ReplayArgs {
-    /// Folder of the session
-    #[arg(value_name = "DIR")]
+    /// Folder of the session, or a recording of it
+    #[arg(value_name = "DIR|FILE.rrd")]
     pub folder: PathBuf,
     /// Entry of the journal to begin with [default: the first; with '--print' and '--csv' the last]
     #[arg(long, value_name = "N")]
@@ -237,6 +186,9 @@ pub enum Command {
     /// List, show or export sessions
     #[command(subcommand)]
     Session(SessionCommand),
+    /// Make, compact or check recordings for the 3D viewer
+    #[command(subcommand)]
+    Record(RecordCommand),
     /// List, show or check robot profiles
     #[command(subcommand)]
     Profile(ProfileCommand),
@@ -297,6 +249,9 @@ pub struct EstimationArgs {
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
 pub struct IdentifyArgs {
+    /// What is recorded.
+    #[command(flatten)]
+    pub record: RecordArgs,
     /// How to identify.
     #[command(flatten)]
     pub estimation: EstimationArgs,
@@ -366,6 +321,9 @@ pub struct ConstraintsArgs {
 /// Arguments of `plan`.
 #[derive(Args, Debug)]
 pub struct PlanArgs {
+    /// What is recorded.
+    #[command(flatten)]
+    pub record: RecordArgs,
     /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
     #[arg(long, value_name = "NAME|FILE")]
     pub profile: String,

@@ -61,6 +61,17 @@ fn horn_rotation(cross: &Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(vector[0], vector[1], vector[2], vector[3]))
 }
 
+/// How many times longer something of length `largest` (m) is drawn so that it is about `shown` (m) long: 1, 2 or 5 times a
+/// power of ten, not more than that and at least 1.
+pub fn enlargement(largest: f64, shown: f64) -> f64 {
+    let factor = shown / largest;
+    if !factor.is_finite() || factor < 1.0 {
+        return 1.0;
+    }
+    let power = 10_f64.powf(factor.log10().floor());
+    [5.0, 2.0].into_iter().map(|step| step * power).find(|round| *round <= factor).unwrap_or(power)
+}
+
 /// Root mean square spread of points along their principal axes (m), largest first: `(0.5, 0.3, 0.0)` is a flat set.
 pub fn principal_spread<'a>(points: impl Iterator<Item = &'a Point3<f64>> + Clone) -> [f64; 3] {
     let count = points.clone().count();

@@ -23,6 +23,7 @@ mod linearise;
 mod observability;
 mod pairs;
 pub mod plausibility;
+pub mod predicted;
 mod problem;
 mod result;
 mod robust;
@@ -100,6 +101,7 @@ pub fn identify_while(
         basis: &basis,
         weights: Weights::uniform(problem, settings.sigma.map_or(FIRST_SIGMA, |(sigma, _)| sigma.max(SMALLEST_SIGMA))),
         iterations: Vec::new(),
+        path: Vec::new(),
         progress,
     };
     let zero = DVector::zeros(basis.transform.ncols());
@@ -117,6 +119,7 @@ pub fn identify_while(
             // From the start: the steps on record are those that lead to the result.
             fit.weights = trusted;
             fit.iterations.clear();
+            fit.path.clear();
             at = fit.solve(zero)?;
         }
     }
@@ -125,8 +128,18 @@ pub fn identify_while(
         return Err(IdentificationError::Diverged);
     }
     check_chirality(problem, &at.model, Some(&fit.weights))?;
-    let Fit { weights, iterations, .. } = fit;
-    Ok(summarise(Solved { problem, settings, basis: &basis, weights, iterations, termination, at, observability }))
+    let Fit { weights, iterations, path, .. } = fit;
+    Ok(summarise(Solved {
+        problem,
+        settings,
+        basis: &basis,
+        weights,
+        iterations,
+        path,
+        termination,
+        at,
+        observability,
+    }))
 }
 
 /// Whether every point comes with its own σ.
@@ -142,6 +155,7 @@ struct Fit<'a, 'p> {
     basis: &'a Basis,
     weights: Weights,
     iterations: Vec<Iteration>,
+    path: Vec<DVector<f64>>,
     progress: &'a mut dyn FnMut(&Iteration) -> ControlFlow<()>,
 }
 
@@ -159,12 +173,13 @@ impl Fit<'_, '_> {
             };
             let before = self.iterations.len();
             let left = self.settings.iterations.saturating_sub(before).max(usize::from(before == 0));
-            let (iterations, progress) = (&mut self.iterations, &mut *self.progress);
+            let (iterations, path, progress) = (&mut self.iterations, &mut self.path, &mut *self.progress);
             let mut cancelled = false;
-            let mut record = |iteration| {
+            let mut record = |iteration, deviations: &DVector<f64>| {
                 let flow = progress(&iteration);
                 cancelled |= flow.is_break();
                 iterations.push(iteration);
+                path.push(deviations.clone());
                 flow
             };
             let (at, termination) = solve.run(z, left, &mut record);
@@ -259,13 +274,14 @@ struct Solved<'a, 'p> {
     basis: &'a Basis,
     weights: Weights,
     iterations: Vec<Iteration>,
+    path: Vec<DVector<f64>>,
     termination: TerminationReason,
     at: Linearised,
     observability: Observability,
 }
 
 fn summarise(solved: Solved<'_, '_>) -> Identification {
-    let Solved { problem, settings, basis, weights, iterations, termination, at, observability } = solved;
+    let Solved { problem, settings, basis, weights, iterations, path, termination, at, observability } = solved;
     let solve = Solve { problem, weighting: settings.weighting, basis, weights: &weights };
     let scatter = residual_sigma(&solve, &at);
     let (from_residuals, normalised) = (scatter.map(|s| s.absolute), scatter.map(|s| s.normalised));
@@ -309,6 +325,7 @@ fn summarise(solved: Solved<'_, '_>) -> Identification {
         sigma,
         rejected,
         iterations,
+        path,
         termination,
         base_from_station: at.points.base_from_station,
         residuals: at.points.of_places,

@@ -33,6 +33,7 @@ pub mod planning;
 pub mod procedure;
 pub mod profile;
 pub mod program;
+pub mod recording;
 pub mod report;
 pub mod runtime;
 pub mod script;

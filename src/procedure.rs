@@ -12,6 +12,7 @@ pub(crate) mod checks;
 pub mod circles;
 pub mod identify;
 pub mod plan;
+pub mod points;
 mod provenance;
 pub(crate) mod result;
 mod settings;

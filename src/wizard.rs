@@ -180,6 +180,10 @@ impl Wizard {
                 }
                 Vec::new()
             }
+            Event::Remark(notice) => {
+                self.notice = Some(notice);
+                Vec::new()
+            }
             Event::Shutdown { cause } => self.shut_down(cause),
         }
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::load::now;
 use super::progress::Progress;
-use super::{Console, estimation_settings, load, to_json};
+use super::{Console, estimation_settings, load, record, to_json};
 use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::checks;
@@ -69,6 +69,9 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         progress.step(iteration);
         ControlFlow::Continue(())
     })?;
+    if let Some(path) = &args.record.record {
+        record::identification(path, &estimation.profile, &request, &identified)?;
+    }
     deliver(identified.summary, identified.calibration.as_ref(), estimation, console)
 }
 

@@ -11,7 +11,7 @@ use std::thread;
 
 use super::load::{self, LoadedProfile, now};
 use super::progress::{Progress, Stopwatch};
-use super::{Console, to_json};
+use super::{Console, record, to_json};
 use crate::cli::PlanArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::planning::Stage;
@@ -59,6 +59,10 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
         let text = plan::write(&procedure::rows(&summary, &joint_types), &joint_types);
         store::replace(file, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         summary.written.push(file.display().to_string());
+    }
+    if let Some(path) = &args.record.record {
+        record::plan(path, &args.profile, profile, &loaded.text, &summary)?;
+        summary.written.push(path.display().to_string());
     }
     let text = if args.json { to_json(&summary)? } else { report::plan_text(&summary) };
     console.print(&text)?;

@@ -1,11 +1,13 @@
 //! `trupose replay DIR`: a session entry by entry, without holding or changing it.
 
 use std::io::Write;
+use std::path::Path;
 
 use super::script::session_failure;
-use super::{Console, wizard};
+use super::{Console, record, wizard};
 use crate::cli::{ReplayArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
+use crate::recording;
 use crate::report;
 use crate::session::journal::Journal;
 use crate::session::state::{SampleState, Session};
@@ -15,7 +17,7 @@ use crate::tui::replay::{self, Replay};
 use crate::units::to_mm;
 
 pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let mut journal = read_journal(&args.folder).map_err(|error| session_failure(&error))?;
+    let mut journal = journal(&args.folder, console)?;
     let damaged = |error: &dyn std::error::Error| {
         Failure::new(ExitStatus::Store, format!("session '{}': {error}", args.folder.display()))
     };
@@ -55,13 +57,40 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
     })
 }
 
-/// The entries, then the points that were measured.
+/// The journal of a session's folder, or the one that a recording carries.
+fn journal<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<Journal, Failure> {
+    if !path.is_file() {
+        return read_journal(path).map_err(|error| session_failure(&error));
+    }
+    let recording = recording::read(path).map_err(|error| record::failure(&error))?;
+    if !recording.missing.is_empty() || recording.damaged > 0 {
+        console.remark(&format!(
+            "the recording has gaps ({} entries missing, {} messages damaged); it is shown up to the first one",
+            recording.missing.len(),
+            recording.damaged
+        ));
+    }
+    recording
+        .lines()
+        .map_err(|error| Failure::new(ExitStatus::Store, format!("'{}' carries no session: {error}", path.display())))
+}
+
+/// The entries, then the points that were measured, with what they say about both arms once these are known.
 fn entries_and_points(journal: &Journal, session: &Session) -> String {
     let entries = journal.lines.iter();
     let mut lines: Vec<String> =
         entries.map(|line| format!("{:>5} {} {}", line.number, line.time, printable(&line.entry.describe()))).collect();
     lines.push(String::new());
-    lines.push(format!("{:>5} {:<12} {:>11} {:>11} {:>11}", "no.", "pose", "x mm", "y mm", "z mm"));
+    lines.push(format!(
+        "{:>5} {:<12} {:>11} {:>11} {:>11} {:>12} {:>12}  kind",
+        "no.", "pose", "x mm", "y mm", "z mm", "nominal mm", "identified mm"
+    ));
+    let errors = |number: u64| {
+        let result = session.identified.as_deref()?;
+        let index = result.samples.iter().position(|sample| *sample == number)?;
+        let norm = |(x, y, z): (f64, f64, f64)| x.hypot(y).hypot(z);
+        result.points.get(index).map(|point| (norm(point.nominal_mm), norm(point.identified_mm)))
+    };
     lines.extend(session.samples.iter().map(|sample| {
         let [x, y, z] = session.point_of(sample).coords.map(to_mm).into();
         let state = match sample.state {
@@ -71,7 +100,15 @@ fn entries_and_points(journal: &Journal, session: &Session) -> String {
             SampleState::Undone => "  taken back",
         };
         let pose = printable(session.pose_of(sample));
-        format!("{:>5} {pose:<12} {x:>11.4} {y:>11.4} {z:>11.4}{state}", sample.noted.number)
+        let (nominal, identified) = errors(sample.noted.number).map_or_else(
+            || ("-".to_owned(), "-".to_owned()),
+            |(nominal, identified)| (format!("{nominal:.4}"), format!("{identified:.4}")),
+        );
+        let kind = session.kind_of(sample);
+        format!(
+            "{:>5} {pose:<12} {x:>11.4} {y:>11.4} {z:>11.4} {nominal:>12} {identified:>13}  {kind}{state}",
+            sample.noted.number
+        )
     }));
     lines.join("\n") + "\n"
 }

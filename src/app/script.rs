@@ -7,8 +7,9 @@ use std::path::Path;
 use jiff::Timestamp;
 
 use super::{Console, load};
-use crate::cli::{DemoArgs, ScriptArgs};
+use crate::cli::{DemoArgs, RecordingArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
+use crate::recording::Live;
 use crate::report;
 use crate::runtime::{Clock, Engine, Options, signals};
 use crate::script::{Format, Outcome, Runner, Script, Transcript};
@@ -28,7 +29,8 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
-    let engine = Engine::new(options(&script, args)).map_err(|error| internal(&error))?;
+    let engine = Engine::new(Options { live: live(args.recording, console)?, ..options(&script, args) })
+        .map_err(|error| internal(&error))?;
     play(engine, &script, args, console)
 }
 
@@ -39,7 +41,8 @@ pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O,
         script_args.values.push(("seed".to_owned(), seed.to_string()));
     }
     let script = parse(DEMO, "demo", &script_args)?;
-    let engine = Engine::new(options(&script, &script_args)).map_err(|error| internal(&error))?;
+    let engine = Engine::new(Options { live: live(args.script.recording, console)?, ..options(&script, &script_args) })
+        .map_err(|error| internal(&error))?;
     play(engine, &script, &script_args, console)
 }
 
@@ -52,7 +55,7 @@ pub(super) fn resume<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
-    let engine = open(folder, options(&script, args))?;
+    let engine = open(folder, Options { live: live(args.recording, console)?, ..options(&script, args) })?;
     play(engine, &script, args, console)
 }
 
@@ -63,7 +66,28 @@ fn parse(text: &str, file: &str, args: &ScriptArgs) -> Result<Script, Failure> {
 
 fn options(script: &Script, args: &ScriptArgs) -> Options {
     let start = script.clock.as_deref().and_then(|clock| clock.parse::<Timestamp>().ok());
-    Options { sessions: args.sessions.clone(), clock: start.map_or(Clock::System, Clock::starting_at) }
+    Options {
+        sessions: args.sessions.clone(),
+        clock: start.map_or(Clock::System, Clock::starting_at),
+        is_recorded: !args.recording.no_recording,
+        live: None,
+    }
+}
+
+/// The port for a live view, if one is asked for.
+pub(super) fn live<O: Write, E: Write>(
+    args: RecordingArgs,
+    console: &mut Console<O, E>,
+) -> Result<Option<Live>, Failure> {
+    let Some(port) = args.live else { return Ok(None) };
+    let live = Live::on(port).map_err(|error| {
+        Failure::from_error(ExitStatus::Usage, &error).hint("another program listens there; give '--live' another port")
+    })?;
+    console.remark(&format!(
+        "live view: 'rerun --connect {}', through 'ssh -L {port}:127.0.0.1:{port}' from elsewhere",
+        live.url()
+    ));
+    Ok(Some(live))
 }
 
 /// Opens a session to go on with it.
@@ -71,7 +95,7 @@ pub(super) fn open(folder: &Path, options: Options) -> Result<Engine, Failure> {
     let (held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
     let session = Session::of(&journal)
         .map_err(|error| Failure::new(ExitStatus::Store, format!("session '{}': {error}", folder.display())))?;
-    Engine::resume(held, session, journal.torn_bytes, options).map_err(|error| internal(&error))
+    Engine::resume(held, session, journal, options).map_err(|error| internal(&error))
 }
 
 /// What a session error means to the operator.

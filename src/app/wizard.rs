@@ -22,7 +22,8 @@ pub(super) fn run<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
-    let mut engine = Engine::new(options(args)).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    let mut engine =
+        Engine::new(options(args, console)?).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     if let Some(profile) = profile {
         engine.intend(Intent::ChooseProfile(profile.to_owned()));
     }
@@ -37,12 +38,17 @@ pub(super) fn resume<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
-    let engine = script::open(folder, options(args))?;
+    let engine = script::open(folder, options(args, console)?)?;
     play(engine, surface, args.record_script.as_deref(), console)
 }
 
-fn options(args: &ScriptArgs) -> Options {
-    Options { sessions: args.sessions.clone(), clock: Clock::System }
+fn options<O: Write, E: Write>(args: &ScriptArgs, console: &mut Console<O, E>) -> Result<Options, Failure> {
+    Ok(Options {
+        sessions: args.sessions.clone(),
+        clock: Clock::System,
+        is_recorded: !args.recording.no_recording,
+        live: script::live(args.recording, console)?,
+    })
 }
 
 /// What the wizard is shown on.

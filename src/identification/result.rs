@@ -1,6 +1,6 @@
 //! What an identification returns.
 
-use nalgebra::{DMatrix, Isometry3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
 use super::linearise::ArmModel;
 use super::observability::Observability;
@@ -93,6 +93,8 @@ pub struct Identification {
     pub rejected: Vec<Rejected>,
     /// Steps of the solver.
     pub iterations: Vec<Iteration>,
+    /// Deviations of all parameters after each of them ((m) and (rad)), in the order of the estimates.
+    pub path: Vec<DVector<f64>>,
     /// Why it stopped.
     pub termination: TerminationReason,
     /// Pose of each instrument station in the base of the identified arm.

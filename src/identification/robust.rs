@@ -263,8 +263,9 @@ fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Weights, floor: f64, ref
     let mut at = from;
     let mut seen: Vec<Weights> = Vec::new();
     let mut scatter = floor;
-    let fit =
-        |weights: &Weights, z| Solve { weights, ..*solve }.run(z, SEARCH_STEPS, &mut |_| ControlFlow::Continue(())).0;
+    let fit = |weights: &Weights, z| {
+        Solve { weights, ..*solve }.run(z, SEARCH_STEPS, &mut |_, _| ControlFlow::Continue(())).0
+    };
     for round in 0..ROUNDS {
         if round > 0 || refit {
             at = fit(&weights, at.z);

@@ -192,12 +192,13 @@ impl Solve<'_, '_> {
         Err(if at.cost.is_finite() { TerminationReason::NoImprovement } else { TerminationReason::NonFinite })
     }
 
-    /// Steps until converged or `limit` steps were taken; `record` sees each as it is taken and may ask to stop there.
+    /// Steps until converged or `limit` steps were taken; `record` sees each with the deviations it leads to ((m) and (rad)) and
+    /// may ask to stop there.
     pub(crate) fn run(
         &self,
         start: DVector<f64>,
         limit: usize,
-        record: &mut dyn FnMut(Iteration) -> ControlFlow<()>,
+        record: &mut dyn FnMut(Iteration, &DVector<f64>) -> ControlFlow<()>,
     ) -> (Linearised, TerminationReason) {
         let mut at = self.linearise(start);
         let mut last_step = 0.0;
@@ -209,7 +210,7 @@ impl Solve<'_, '_> {
                     let left = step.step * (step.step / last_step).min(1.0);
                     let converged = step.damping == 0.0 && left <= STEP_TOLERANCE || step.negligible;
                     last_step = step.step;
-                    let flow = record(step);
+                    let flow = record(step, &at.x);
                     if converged {
                         return (at, TerminationReason::Converged);
                     }

@@ -128,6 +128,8 @@ pub struct Progress {
     pub sweep: usize,
     /// Condition number of the best set of this start.
     pub condition_number: f64,
+    /// Its observability index O1 (m), see [`super::ObservabilityIndices`].
+    pub o1: f64,
     /// Its predicted error (σ).
     pub predicted_error: f64,
 }

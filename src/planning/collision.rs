@@ -235,7 +235,7 @@ impl<'a> ArmShape<'a> {
     /// Contacts whose gap is less than their clearance. A NaN is too near.
     fn too_near(&self, lines: &[Segment]) -> impl Iterator<Item = (Contact, f64)> {
         let gaps = self.gaps(lines).zip(&self.clearances);
-        gaps.filter(|((_, gap), clearance)| gap.is_nan() || gap < clearance).map(|(gap, _)| gap)
+        gaps.filter(|((_, gap), clearance)| gap.is_nan() || *gap < **clearance).map(|(gap, _)| gap)
     }
 
     /// Lines of the capsules in the base.

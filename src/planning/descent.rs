@@ -13,7 +13,7 @@ use super::exchange::{Merit, Prediction, add_pose};
 use super::information::Information;
 use super::pair_exchange::{Vacancy, spectral_cost};
 use super::pairs::{add_pairs, pair_gram};
-use super::score::condition_number;
+use super::score::{ObservabilityIndices, condition_number};
 
 /// Poses replaced at random where no exchange is left.
 const KICKED: usize = 3;
@@ -48,9 +48,13 @@ impl State {
         Self { set, matrix, gram, cost, merit }
     }
 
+    /// Eigenvalues of the Gram matrix of the pair rows (m²).
+    fn eigenvalues(&self, information: &Information) -> Vec<f64> {
+        pair_gram(information, &self.set).symmetric_eigenvalues().as_slice().to_vec()
+    }
+
     fn condition_number(&self, information: &Information) -> f64 {
-        let gram = pair_gram(information, &self.set);
-        condition_number(gram.symmetric_eigenvalues().as_slice()).unwrap_or(f64::INFINITY)
+        condition_number(&self.eigenvalues(information)).unwrap_or(f64::INFINITY)
     }
 }
 
@@ -151,11 +155,13 @@ impl<'a> Descent<'a> {
                 interrupted = true;
                 break;
             };
+            let values = self.best.eigenvalues(self.information);
             progress(&Progress {
                 start,
                 stage: self.stage,
                 sweep,
-                condition_number: self.best.condition_number(self.information),
+                condition_number: condition_number(&values).unwrap_or(f64::INFINITY),
+                o1: ObservabilityIndices::new(&values, self.best.set.len()).o1,
                 predicted_error: self.best.merit.predicted_error(),
             });
             // Nothing is left only when every place has seen the whole pool.

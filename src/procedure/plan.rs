@@ -1,7 +1,10 @@
 //! Which poses to measure, in which order, and how good a list of poses is.
 
+mod history;
 mod request;
 mod summary;
+
+use history::History;
 
 use super::cell::cell;
 use super::{joint_types, warning};
@@ -230,14 +233,19 @@ impl<'a> Planner<'a> {
         let required = request.included.len();
         let mut candidates = self.candidates(request.poses + request.verification, &request.included)?;
         let mut round = 0;
+        let history = History::default();
+        let told = |step: Progress| {
+            history.take(&step);
+            progress(step);
+        };
         let (information, ordered) = loop {
             round += 1;
             let information = self.information(&candidates.kept)?;
-            let chosen = self.search(&information, required, keep_going, progress)?;
+            let chosen = self.search(&information, required, keep_going, &told)?;
             match self.order(&candidates.kept, required, chosen)? {
                 Ok(ordered) => break (information, ordered),
                 Err(unreachable) if round < ROUNDS => {
-                    progress(Progress::Unreachable { poses: unreachable.len() });
+                    told(Progress::Unreachable { poses: unreachable.len() });
                     let mut index = 0;
                     candidates.kept.retain(|_| {
                         index += 1;
@@ -261,6 +269,7 @@ impl<'a> Planner<'a> {
         summary.predicted_verification_rms_mm = self.predicted_verification(&candidates.kept, set, &ordered)?;
         summary.objective = Some(objective_name(request.objective).to_owned());
         summary.interrupted = ordered.chosen.interrupted;
+        summary.search = history.steps();
         let minutes = |seconds: f64| seconds / 60.0;
         let Route { moving_time, measuring_time, .. } = ordered.route;
         let total = ordered.route.time();

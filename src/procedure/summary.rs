@@ -2,8 +2,8 @@
 
 use super::{EstimationSettings, assess, provenance};
 use crate::identification::{
-    Estimator, Identification, Observability, Prior, RejectionReason, SampleIndex, SigmaSource, TerminationReason,
-    Weighting,
+    Estimate, Estimator, Identification, Observability, Prior, RejectionReason, SampleIndex, SigmaSource,
+    TerminationReason, Weighting,
 };
 use crate::profile::{Level, Profile};
 use crate::session::summary::{
@@ -73,6 +73,14 @@ fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSum
             }
         })
         .collect()
+}
+
+/// Deviations of all parameters after a step of the solver, in the units of the parameters and rounded to 1 nm and 1 ndeg.
+fn deviations(found: &Identification, step: usize) -> Vec<f64> {
+    let Some(path) = found.path.get(step) else { return Vec::new() };
+    let edge =
+        |(estimate, value): (&Estimate, &f64)| (estimate.id.quantity().to_edge(*value) * 1e9).round() / 1e9 + 0.0;
+    found.estimates.iter().zip(path.iter()).map(edge).collect()
 }
 
 fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
@@ -201,7 +209,12 @@ impl Finished<'_> {
             iterations: found
                 .iterations
                 .iter()
-                .map(|iteration| IterationSummary { cost: iteration.cost, step: iteration.step })
+                .enumerate()
+                .map(|(index, iteration)| IterationSummary {
+                    cost: iteration.cost,
+                    step: iteration.step,
+                    deviations: deviations(found, index),
+                })
                 .collect(),
             written: Vec::new(),
         }

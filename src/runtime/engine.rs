@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
@@ -12,7 +12,8 @@ use super::clock::Clock;
 use super::jobs;
 use super::links::LinkThread;
 use super::store_thread::{Command, StoreThread};
-use crate::session::journal::Line;
+use crate::recording::{Live, Recorder, RecordingEvent};
+use crate::session::journal::{Journal, Line};
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
 use crate::wizard::{Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard};
@@ -27,6 +28,17 @@ pub struct Options {
     pub sessions: PathBuf,
     /// What time it is.
     pub clock: Clock,
+    /// Whether sessions are recorded for a 3D viewer.
+    pub is_recorded: bool,
+    /// Where a viewer may look on.
+    pub live: Option<Live>,
+}
+
+impl Options {
+    /// Sessions in this folder, without a recording.
+    pub const fn unrecorded(sessions: PathBuf, clock: Clock) -> Self {
+        Self { sessions, clock, is_recorded: false, live: None }
+    }
 }
 
 /// What ends a wait.
@@ -81,6 +93,14 @@ pub struct Deed {
     pub failure: Option<String>,
 }
 
+/// The recording for a 3D viewer, if one is wanted.
+#[derive(Debug)]
+struct Recording {
+    is_wanted: bool,
+    live: Option<Live>,
+    recorder: Option<Recorder>,
+}
+
 /// The wizard with its threads.
 #[derive(Debug)]
 pub struct Engine {
@@ -90,6 +110,7 @@ pub struct Engine {
     events: Receiver<Message>,
     store: StoreThread,
     link: LinkThread,
+    recording: Recording,
     /// Flags of the requests under way.
     cancelled: BTreeMap<RequestId, Arc<AtomicBool>>,
     /// Lines that the store works on.
@@ -116,14 +137,16 @@ impl Engine {
     ///
     /// # Errors
     /// The system refuses a thread.
-    pub fn resume(folder: SessionFolder, session: Session, torn_bytes: usize, options: Options) -> io::Result<Self> {
+    pub fn resume(folder: SessionFolder, session: Session, journal: Journal, options: Options) -> io::Result<Self> {
         if let (Clock::Virtual(_), Some(latest)) = (&options.clock, session.latest) {
             let seconds = latest.duration_since(options.clock.now()).as_secs_f64();
             options.clock.pass(seconds);
         }
-        let path = folder.path().display().to_string();
-        let (wizard, effects) = Wizard::resume(session, path, torn_bytes, options.clock.now());
+        let path = folder.path().to_owned();
+        let shown = path.display().to_string();
+        let (wizard, effects) = Wizard::resume(session, shown, journal.torn_bytes, options.clock.now());
         let mut engine = Self::with(wizard, Some(folder), options)?;
+        engine.begin_recording(&path, journal.lines);
         engine.perform(effects);
         Ok(engine)
     }
@@ -136,6 +159,7 @@ impl Engine {
             clock: options.clock,
             store: StoreThread::start(options.sessions, folder, sender.clone())?,
             link: LinkThread::start(sender.clone())?,
+            recording: Recording { is_wanted: options.is_recorded, live: options.live, recorder: None },
             sender,
             events,
             cancelled: BTreeMap::new(),
@@ -214,6 +238,10 @@ impl Engine {
 
     /// Gives the session's folder back, with everything written that was asked for.
     pub fn release(&mut self) {
+        if let Some(recorder) = &mut self.recording.recorder {
+            // What is not done in time stays in parts, which the next program joins.
+            recorder.finish();
+        }
         self.store.finish();
     }
 
@@ -222,10 +250,38 @@ impl Engine {
         self.happenings.drain(..)
     }
 
+    /// Begins to record into a session's folder, which has these lines already.
+    fn begin_recording(&mut self, folder: &Path, before: Vec<Line>) {
+        if !std::mem::take(&mut self.recording.is_wanted) {
+            return;
+        }
+        let events = self.sender.clone();
+        // Nobody waits for the recorder, and the recorder does not wait for the wizard.
+        let tell = move |event: RecordingEvent| events.offer(Event::Remark(remark(&event)));
+        match Recorder::start(folder, before, self.recording.live.take(), tell) {
+            Ok(recorder) => self.recording.recorder = Some(recorder),
+            Err(error) => self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(error.to_string())))),
+        }
+    }
+
+    /// Lines that are on disk go on to the recording.
+    fn record_lines(&mut self, lines: &[Line]) {
+        let Some(recorder) = &mut self.recording.recorder else { return };
+        if !recorder.take(lines) {
+            self.recording.recorder = None;
+            let message = "the disk is too slow for it".to_owned();
+            self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(message))));
+        }
+    }
+
     /// An event goes in, its effects are done.
     fn take(&mut self, event: Event) {
         let mut written = None;
         match &event {
+            Event::Store(StoreEvent::Created { folder, .. }) => {
+                let folder = PathBuf::from(folder);
+                self.begin_recording(&folder, Vec::new());
+            }
             Event::Store(StoreEvent::Written { id } | StoreEvent::Failed { id, .. }) => {
                 let lines = self.writing.remove(id);
                 if matches!(event, Event::Store(StoreEvent::Written { .. })) {
@@ -243,6 +299,7 @@ impl Engine {
         let mut effects = self.wizard.update(Event::Tick(self.clock.now()));
         effects.extend(self.wizard.update(event));
         if let Some(lines) = written {
+            self.record_lines(&lines);
             self.happenings.push_back(Happening::Written(lines));
         }
         let notice = self.wizard.notice();
@@ -293,6 +350,19 @@ impl Engine {
     }
 }
 
+/// What the operator is told about the recording.
+fn remark(event: &RecordingEvent) -> Notice {
+    match event {
+        RecordingEvent::Failed(cause) => Notice::attention(format!(
+            "the 3D recording has stopped: {cause}; the session itself is complete and goes on"
+        ))
+        .hint("'trupose record rebuild' makes the recording anew from the journal, at any time"),
+        RecordingEvent::LiveFailed(cause) => {
+            Notice::attention(format!("the live view has stopped: {cause}; recording and session go on"))
+        }
+    }
+}
+
 /// Whoever works for the engine is told to stop.
 impl Drop for Engine {
     fn drop(&mut self) {
@@ -311,7 +381,7 @@ mod tests {
     #[test]
     fn what_was_done_is_known_and_what_was_refused_is_not() {
         let folder = tempfile::tempdir().unwrap();
-        let mut engine = Engine::new(Options { sessions: folder.path().to_owned(), clock: Clock::System }).unwrap();
+        let mut engine = Engine::new(Options::unrecorded(folder.path().to_owned(), Clock::System)).unwrap();
         // No robot to go on with; a robot that is not there; one that is.
         engine.intend(Intent::Next);
         for profile in ["missing", "soochow"] {
@@ -329,7 +399,7 @@ mod tests {
     #[test]
     fn a_driver_can_be_woken_without_an_event() {
         let folder = tempfile::tempdir().unwrap();
-        let options = Options { sessions: folder.path().to_owned(), clock: Clock::System };
+        let options = Options::unrecorded(folder.path().to_owned(), Clock::System);
         let mut engine = Engine::new(options).unwrap();
         let before = engine.wizard().view();
         assert!(!engine.wait(Duration::ZERO));

@@ -79,6 +79,17 @@ pub struct RejectionSummary {
     pub alone: usize,
 }
 
+/// A set of poses during the search: the best one after a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SearchStepSummary {
+    /// Condition number of `A·S`.
+    pub condition_number: f64,
+    /// Observability index O1 (m).
+    pub o1: f64,
+    /// Predicted error per σ.
+    pub predicted_error_sigma: f64,
+}
+
 /// Candidates and what became of the others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CandidateSummary {
@@ -156,6 +167,9 @@ pub struct PlanSummary {
     pub d_efficiency: f64,
     /// How far the bound may lie above the true optimum, relative.
     pub d_bound_gap: f64,
+    /// How the search went on, sweep by sweep; empty for a plan that was only checked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub search: Vec<SearchStepSummary>,
     /// Prediction against number of poses.
     pub trade_off: Vec<TradeOffSummary>,
     /// Parameters that stay weak.

@@ -322,12 +322,15 @@ pub struct Verdict {
 }
 
 /// One step of the solver.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IterationSummary {
     /// Weighted square sum of residuals plus the prior's share, dimensionless.
     pub cost: f64,
     /// Largest change of a parameter, in expected deviations.
     pub step: f64,
+    /// Deviations of all parameters after it, in the order and units of the parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub deviations: Vec<f64>,
 }
 
 /// Everything about an identification.

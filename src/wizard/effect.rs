@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 
 use super::intent::Intent;
-use super::notice::Problem;
+use super::notice::{Notice, Problem};
 use crate::identification::Iteration;
 use crate::procedure;
 use crate::procedure::identify::{Identified, IdentifyRequest};
@@ -42,6 +42,8 @@ pub enum Event {
         /// How far it is.
         progress: Progress,
     },
+    /// Something beside the calibration that the operator should know, such as a recording that stopped.
+    Remark(Notice),
     /// The program has to end.
     Shutdown {
         /// Why, such as `SIGTERM`.

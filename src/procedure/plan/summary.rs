@@ -71,6 +71,7 @@ impl Planner<'_> {
             },
             d_efficiency,
             d_bound_gap: bound.gap,
+            search: Vec::new(),
             trade_off: sizes.iter().map(|size| trade_off_row(size, sigma)).collect(),
             weak_parameters: sigma.map_or_else(Vec::new, |sigma| weak_parameters(&score, sigma)),
             blind_groups: information.observability().groups.iter().map(|group| group.description.clone()).collect(),

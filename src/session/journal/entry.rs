@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::kinematics::JointType;
 use crate::session::calibration::Calibration;
 use crate::session::plan::{PlannedPose, PoseKind};
+use crate::session::plan_summary::SearchStepSummary;
 use crate::session::set_up::{InstrumentChoice, Step, TargetChoice};
 use crate::session::summary::IdentificationSummary;
 use crate::units::{from_mm, to_mm};
@@ -128,6 +129,9 @@ pub struct PlanText {
     pub predicted_error_sigma: Option<f64>,
     /// Time that the program takes.
     pub minutes: Option<f64>,
+    /// How the search for it went on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub search: Vec<SearchStepSummary>,
     /// The rows, in the order of the program.
     pub rows: Vec<PlannedText>,
 }
@@ -223,6 +227,9 @@ pub struct MeasuredText {
     pub temperature_degc: Option<f64>,
     /// Time that the measurement took, motion included (s).
     pub seconds: f64,
+    /// Predicted RMS position error at fresh poses per σ with this sample and all before it, once they determine the arm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_error_sigma: Option<f64>,
     /// What the checks said.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<FindingText>,
@@ -311,6 +318,9 @@ pub struct PointErrorText {
     pub nominal_mm: (f64, f64, f64),
     /// Measured − predicted by the identified arm. For identification samples it is a residual, never an accuracy.
     pub identified_mm: (f64, f64, f64),
+    /// Covariance of the position that the identified arm predicts there, after registration (µm²): xx, xy, xz, yy, yz, zz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance_um2: Option<(f64, f64, f64, f64, f64, f64)>,
     /// The identification left the sample out.
     pub rejected: bool,
 }

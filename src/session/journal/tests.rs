@@ -11,6 +11,7 @@ use crate::procedure::identify::{IdentifyRequest, NamedSample, identify};
 use crate::profile::{Profile, builtin};
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
+use crate::session::plan_summary::SearchStepSummary;
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, RecordedSet, Step, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::summary::VerificationMode;
@@ -66,6 +67,7 @@ fn sample(number: u64) -> MeasuredText {
         shots: u32::MAX,
         temperature_degc: Some(-3.5),
         seconds: 11.25,
+        predicted_error_sigma: Some(0.71),
         findings: vec![
             FindingText {
                 about: number,
@@ -86,6 +88,7 @@ fn plan() -> PlanText {
         condition_number: Some(69.25),
         predicted_error_sigma: None,
         minutes: Some(0.1),
+        search: vec![SearchStepSummary { condition_number: 61.5, o1: 0.25, predicted_error_sigma: 0.7 }],
         rows: PoseKind::ALL
             .into_iter()
             .map(|kind| row(kind, Some((1.0, 2.0, -3.001))))
@@ -138,6 +141,7 @@ fn identified() -> IdentifiedText {
         at_mm: (1.0, -2.0, 3.5),
         nominal_mm: (0.25, 0.0, -1.0),
         identified_mm: (1e-6, 0.0, 0.0),
+        covariance_um2: Some((1.0, 0.0, -0.5, 2.0, 0.25, 3.0)),
         rejected: true,
     };
     let samples = (1..=40).collect();
@@ -181,6 +185,7 @@ fn all_entries() -> Vec<Entry> {
         sigma_mm: None,
         scatter_mm: None,
         temperature_degc: None,
+        predicted_error_sigma: None,
         findings: Vec::new(),
         ..sample(1)
     };

@@ -18,7 +18,14 @@ fn planned(pose: usize) -> PlannedText {
 
 fn plan() -> PlanText {
     let rows = (0..ROWS).map(planned).collect();
-    PlanText { origin: "test".to_owned(), condition_number: None, predicted_error_sigma: None, minutes: None, rows }
+    PlanText {
+        origin: "test".to_owned(),
+        condition_number: None,
+        predicted_error_sigma: None,
+        minutes: None,
+        search: Vec::new(),
+        rows,
+    }
 }
 
 /// A session that can be measured.
@@ -49,6 +56,7 @@ fn sample(number: u64, row: usize) -> Entry {
         shots: 1,
         temperature_degc: None,
         seconds: 10.0,
+        predicted_error_sigma: None,
         findings: Vec::new(),
     })
 }

@@ -21,7 +21,7 @@ fn journal() -> Journal {
     let plan = folder.path().join("plan.csv");
     crate::store::replace(&plan, include_str!("../../../tests/sessions/plan.csv")).unwrap();
     let clock = Clock::starting_at(jiff::Timestamp::UNIX_EPOCH);
-    let options = crate::runtime::Options { sessions: folder.path().to_owned(), clock };
+    let options = crate::runtime::Options::unrecorded(folder.path().to_owned(), clock);
     let mut engine = Engine::new(options).unwrap();
     let simulation = Simulation { truth: Truth::Paper, ..Simulation::default() };
     let before = [

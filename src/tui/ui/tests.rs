@@ -160,7 +160,7 @@ impl Walk {
 fn the_first_steps_are_walked_by_keys() {
     let folder = tempfile::tempdir().unwrap();
     let clock = Clock::starting_at(jiff::Timestamp::UNIX_EPOCH);
-    let engine = Engine::new(Options { sessions: folder.path().to_owned(), clock }).unwrap();
+    let engine = Engine::new(Options::unrecorded(folder.path().to_owned(), clock)).unwrap();
     let mut walk = Walk { engine, ui: Ui::new(themes()[0]) };
     let enter = Key::plain_code(KeyCode::Enter);
     walk.press(Key::char('c'));

@@ -6,7 +6,7 @@ mod show;
 
 use super::plan::{plan_request, plan_text};
 use super::{Action, Cx, StepMachine};
-use crate::session::journal::{Correction, Decision, Entry, FindingText, MeasuredText, to_edge, to_xyz_mm};
+use crate::session::journal::{Correction, Decision, Entry, FindingText, Line, MeasuredText, to_edge, to_xyz_mm};
 use crate::session::plan::PoseKind;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
@@ -39,6 +39,8 @@ pub(in crate::wizard) struct CaptureStep {
     measuring: bool,
     /// What the samples so far let expect.
     prediction: Prediction,
+    /// The same with the measurement of this number, which is being written.
+    expected: Option<(u64, Prediction)>,
 }
 
 /// A reading that is good enough only if the operator says so.
@@ -66,6 +68,7 @@ impl CaptureStep {
             question: None,
             measuring: false,
             prediction: Prediction::of(session),
+            expected: None,
         };
         step.ask(session);
         step
@@ -127,6 +130,7 @@ impl CaptureStep {
             shots: reading.shots,
             temperature_degc: reading.temperature,
             seconds: reading.seconds,
+            predicted_error_sigma: None,
             findings: Vec::new(),
         };
         let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
@@ -149,13 +153,25 @@ impl CaptureStep {
                 .hint("wait until it is at rest and measure again; or take the reading as it is");
             return vec![Action::Write(vec![entry]), Action::Say(notice)];
         }
-        Self::write(noted, cx)
+        self.write(noted, cx)
     }
 
     /// Writes a sample with what the checks say about it.
-    fn write(mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
+    fn write(&mut self, mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
         noted.findings = checks::findings(cx, &noted);
-        vec![Action::Write(vec![Entry::Sample(noted)])]
+        vec![Action::Write(vec![self.sample(noted, cx)])]
+    }
+
+    /// A sample with what a calibration from all samples up to it would be worth.
+    fn sample(&mut self, mut noted: MeasuredText, cx: &Cx<'_>) -> Entry {
+        let mut with = cx.session.clone();
+        let line = Line { number: with.lines + 1, time: cx.now, entry: Entry::Sample(noted.clone()) };
+        if with.apply(&line).is_ok() {
+            let prediction = Prediction::of(&with);
+            noted.predicted_error_sigma = prediction.now().map(|sigma| (sigma * 1e6).round() / 1e6);
+            self.expected = Some((noted.number, prediction));
+        }
+        Entry::Sample(noted)
     }
 
     /// The sample in question with what was found about it.
@@ -290,7 +306,7 @@ impl StepMachine for CaptureStep {
                     remedy: None,
                 });
                 let keep = Entry::Decision { sample: number, decision: Decision::Keep };
-                let entries = std::iter::once(Entry::Sample(noted)).chain(is_settled.then_some(keep));
+                let entries = std::iter::once(self.sample(noted, cx)).chain(is_settled.then_some(keep));
                 vec![Action::Write(entries.collect())]
             }
             Intent::MeasureAgain => {
@@ -358,7 +374,10 @@ impl StepMachine for CaptureStep {
         match entry {
             Entry::Sample(noted) => {
                 self.held = None;
-                self.prediction = Prediction::of(session);
+                self.prediction = match self.expected.take() {
+                    Some((number, prediction)) if number == noted.number => prediction,
+                    _ => Prediction::of(session),
+                };
                 self.ask(session);
                 match noted.findings.first() {
                     Some(finding) if self.question.is_some() => {

@@ -1,13 +1,12 @@
 //! Identify and Verify: from samples to a result, and what it is worth on points that it never saw.
 
-use nalgebra::Point3;
-
 use super::{Action, Cx, StepMachine};
 use crate::identification::{PointSample, TargetAt};
 use crate::procedure::EstimationSettings;
-use crate::procedure::identify::{Identified, IdentifyRequest, NamedSample, SampleSet};
+use crate::procedure::identify::{IdentifyRequest, NamedSample, SampleSet};
+use crate::procedure::points::point_errors;
 use crate::session::export::measurements_csv;
-use crate::session::journal::{Entry, IdentifiedText, PointErrorText, to_xyz_mm};
+use crate::session::journal::{Entry, IdentifiedText};
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, Step};
 use crate::session::sha256;
@@ -110,31 +109,6 @@ fn left_out(session: &Session, kind: PoseKind) -> Option<Warning> {
     })
 }
 
-/// What each sample says about both models.
-fn points(identified: &Identified, session: &Session) -> Vec<PointErrorText> {
-    let (found, nominal) = (&identified.found, &identified.nominal);
-    let (Some(of_found), Some(of_nominal)) = (found.base_from_station.first(), nominal.base_from_station.first())
-    else {
-        return Vec::new();
-    };
-    let samples = samples(session, PoseKind::Identification);
-    let judged = samples.len();
-    let all = samples.into_iter().chain(self::samples(session, PoseKind::Verification));
-    all.enumerate()
-        .map(|(index, NamedSample { sample, .. })| {
-            let at = found.model.point_in_base(&sample.at);
-            let error =
-                |measured: Point3<f64>, predicted: Point3<f64>| to_xyz_mm(&Point3::from(measured - predicted), 6);
-            PointErrorText {
-                at_mm: to_xyz_mm(&at, 3),
-                nominal_mm: error(of_nominal * sample.point, nominal.model.point_in_base(&sample.at)),
-                identified_mm: error(of_found * sample.point, at),
-                rejected: index < judged && found.is_rejected(index),
-            }
-        })
-        .collect()
-}
-
 fn result<'a>(cx: &Cx<'a>) -> Option<&'a IdentifiedText> {
     cx.session.identified.as_deref()
 }
@@ -174,7 +148,8 @@ impl StepMachine for IdentifyStep {
             identified.summary.verdict.reasons =
                 vec!["no verification pose is measured: go back, plan some and measure them".to_owned()];
         }
-        let points = points(&identified, cx.session);
+        let of = |kind| samples(cx.session, kind);
+        let points = point_errors(&identified, &of(PoseKind::Identification), &of(PoseKind::Verification));
         let text = IdentifiedText {
             points,
             samples: cx.session.basis(),

@@ -39,6 +39,7 @@ pub(super) fn plan_text(cx: &Cx<'_>, summary: Option<&PlanSummary>, rows: &[Plan
         condition_number: summary.map(|summary| summary.condition_number),
         predicted_error_sigma: summary.map(|summary| summary.predicted_error_sigma),
         minutes: summary.and_then(|summary| summary.time.as_ref()).map(|time| time.total_min),
+        search: summary.map(|summary| summary.search.clone()).unwrap_or_default(),
         rows: rows.iter().map(|row| PlannedText::new(row, joint_types)).collect(),
     }
 }

@@ -53,6 +53,7 @@ fn summary() -> PlanSummary {
         },
         d_efficiency: 0.934,
         d_bound_gap: 0.001,
+        search: Vec::new(),
         trade_off: (10..=100).step_by(4).map(option).collect(),
         weak_parameters: vec![WeakParameterSummary {
             name: "d2".to_owned(),

@@ -1,0 +1,245 @@
+//! `trupose record rebuild | compact | check`, and the recordings of commands without a session.
+
+use std::io::Write;
+use std::path::Path;
+
+use jiff::Timestamp;
+
+use super::script::session_failure;
+use super::{Console, load};
+use crate::cli::RecordCommand;
+use crate::error::{ExitStatus, Failure};
+use crate::kinematics::JointType;
+use crate::procedure::identify::{Identified, IdentifyRequest, NamedSample};
+use crate::procedure::joint_types;
+use crate::procedure::points::point_errors;
+use crate::profile::Profile;
+use crate::recording::{self, Check, RecordingError};
+use crate::session::journal::{
+    Entry, IdentifiedText, Line, MeasuredText, PlanText, PlannedText, SCHEMA, to_edge, to_xyz_mm,
+};
+use crate::session::plan::{PlannedPose, PoseKind};
+use crate::session::plan_summary::PlanSummary;
+use crate::session::sha256;
+use crate::store::session::{SessionFolder, read_journal};
+use crate::units::to_mm;
+
+pub(super) fn run<O: Write, E: Write>(
+    command: &RecordCommand,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    match command {
+        RecordCommand::Rebuild { folder } => {
+            // Held, so that no program records into the folder meanwhile.
+            let (_held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
+            let path = recording::rebuild(folder, &journal.lines).map_err(|error| failure(&error))?;
+            console.print(&format!("written: {}\n{}\n", path.display(), described(&check(&path)?)))?;
+            Ok(ExitStatus::Accepted)
+        }
+        RecordCommand::Compact { path } => compact(path, console),
+        RecordCommand::Check { paths } => {
+            let mut all_whole = true;
+            for path in paths {
+                all_whole &= check_one(path, console)?;
+            }
+            Ok(if all_whole { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
+        }
+    }
+}
+
+fn compact<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let before;
+    let file = if path.is_dir() {
+        let (_held, _journal) = SessionFolder::open(path).map_err(|error| session_failure(&error))?;
+        before = None;
+        recording::merge(path).map_err(|error| failure(&error))?.ok_or_else(|| {
+            Failure::new(ExitStatus::Usage, format!("there is no recording in '{}'", path.display()))
+                .hint("'trupose record rebuild DIR' makes one from the journal")
+        })?
+    } else {
+        before = Some(check(path)?.bytes);
+        recording::compact_file(path).map_err(|error| failure(&error))?;
+        path.to_owned()
+    };
+    let after = check(&file)?;
+    let change = before.map_or_else(String::new, |before| format!(", {before} bytes before"));
+    console.print(&format!("written: {}\n{}{change}\n", file.display(), described(&after)))?;
+    Ok(ExitStatus::Accepted)
+}
+
+/// Whether a recording is whole, and says so.
+fn check_one<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<bool, Failure> {
+    if !path.is_dir() {
+        let found = check(path)?;
+        console.print(&format!("{}: {}\n", path.display(), described(&found)))?;
+        return Ok(found.is_whole());
+    }
+    let journal = read_journal(path).map_err(|error| session_failure(&error))?;
+    let files = recording::files(path);
+    if files.is_empty() {
+        console.print(&format!(
+            "{}: no recording of {} journal entries; 'trupose record rebuild' makes it\n",
+            path.display(),
+            journal.lines.len()
+        ))?;
+        return Ok(false);
+    }
+    let mut is_whole = files.len() == 1;
+    let mut lines = std::collections::BTreeSet::new();
+    for file in &files {
+        let found = check(file)?;
+        is_whole &= found.has_index && found.damaged == 0;
+        lines.extend(recording::read(file).map_err(|error| failure(&error))?.numbers);
+        console.print(&format!("{}: {}\n", file.display(), described(&found)))?;
+    }
+    let missing: Vec<String> = journal
+        .lines
+        .iter()
+        .filter(|line| !lines.contains(&line.number))
+        .map(|line| format!("{:>5} {}", line.number, crate::session::printable(&line.entry.describe())))
+        .collect();
+    if !missing.is_empty() {
+        console.print(&format!(
+            "missing of {} journal entries:\n{}\n'trupose record rebuild {}' makes the recording anew\n",
+            journal.lines.len(),
+            missing.join("\n"),
+            path.display()
+        ))?;
+    } else if is_whole {
+        console.print(&format!("all {} entries of the journal are recorded\n", journal.lines.len()))?;
+    } else {
+        console.print(&format!("'trupose record compact {}' makes one file with an index\n", path.display()))?;
+    }
+    Ok(is_whole && missing.is_empty())
+}
+
+fn check(path: &Path) -> Result<Check, Failure> {
+    recording::check(path).map_err(|error| failure(&error))
+}
+
+fn described(check: &Check) -> String {
+    let mut text = format!("{} bytes, {} journal entries, {} samples", check.bytes, check.lines, check.samples);
+    if !check.has_index {
+        text.push_str(", no index (still being written, or ended by a crash)");
+    }
+    if !check.missing.is_empty() {
+        text.push_str(&format!(", entries missing: {:?}", check.missing));
+    }
+    if check.damaged > 0 {
+        text.push_str(&format!(", {} messages cannot be read", check.damaged));
+    }
+    text
+}
+
+/// What an error of a recording means to the operator.
+pub(super) fn failure(error: &RecordingError) -> Failure {
+    Failure::from_error(ExitStatus::Store, error)
+}
+
+/// Writes a recording of an identification from files.
+pub(super) fn identification(
+    path: &Path,
+    source: &str,
+    request: &IdentifyRequest,
+    identified: &Identified,
+) -> Result<(), Failure> {
+    let types = joint_types(&request.profile);
+    let mut lines = Lines::new(path, source, &request.profile_text);
+    let named = |kind: PoseKind, samples: &[NamedSample]| -> Vec<(PoseKind, NamedSample)> {
+        samples.iter().map(|sample| (kind, sample.clone())).collect()
+    };
+    let (judged, tested) = (&request.identification.samples, &request.verification.samples);
+    let mut all = named(PoseKind::Identification, judged);
+    all.extend(named(PoseKind::Verification, tested));
+    let rows = all.iter().map(|(kind, sample)| PlannedPose {
+        pose: sample.pose.clone(),
+        kind: *kind,
+        configuration: sample.sample.at.configuration.clone(),
+        point_in_base: None,
+    });
+    let summary = &identified.summary;
+    lines.push(Entry::Plan(PlanText {
+        origin: "the rows of the measured files".to_owned(),
+        condition_number: summary.condition_number,
+        predicted_error_sigma: None,
+        minutes: None,
+        search: Vec::new(),
+        rows: rows.map(|row| PlannedText::new(&row, &types)).collect(),
+    }));
+    for (row, (kind, sample)) in all.iter().enumerate() {
+        lines.push(Entry::Sample(measured(row, *kind, sample, &types)));
+    }
+    lines.push(Entry::Identified(Box::new(IdentifiedText {
+        samples: (1..=all.len() as u64).collect(),
+        summary: summary.clone(),
+        calibration: identified.calibration.clone(),
+        points: point_errors(identified, judged, tested),
+    })));
+    recording::write(path, &lines.lines, false).map_err(|error| failure(&error))
+}
+
+fn measured(row: usize, kind: PoseKind, named: &NamedSample, types: &[JointType]) -> MeasuredText {
+    let sample = &named.sample;
+    MeasuredText {
+        number: row as u64 + 1,
+        row,
+        pose: named.pose.clone(),
+        kind,
+        target: sample.at.target,
+        joints: to_edge(&sample.at.configuration, types),
+        reported_joints: None,
+        xyz_mm: to_xyz_mm(&sample.point, 9),
+        sigma_mm: sample.sigma.map(to_mm),
+        scatter_mm: None,
+        shots: 1,
+        temperature_degc: None,
+        seconds: 0.0,
+        predicted_error_sigma: None,
+        findings: Vec::new(),
+    }
+}
+
+/// Writes a recording of a plan.
+pub(super) fn plan(
+    path: &Path,
+    source: &str,
+    profile: &Profile,
+    profile_text: &str,
+    summary: &PlanSummary,
+) -> Result<(), Failure> {
+    let types = joint_types(profile);
+    let rows = crate::procedure::plan::rows(summary, &types);
+    let mut lines = Lines::new(path, source, profile_text);
+    lines.push(Entry::Plan(PlanText {
+        origin: summary.objective.clone().unwrap_or_else(|| "a list that was checked".to_owned()),
+        condition_number: Some(summary.condition_number),
+        predicted_error_sigma: Some(summary.predicted_error_sigma),
+        minutes: summary.time.as_ref().map(|time| time.total_min),
+        search: summary.search.clone(),
+        rows: rows.iter().map(|row| PlannedText::new(row, &types)).collect(),
+    }));
+    recording::write(path, &lines.lines, true).map_err(|error| failure(&error))
+}
+
+/// Journal lines of what was not a session.
+struct Lines {
+    time: Timestamp,
+    lines: Vec<Line>,
+}
+
+impl Lines {
+    fn new(path: &Path, source: &str, profile_text: &str) -> Self {
+        let name = path.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let time = load::now().parse().unwrap_or(Timestamp::UNIX_EPOCH);
+        let mut lines = Self { time, lines: Vec::new() };
+        let program = crate::wizard::program();
+        lines.push(Entry::Opened { schema: SCHEMA, program, name });
+        let text = profile_text.to_owned();
+        lines.push(Entry::Profile { source: source.to_owned(), sha256: sha256(text.as_bytes()), text });
+        lines
+    }
+
+    fn push(&mut self, entry: Entry) {
+        self.lines.push(Line { number: self.lines.len() as u64 + 1, time: self.time, entry });
+    }
+}

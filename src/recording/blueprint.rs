@@ -1,0 +1,232 @@
+//! The layout that a viewer opens with.
+//!
+//! The library's layout builder lacks cameras, legends and trails; they are entities of the same store, written beside what
+//! the builder writes.
+
+use nalgebra::Point3;
+use rerun::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind, PanelState, PlayState};
+use rerun::blueprint::{
+    BarChartView, Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel,
+    Spatial3DView, Tabs, TensorView, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
+};
+use rerun::external::re_log_types::BlueprintActivationCommand;
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, VisibleTimeRanges,
+};
+use rerun::external::re_sdk_types::datatypes;
+use rerun::log::LogMsg;
+use rerun::{AsComponents, Color, RecordingStream, RecordingStreamBuilder};
+
+use super::canvas::Canvas;
+use super::{RecordingError, layout, names};
+use crate::profile::Profile;
+
+/// What a recording is looked at for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// A session: poses first.
+    Session,
+    /// A plan: the search first.
+    Plan,
+}
+
+/// Background of the picture.
+const BACKGROUND: Color = layout::rgb(24, 28, 33);
+
+/// Something that the layout builder cannot say, at a path of the layout's store.
+type Extra = (String, Box<dyn AsComponents>);
+
+/// Sends the layout for the cell of `profile`.
+pub(super) fn send(canvas: &Canvas, profile: &Profile, purpose: Purpose) {
+    // A layout that cannot be made leaves the viewer's own: no reason to lose a recording.
+    if let Ok((messages, activation)) = messages(profile, purpose) {
+        canvas.stream().send_blueprint(messages, activation);
+    }
+}
+
+fn messages(profile: &Profile, purpose: Purpose) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
+    let mut extras = Vec::new();
+    let picture = picture(profile, &mut extras);
+    let plots = plots(&mut extras);
+    let (poses, solver, search) = plots;
+    let texts = |first: ContainerLike, second: ContainerLike| {
+        Tabs::new([first, second, view(TextLogView::new("Log").with_origin(names::LOG))])
+    };
+    let report = view(TextDocumentView::new("Report").with_origin(names::REPORT));
+    let guide = view(TextDocumentView::new("How to read this").with_origin(names::GUIDE));
+    let bars = Tabs::new([
+        view(BarChartView::new("Deviations / sigma").with_origin(names::SIGNIFICANCE)),
+        view(TensorView::new("All pairs, nominal (um)").with_origin(names::MAP_NOMINAL)),
+        view(TensorView::new("All pairs, identified (um)").with_origin(names::MAP_IDENTIFIED)),
+    ]);
+    let (plots, timeline) = match purpose {
+        Purpose::Session => (Tabs::new([poses, capture(&mut extras), solver, search]), names::POSE),
+        Purpose::Plan => (Tabs::new([search]), names::PLAN_ITERATION),
+    };
+    let right = match purpose {
+        Purpose::Session => Vertical::new([
+            ContainerLike::from(plots.with_name("Errors")),
+            bars.with_name("Parameters and pairs").into(),
+            texts(report, guide).with_name("Texts").into(),
+        ])
+        .with_row_shares([1.1, 0.8, 1.1]),
+        Purpose::Plan => Vertical::new([ContainerLike::from(plots), texts(guide, report).into()]),
+    };
+    let root = Horizontal::new([picture, right.into()]).with_column_shares([1.45, 1.0]);
+    let blueprint = Blueprint::new(root)
+        .with_auto_views(false)
+        .with_auto_layout(false)
+        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
+        .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
+        .with_time_panel(
+            TimePanel::new()
+                .with_state(PanelState::Collapsed)
+                .with_timeline(timeline)
+                .with_fps(4.0)
+                .with_play_state(PlayState::Following),
+        );
+    with_extras(&blueprint, &extras)
+}
+
+/// The 3D view.
+fn picture(profile: &Profile, extras: &mut Vec<Extra>) -> ContainerLike {
+    let view: ContainerLike = Spatial3DView::new("Cell").with_origin(names::WORLD).with_contents(["$origin/**"]).into();
+    let Some(path) = path(&view) else { return view };
+    let (eye, target) = camera(profile);
+    let mut at = |name: &str, what: Box<dyn AsComponents>| extras.push((format!("{path}/{name}"), what));
+    at(
+        "EyeControls3D",
+        Box::new(
+            EyeControls3D::new()
+                .with_kind(Eye3DKind::Orbital)
+                .with_position(layout::at(&eye))
+                .with_look_target(layout::at(&target))
+                .with_eye_up([0.0, 0.0, 1.0]),
+        ),
+    );
+    at("LineGrid3D", Box::new(LineGrid3D::new().with_visible(false)));
+    at("Background", Box::new(Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND)));
+    let mut of = |entity: &str, name: &str, what: Box<dyn AsComponents>| {
+        let _: () = extras.push((format!("{path}/ViewContents/overrides/{entity}{name}"), what));
+    };
+    of(names::MEASURED, "/visualizers", Box::new(trail()));
+    for hidden in [names::PAIRS_NOMINAL, names::PAIRS_IDENTIFIED, names::UNCERTAINTY] {
+        of(hidden, "/visualizers", Box::new(EntityBehavior::new().with_visible(false)));
+    }
+    view
+}
+
+/// All rows up to the time cursor.
+fn trail() -> VisibleTimeRanges {
+    VisibleTimeRanges::new([datatypes::VisibleTimeRange {
+        timeline: names::POSE.into(),
+        range: datatypes::TimeRange {
+            start: datatypes::TimeRangeBoundary::Infinite,
+            end: datatypes::TimeRangeBoundary::CursorRelative(datatypes::TimeInt(0)),
+        },
+    }])
+}
+
+/// Where the camera stands and what it looks at: across the line from robot to tracker, so that both are seen.
+fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
+    let tracker = profile.tracker().position_in_base;
+    let reach: f64 = profile.chain().joints().iter().map(|joint| joint.link.a.abs() + joint.link.d.abs()).sum();
+    let floor = profile.floor().unwrap_or(0.0);
+    let towards = nalgebra::Vector3::new(tracker.x, tracker.y, 0.0);
+    let towards = towards.try_normalize(1e-9).unwrap_or_else(nalgebra::Vector3::x);
+    let aside = nalgebra::Vector3::new(towards.y, -towards.x, 0.0);
+    let target = Point3::from(towards * (0.35 * reach)) + nalgebra::Vector3::z() * (0.45 * reach + 0.2 * floor);
+    let eye = target + aside * (1.25 * reach) - towards * (1.35 * reach) + nalgebra::Vector3::z() * (0.7 * reach);
+    (eye, target)
+}
+
+/// Plots: errors at the poses, the solver, the search.
+fn plots(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike, ContainerLike) {
+    let mut plot = |name: &str, contents: &[&str]| series(name, contents, extras);
+    let poses = Vertical::new([
+        plot("Position error (mm)", &["+ /errors_mm/position/**"]),
+        plot("Mean distance error to all others (mm)", &["+ /errors_mm/distance/**"]),
+    ])
+    .with_name("Errors per pose");
+    let solver = Vertical::new([
+        plot("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"]),
+        plot("Cost and largest step (log10), per solver step", &["+ /solver/cost_and_step_log10"]),
+    ])
+    .with_name("Solver");
+    let search = Vertical::new([
+        plot("Condition number, per sweep", &["+ /search/condition_number"]),
+        plot(
+            "Observability O1 (mm), predicted error (sigma), per sweep",
+            &["+ /search/observability_o1_mm", "+ /search/predicted_error_sigma"],
+        ),
+    ])
+    .with_name("Search");
+    (poses.into(), solver.into(), search.into())
+}
+
+/// Plots of the capture.
+fn capture(extras: &mut Vec<Extra>) -> ContainerLike {
+    let mut plot = |name: &str, contents: &[&str]| series(name, contents, extras);
+    Vertical::new([
+        plot(
+            "Predicted error of a calibration so far, scatter, drift (mm)",
+            &["+ /capture/predicted_error_mm", "+ /capture/scatter_mm", "+ /capture/drift_mm"],
+        ),
+        plot("Temperature (degC)", &["+ /capture/temperature_degc"]),
+    ])
+    .with_name("Capture")
+    .into()
+}
+
+fn series(name: &str, contents: &[&str], extras: &mut Vec<Extra>) -> ContainerLike {
+    let view: ContainerLike = TimeSeriesView::new(name).with_origin("/").with_contents(contents.iter().copied()).into();
+    let is_crowded = contents.iter().any(|content| content.ends_with("**"));
+    if let (Some(path), true) = (path(&view), is_crowded) {
+        extras.push((format!("{path}/PlotLegend"), Box::new(PlotLegend::new().with_corner(Corner2D::RightTop))));
+    }
+    view
+}
+
+fn view(view: impl Into<ContainerLike>) -> ContainerLike {
+    view.into()
+}
+
+/// Where a view stands in the layout's store.
+fn path(view: &ContainerLike) -> Option<String> {
+    match view {
+        ContainerLike::View(view) => Some(view.blueprint_path().to_string()),
+        _ => None,
+    }
+}
+
+/// The messages of a layout with what its builder cannot say.
+fn with_extras(
+    blueprint: &Blueprint,
+    extras: &[Extra],
+) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
+    let failed = |error: rerun::RecordingStreamError| RecordingError::library("making the layout", error);
+    let (carrier, sent) = RecordingStreamBuilder::new(names::APPLICATION).enabled(true).memory().map_err(failed)?;
+    let activation = BlueprintActivation { make_active: true, make_default: true };
+    blueprint.send(&carrier, activation).map_err(failed)?;
+    let mut messages = Vec::new();
+    let mut command = None;
+    for message in sent.take() {
+        match message {
+            LogMsg::BlueprintActivationCommand(activation) => command = Some(activation),
+            message if message.store_id().is_blueprint() => messages.push(message),
+            _ => {}
+        }
+    }
+    let command = command.ok_or_else(|| RecordingError::library("making the layout", "it has no activation"))?;
+    let (own, written): (RecordingStream, _) = RecordingStreamBuilder::from_store_id(&command.blueprint_id)
+        .send_properties(false)
+        .enabled(true)
+        .memory()
+        .map_err(failed)?;
+    own.set_time_sequence("blueprint", 0);
+    for (path, what) in extras {
+        own.log(path.as_str(), what.as_ref()).map_err(failed)?;
+    }
+    messages.extend(written.take().into_iter().filter(|message| matches!(message, LogMsg::ArrowMsg(..))));
+    Ok((messages, command))
+}

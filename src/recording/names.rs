@@ -1,0 +1,109 @@
+//! Paths of entities, timelines and frames. Only `a` to `z`, digits, `_` and `/`: nothing that the library would escape.
+
+/// Application id of all recordings: layouts belong to it.
+pub(super) const APPLICATION: &str = "trupose";
+
+/// Number of the measurement; 0 before the first.
+pub(super) const POSE: &str = "pose";
+/// Sweep of the pose search.
+pub(super) const PLAN_ITERATION: &str = "plan_iteration";
+/// Step of the solver; 0 is the nominal arm.
+pub(super) const SOLVER_ITERATION: &str = "solver_iteration";
+/// When it happened.
+pub(super) const TIME: &str = "time";
+/// Number of the journal line.
+pub(super) const ENTRY: &str = "entry";
+
+/// Lines of the journal, as they stand there.
+pub(super) const JOURNAL: &str = "journal";
+/// What happened, in words.
+pub(super) const LOG: &str = "log";
+/// The result as a document.
+pub(super) const REPORT: &str = "report";
+/// How to read the picture.
+pub(super) const GUIDE: &str = "guide";
+
+/// Everything in the picture.
+pub(super) const WORLD: &str = "world";
+/// Frames of the nominal arm at the pose.
+pub(super) const NOMINAL_FRAMES: &str = "world/nominal/frames";
+/// Castings and joint axes of the nominal arm, one entity per frame.
+pub(super) const NOMINAL_LINKS: &str = "world/nominal/link";
+/// Line through the joints of an arm without castings.
+pub(super) const NOMINAL_SKELETON: &str = "world/nominal/skeleton";
+/// Frames of the identified arm at the pose, as they are.
+pub(super) const IDENTIFIED_FRAMES: &str = "world/identified/frames";
+/// Line through the joints of the identified arm, as it is.
+pub(super) const IDENTIFIED_SKELETON: &str = "world/identified/skeleton";
+/// The same with its deviations enlarged.
+pub(super) const IDENTIFIED_ENLARGED: &str = "world/identified/enlarged";
+/// Floor of the cell.
+pub(super) const FLOOR: &str = "world/cell/floor";
+/// Base of the robot.
+pub(super) const BASE: &str = "world/cell/base";
+/// Boxes to keep out of.
+pub(super) const KEEP_OUT: &str = "world/cell/keep_out";
+/// The tracker.
+pub(super) const TRACKER: &str = "world/tracker/body";
+/// From the tracker to the reflector.
+pub(super) const BEAM: &str = "world/tracker/beam";
+/// Poses that wait, are next, or are not used.
+pub(super) const PLAN: &str = "world/plan";
+/// Measured points, each at its pose.
+pub(super) const MEASURED: &str = "world/measured";
+/// Errors of the nominal arm, enlarged.
+pub(super) const ERRORS_NOMINAL: &str = "world/errors/nominal";
+/// Errors of the identified arm, enlarged.
+pub(super) const ERRORS_IDENTIFIED: &str = "world/errors/identified";
+/// Errors while the solver works, enlarged as those of the nominal arm.
+pub(super) const ERRORS_SOLVING: &str = "world/errors/solving";
+/// The pairs with the largest distance errors of the nominal arm.
+pub(super) const PAIRS_NOMINAL: &str = "world/pairs/nominal";
+/// The same of the identified arm.
+pub(super) const PAIRS_IDENTIFIED: &str = "world/pairs/identified";
+/// Predicted uncertainty of positions, enlarged.
+pub(super) const UNCERTAINTY: &str = "world/uncertainty";
+/// What the enlargements are.
+pub(super) const SCALE_NOTE: &str = "world/scale_note";
+
+/// Distance errors of all pairs, nominal arm.
+pub(super) const MAP_NOMINAL: &str = "pairs_map/nominal_um";
+/// The same of the identified arm.
+pub(super) const MAP_IDENTIFIED: &str = "pairs_map/identified_um";
+
+/// Measured coordinates in the tracker frame (mm).
+pub(super) const READING: &str = "reading/xyz_mm";
+/// Scatter of the shots.
+pub(super) const SCATTER: &str = "capture/scatter_mm";
+/// Temperature.
+pub(super) const TEMPERATURE: &str = "capture/temperature_degc";
+/// Distance of a repeated pose from its first measurement.
+pub(super) const DRIFT: &str = "capture/drift_mm";
+/// Predicted error of a calibration from the samples so far.
+pub(super) const PREDICTED: &str = "capture/predicted_error_mm";
+/// Condition number during the search.
+pub(super) const CONDITION: &str = "search/condition_number";
+/// Observability index O1 during the search.
+pub(super) const OBSERVABILITY: &str = "search/observability_o1_mm";
+/// Predicted error during the search.
+pub(super) const SEARCH_PREDICTED: &str = "search/predicted_error_sigma";
+/// Cost of the solver and its largest step, as powers of ten.
+pub(super) const COST_AND_STEP: &str = "solver/cost_and_step_log10";
+/// Mean error of all samples while the solver works.
+pub(super) const FIT: &str = "solver/mean_error_mm";
+/// Deviations in units of their standard deviation, one bar per parameter.
+pub(super) const SIGNIFICANCE: &str = "parameters/deviation_in_sigma";
+
+/// Errors at each pose of the result number `run`, of the nominal and the identified arm: `quantity` is `position` or `distance`,
+/// `samples` is `fit` or `verification`.
+pub(super) fn errors(run: usize, quantity: &str, samples: &str) -> String {
+    format!("errors_mm/{quantity}/{samples}_{run}")
+}
+
+/// Frame `index` of an arm.
+pub(super) fn frame(arm: &str, index: usize) -> String {
+    format!("{arm}/{index}")
+}
+
+/// The frame of the robot base.
+pub(super) const WORLD_FRAME: &str = "tf#/world";

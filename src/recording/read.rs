@@ -1,0 +1,137 @@
+//! Reads recordings, also those that a crash left half-written.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use rerun::external::re_log_encoding::DecoderApp;
+use rerun::log::{Chunk, LogMsg};
+use rerun::{TextDocument, TimelineName};
+
+use super::{RecordingError, names};
+use crate::session::journal::{self, Journal};
+
+/// What a recording carries of its session.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// The journal as far as the recording has it, line breaks included. Empty if it has none.
+    pub journal: Vec<u8>,
+    /// Numbers of the journal lines in it.
+    pub numbers: Vec<u64>,
+    /// Messages that could not be read.
+    pub damaged: usize,
+    /// Journal lines that are missing between others.
+    pub missing: Vec<i64>,
+}
+
+impl Recording {
+    /// The journal's lines.
+    ///
+    /// # Errors
+    /// There are none, or they do not fit together.
+    pub fn lines(&self) -> Result<Journal, journal::JournalError> {
+        journal::read(&self.journal)
+    }
+}
+
+/// Reads the recording at `path`.
+///
+/// # Errors
+/// The file cannot be read or is not a recording of this program.
+pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+    let mut recording = Recording::default();
+    let (lines, damaged) = journal_lines(path)?;
+    recording.damaged = damaged;
+    if let Some((last, _)) = lines.last_key_value() {
+        recording.missing = (1..=*last).filter(|number| !lines.contains_key(number)).collect();
+    }
+    recording.numbers = lines.keys().filter_map(|number| u64::try_from(*number).ok()).collect();
+    // Lines behind a gap cannot be checked.
+    let whole = recording.missing.first().copied().unwrap_or(i64::MAX);
+    recording.journal = lines.range(..whole).flat_map(|(_, text)| text.bytes()).collect();
+    Ok(recording)
+}
+
+/// Numbers of the journal lines in the recording at `path`, and how many messages could not be read.
+pub(super) fn line_numbers(path: &Path) -> Result<(Vec<i64>, usize), RecordingError> {
+    let (lines, damaged) = journal_lines(path)?;
+    Ok((lines.into_keys().collect(), damaged))
+}
+
+fn journal_lines(path: &Path) -> Result<(BTreeMap<i64, String>, usize), RecordingError> {
+    let mut lines: BTreeMap<i64, String> = BTreeMap::new();
+    let damaged = chunks(path, |chunk| {
+        if chunk.entity_path().to_string().trim_start_matches('/') != names::JOURNAL {
+            return;
+        }
+        let text = TextDocument::descriptor_text().component;
+        let at = chunk.iter_component_indices(TimelineName::from_static_str(names::ENTRY), text);
+        let texts = chunk.iter_slices::<String>(text);
+        for ((time, _row), text) in at.zip(texts) {
+            if let Some(text) = text.first() {
+                lines.insert(time.as_i64(), text.to_string());
+            }
+        }
+    })?;
+    Ok((lines, damaged))
+}
+
+/// Gives all chunks of data of the recording at `path` to `take`; returns how many messages could not be read.
+pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize, RecordingError> {
+    let file = File::open(path).map_err(|source| RecordingError::file("cannot open the recording", path, source))?;
+    let (mut damaged, mut known) = (0, false);
+    for message in DecoderApp::decode_lazy(BufReader::new(file)) {
+        match message {
+            Ok(LogMsg::SetStoreInfo(info)) => {
+                let application = info.info.store_id.application_id().to_string();
+                if application != names::APPLICATION {
+                    let message = format!("it was written by '{}'", plain(&application));
+                    return Err(RecordingError::Foreign { path: path.to_owned(), message });
+                }
+                known = true;
+            }
+            Ok(LogMsg::ArrowMsg(store, arrow)) if store.is_recording() => match Chunk::from_arrow_msg(&arrow) {
+                Ok(chunk) => take(&chunk),
+                Err(_error) => damaged += 1,
+            },
+            Ok(_) => {}
+            Err(error) if !known => {
+                let message = plain(&error.to_string());
+                return Err(RecordingError::Foreign { path: path.to_owned(), message });
+            }
+            Err(_error) => damaged += 1,
+        }
+    }
+    if known {
+        Ok(damaged)
+    } else {
+        Err(RecordingError::Foreign { path: path.to_owned(), message: "there is nothing in it".to_owned() })
+    }
+}
+
+/// A text in plain Latin letters: some viewers cannot draw others.
+pub(super) fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' | ' '..='~' => plain.push(c),
+            '\u{2212}' | '\u{2013}' | '\u{2014}' => plain.push('-'),
+            '\u{394}' => plain.push('d'),
+            'σ' => plain.push_str("sigma"),
+            'α' => plain.push_str("alpha"),
+            'β' => plain.push_str("beta"),
+            'θ' => plain.push_str("theta"),
+            'µ' | 'μ' => plain.push('u'),
+            '°' => plain.push_str(" deg"),
+            '±' => plain.push_str("+-"),
+            '…' => plain.push_str("..."),
+            '²' => plain.push_str("^2"),
+            '\u{2019}' => plain.push('\''),
+            // Latin letters with marks are drawn everywhere.
+            'À'..='ÿ' => plain.push(c),
+            _ => plain.push('?'),
+        }
+    }
+    plain
+}

@@ -1,0 +1,174 @@
+//! Turns the journal into the picture, line by line: the same lines always draw the same.
+
+mod cell;
+mod document;
+mod measured;
+mod plan;
+mod result;
+
+use jiff::Timestamp;
+use rerun::{RecordingStream, TextDocument, TextLog};
+
+use super::blueprint::{self, Purpose};
+use super::canvas::{Canvas, Moment};
+use super::names;
+use crate::kinematics::{ForwardKinematics, KinematicChain};
+use crate::profile::Profile;
+use crate::session::journal::{Entry, Line, Sum, encode};
+use crate::session::state::Session;
+use nalgebra::{Isometry3, Point3};
+
+/// Draws a session.
+#[derive(Debug)]
+pub(super) struct Scribe {
+    canvas: Canvas,
+    purpose: Purpose,
+    session: Session,
+    sum: Sum,
+    /// Results so far.
+    runs: usize,
+    /// Whether a line did not fit: nothing after it can be drawn.
+    is_lost: bool,
+}
+
+impl Scribe {
+    /// Draws on `stream` a session whose first lines are drawn elsewhere already.
+    pub(super) fn new(stream: RecordingStream, purpose: Purpose, before: &[Line]) -> Self {
+        let mut scribe = Self {
+            canvas: Canvas::new(stream),
+            purpose,
+            session: Session::default(),
+            sum: Sum::default(),
+            runs: 0,
+            is_lost: false,
+        };
+        for line in before {
+            scribe.follow(line);
+        }
+        scribe
+    }
+
+    /// Where it draws.
+    pub(super) const fn stream(&self) -> &RecordingStream {
+        self.canvas.stream()
+    }
+
+    /// Draws a line of the journal.
+    pub(super) fn take(&mut self, line: &Line) {
+        let before = self.sum.clone();
+        let follows = self.follow(line);
+        if let Ok((text, _)) = encode(line, &before) {
+            self.canvas.draw(entry_moment(line), names::JOURNAL, &TextDocument::new(text));
+        }
+        self.log(line);
+        if !follows {
+            return;
+        }
+        match &line.entry {
+            Entry::Opened { program, name, .. } => document::opening(&self.canvas, program, name, line.time),
+            Entry::Profile { .. } => {
+                self.cell();
+                if let Some(profile) = self.session.mounted_profile() {
+                    blueprint::send(&self.canvas, &profile, self.purpose);
+                }
+            }
+            Entry::Target(_) => self.cell(),
+            Entry::Plan(plan) | Entry::PlanExtended(plan) => {
+                plan::search(&self.canvas, &plan.search);
+                self.points(line.time);
+            }
+            Entry::Sample(noted) => {
+                measured::sample(&self.canvas, &self.session, noted, line.time);
+                self.points(line.time);
+            }
+            Entry::Decision { .. } | Entry::Correction(_) | Entry::Row(_) | Entry::Skipped { .. } => {
+                self.points(line.time);
+            }
+            Entry::Identified(identified) => {
+                result::draw(&self.canvas, &self.session, identified, self.runs, line.time);
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes note of a line without drawing it; `false` if it does not fit.
+    fn follow(&mut self, line: &Line) -> bool {
+        if let Ok((_, sum)) = encode(line, &self.sum) {
+            self.sum = sum;
+        }
+        if matches!(line.entry, Entry::Identified(_)) {
+            self.runs += 1;
+        }
+        self.is_lost = self.is_lost || self.session.apply(line).is_err();
+        !self.is_lost
+    }
+
+    /// The cell as soon as the robot is known.
+    fn cell(&self) {
+        if let Some(profile) = self.session.mounted_profile() {
+            cell::draw(&self.canvas, &profile);
+        }
+    }
+
+    fn points(&self, time: Timestamp) {
+        plan::points(&self.canvas, &self.session, time);
+    }
+
+    /// What happened in words.
+    fn log(&self, line: &Line) {
+        let level = match &line.entry {
+            Entry::Sample(noted) if !noted.findings.is_empty() => "WARN",
+            Entry::Refused { .. } => "WARN",
+            Entry::Row(_) | Entry::Step(_) => "DEBUG",
+            _ => "INFO",
+        };
+        let text = TextLog::new(super::read::plain(&line.entry.describe())).with_level(level);
+        let pose = i64::try_from(self.session.measurements).unwrap_or(i64::MAX);
+        self.canvas.draw(Moment { pose: Some(pose), ..entry_moment(line) }, names::LOG, &text);
+    }
+}
+
+/// When a line was written.
+fn entry_moment(line: &Line) -> Moment {
+    Moment { entry: Some(i64::try_from(line.number).unwrap_or(i64::MAX)), time: Some(line.time), ..Moment::default() }
+}
+
+/// When a measurement was made.
+fn pose_moment(number: u64, time: Timestamp) -> Moment {
+    Moment { time: Some(time), ..Moment::pose(number) }
+}
+
+/// An arm at a configuration: its frames and the points that a line through it visits, the reflector last.
+struct Posture {
+    frames: Vec<Isometry3<f64>>,
+    line: Vec<Point3<f64>>,
+    reflector: Point3<f64>,
+}
+
+impl Posture {
+    /// `q` are pendant values ((rad) or (m)); missing ones are zero.
+    fn new(chain: &KinematicChain, target: &Point3<f64>, q: &[f64]) -> Self {
+        let mut q = q.to_vec();
+        q.resize(chain.dof(), 0.0);
+        let forward = ForwardKinematics::new(chain);
+        let frames = forward.base_from_links(&q);
+        let reflector = forward.point_in_base(&q, target);
+        let mut line = vec![Point3::origin()];
+        line.extend(frames.iter().map(|frame| Point3::from(frame.translation.vector)));
+        line.push(reflector);
+        line.dedup_by(|one, other| (*one - *other).norm() < 1e-6);
+        Self { frames, line, reflector }
+    }
+
+    /// The nominal arm of `profile` with its first target.
+    fn nominal(profile: &Profile, q: &[f64]) -> Self {
+        let target = profile.targets().first().map_or(Point3::origin(), |target| target.position_in_flange);
+        Self::new(profile.chain(), &target, q)
+    }
+}
+
+/// Length of the arm stretched out (m), for sizes in the picture.
+fn reach(profile: &Profile) -> f64 {
+    let link = |joint: &crate::kinematics::Joint| joint.link.a.abs() + joint.link.d.abs();
+    profile.chain().joints().iter().map(link).sum::<f64>().max(0.1)
+}

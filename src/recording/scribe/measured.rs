@@ -1,0 +1,72 @@
+//! A sample: the arm at its pose, the point, and what was known about it.
+
+use jiff::Timestamp;
+use nalgebra::Point3;
+use rerun::{Points3D, Radius, Scalars};
+
+use super::{Posture, cell, pose_moment};
+use crate::geometry::register;
+use crate::profile::Profile;
+use crate::recording::canvas::Canvas;
+use crate::recording::{layout, names};
+use crate::session::journal::MeasuredText;
+use crate::session::plan::PoseKind;
+use crate::session::state::{Sample, Session};
+use crate::units::to_mm;
+
+/// Fewer points than this do not tell where the tracker is.
+const FEWEST: usize = 4;
+
+/// Draws a sample that `session` has taken already.
+pub(super) fn sample(canvas: &Canvas, session: &Session, noted: &MeasuredText, time: Timestamp) {
+    let (Some(profile), Some(sample)) = (session.mounted_profile(), session.sample(noted.number)) else { return };
+    let moment = pose_moment(noted.number, time);
+    let q = session.configuration_of(sample);
+    cell::pose(canvas, &profile, &q, moment);
+    let color = match session.kind_of(sample) {
+        _ if !noted.findings.is_empty() => layout::ATTENTION,
+        PoseKind::Verification => layout::VERIFICATION,
+        _ => layout::DONE,
+    };
+    let dot = Points3D::new([layout::at(&place(session, &profile, sample))])
+        .with_radii([Radius::new_ui_points(4.0)])
+        .with_colors([color]);
+    canvas.draw(moment, names::MEASURED, &dot);
+    let (x, y, z) = noted.xyz_mm;
+    canvas.draw(moment, names::READING, &Scalars::new([x, y, z]));
+    let drift = drift(session, sample);
+    let sigma = profile.instrument().map(|instrument| to_mm(instrument.sigma));
+    let predicted = noted.predicted_error_sigma.zip(sigma).map(|(per_sigma, sigma)| per_sigma * sigma);
+    let series = [
+        (names::SCATTER, noted.scatter_mm),
+        (names::TEMPERATURE, noted.temperature_degc),
+        (names::DRIFT, drift),
+        (names::PREDICTED, predicted),
+    ];
+    for (path, value) in series {
+        if let Some(value) = value.filter(|value| value.is_finite()) {
+            canvas.draw(moment, path, &Scalars::new([value]));
+        }
+    }
+}
+
+/// Where the point is in the base: the tracker is registered to the nominal arm by the samples so far; before there are
+/// enough of them, where the nominal arm has it.
+fn place(session: &Session, profile: &Profile, sample: &Sample) -> Point3<f64> {
+    let predicted = |sample: &Sample| Posture::nominal(profile, &session.configuration_of(sample)).reflector;
+    let pairs: Vec<(Point3<f64>, Point3<f64>)> =
+        session.counted().map(|sample| (session.point_of(sample), predicted(sample))).collect();
+    let registered = (pairs.len() >= FEWEST)
+        .then(|| register(pairs.iter().map(|(from, to)| (1.0, *from, *to))))
+        .flatten()
+        .map(|found| found.to_from_from * session.point_of(sample));
+    registered.filter(|point| point.coords.iter().all(|value| value.is_finite())).unwrap_or_else(|| predicted(sample))
+}
+
+/// How far a repeated pose is from its first measurement (mm).
+fn drift(session: &Session, sample: &Sample) -> Option<f64> {
+    let pose = session.pose_of(sample);
+    let first = session.counted().find(|other| session.pose_of(other) == pose)?;
+    let is_repeated = session.kind_of(sample) == PoseKind::Drift && first.noted.number != sample.noted.number;
+    is_repeated.then(|| to_mm((session.point_of(sample) - session.point_of(first)).norm()))
+}

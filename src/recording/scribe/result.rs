@@ -1,0 +1,369 @@
+//! A result: both arms, their errors at every sample, and how the solver got there.
+
+use std::iter;
+
+use jiff::Timestamp;
+use nalgebra::{Matrix3, Point3, Vector3};
+use rerun::{
+    Arrows3D, BarChart, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Radius, Scalars, SeriesLines, Tensor,
+    TensorData,
+};
+
+use super::{Posture, cell, document, reach};
+use crate::geometry::{enlargement, register};
+use crate::profile::Profile;
+use crate::recording::canvas::{Canvas, Moment};
+use crate::recording::{layout, names};
+use crate::session::calibration::Calibration;
+use crate::session::journal::{IdentifiedText, PointErrorText, from_xyz_mm};
+use crate::session::plan::PoseKind;
+use crate::session::state::{Sample, Session};
+use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
+
+/// Errors and differences are drawn up to this part of the arm's reach.
+const SHOWN: f64 = 0.15;
+/// Ellipsoids are drawn up to this part of the arm's reach.
+const SHOWN_ELLIPSOID: f64 = 0.05;
+/// Pairs that are drawn.
+const WORST_PAIRS: usize = 12;
+/// Samples of the map of all pairs; more are thinned out evenly.
+const MAP_SIZE: usize = 128;
+
+/// A sample with what it says about both arms (m).
+struct Judged<'a> {
+    sample: &'a Sample,
+    /// Its configuration: pendant values ((rad) or (m)).
+    q: Vec<f64>,
+    /// Measured, in the base of the identified arm.
+    measured: Point3<f64>,
+    /// Where the nominal arm has it, in its own registration.
+    nominal_at: Point3<f64>,
+    /// Where the identified arm has it.
+    identified_at: Point3<f64>,
+    nominal: Vector3<f64>,
+    identified: Vector3<f64>,
+    text: &'a PointErrorText,
+}
+
+/// Draws result number `run` of `session`.
+pub(super) fn draw(canvas: &Canvas, session: &Session, identified: &IdentifiedText, run: usize, time: Timestamp) {
+    let Some(profile) = session.mounted_profile() else { return };
+    document::report(canvas, session, identified, time);
+    parameters(canvas, identified);
+    let Some(calibration) = &identified.calibration else { return };
+    let judged = judged(session, &profile, identified, calibration);
+    let scales = Scales {
+        nominal: scale(&profile, judged.iter().map(|one| one.nominal.norm())),
+        identified: scale(&profile, judged.iter().map(|one| one.identified.norm())),
+        arm: arm_scale(&profile, calibration, &judged),
+        ellipsoid: ellipsoid_scale(&profile, &judged),
+    };
+    vectors(canvas, &judged, &scales);
+    arms(canvas, session, &profile, calibration, scales.arm);
+    series(canvas, session, &judged, run);
+    pairs(canvas, &judged);
+    ellipsoids(canvas, &judged, scales.ellipsoid);
+    solver(canvas, &profile, identified, calibration, &judged, &scales);
+    note(canvas, &profile, &scales);
+}
+
+/// How many times larger things are drawn than they are.
+struct Scales {
+    nominal: f64,
+    identified: f64,
+    arm: f64,
+    ellipsoid: f64,
+}
+
+fn judged<'a>(
+    session: &'a Session,
+    profile: &Profile,
+    identified: &'a IdentifiedText,
+    calibration: &Calibration,
+) -> Vec<Judged<'a>> {
+    let target = |index: usize| {
+        let (x, y, z) = calibration.nominal_targets_mm.get(index).copied()?;
+        Some(from_xyz_mm((x, y, z)))
+    };
+    let samples = identified.samples.iter().zip(&identified.points);
+    samples
+        .filter_map(|(number, text)| {
+            let sample = session.sample(*number)?;
+            let q = session.configuration_of(sample);
+            let own = profile.targets().first().map(|target| target.position_in_flange)?;
+            let at = target(sample.noted.target).unwrap_or(own);
+            let identified_at = from_xyz_mm(text.at_mm);
+            let error = from_xyz_mm(text.identified_mm).coords;
+            Some(Judged {
+                sample,
+                nominal_at: Posture::new(profile.chain(), &at, &q).reflector,
+                q,
+                measured: identified_at + error,
+                identified_at,
+                nominal: from_xyz_mm(text.nominal_mm).coords,
+                identified: error,
+                text,
+            })
+        })
+        .collect()
+}
+
+fn scale(profile: &Profile, lengths: impl Iterator<Item = f64>) -> f64 {
+    enlargement(lengths.fold(0.0, f64::max), SHOWN * reach(profile))
+}
+
+/// How much the deviations of the arm are enlarged so that the difference is seen.
+fn arm_scale(profile: &Profile, calibration: &Calibration, judged: &[Judged<'_>]) -> f64 {
+    let Some(chain) = calibration.identified_chain(profile) else { return 1.0 };
+    let target = Point3::origin();
+    let difference = |one: &Judged<'_>| {
+        let (nominal, found) = (Posture::new(profile.chain(), &target, &one.q), Posture::new(&chain, &target, &one.q));
+        (found.reflector - nominal.reflector).norm()
+    };
+    // Enlarged angles bend the arm: half the usual size keeps its shape.
+    enlargement(judged.iter().map(difference).fold(0.0, f64::max), 0.5 * SHOWN * reach(profile))
+}
+
+fn ellipsoid_scale(profile: &Profile, judged: &[Judged<'_>]) -> f64 {
+    let axes = judged.iter().filter_map(|one| covariance(one.text)).map(|one| layout::ellipsoid(&one).0.max());
+    enlargement(axes.fold(0.0, f64::max), SHOWN_ELLIPSOID * reach(profile))
+}
+
+/// Errors as arrows from where the identified arm has the point.
+fn vectors(canvas: &Canvas, judged: &[Judged<'_>], scales: &Scales) {
+    let arrows = |scale: f64, color: rerun::Color, pick: fn(&Judged<'_>) -> Vector3<f64>| {
+        Arrows3D::from_vectors(judged.iter().map(|one| layout::vector(&(pick(one) * scale))).collect::<Vec<_>>())
+            .with_origins(judged.iter().map(|one| layout::at(&one.identified_at)).collect::<Vec<_>>())
+            .with_radii([Radius::new_ui_points(1.5)])
+            .with_colors([color])
+    };
+    canvas.fix(names::ERRORS_NOMINAL, &arrows(scales.nominal, layout::NOMINAL_ERROR, |one| one.nominal));
+    canvas.fix(names::ERRORS_IDENTIFIED, &arrows(scales.identified, layout::IDENTIFIED_ERROR, |one| one.identified));
+}
+
+/// The identified arm at every pose, as it is and enlarged.
+fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Calibration, enlarged: f64) {
+    let deviations: Vec<f64> = calibration.parameters.iter().map(|parameter| parameter.deviation).collect();
+    let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * enlarged).collect();
+    let (Some((chain, targets)), Some((bent, bent_targets))) =
+        (calibration.arm_with(profile, &deviations), calibration.arm_with(profile, &larger))
+    else {
+        return;
+    };
+    for sample in &session.samples {
+        let target = sample.noted.target;
+        let (Some(at), Some(bent_at)) = (targets.get(target), bent_targets.get(target)) else { continue };
+        let moment = Moment::pose(sample.noted.number);
+        let q = session.configuration_of(sample);
+        let posture = Posture::new(&chain, at, &q);
+        for (index, frame) in posture.frames.iter().enumerate() {
+            canvas.draw(moment, names::IDENTIFIED_FRAMES, &layout::frame(frame, &names::frame("identified", index)));
+        }
+        canvas.draw(moment, names::IDENTIFIED_SKELETON, &skeleton(&posture, 2.5));
+        canvas.draw(moment, names::IDENTIFIED_ENLARGED, &skeleton(&Posture::new(&bent, bent_at, &q), 5.0));
+    }
+}
+
+fn skeleton(posture: &Posture, points: f32) -> LineStrips3D {
+    LineStrips3D::new([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
+        .with_radii([Radius::new_ui_points(points)])
+        .with_colors([layout::IDENTIFIED])
+}
+
+/// Errors at each pose. What the identification has seen is a residual, and is named so.
+fn series(canvas: &Canvas, session: &Session, judged: &[Judged<'_>], run: usize) {
+    let by_kind = |is_verification: bool| {
+        judged.iter().filter(move |one| (session.kind_of(one.sample) == PoseKind::Verification) == is_verification)
+    };
+    let again = if run > 1 { format!(" (result {run})") } else { String::new() };
+    let kinds = [
+        (false, "fit", [layout::NOMINAL_ERROR, layout::IDENTIFIED_ERROR]),
+        (true, "verification", [layout::ATTENTION, layout::VERIFICATION]),
+    ];
+    for (is_verification, suffix, colors) in kinds {
+        let group: Vec<&Judged<'_>> = by_kind(is_verification).collect();
+        if group.is_empty() {
+            continue;
+        }
+        for quantity in ["position", "distance"] {
+            let style = SeriesLines::new()
+                .with_names([format!("nominal, {suffix}{again}"), format!("identified, {suffix}{again}")])
+                .with_colors(colors)
+                .with_widths([1.5]);
+            canvas.fix(&names::errors(run, quantity, suffix), &style);
+        }
+        for one in &group {
+            let moment = Moment::pose(one.sample.noted.number);
+            let position = Scalars::new([to_mm(one.nominal.norm()), to_mm(one.identified.norm())]);
+            canvas.draw(moment, &names::errors(run, "position", suffix), &position);
+            let Some((nominal, identified)) = distance_errors(one, &group) else { continue };
+            let distance = Scalars::new([to_mm(nominal), to_mm(identified)]);
+            canvas.draw(moment, &names::errors(run, "distance", suffix), &distance);
+        }
+    }
+}
+
+/// Mean absolute distance error (m) of the pairs of one sample with all others, of both arms.
+fn distance_errors(one: &Judged<'_>, group: &[&Judged<'_>]) -> Option<(f64, f64)> {
+    let others = group.iter().filter(|other| other.sample.noted.number != one.sample.noted.number);
+    let (mut count, mut nominal, mut identified) = (0_u32, 0.0, 0.0);
+    for other in others {
+        let errors = pair(one, other);
+        count += 1;
+        nominal += errors.0.abs();
+        identified += errors.1.abs();
+    }
+    (count > 0).then(|| (nominal / f64::from(count), identified / f64::from(count)))
+}
+
+/// Distance errors (m) of a pair, measured less predicted: of the nominal and of the identified arm.
+fn pair(one: &Judged<'_>, other: &Judged<'_>) -> (f64, f64) {
+    let measured = (one.measured - other.measured).norm();
+    (measured - (one.nominal_at - other.nominal_at).norm(), measured - (one.identified_at - other.identified_at).norm())
+}
+
+/// The worst pairs as lines, and the errors of all pairs as a picture.
+fn pairs(canvas: &Canvas, judged: &[Judged<'_>]) {
+    let step = judged.len().div_ceil(MAP_SIZE).max(1);
+    let shown: Vec<&Judged<'_>> = judged.iter().step_by(step).collect();
+    let mut all = Vec::new();
+    let count = shown.len();
+    let mut maps = (vec![0_u16; count * count], vec![0_u16; count * count]);
+    for (i, one) in shown.iter().enumerate() {
+        for (j, other) in shown.iter().enumerate().filter(|(j, _)| *j != i) {
+            let errors = pair(one, other);
+            maps.0[i * count + j] = micrometres(errors.0);
+            maps.1[i * count + j] = micrometres(errors.1);
+            if j > i {
+                all.push((errors, one, other));
+            }
+        }
+    }
+    if all.is_empty() {
+        return;
+    }
+    let shape = || vec![count as u64, count as u64];
+    for (path, map) in [(names::MAP_NOMINAL, maps.0), (names::MAP_IDENTIFIED, maps.1)] {
+        let data = TensorData::new(shape(), rerun::TensorBuffer::U16(map.into()));
+        canvas.fix(path, &Tensor::new(data).with_dim_names(["sample", "with sample"]));
+    }
+    type Pick = fn(&(f64, f64)) -> f64;
+    let picks: [(&str, Pick); 2] =
+        [(names::PAIRS_NOMINAL, |errors| errors.0), (names::PAIRS_IDENTIFIED, |errors| errors.1)];
+    for (path, pick) in picks {
+        all.sort_by(|(one, ..), (other, ..)| pick(other).abs().total_cmp(&pick(one).abs()));
+        let worst: Vec<_> = all.iter().take(WORST_PAIRS).collect();
+        let largest = worst.first().map_or(1.0, |(errors, ..)| pick(errors).abs());
+        let strips = worst.iter().map(|(_, one, other)| [layout::at(&one.measured), layout::at(&other.measured)]);
+        let labels = worst.iter().map(|(errors, ..)| format!("{:+.3} mm", to_mm(pick(errors))));
+        let lines = LineStrips3D::new(strips)
+            .with_colors(worst.iter().map(|(errors, ..)| layout::two_sided(pick(errors) / largest)))
+            .with_radii([Radius::new_ui_points(1.5)])
+            .with_labels(labels);
+        canvas.fix(path, &lines);
+    }
+}
+
+/// The size of an error (m) in whole micrometres, up to 65 mm.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+const fn micrometres(error: f64) -> u16 {
+    (error.abs() / MICROMETRE).round() as u16
+}
+
+/// Covariance of a predicted position (m²).
+fn covariance(text: &PointErrorText) -> Option<Matrix3<f64>> {
+    let (xx, xy, xz, yy, yz, zz) = text.covariance_um2?;
+    Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * MICROMETRE.powi(2))
+}
+
+fn ellipsoids(canvas: &Canvas, judged: &[Judged<'_>], scale: f64) {
+    let known: Vec<_> =
+        judged.iter().filter_map(|one| Some((one.identified_at, layout::ellipsoid(&covariance(one.text)?)))).collect();
+    let drawn = Ellipsoids3D::from_centers_and_half_sizes(
+        known.iter().map(|(at, _)| layout::at(at)),
+        known.iter().map(|(_, (axes, _))| layout::vector(&(axes * scale))),
+    )
+    .with_quaternions(known.iter().map(|(_, (_, rotation))| layout::quaternion(rotation)))
+    .with_colors([layout::VERIFICATION])
+    .with_line_radii([Radius::new_ui_points(0.4)])
+    .with_fill_mode(FillMode::MajorWireframe);
+    canvas.fix(names::UNCERTAINTY, &drawn);
+}
+
+/// The solver, step by step: the arm bends from nominal to identified, and the errors shrink.
+fn solver(
+    canvas: &Canvas,
+    profile: &Profile,
+    identified: &IdentifiedText,
+    calibration: &Calibration,
+    judged: &[Judged<'_>],
+    scales: &Scales,
+) {
+    let rest = cell::rest(profile);
+    let nothing = vec![0.0; calibration.parameters.len()];
+    let steps = identified.summary.iterations.iter().map(|step| (Some(step), &step.deviations));
+    for (index, (step, deviations)) in iter::once((None, &nothing)).chain(steps).enumerate() {
+        let moment = Moment::solver(index);
+        cell::pose(canvas, profile, &rest, moment);
+        if let Some(step) = step {
+            let (cost, largest) = (step.cost.log10(), step.step.log10());
+            if cost.is_finite() && largest.is_finite() {
+                canvas.draw(moment, names::COST_AND_STEP, &Scalars::new([cost, largest]));
+            }
+        }
+        let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * scales.arm).collect();
+        let Some((bent, bent_targets)) = calibration.arm_with(profile, &larger) else { continue };
+        if let Some(target) = bent_targets.first() {
+            canvas.draw(moment, names::IDENTIFIED_ENLARGED, &skeleton(&Posture::new(&bent, target, &rest), 5.0));
+        }
+        let Some((chain, targets)) = calibration.arm_with(profile, deviations) else { continue };
+        let predicted: Vec<Point3<f64>> = judged
+            .iter()
+            .filter_map(|one| Some(Posture::new(&chain, targets.get(one.sample.noted.target)?, &one.q).reflector))
+            .collect();
+        let pairs = judged.iter().map(|one| one.measured).zip(predicted.iter().copied());
+        let trusted = judged.iter().map(|one| if one.text.rejected { 0.0 } else { 1.0 });
+        let weighed = pairs.clone().zip(trusted).map(|((from, to), weight)| (weight, from, to));
+        let Some(found) = register(weighed.collect::<Vec<_>>().iter().copied()) else { continue };
+        let errors: Vec<Vector3<f64>> =
+            pairs.map(|(measured, predicted)| found.to_from_from * measured - predicted).collect();
+        let arrows = Arrows3D::from_vectors(errors.iter().map(|error| layout::vector(&(error * scales.nominal))))
+            .with_origins(predicted.iter().map(layout::at))
+            .with_radii([Radius::new_ui_points(1.5)])
+            .with_colors([layout::NOMINAL_ERROR]);
+        canvas.draw(moment, names::ERRORS_SOLVING, &arrows);
+        let mean = errors.iter().map(nalgebra::Matrix::norm).sum::<f64>() / errors.len().max(1) as f64;
+        canvas.draw(moment, names::FIT, &Scalars::new([to_mm(mean)]));
+    }
+}
+
+/// Deviations of the parameters as bars, in units of their standard deviation.
+fn parameters(canvas: &Canvas, identified: &IdentifiedText) {
+    let parameters = &identified.summary.parameters;
+    let of_sigma: Vec<f64> = parameters
+        .iter()
+        .map(|parameter| parameter.sigma.map_or(0.0, |sigma| finite(parameter.deviation / sigma)))
+        .collect();
+    let data = TensorData::new(vec![of_sigma.len() as u64], rerun::TensorBuffer::F64(of_sigma.into()));
+    canvas.fix(names::SIGNIFICANCE, &BarChart::new(data).with_color(layout::IDENTIFIED));
+}
+
+/// Zero instead of what cannot be drawn.
+const fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { 0.0 }
+}
+
+/// What the enlargements are, beside the robot.
+fn note(canvas: &Canvas, profile: &Profile, scales: &Scales) {
+    let text = format!(
+        "drawn larger: nominal errors {} x, identified errors {} x, difference of the arms {} x, uncertainty {} x",
+        scales.nominal, scales.identified, scales.arm, scales.ellipsoid
+    );
+    let at = Point3::new(0.0, 0.0, profile.floor().unwrap_or(0.0) - 0.12 * reach(profile));
+    let note = Points3D::new([layout::at(&at)])
+        .with_radii([layout::single(0.1 * MILLIMETRE)])
+        .with_colors([layout::NOMINAL])
+        .with_labels([text])
+        .with_show_labels(true);
+    canvas.fix(names::SCALE_NOTE, &note);
+}

@@ -1,0 +1,170 @@
+//! The files of a recording in the folder of its session.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use rerun::sink::LogSink;
+use rerun::{RecordingStream, RecordingStreamBuilder};
+
+use super::blueprint::Purpose;
+use super::scribe::Scribe;
+use super::sink::DurableSink;
+use super::{RecordingError, compact, names, read};
+use crate::session::journal::{Entry, Line};
+use crate::session::sha256;
+
+/// Name of the recording in a session's folder.
+pub const FILE_NAME: &str = "recording.rrd";
+
+/// How the names of parts begin and end.
+const PART: (&str, &str) = ("recording.part-", ".rrd");
+
+/// Which recording lines belong to: all parts of a session carry the same id.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Identity {
+    id: String,
+    name: String,
+}
+
+impl Identity {
+    /// From the first line of a journal.
+    pub(super) fn of(first: &Line) -> Self {
+        let name = match &first.entry {
+            Entry::Opened { name, .. } => name.clone(),
+            _ => "session".to_owned(),
+        };
+        let id = sha256(format!("{name} {}", first.time).as_bytes()).chars().take(32).collect();
+        Self { id, name: read::plain(&name) }
+    }
+
+    /// A stream of this recording. Neither the environment nor a viewer decides whether it is written.
+    pub(super) fn builder(&self) -> RecordingStreamBuilder {
+        RecordingStreamBuilder::new(names::APPLICATION)
+            .recording_id(self.id.clone())
+            .recording_name(self.name.clone())
+            .send_properties(true)
+            .enabled(true)
+    }
+
+    /// A stream to a new file, forced to disk by every flush.
+    pub(super) fn file(&self, path: &Path) -> Result<RecordingStream, RecordingError> {
+        let create = |source| RecordingError::file("cannot create the recording", path, source);
+        let file = File::options().write(true).create_new(true).open(path).map_err(create)?;
+        let sink = DurableSink::new(file).map_err(|message| create(std::io::Error::other(message)))?;
+        self.builder()
+            .set_sinks(vec![Box::new(sink) as Box<dyn LogSink>])
+            .map_err(|error| RecordingError::library("beginning the recording", error))
+    }
+}
+
+/// The parts in `folder`, oldest first.
+fn parts(folder: &Path) -> Vec<(u32, PathBuf)> {
+    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let mut parts: Vec<(u32, PathBuf)> = entries
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            let number = name.to_str()?.strip_prefix(PART.0)?.strip_suffix(PART.1)?.parse().ok()?;
+            Some((number, entry.path()))
+        })
+        .collect();
+    parts.sort();
+    parts
+}
+
+/// The files of the recording in `folder`, oldest first.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let whole = folder.join(FILE_NAME);
+    let whole = whole.exists().then_some(whole);
+    whole.into_iter().chain(parts(folder).into_iter().map(|(_, path)| path)).collect()
+}
+
+/// The path of the next part.
+pub(super) fn next_part(folder: &Path) -> PathBuf {
+    let number = parts(folder).last().map_or(1, |(number, _)| number + 1);
+    folder.join(format!("{}{number:03}{}", PART.0, PART.1))
+}
+
+/// How many lines of a journal the files in `folder` have already. `None`: they have gaps or cannot be read, and are best made
+/// anew.
+pub(super) fn recorded_lines(folder: &Path) -> Option<usize> {
+    let mut seen = 0_usize;
+    let mut lines = std::collections::BTreeSet::new();
+    for file in files(folder) {
+        let found = read::line_numbers(&file).ok()?;
+        if found.1 > 0 {
+            return None;
+        }
+        lines.extend(found.0);
+    }
+    for number in &lines {
+        if usize::try_from(*number) != Ok(seen + 1) {
+            return None;
+        }
+        seen += 1;
+    }
+    Some(seen)
+}
+
+/// Removes all files of the recording in `folder`.
+pub(super) fn remove(folder: &Path) -> Result<(), RecordingError> {
+    for file in files(folder) {
+        fs::remove_file(&file).map_err(|source| RecordingError::file("cannot remove", &file, source))?;
+    }
+    Ok(())
+}
+
+/// Makes one compact file of all parts in `folder`; the parts go when it is on disk. Returns its path, if there is anything.
+///
+/// # Errors
+/// A file cannot be read or written; nothing is lost then.
+pub fn merge(folder: &Path) -> Result<Option<PathBuf>, RecordingError> {
+    let whole = folder.join(FILE_NAME);
+    let parts = parts(folder);
+    if parts.is_empty() {
+        return Ok(whole.exists().then_some(whole));
+    }
+    let all = files(folder);
+    let messages: Vec<_> = compact::messages(all.iter().map(PathBuf::as_path))?.collect();
+    compact::store(messages.into_iter(), &whole)?;
+    for (_, part) in parts {
+        fs::remove_file(&part).map_err(|source| RecordingError::file("cannot remove", &part, source))?;
+    }
+    Ok(Some(whole))
+}
+
+/// Makes the recording in `folder` anew from the lines of its journal, and returns its path.
+///
+/// # Errors
+/// It cannot be written; the old one stays then.
+pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<PathBuf, RecordingError> {
+    let whole = folder.join(FILE_NAME);
+    write_for(&whole, lines, Purpose::Session)?;
+    for (_, part) in parts(folder) {
+        fs::remove_file(&part).map_err(|source| RecordingError::file("cannot remove", &part, source))?;
+    }
+    Ok(whole)
+}
+
+/// Writes a recording of these lines to `path`. `of_plan`: it opens on the search for the poses.
+///
+/// # Errors
+/// There are no lines, or the file cannot be written.
+pub fn write(path: &Path, lines: &[Line], of_plan: bool) -> Result<(), RecordingError> {
+    write_for(path, lines, if of_plan { Purpose::Plan } else { Purpose::Session })
+}
+
+fn write_for(path: &Path, lines: &[Line], purpose: Purpose) -> Result<(), RecordingError> {
+    let Some(first) = lines.first() else {
+        return Err(RecordingError::library("beginning the recording", "there is nothing to record"));
+    };
+    let (stream, storage) = Identity::of(first)
+        .builder()
+        .memory()
+        .map_err(|error| RecordingError::library("beginning the recording", error))?;
+    let mut scribe = Scribe::new(stream, purpose, &[]);
+    for line in lines {
+        scribe.take(line);
+    }
+    scribe.stream().flush_blocking().map_err(|error| RecordingError::library("drawing the recording", error))?;
+    compact::store(storage.take().into_iter(), path)
+}
