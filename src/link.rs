@@ -6,13 +6,24 @@
 
 #![warn(missing_docs)]
 
+mod build;
+pub mod protocol;
 mod replay;
 mod simulated;
+pub mod simulator;
+mod transport;
+mod wire;
+mod wired;
 
+use std::time::Duration;
+
+use nalgebra::Point3;
 use thiserror::Error;
 
 pub use replay::{Replay, ReplayRow};
 pub use simulated::{HiddenArm, SimulatedCell};
+pub use wire::RawLog;
+pub use wired::Wired;
 
 use crate::session::reading::{MeasureRequest, Reading};
 
@@ -30,6 +41,39 @@ pub trait Link: Send {
     /// # Errors
     /// There is no reading.
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError>;
+
+    /// What there is to see while nothing is measured, and what has happened; takes up to `wait`. `None`: this link has nothing
+    /// to show between measurements, and does not wait.
+    fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
+        let _nothing = wait;
+        None
+    }
+}
+
+/// What a link sees now.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LiveReading {
+    /// Time by the link's own clock (s); only differences matter.
+    pub seconds: f64,
+    /// The reflector in the frame of the instrument (m), if it is seen. Never a measurement.
+    pub point: Option<Point3<f64>>,
+    /// Joints of the robot: pendant values (rad), if it tells them.
+    pub joints: Option<Vec<f64>>,
+    /// Whether the robot rests; `None`: it does not tell.
+    pub is_still: Option<bool>,
+    /// Why the instrument cannot be asked now.
+    pub down: Option<String>,
+}
+
+/// Something that happened at a link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LinkNews {
+    /// It is set up, for the first time or again: who answers.
+    Up(String),
+    /// It is lost and will be tried again: why.
+    Down(String),
+    /// The operator should know.
+    Status(String),
 }
 
 /// Why there is no reading.
@@ -47,6 +91,12 @@ pub enum LinkError {
         /// Name of the pose.
         pose: String,
     },
+    /// The instrument gave no point, or cannot be asked.
+    #[error(transparent)]
+    Instrument(#[from] protocol::Failure),
+    /// The robot is not ready for a measurement.
+    #[error("the robot: {0}")]
+    Robot(String),
     /// The set-up cannot be simulated or played.
     #[error("{0}")]
     SetUp(String),

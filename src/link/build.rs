@@ -1,0 +1,96 @@
+//! Protocols from their names and options.
+
+use super::protocol::Protocol;
+use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Preset};
+use super::protocol::emscon::{Emscon, EmsconOptions};
+use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
+use super::protocol::ndi::{NdiOptions, NdiProtocol};
+use super::protocol::rtde::{Rtde, RtdeOptions};
+use crate::session::wire::{Route, WireAddress, WireProtocol};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+/// Shortest and longest stationary measurement (ms).
+const MEASURE_MS: (i32, i32) = (50, 60_000);
+
+/// Options of emScon.
+#[derive(Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct EmsconSettings {
+    measure_ms: i32,
+    use_adm: bool,
+    reflector: Option<i32>,
+    initialize: bool,
+}
+
+impl Default for EmsconSettings {
+    fn default() -> Self {
+        let EmsconOptions { measure_ms, use_adm, reflector, initialize, .. } = EmsconOptions::default();
+        Self { measure_ms, use_adm, reflector, initialize }
+    }
+}
+
+/// Options of RTDE.
+#[derive(Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct RtdeSettings {
+    frequency_hz: f64,
+}
+
+impl Default for RtdeSettings {
+    fn default() -> Self {
+        Self { frequency_hz: RtdeOptions::default().frequency }
+    }
+}
+
+/// Options from their text; without one the usual ones.
+fn read<T: DeserializeOwned + Default>(options: Option<&str>) -> Result<T, String> {
+    let Some(text) = options else { return Ok(T::default()) };
+    ron::Options::default()
+        .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
+        .from_str(text)
+        .map_err(|error| format!("the options '{}' of the link: {error}", crate::session::printable(text)))
+}
+
+/// The protocol of an address. `options` is the name of a preset or a RON struct of what differs from the usual.
+///
+/// # Errors
+/// An option that does not exist or cannot be.
+pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<Box<dyn Protocol>, String> {
+    let options = options.map(str::trim).filter(|options| !options.is_empty());
+    match address.protocol {
+        WireProtocol::Emscon => {
+            let EmsconSettings { measure_ms, use_adm, reflector, initialize } = read(options)?;
+            if !(MEASURE_MS.0..=MEASURE_MS.1).contains(&measure_ms) {
+                return Err(format!("measure_ms is {measure_ms}: use {} to {}", MEASURE_MS.0, MEASURE_MS.1));
+            }
+            // Its positions are what the live display shows.
+            let reflector_positions = true;
+            let usual = EmsconOptions::default();
+            let options =
+                EmsconOptions { measure_ms, use_adm, reflector, initialize, reflector_positions, ..usual };
+            Ok(Box::new(Emscon::new(options)))
+        }
+        WireProtocol::Rtde => {
+            let RtdeSettings { frequency_hz } = read(options)?;
+            Ok(Box::new(Rtde::new(RtdeOptions { frequency: frequency_hz, ..RtdeOptions::default() })))
+        }
+        WireProtocol::Ascii => {
+            let preset = options.and_then(|name| name.parse::<Preset>().ok());
+            let mut options: AsciiOptions = match preset {
+                Some(preset) => preset.options(),
+                None => read(options)?,
+            };
+            options.datagrams |= matches!(address.route, Route::Udp { .. });
+            Ok(Box::new(AsciiProtocol::new(options)?))
+        }
+        WireProtocol::Geocom => {
+            let options: GeocomOptions = read(options)?;
+            Ok(Box::new(GeocomProtocol::new(options)?))
+        }
+        WireProtocol::Ndi => {
+            let options: NdiOptions = read(options)?;
+            Ok(Box::new(NdiProtocol::new(options)?))
+        }
+    }
+}

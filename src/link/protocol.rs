@@ -1,0 +1,240 @@
+//! What instruments and robots speak, without sockets: bytes in, events and bytes out.
+//!
+//! A [`Protocol`] has no clock and no wire. Its owner connects, calls [`Protocol::start`], hands it every byte that arrives and
+//! every passing deadline, and carries away what it wants to send. So one and the same code talks over a serial port, TCP or a
+//! list of bytes in a test, and splitting a stream at any byte changes nothing.
+//!
+//! Conversation: `start` runs the whole set-up (identity, units, frame, mode) and ends with [`ProtocolEvent::Ready`];
+//! `trigger` asks for one shot and is answered by exactly one [`ProtocolEvent::Shot`] or [`ProtocolEvent::Failed`]. After
+//! [`ProtocolEvent::Lost`] nothing is valid until the owner has connected again and called `start`. A point is given only on
+//! an explicit success of the instrument.
+
+pub mod emscon;
+pub mod mailbox;
+pub mod rtde;
+pub mod ascii;
+pub mod crc;
+pub mod geocom;
+pub mod lines;
+pub mod ndi;
+pub mod outbox;
+
+use std::fmt::Debug;
+use std::time::Duration;
+
+use nalgebra::Point3;
+use thiserror::Error;
+
+/// Time since some start that the owner of the protocol chose; only differences matter.
+pub type Moment = Duration;
+
+/// One conversation with an instrument or a robot.
+pub trait Protocol: Send + Debug {
+    /// A new connection: forgets all that was received and begins the set-up.
+    fn start(&mut self, now: Moment);
+
+    /// Bytes as they arrived; any split of the stream gives the same events. A datagram is fed whole.
+    fn feed(&mut self, bytes: &[u8], now: Moment);
+
+    /// Time has passed: deadlines, retries, keep-alive.
+    fn tick(&mut self, now: Moment);
+
+    /// Asks for one shot. Not ready, or one is under way: answered by [`ProtocolEvent::Failed`].
+    fn trigger(&mut self, now: Moment);
+
+    /// Gives up the shot under way; what still comes of it is swallowed. Not answered.
+    fn cancel(&mut self, now: Moment);
+
+    /// The next bytes to send.
+    fn next_output(&mut self) -> Option<Vec<u8>>;
+
+    /// The next thing that happened.
+    fn next_event(&mut self) -> Option<ProtocolEvent>;
+
+    /// When [`Self::tick`] wants to be called at the latest.
+    fn next_deadline(&self) -> Option<Moment>;
+}
+
+/// Something that happened on the wire.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ProtocolEvent {
+    /// The set-up is complete and was read back; shots may be asked for.
+    Ready(Identity),
+    /// The shot that was asked for.
+    Shot(Shot),
+    /// The shot that was asked for did not come; the link goes on.
+    Failed(Failure),
+    /// A point that nobody asked for: a stream, or the position of the reflector. Never a measurement.
+    Live(Shot),
+    /// A complete measurement that somebody started at the instrument itself.
+    Offered(Shot),
+    /// Joint values that the robot reported.
+    Joints(JointState),
+    /// Something that the operator should know.
+    Status(Status),
+    /// The connection is of no use any more.
+    Lost(Failure),
+}
+
+/// Who answers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Identity {
+    /// Maker, model, serial number, version: in one line.
+    pub name: String,
+    /// Reflector in use with its surface offset, if the instrument says it.
+    pub reflector: Option<Reflector>,
+    /// What was checked in the set-up, one item each, such as `units: mm, rad (read back)`.
+    pub checked: Vec<String>,
+    /// What the operator should know before measuring, such as a frame that is not the instrument's own.
+    pub warnings: Vec<String>,
+}
+
+/// A reflector that the instrument knows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reflector {
+    /// Number at the instrument.
+    pub id: i32,
+    /// Name.
+    pub name: String,
+    /// Distance of its centre from the surface that it touches (m).
+    pub offset: f64,
+}
+
+/// One point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shot {
+    /// Centre of the reflector in the frame of the instrument (m).
+    pub point: Point3<f64>,
+    /// Standard deviation of each coordinate (m), if the instrument states it.
+    pub sigma: Option<[f64; 3]>,
+    /// Time by the instrument's clock (s).
+    pub instrument_time: Option<f64>,
+    /// Face of the telescope, 1 or 2.
+    pub face: Option<u8>,
+    /// Temperature (°C).
+    pub temperature: Option<f64>,
+    /// Pressure (hPa).
+    pub pressure: Option<f64>,
+    /// Relative humidity (%).
+    pub humidity: Option<f64>,
+    /// Said with the point, such as a name or `accuracy not guaranteed`.
+    pub remark: Option<String>,
+    /// The bytes that it was read from.
+    pub raw: Vec<u8>,
+}
+
+impl Shot {
+    /// A point with nothing said beside it.
+    pub const fn bare(point: Point3<f64>) -> Self {
+        Self {
+            point,
+            sigma: None,
+            instrument_time: None,
+            face: None,
+            temperature: None,
+            pressure: None,
+            humidity: None,
+            remark: None,
+            raw: Vec::new(),
+        }
+    }
+}
+
+/// Joints of a robot at one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointState {
+    /// Values (rad).
+    pub positions: Vec<f64>,
+    /// Speeds (rad/s), if the controller gives them.
+    pub speeds: Option<Vec<f64>>,
+    /// Time by the controller's clock (s).
+    pub controller_time: f64,
+    /// Why it is no time to measure, such as a protective stop.
+    pub stopped: Option<String>,
+}
+
+/// How much a status matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Good to know.
+    Info,
+    /// Wants attention.
+    Warning,
+}
+
+/// Something to know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Status {
+    /// How much it matters.
+    pub severity: Severity,
+    /// In words.
+    pub text: String,
+}
+
+/// Why there is no point, or no link. Every variant's message says what happened; [`Failure::hint`] says what to do.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum Failure {
+    /// No reflector is seen.
+    #[error("the instrument sees no reflector ({0})")]
+    NoTarget(String),
+    /// The reflector or the air is not steady.
+    #[error("the reading was not stable ({0})")]
+    Unstable(String),
+    /// Not now: warm-up, motion, another command.
+    #[error("the instrument is not ready ({0})")]
+    NotReady(String),
+    /// It said nothing in time.
+    #[error("the instrument said nothing for {seconds:.0} s while {what}")]
+    Silent {
+        /// What was waited for.
+        what: String,
+        /// How long.
+        seconds: f64,
+    },
+    /// It refused.
+    #[error("the instrument refused: {0}")]
+    Refused(String),
+    /// It is set in another way than asked for: units, frame, mode, reflector.
+    #[error("the instrument is set differently: {0}")]
+    Settings(String),
+    /// A point came that cannot be one.
+    #[error("the reading is no measurement: {0}")]
+    Unusable(String),
+    /// What came cannot be understood.
+    #[error("cannot read what the instrument sends: {0}")]
+    Garbled(String),
+    /// Somebody else uses it.
+    #[error("the instrument is in use by another program ({0})")]
+    InUse(String),
+    /// The connection ended.
+    #[error("the connection is lost: {0}")]
+    Disconnected(String),
+    /// The shot was asked for while another was under way, or before the set-up was complete.
+    #[error("a shot was asked for too early: {0}")]
+    TooEarly(String),
+}
+
+impl Failure {
+    /// What the operator can do.
+    pub const fn hint(&self) -> &'static str {
+        match self {
+            Self::NoTarget(_) => "return the SMR to the nest until the instrument has it again, then measure again",
+            Self::Unstable(_) => "wait until the robot and the SMR are at rest, then measure again",
+            Self::NotReady(_) => "wait until the instrument shows that it is ready, then measure again",
+            Self::Silent { .. } => "look whether the instrument is on and the cable or network is in place",
+            Self::Refused(_) => "look at the instrument's own display for what it wants",
+            Self::Settings(_) => "set the instrument as said, or connect again to let the set-up do it",
+            Self::Unusable(_) => "measure again; if it stays, check the beam and the settings of the instrument",
+            Self::Garbled(_) => "check baud rate, line ending and the kind of instrument that was chosen",
+            Self::InUse(_) => "close the other program; then connect again",
+            Self::Disconnected(_) => "check the cable or network; the link connects again by itself",
+            Self::TooEarly(_) => "wait for the reading under way",
+        }
+    }
+
+    /// True where asking again at once has a chance.
+    pub const fn is_transient(&self) -> bool {
+        matches!(self, Self::Unstable(_) | Self::NotReady(_))
+    }
+}

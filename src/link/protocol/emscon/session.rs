@@ -1,0 +1,462 @@
+//! The conversation: at most one command is under way at any time, and answers are matched by command, never by order.
+
+use std::time::Duration;
+
+use super::super::mailbox::Mailbox;
+use super::super::{Failure, Moment, ProtocolEvent, Severity};
+use super::EmsconOptions;
+use super::command::Command;
+use super::exchange::{Due, Exchange, patience};
+use super::packet::{Framer, Packet, Reply, SingleResult};
+use super::setup::{Outcome, SetUp, WARM_UP_PAUSE};
+use super::shot::{position_of, shot_of};
+use super::status::{CommandId, PacketType, ResultStatus, SystemEvent, TrackerStatus};
+use super::step::reading_of;
+
+/// Re-checks in a row that find yet another change, after which somebody else is at the settings.
+const MAX_RECHECKS: u32 = 5;
+
+/// What the link is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Not connected, or of no use any more.
+    Off,
+    /// Setting up or re-checking.
+    Settling,
+    /// Ready for a shot. A command under way is a keep-alive.
+    Idle,
+    /// A shot: asking whether the tracker is ready.
+    Asking,
+    /// A shot: waiting for the acceptance.
+    Starting,
+    /// A shot: waiting for the result.
+    Waiting {
+        /// Since when.
+        since: Moment,
+        /// Until when.
+        until: Moment,
+    },
+    /// A shot was given up; whatever comes of it before the answer to the stop is swallowed.
+    Stopping,
+}
+
+/// One conversation.
+#[derive(Clone, Debug)]
+pub(super) struct Session {
+    options: EmsconOptions,
+    /// What is to be sent and told.
+    pub mailbox: Mailbox,
+    framer: Framer,
+    phase: Phase,
+    exchange: Option<Exchange>,
+    set_up: SetUp,
+    /// The owner was told that the link is ready.
+    is_announced: bool,
+    /// Something that points depend on changed since it was read.
+    is_dirty: bool,
+    rechecks: u32,
+    was_not_ready: bool,
+    face: Option<u8>,
+    last_heard: Moment,
+}
+
+impl Session {
+    /// A conversation that has not begun.
+    pub(super) fn new(options: EmsconOptions) -> Self {
+        Self {
+            options,
+            mailbox: Mailbox::default(),
+            framer: Framer::default(),
+            phase: Phase::Off,
+            exchange: None,
+            set_up: SetUp::whole(options),
+            is_announced: false,
+            is_dirty: false,
+            rechecks: 0,
+            was_not_ready: false,
+            face: None,
+            last_heard: Moment::ZERO,
+        }
+    }
+
+    /// A new connection.
+    pub(super) fn start(&mut self, now: Moment) {
+        *self = Self::new(self.options);
+        self.last_heard = now;
+        self.phase = Phase::Settling;
+        self.next_step(now);
+    }
+
+    /// Bytes from the tracker.
+    pub(super) fn feed(&mut self, bytes: &[u8], now: Moment) {
+        if self.phase == Phase::Off {
+            return;
+        }
+        self.last_heard = now;
+        self.framer.feed(bytes);
+        while self.phase != Phase::Off {
+            match self.framer.next_packet() {
+                Ok(Some(packet)) => self.take(&packet, now),
+                Ok(None) => return,
+                Err(error) => self.lose(Failure::Garbled(error.to_string())),
+            }
+        }
+    }
+
+    /// Time has passed.
+    pub(super) fn tick(&mut self, now: Moment) {
+        if let Phase::Waiting { since, until } = self.phase
+            && now >= until
+        {
+            let seconds = now.saturating_sub(since).as_secs_f64();
+            self.fail(Failure::Silent { what: "the result of the measurement was awaited".to_owned(), seconds });
+            self.stop(now);
+        }
+        match self.exchange.as_mut().map(|exchange| exchange.due(now)) {
+            Some(Due::Again(bytes)) => self.mailbox.send(bytes),
+            Some(Due::TimedOut) => self.timed_out(now),
+            None if self.phase == Phase::Idle && now >= self.keep_alive_at() => {
+                self.send(Command::bare(CommandId::GetTrackerStatus), now);
+            }
+            Some(Due::Nothing) | None => {}
+        }
+    }
+
+    /// Asks for a shot.
+    pub(super) fn trigger(&mut self, now: Moment) {
+        let too_early = |text: &str| ProtocolEvent::Failed(Failure::TooEarly(text.to_owned()));
+        match self.phase {
+            Phase::Idle => {
+                self.phase = Phase::Asking;
+                self.send(Command::bare(CommandId::GetTrackerStatus), now);
+            }
+            Phase::Off => self.mailbox.report(too_early("the tracker is not connected")),
+            Phase::Settling if self.is_announced => {
+                let text = "its settings were changed and are being checked again".to_owned();
+                self.mailbox.report(ProtocolEvent::Failed(Failure::NotReady(text)));
+            }
+            Phase::Settling => self.mailbox.report(too_early("the set-up is not complete")),
+            Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {
+                self.mailbox.report(too_early("a measurement is under way"));
+            }
+            Phase::Stopping => self.mailbox.report(too_early("the measurement before is being stopped")),
+        }
+    }
+
+    /// Gives up the shot under way.
+    pub(super) fn cancel(&mut self, now: Moment) {
+        match self.phase {
+            Phase::Asking => self.phase = Phase::Idle,
+            Phase::Starting | Phase::Waiting { .. } => self.stop(now),
+            Phase::Off | Phase::Settling | Phase::Idle | Phase::Stopping => {}
+        }
+    }
+
+    /// When [`Self::tick`] has something to do.
+    pub(super) fn next_deadline(&self) -> Option<Moment> {
+        let exchange = self.exchange.as_ref().map(Exchange::deadline);
+        match self.phase {
+            Phase::Off => None,
+            Phase::Waiting { until, .. } => Some(exchange.map_or(until, |deadline| deadline.min(until))),
+            Phase::Idle => exchange.or_else(|| Some(self.keep_alive_at())),
+            Phase::Settling | Phase::Asking | Phase::Starting | Phase::Stopping => exchange,
+        }
+    }
+
+    fn keep_alive_at(&self) -> Moment {
+        self.last_heard.saturating_add(self.options.keep_alive)
+    }
+
+    fn take(&mut self, bytes: &[u8], now: Moment) {
+        match Packet::decode(bytes) {
+            Ok(Packet::Reply(reply)) => self.take_answer(reply.command(), reply.status(), Some(&reply), now),
+            Ok(Packet::Error { command, status }) => self.take_error(command, status, now),
+            Ok(Packet::Single(result)) => self.take_result(result, now),
+            Ok(Packet::ReflectorPosition { values, raw }) => self.take_position(values, raw),
+            Ok(Packet::Event(event)) => self.take_event(event, now),
+            Ok(Packet::Skipped(PacketType::Other(number))) => {
+                self.mailbox.say(Severity::Info, format!("skipped a packet of unknown type {number}"));
+            }
+            Ok(Packet::Skipped(_)) => {}
+            Err(error) if matches!(self.phase, Phase::Waiting { .. }) => {
+                self.fail(Failure::Garbled(error.to_string()));
+                self.stop(now);
+            }
+            Err(error) => self.mailbox.say(Severity::Warning, error.to_string()),
+        }
+    }
+
+    /// An error packet is the answer to the command that it names; while a result is awaited it ends the measurement.
+    fn take_error(&mut self, command: CommandId, status: ResultStatus, now: Moment) {
+        if self.exchange.as_ref().is_some_and(|exchange| exchange.is_answered_by(command)) {
+            self.take_answer(command, status, None, now);
+        } else if status == ResultStatus::MultiConnectionsNotAllowed {
+            self.lose(status.failure("connecting"));
+        } else if matches!(self.phase, Phase::Waiting { .. }) {
+            self.fail(status.measurement_failure());
+            if command == CommandId::StartMeasurement { self.settle_or_idle(now) } else { self.stop(now) }
+        } else if self.phase != Phase::Stopping {
+            self.mailbox.say(Severity::Warning, format!("{command}: {}", status.described()));
+        }
+    }
+
+    fn take_answer(&mut self, command: CommandId, status: ResultStatus, reply: Option<&Reply>, now: Moment) {
+        let Some(exchange) = self.exchange.as_mut().filter(|exchange| exchange.is_answered_by(command)) else { return };
+        if status == ResultStatus::ServerBusy && exchange.retry(now) {
+            return;
+        }
+        match self.phase {
+            Phase::Off | Phase::Waiting { .. } => {}
+            Phase::Settling => self.take_step(status, reply, now),
+            Phase::Idle => {
+                self.exchange = None;
+                if status == ResultStatus::MultiConnectionsNotAllowed {
+                    self.lose(status.failure("keep-alive"));
+                }
+            }
+            Phase::Asking => self.take_readiness(status, reply, now),
+            Phase::Starting if status == ResultStatus::AllOk && reply.is_some() => {
+                self.exchange = None;
+                let measuring = Duration::from_millis(u64::try_from(self.set_up.measure_ms).unwrap_or(0));
+                let until = now.saturating_add(measuring).saturating_add(self.options.result_margin);
+                self.phase = Phase::Waiting { since: now, until };
+            }
+            Phase::Starting => {
+                self.fail(status.failure("starting the measurement"));
+                self.settle_or_idle(now);
+            }
+            Phase::Stopping => self.settle_or_idle(now),
+        }
+    }
+
+    /// An answer in the set-up.
+    fn take_step(&mut self, status: ResultStatus, reply: Option<&Reply>, now: Moment) {
+        let outcome = match reply {
+            Some(reply) if status == ResultStatus::AllOk => self.set_up.answered(reply),
+            _ => self.set_up.refused(status),
+        };
+        match outcome {
+            Ok(Outcome::Done) => self.next_step(now),
+            Ok(Outcome::More) => {}
+            Ok(Outcome::Wait(text)) => {
+                self.mailbox.say(Severity::Warning, text);
+                if let Some(exchange) = &mut self.exchange {
+                    exchange.repeat_after(WARM_UP_PAUSE, now);
+                }
+            }
+            Err(failure) => self.lose(failure),
+        }
+    }
+
+    /// The answer to whether a shot may start. A tracker that is only busy is asked again.
+    fn take_readiness(&mut self, status: ResultStatus, reply: Option<&Reply>, now: Moment) {
+        let fields = reply.filter(|_| status == ResultStatus::AllOk).map(|reply| reply.fields(20));
+        let readiness = fields.map(|fields| fields.map(|fields| TrackerStatus::from_number(fields.i32(16))));
+        let failure = match readiness {
+            Some(Ok(TrackerStatus::Ready)) => {
+                self.phase = Phase::Starting;
+                self.send(Command::bare(CommandId::StartMeasurement), now);
+                return;
+            }
+            Some(Ok(TrackerStatus::Busy)) if self.exchange.as_mut().is_some_and(|exchange| exchange.retry(now)) => {
+                return;
+            }
+            Some(Ok(TrackerStatus::NotReady)) => Failure::NoTarget(
+                "tracker status 'not ready': no reflector is locked, or it is not initialised".to_owned(),
+            ),
+            Some(Ok(other)) => Failure::NotReady(format!("tracker status: {other}")),
+            Some(Err(error)) => Failure::Garbled(error.to_string()),
+            None => status.failure("reading the tracker status"),
+        };
+        self.fail(failure);
+        self.settle_or_idle(now);
+    }
+
+    fn take_result(&mut self, result: SingleResult, now: Moment) {
+        match self.phase {
+            Phase::Off | Phase::Stopping => return,
+            Phase::Settling => {
+                self.mailbox
+                    .say(Severity::Warning, "a point came while the settings were being checked; it is not used");
+                return;
+            }
+            Phase::Idle | Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {}
+        }
+        let is_ours = matches!(self.phase, Phase::Waiting { .. });
+        let judged = shot_of(result, &self.options, self.face);
+        self.is_dirty |= matches!(judged, Err(Failure::Settings(_) | Failure::Unusable(_)));
+        match (judged, is_ours) {
+            (Ok(shot), true) => self.mailbox.report(ProtocolEvent::Shot(shot)),
+            (Err(failure), true) => self.fail(failure),
+            (Ok(shot), false) => self.mailbox.report(ProtocolEvent::Offered(shot)),
+            (Err(failure), false) => {
+                self.mailbox.say(Severity::Warning, format!("a point that nobody asked for is not used: {failure}"));
+            }
+        }
+        if is_ours || (self.is_dirty && self.phase == Phase::Idle) {
+            self.settle_or_idle(now);
+        }
+    }
+
+    /// A position is shown only while the units are certain.
+    fn take_position(&mut self, values: [f64; 3], raw: Vec<u8>) {
+        let is_certain = !self.is_dirty && !matches!(self.phase, Phase::Off | Phase::Settling);
+        if let Some(shot) = position_of(values, raw, self.face).filter(|_| is_certain) {
+            self.mailbox.report(ProtocolEvent::Live(shot));
+        }
+    }
+
+    fn take_event(&mut self, event: SystemEvent, now: Moment) {
+        match event {
+            SystemEvent::IsFace1 => self.face = Some(1),
+            SystemEvent::IsFace2 => self.face = Some(2),
+            SystemEvent::TpConnectionClosing | SystemEvent::ServerClosing => {
+                self.lose(Failure::Disconnected(event.to_string()));
+            }
+            SystemEvent::MeasStatusNotReady => self.take_not_ready(now),
+            SystemEvent::MeasStatusReady if self.was_not_ready => {
+                self.was_not_ready = false;
+                self.mailbox.say(Severity::Info, "the tracker is ready again");
+            }
+            SystemEvent::LaserWarmedUp
+            | SystemEvent::CompensationChanged
+            | SystemEvent::InitializationStatusChanged => {
+                self.mailbox.say(Severity::Info, event.words());
+            }
+            SystemEvent::SensorDisconnected | SystemEvent::BatteryStatus | SystemEvent::ExternalControlActive => {
+                self.mailbox.say(Severity::Warning, event.words());
+            }
+            _ if reading_of(event).is_some() => self.take_change(event, now),
+            _ => {}
+        }
+    }
+
+    /// While a shot is under way this is how a broken beam shows.
+    fn take_not_ready(&mut self, now: Moment) {
+        match self.phase {
+            Phase::Starting | Phase::Waiting { .. } => {
+                self.fail(Failure::NoTarget(
+                    "the tracker said 'not ready' before the result: the beam is broken".to_owned(),
+                ));
+                self.stop(now);
+            }
+            Phase::Idle | Phase::Asking if !self.was_not_ready => {
+                self.mailbox.say(Severity::Warning, "the tracker is not ready: the beam may be broken");
+            }
+            _ => {}
+        }
+        self.was_not_ready = true;
+    }
+
+    /// Something that points depend on changed: a shot under way is of no use, and everything is read again.
+    fn take_change(&mut self, event: SystemEvent, now: Moment) {
+        match self.phase {
+            Phase::Off => return,
+            Phase::Settling => {
+                self.is_dirty |= !self.set_up.will_read(event);
+                return;
+            }
+            Phase::Idle | Phase::Stopping => {}
+            Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {
+                self.fail(Failure::Settings(format!("{} while a point was being measured", event.words())));
+            }
+        }
+        self.is_dirty = true;
+        match self.phase {
+            Phase::Starting | Phase::Waiting { .. } => self.stop(now),
+            Phase::Idle | Phase::Asking => self.settle_or_idle(now),
+            Phase::Off | Phase::Settling | Phase::Stopping => {}
+        }
+    }
+
+    /// An answer did not come. Without any answer to a status or a stop the tracker is gone.
+    fn timed_out(&mut self, now: Moment) {
+        let Some(exchange) = self.exchange.take() else { return };
+        let seconds = patience(exchange.command.id).as_secs_f64();
+        let failure = Failure::Silent { what: exchange.command.id.words().to_owned(), seconds };
+        if self.phase == Phase::Starting {
+            self.fail(failure);
+            self.stop(now);
+        } else {
+            self.lose(failure);
+        }
+    }
+
+    /// Goes on with the set-up, or ends it.
+    fn next_step(&mut self, now: Moment) {
+        if let Some(command) = self.set_up.command() {
+            self.send(command, now);
+            return;
+        }
+        if self.is_dirty {
+            self.settle_or_idle(now);
+            return;
+        }
+        self.exchange = None;
+        self.phase = Phase::Idle;
+        self.rechecks = 0;
+        let identity = self.set_up.identity();
+        if self.is_announced {
+            for warning in identity.warnings {
+                self.mailbox.say(Severity::Warning, warning);
+            }
+            self.mailbox
+                .say(Severity::Info, "the settings of the tracker were checked again and are as they should be");
+        } else {
+            self.is_announced = true;
+            self.mailbox.report(ProtocolEvent::Ready(identity));
+        }
+    }
+
+    /// Nothing is under way any more: reads the settings again if they changed.
+    fn settle_or_idle(&mut self, now: Moment) {
+        self.exchange = None;
+        if !self.is_dirty {
+            self.phase = Phase::Idle;
+            return;
+        }
+        self.rechecks += 1;
+        if self.rechecks > MAX_RECHECKS {
+            self.lose(Failure::Settings("another program keeps changing the settings of the tracker".to_owned()));
+            return;
+        }
+        self.is_dirty = false;
+        self.phase = Phase::Settling;
+        self.set_up.recheck();
+        self.next_step(now);
+    }
+
+    fn stop(&mut self, now: Moment) {
+        self.phase = Phase::Stopping;
+        self.send(Command::bare(CommandId::StopMeasurement), now);
+    }
+
+    fn send(&mut self, command: Command, now: Moment) {
+        self.mailbox.send(command.encode());
+        self.exchange = Some(Exchange::new(command, now));
+    }
+
+    /// Answers the trigger.
+    fn fail(&mut self, failure: Failure) {
+        self.mailbox.report(ProtocolEvent::Failed(failure));
+    }
+
+    fn lose(&mut self, failure: Failure) {
+        if matches!(self.phase, Phase::Asking | Phase::Starting | Phase::Waiting { .. }) {
+            self.fail(failure.clone());
+        }
+        self.phase = Phase::Off;
+        self.exchange = None;
+        self.framer.clear();
+        self.mailbox.drop_outputs();
+        self.mailbox.report(ProtocolEvent::Lost(failure));
+    }
+}
+
+#[cfg(test)]
+impl Session {
+    pub(super) fn buffered(&self) -> (usize, usize, usize) {
+        let (outputs, events) = self.mailbox.waiting();
+        (self.framer.pending(), outputs, events)
+    }
+}

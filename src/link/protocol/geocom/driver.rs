@@ -1,0 +1,474 @@
+//! The conversation: waking, set-up, measurement, and getting in step again after silence.
+
+use std::f64::consts::PI;
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+use nalgebra::Point3;
+
+use super::super::Failure;
+use super::super::Identity;
+use super::super::Moment;
+use super::super::Protocol;
+use super::super::ProtocolEvent;
+use super::super::Reflector;
+use super::super::Severity;
+use super::super::Shot;
+use super::super::outbox::Outbox;
+use super::codes::ACCURACY_NOT_GUARANTEED;
+use super::codes::NO_FULL_CORRECTION;
+use super::codes::OK;
+use super::codes::code_in_words;
+use super::codes::failure_of;
+use super::exchange::Call;
+use super::exchange::Damage;
+use super::exchange::Exchange;
+use super::exchange::Outcome;
+use super::options::GeocomOptions;
+use super::options::Measurement;
+use super::wire::Reply;
+
+/// How long a sleeping or silent instrument is called before it is given up.
+const CALLING: Duration = Duration::from_secs(15);
+
+/// How long one such call waits.
+const CALL: Duration = Duration::from_secs(1);
+
+/// How long the answer to an ordinary request may take.
+const ORDINARY: Duration = Duration::from_secs(15);
+
+/// Quiet time after which the instrument is asked whether it is still there.
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+
+/// What a total station can do, said before measuring.
+const ACCURACY: &str = "total stations are of the order of 0.5 to 1 mm per point: good for a coarse placement of the base, \
+                        not for a full calibration (see the data sheet)";
+
+/// Said where an instrument does not tell.
+const UNKNOWN: &str = "unknown";
+
+/// A Leica total station.
+#[derive(Debug)]
+pub struct GeocomProtocol {
+    options: GeocomOptions,
+    exchange: Exchange,
+    outbox: Outbox,
+    phase: Phase,
+    known: Known,
+    previous: Option<Point3<f64>>,
+}
+
+#[derive(Debug)]
+enum Phase {
+    Closed,
+    /// Called until it answers.
+    Calling {
+        until: Moment,
+        then: Then,
+    },
+    SetUp {
+        steps: Vec<Call>,
+    },
+    Idle {
+        since: Moment,
+    },
+    /// Asked whether it is there; a shot may wait for the answer.
+    KeepAlive {
+        is_wanted: bool,
+    },
+    Measuring {
+        steps: Vec<Call>,
+    },
+}
+
+/// What follows when a called instrument answers.
+#[derive(Clone, Copy, Debug)]
+enum Then {
+    SetUp,
+    Idle,
+}
+
+/// What the set-up learned.
+#[derive(Debug, Default)]
+struct Known {
+    serial: Option<String>,
+    name: Option<String>,
+    release: Option<String>,
+    reflector: Option<Reflector>,
+    checked: Vec<String>,
+    warnings: Vec<String>,
+}
+
+impl GeocomProtocol {
+    /// Fails where [`GeocomOptions::validate`] does.
+    pub fn new(options: GeocomOptions) -> Result<Self, String> {
+        options.validate()?;
+        let exchange = Exchange::new(options.checksum);
+        let outbox = Outbox::default();
+        Ok(Self { options, exchange, outbox, phase: Phase::Closed, known: Known::default(), previous: None })
+    }
+
+    /// Bytes of a line that has begun, for the bound of the memory.
+    pub const fn pending(&self) -> usize {
+        self.exchange.pending_bytes()
+    }
+
+    fn ask(&mut self, call: Call, now: Moment) {
+        self.exchange.ask(call, now, &mut self.outbox);
+    }
+
+    fn call_it(&mut self, now: Moment, patience: Duration, then: Then) {
+        self.phase = Phase::Calling { until: now + patience, then };
+        self.ask(null_call(CALL), now);
+    }
+
+    /// Makes the first of the steps that are left.
+    fn make_step(&mut self, now: Moment) {
+        let step = match &self.phase {
+            Phase::SetUp { steps } | Phase::Measuring { steps } => steps.last().cloned(),
+            _ => None,
+        };
+        if let Some(call) = step {
+            self.ask(call, now);
+        }
+    }
+
+    fn handle(&mut self, outcome: Outcome, now: Moment) {
+        match std::mem::replace(&mut self.phase, Phase::Closed) {
+            Phase::Closed => {}
+            Phase::Calling { until, then } => self.handle_called(&outcome, until, then, now),
+            Phase::SetUp { steps } => self.handle_set_up(outcome, steps, now),
+            Phase::Idle { since } => self.phase = Phase::Idle { since },
+            Phase::KeepAlive { is_wanted } => self.handle_keep_alive(&outcome, is_wanted, now),
+            Phase::Measuring { steps } => self.handle_measured(outcome, steps, now),
+        }
+    }
+
+    fn handle_called(&mut self, outcome: &Outcome, until: Moment, then: Then, now: Moment) {
+        match (outcome, then) {
+            (Outcome::Reply(..), Then::SetUp) => {
+                self.phase = Phase::SetUp { steps: set_up(&self.options) };
+                self.make_step(now);
+            }
+            (Outcome::Reply(..), Then::Idle) => {
+                self.outbox.status(Severity::Info, "the instrument answers again");
+                self.phase = Phase::Idle { since: now };
+            }
+            _ if now >= until => self.lose(failure_of_outcome(outcome, CALLING)),
+            _ => {
+                self.phase = Phase::Calling { until, then };
+                self.ask(null_call(CALL), now);
+            }
+        }
+    }
+
+    fn handle_keep_alive(&mut self, outcome: &Outcome, is_wanted: bool, now: Moment) {
+        let is_there = matches!(outcome, Outcome::Reply(..));
+        if is_there && is_wanted {
+            return self.measure(now);
+        }
+        if is_there {
+            self.phase = Phase::Idle { since: now };
+            return;
+        }
+        if is_wanted {
+            self.outbox.push(ProtocolEvent::Failed(failure_of_outcome(outcome, KEEP_ALIVE)));
+        }
+        self.call_it(now, CALLING, Then::Idle);
+    }
+
+    fn handle_set_up(&mut self, outcome: Outcome, mut steps: Vec<Call>, now: Moment) {
+        let (call, reply) = match outcome {
+            Outcome::Reply(call, reply) => (call, reply),
+            other => return self.lose(failure_of_outcome(&other, ORDINARY)),
+        };
+        if let Err(failure) = self.known.learn(&call, &reply, &self.options) {
+            return self.lose(failure);
+        }
+        steps.pop();
+        if steps.is_empty() {
+            self.phase = Phase::Idle { since: now };
+            let identity = std::mem::take(&mut self.known).identity();
+            return self.outbox.ready(identity);
+        }
+        self.phase = Phase::SetUp { steps };
+        self.make_step(now);
+    }
+
+    fn measure(&mut self, now: Moment) {
+        self.phase = Phase::Measuring { steps: measurement(&self.options) };
+        self.make_step(now);
+    }
+
+    fn handle_measured(&mut self, outcome: Outcome, mut steps: Vec<Call>, now: Moment) {
+        let limit = Duration::from_secs_f64(self.options.timeout_s);
+        let reply = match outcome {
+            Outcome::Reply(_, reply) => reply,
+            Outcome::Busy(_) => {
+                self.phase = Phase::Idle { since: now };
+                return self.outbox.push(ProtocolEvent::Failed(failure_of_outcome(&outcome, limit)));
+            }
+            other => {
+                self.outbox.push(ProtocolEvent::Failed(failure_of_outcome(&other, limit)));
+                return self.call_it(now, CALLING, Then::Idle);
+            }
+        };
+        steps.pop();
+        if reply.code == OK && !steps.is_empty() {
+            self.phase = Phase::Measuring { steps };
+            return self.make_step(now);
+        }
+        self.phase = Phase::Idle { since: now };
+        let answer = if steps.is_empty() { self.shot(&reply) } else { Err(failure_of(reply.code)) };
+        self.outbox.push(answer.map_or_else(ProtocolEvent::Failed, ProtocolEvent::Shot));
+    }
+
+    fn shot(&mut self, reply: &Reply) -> Result<Shot, Failure> {
+        let remark = match reply.code {
+            OK => None,
+            NO_FULL_CORRECTION | ACCURACY_NOT_GUARANTEED => Some(code_in_words(reply.code).to_owned()),
+            // Whatever numbers follow may be of an earlier measurement.
+            code => return Err(failure_of(code)),
+        };
+        let (point, face) = point_from_polar(&reply.parameters)?;
+        if self.previous == Some(point) {
+            let text = "it is equal to the point before to the last digit, so it was not measured anew";
+            return Err(Failure::Unusable(text.to_owned()));
+        }
+        self.previous = Some(point);
+        let raw = format!("{},{}", reply.code, reply.parameters.join(",")).into_bytes();
+        Ok(Shot { face: Some(face), remark, raw, ..Shot::bare(point) })
+    }
+
+    fn lose(&mut self, failure: Failure) {
+        self.exchange.abandon();
+        self.phase = Phase::Closed;
+        self.outbox.push(ProtocolEvent::Lost(failure));
+    }
+}
+
+/// Point (m) and face of the horizontal angle, zenith angle (rad) and slope distance (m).
+fn point_from_polar(parameters: &[String]) -> Result<(Point3<f64>, u8), Failure> {
+    let value = |index: usize| parameters.get(index).and_then(|text: &String| text.trim().parse::<f64>().ok());
+    let (Some(horizontal), Some(zenith), Some(distance)) = (value(0), value(1), value(2)) else {
+        return Err(Failure::Garbled(format!("`{}` is not two angles and a distance", parameters.join(","))));
+    };
+    let is_angle = |angle: f64| (-TAU..=2.0 * TAU).contains(&angle);
+    if !is_angle(horizontal) || !is_angle(zenith) {
+        return Err(Failure::Unusable("an angle is out of its range".to_owned()));
+    }
+    if !(distance > 0.0 && distance < 1e5) {
+        return Err(Failure::Unusable(format!("the distance is {distance} m")));
+    }
+    let face = if zenith.rem_euclid(TAU) > PI { 2 } else { 1 };
+    let (east, north) = (zenith.sin() * horizontal.sin(), zenith.sin() * horizontal.cos());
+    Ok((Point3::new(east * distance, north * distance, zenith.cos() * distance), face))
+}
+
+fn failure_of_outcome(outcome: &Outcome, limit: Duration) -> Failure {
+    match outcome {
+        Outcome::Reply(_, reply) => failure_of(reply.code),
+        Outcome::TimedOut(call) => Failure::Silent { what: call.what.to_owned(), seconds: limit.as_secs_f64() },
+        Outcome::Busy(code) | Outcome::Damaged(Damage::Code(code)) => failure_of(*code),
+        Outcome::Damaged(Damage::Line(text)) => Failure::Garbled(text.clone()),
+    }
+}
+
+/// `COM_NullProc`: does nothing, but answers.
+const fn null_call(limit: Duration) -> Call {
+    Call { rpc: 0, parameters: String::new(), limit, what: "waiting for a sign of life" }
+}
+
+fn ordinary(rpc: u32, parameters: String, what: &'static str) -> Call {
+    Call { rpc, parameters, limit: ORDINARY, what }
+}
+
+/// The calls of the set-up, the first one last.
+fn set_up(options: &GeocomOptions) -> Vec<Call> {
+    let plain = |rpc, what| ordinary(rpc, String::new(), what);
+    let mut steps = vec![
+        plain(5003, "asking for the serial number"),
+        plain(5004, "asking for the name"),
+        plain(110, "asking for the version"),
+    ];
+    if let Some(is_on) = options.target_recognition {
+        steps.push(ordinary(18005, u8::from(is_on).to_string(), "setting the target recognition"));
+    }
+    if let Some(mode) = options.edm_mode {
+        steps.push(ordinary(2020, mode.to_string(), "setting the EDM mode"));
+    }
+    steps.push(plain(2021, "reading the EDM mode"));
+    if let Some(constant) = options.prism_constant_mm {
+        steps.push(ordinary(2024, format!("{:.7}", constant * 1e-3), "setting the prism constant"));
+    }
+    steps.push(plain(2023, "reading the prism constant"));
+    steps.push(plain(2026, "reading the face"));
+    steps.reverse();
+    steps
+}
+
+/// The calls of a measurement, the first one last.
+fn measurement(options: &GeocomOptions) -> Vec<Call> {
+    let limit = Duration::from_secs_f64(options.timeout_s);
+    let what = "measuring";
+    let long = |rpc, parameters: &str| Call { rpc, parameters: parameters.to_owned(), limit, what };
+    match options.measurement {
+        Measurement::DistanceAngle => vec![long(17017, "2")],
+        Measurement::FineAdjust => {
+            let range = options.search_deg.to_radians();
+            vec![long(17017, "2"), long(9037, &format!("{range:.6},{range:.6},0"))]
+        }
+        Measurement::Simple => {
+            vec![long(2108, "5000,1"), ordinary(2008, "1,1".to_owned(), what), ordinary(2008, "3,1".to_owned(), what)]
+        }
+    }
+}
+
+impl Known {
+    fn learn(&mut self, call: &Call, reply: &Reply, options: &GeocomOptions) -> Result<(), Failure> {
+        let is_order = matches!(call.rpc, 2020 | 2024 | 18005);
+        if reply.code != OK {
+            let text = format!("{} failed: {} (code {})", call.what, code_in_words(reply.code), reply.code);
+            if is_order {
+                return Err(Failure::Settings(text));
+            }
+            self.warnings.push(text);
+            return self.unread(call, options);
+        }
+        let first = reply.parameters.first().map_or(UNKNOWN, |text| text.trim());
+        match call.rpc {
+            5003 => self.serial = Some(first.to_owned()),
+            5004 => self.name = Some(first.to_owned()),
+            110 => self.release = Some(reply.parameters.join(".")),
+            18005 => {
+                self.checked.push(format!("target recognition: {}", if call.parameters == "1" { "on" } else { "off" }));
+            }
+            2021 => return self.learn_edm_mode(first, options),
+            2023 => return self.learn_prism(first, options),
+            2026 => self.checked.push(format!("face: {}", if first == "1" { 2 } else { 1 })),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// What was set must be read back.
+    fn unread(&self, call: &Call, options: &GeocomOptions) -> Result<(), Failure> {
+        let was_set = (call.rpc == 2021 && options.edm_mode.is_some())
+            || (call.rpc == 2023 && options.prism_constant_mm.is_some());
+        match self.warnings.last() {
+            Some(text) if was_set => Err(Failure::Settings(text.clone())),
+            _ => Ok(()),
+        }
+    }
+
+    fn learn_edm_mode(&mut self, text: &str, options: &GeocomOptions) -> Result<(), Failure> {
+        if options.edm_mode.is_some_and(|mode| text.parse() != Ok(mode)) {
+            return Err(Failure::Settings(format!("the EDM mode stays at {text}")));
+        }
+        self.checked.push(format!("EDM mode: {text} (read back)"));
+        Ok(())
+    }
+
+    fn learn_prism(&mut self, text: &str, options: &GeocomOptions) -> Result<(), Failure> {
+        let Some(constant) = text.parse::<f64>().ok().filter(|constant| constant.is_finite()) else {
+            return Err(Failure::Garbled(format!("`{text}` is not a prism constant")));
+        };
+        if options.prism_constant_mm.is_some_and(|wanted| (wanted * 1e-3 - constant).abs() > 1e-6) {
+            return Err(Failure::Settings(format!("the prism constant stays at {:.2} mm", constant * 1e3)));
+        }
+        self.checked.push(format!("prism constant: {:.2} mm (read back)", constant * 1e3));
+        self.reflector =
+            Some(Reflector { id: 0, name: "prism (offset is the prism constant)".to_owned(), offset: constant });
+        Ok(())
+    }
+
+    fn identity(mut self) -> Identity {
+        let or_unknown = |text: Option<String>| text.unwrap_or_else(|| UNKNOWN.to_owned());
+        let name = format!(
+            "{}, serial number {}, GeoCOM {}",
+            or_unknown(self.name),
+            or_unknown(self.serial),
+            or_unknown(self.release)
+        );
+        self.checked.insert(0, "units: m, rad (fixed in GeoCOM)".to_owned());
+        self.checked.insert(1, "frame: the instrument's own, from angles and distance".to_owned());
+        self.warnings.insert(0, ACCURACY.to_owned());
+        Identity { name, reflector: self.reflector, checked: self.checked, warnings: self.warnings }
+    }
+}
+
+impl Protocol for GeocomProtocol {
+    fn start(&mut self, now: Moment) {
+        self.exchange.restart();
+        self.outbox.clear_output();
+        self.known = Known::default();
+        self.call_it(now, CALLING, Then::SetUp);
+    }
+
+    fn feed(&mut self, bytes: &[u8], now: Moment) {
+        for &byte in bytes {
+            if let Some(outcome) = self.exchange.push(byte, now, &mut self.outbox) {
+                self.handle(outcome, now);
+            }
+        }
+    }
+
+    fn tick(&mut self, now: Moment) {
+        if let Some(outcome) = self.exchange.tick(now, &mut self.outbox) {
+            self.handle(outcome, now);
+        }
+        if let Phase::Idle { since } = self.phase
+            && since + KEEP_ALIVE <= now
+        {
+            self.phase = Phase::KeepAlive { is_wanted: false };
+            self.ask(null_call(KEEP_ALIVE), now);
+        }
+    }
+
+    fn trigger(&mut self, now: Moment) {
+        let failure = match &mut self.phase {
+            Phase::Idle { .. } => return self.measure(now),
+            Phase::KeepAlive { is_wanted } if !*is_wanted => {
+                *is_wanted = true;
+                return;
+            }
+            Phase::Calling { then: Then::Idle, .. } => {
+                Failure::NotReady("the last request was not answered; it is being called".to_owned())
+            }
+            Phase::Closed | Phase::Calling { .. } | Phase::SetUp { .. } => {
+                Failure::TooEarly("the set-up is not complete".to_owned())
+            }
+            Phase::KeepAlive { .. } | Phase::Measuring { .. } => {
+                Failure::TooEarly("another shot is under way".to_owned())
+            }
+        };
+        self.outbox.push(ProtocolEvent::Failed(failure));
+    }
+
+    fn cancel(&mut self, now: Moment) {
+        match &mut self.phase {
+            Phase::KeepAlive { is_wanted } => *is_wanted = false,
+            Phase::Measuring { .. } => {
+                // It answers nothing else until it has done what it was asked for.
+                let patience = CALLING + Duration::from_secs_f64(self.options.timeout_s);
+                self.call_it(now, patience, Then::Idle);
+            }
+            _ => {}
+        }
+    }
+
+    fn next_output(&mut self) -> Option<Vec<u8>> {
+        self.outbox.next_output()
+    }
+
+    fn next_event(&mut self) -> Option<ProtocolEvent> {
+        self.outbox.next_event()
+    }
+
+    fn next_deadline(&self) -> Option<Moment> {
+        match self.phase {
+            Phase::Idle { since } => Some(since + KEEP_ALIVE),
+            _ => self.exchange.next_deadline(),
+        }
+    }
+}

@@ -1,0 +1,439 @@
+//! The conversation: set-up, live positions, and fresh frames for shots.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+
+use super::super::Failure;
+use super::super::Moment;
+use super::super::Protocol;
+use super::super::ProtocolEvent;
+use super::super::Severity;
+use super::super::Shot;
+use super::super::outbox::Outbox;
+use super::codes::BAD_CRC;
+use super::codes::failure_of_error;
+use super::options::NdiOptions;
+use super::options::ReplyFormat;
+use super::set_up::Next;
+use super::set_up::SetUp;
+use super::set_up::Step;
+use super::tools::Tool;
+use super::tools::ToolState;
+use super::tools::decode_bx;
+use super::tools::decode_tx;
+use super::tools::tip_in_instrument;
+use super::wire::Frame;
+use super::wire::FrameDecoder;
+use super::wire::encode_text;
+
+/// Quiet time after which the next byte begins a message.
+const DRAIN: Duration = Duration::from_millis(200);
+
+/// Pause before the next look for a fresh frame: instruments make 20 to 60 frames per second.
+const POLL: Duration = Duration::from_millis(10);
+
+/// Time between live positions; they show too that the instrument is still there.
+const LIVE: Duration = Duration::from_secs(1);
+
+/// How often a command is sent again that was damaged on its way.
+const MAX_RESENDS: u32 = 2;
+
+/// So many unanswered commands in a row, with nobody asking for a shot, are the end of the link.
+const MAX_UNANSWERED: u32 = 5;
+
+/// So many damaged replies in a row are a wrong setting, not noise.
+const BAD_IN_A_ROW: u32 = 3;
+
+/// Most replies that may still come of commands that were given up.
+const MAX_OWED: u32 = 16;
+
+/// An NDI tracker.
+#[derive(Debug)]
+pub struct NdiProtocol {
+    options: NdiOptions,
+    timeout: Duration,
+    decoder: FrameDecoder,
+    outbox: Outbox,
+    phase: Phase,
+    set_up: SetUp,
+    handle: u8,
+    /// The command that is out or will be.
+    pending: Option<Pending>,
+    /// Replies that commands which were given up may still get.
+    owed: u32,
+    unanswered: u32,
+    bad_in_a_row: u32,
+}
+
+#[derive(Debug)]
+enum Phase {
+    Closed,
+    SetUp(Step),
+    /// Live positions.
+    Idle,
+    /// Waits for a frame after the one that was current at the trigger.
+    Shot {
+        deadline: Moment,
+        to_skip: u32,
+        frame_at_trigger: Option<u32>,
+    },
+}
+
+#[derive(Debug)]
+struct Pending {
+    command: String,
+    is_sent: bool,
+    /// When it is to be sent, or its answer is late.
+    at: Moment,
+    resends: u32,
+    is_damaged: bool,
+}
+
+impl NdiProtocol {
+    /// Fails where [`NdiOptions::validate`] does.
+    pub fn new(options: NdiOptions) -> Result<Self, String> {
+        options.validate()?;
+        let timeout = Duration::from_secs_f64(options.timeout_s);
+        Ok(Self {
+            options,
+            timeout,
+            decoder: FrameDecoder::default(),
+            outbox: Outbox::default(),
+            phase: Phase::Closed,
+            set_up: SetUp::default(),
+            handle: 0,
+            pending: None,
+            owed: 0,
+            unanswered: 0,
+            bad_in_a_row: 0,
+        })
+    }
+
+    /// Bytes of a message that has begun, for the bound of the memory.
+    pub const fn pending(&self) -> usize {
+        self.decoder.pending()
+    }
+
+    fn ask_at(&mut self, command: String, at: Moment) {
+        self.pending = Some(Pending { command, is_sent: false, at, resends: 0, is_damaged: false });
+    }
+
+    fn ask(&mut self, command: String, now: Moment) {
+        self.ask_at(command, now);
+        self.send(now);
+    }
+
+    fn send(&mut self, now: Moment) {
+        if let Some(pending) = &mut self.pending {
+            if std::mem::take(&mut pending.is_damaged) {
+                self.decoder.resync();
+            }
+            pending.is_sent = true;
+            pending.at = now + self.timeout;
+            self.outbox.send(encode_text(&pending.command));
+        }
+    }
+
+    fn position_command(&self) -> String {
+        match self.options.reply {
+            ReplyFormat::Text => "TX:0001".to_owned(),
+            ReplyFormat::Binary => "BX:0001".to_owned(),
+        }
+    }
+
+    fn take(&mut self, frame: Frame, now: Moment) {
+        if let Frame::Damaged(text) = frame {
+            return self.damaged(text, now);
+        }
+        self.bad_in_a_row = 0;
+        if frame == Frame::Text("RESET".to_owned()) && !matches!(self.phase, Phase::Closed) {
+            return self.lose(Failure::Disconnected("the instrument was switched off and on, or reset".to_owned()));
+        }
+        if frame == Frame::Text(format!("ERROR{BAD_CRC:02X}")) && self.send_again(now) {
+            return;
+        }
+        match self.pending.take_if(|pending| pending.is_sent) {
+            Some(_) => self.answer(&frame, now),
+            None => self.owed = self.owed.saturating_sub(1),
+        }
+    }
+
+    fn answer(&mut self, frame: &Frame, now: Moment) {
+        self.unanswered = 0;
+        let error = error_of(frame);
+        if let Frame::Text(text) = frame
+            && text.starts_with("WARNING")
+        {
+            self.outbox.status(Severity::Warning, format!("the instrument says: {}", text.escape_default()));
+        }
+        match (std::mem::replace(&mut self.phase, Phase::Closed), error) {
+            (Phase::Closed, _) => {}
+            (Phase::SetUp(step), Some(code)) if !step.is_optional() => self.lose(failure_of_error(code)),
+            (Phase::SetUp(step), error) => self.next_step(step, frame, error.is_some(), now),
+            (Phase::Idle, _) => {
+                self.live(frame);
+                self.rest(now);
+            }
+            (Phase::Shot { .. }, Some(code)) => self.fail(failure_of_error(code), now),
+            (Phase::Shot { deadline, to_skip, frame_at_trigger }, None) => {
+                self.phase = Phase::Shot { deadline, to_skip, frame_at_trigger };
+                self.look_for_fresh(frame, now);
+            }
+        }
+    }
+
+    fn next_step(&mut self, step: Step, frame: &Frame, is_error: bool, now: Moment) {
+        let text = match frame {
+            _ if is_error => None,
+            Frame::Text(text) => Some(text.as_str()),
+            _ => Some(""),
+        };
+        match self.set_up.advance(step, text, &self.options) {
+            Err(failure) => self.lose(failure),
+            Ok(Next::Step(step)) => {
+                let command = step.command();
+                self.phase = Phase::SetUp(step);
+                self.ask(command, now);
+            }
+            Ok(Next::Ready(handle)) => {
+                self.handle = handle;
+                let identity = std::mem::take(&mut self.set_up).identity(handle, &self.options);
+                self.outbox.ready(identity);
+                self.rest(now);
+            }
+        }
+    }
+
+    /// Waits for a shot, with live positions meanwhile.
+    fn rest(&mut self, now: Moment) {
+        self.phase = Phase::Idle;
+        self.ask_at(self.position_command(), now + LIVE);
+    }
+
+    fn live(&mut self, frame: &Frame) {
+        if let Ok(tool) = self.tool(frame)
+            && let Ok(shot) = self.shot(&tool, frame)
+        {
+            self.outbox.live(shot);
+        }
+    }
+
+    fn look_for_fresh(&mut self, frame: &Frame, now: Moment) {
+        let tool = match self.tool(frame) {
+            Ok(tool) => tool,
+            Err(failure) => return self.fail(failure, now),
+        };
+        let Phase::Shot { deadline, to_skip, frame_at_trigger } = &mut self.phase else {
+            return;
+        };
+        // This may be the answer to a command that was given up.
+        if let Some(left) = to_skip.checked_sub(1) {
+            *to_skip = left;
+            self.owed = self.owed.saturating_sub(1);
+        } else {
+            let reference = *frame_at_trigger.get_or_insert(tool.frame);
+            // The number starts anew after 2^32 frames, and when tracking is started.
+            let is_fresh = tool.frame != reference && tool.frame.wrapping_sub(reference) < u32::MAX / 2;
+            let has_no_frame = matches!(tool.state, ToolState::Disabled | ToolState::Unoccupied);
+            if is_fresh || has_no_frame {
+                let answer = self.shot(&tool, frame);
+                self.rest(now);
+                return self.outbox.push(answer.map_or_else(ProtocolEvent::Failed, ProtocolEvent::Shot));
+            }
+        }
+        if *deadline <= now {
+            return self.fail(Failure::NotReady("no new frame comes".to_owned()), now);
+        }
+        self.ask_at(self.position_command(), now + POLL);
+    }
+
+    fn tool(&self, frame: &Frame) -> Result<Tool, Failure> {
+        let tools = match frame {
+            Frame::Text(text) => decode_tx(text),
+            Frame::Binary(body) => decode_bx(body),
+            Frame::Damaged(text) => Err(text.clone()),
+        };
+        let tools = tools.map_err(Failure::Garbled)?;
+        let mine = tools.into_iter().find(|tool| tool.handle == self.handle);
+        mine.ok_or_else(|| Failure::Settings(format!("tool {:02X} is not in the reply", self.handle)))
+    }
+
+    fn shot(&self, tool: &Tool, frame: &Frame) -> Result<Shot, Failure> {
+        let handle = tool.handle;
+        let (quaternion, origin, error) = match &tool.state {
+            ToolState::Seen { quaternion, origin, error } => (*quaternion, *origin, *error),
+            ToolState::Missing => return Err(Failure::NoTarget(format!("tool {handle:02X} is not seen"))),
+            ToolState::Disabled => return Err(Failure::Settings(format!("tool {handle:02X} is disabled"))),
+            ToolState::Unoccupied => return Err(Failure::NoTarget(format!("there is no tool at port {handle:02X}"))),
+        };
+        let tip = Vector3::from(self.options.tip_mm) * 1e-3;
+        let point = tip_in_instrument(quaternion, origin, tip).map_err(Failure::Unusable)?;
+        let raw = match frame {
+            Frame::Text(text) => text.clone().into_bytes(),
+            Frame::Binary(body) => body.clone(),
+            Frame::Damaged(_) => Vec::new(),
+        };
+        let remark = Some(format!("frame {}, marker fit {:.4} mm", tool.frame, error * 1e3));
+        Ok(Shot { remark, raw, ..Shot::bare(point) })
+    }
+
+    fn damaged(&mut self, text: String, now: Moment) {
+        self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
+        if self.bad_in_a_row == BAD_IN_A_ROW {
+            let said = format!(
+                "{BAD_IN_A_ROW} replies in a row cannot be read ({text}): check baud rate and kind of instrument"
+            );
+            self.outbox.status(Severity::Warning, said);
+        }
+        if self.send_again(now) {
+            return;
+        }
+        let was_sent = self.pending.take_if(|pending| pending.is_sent).is_some();
+        if was_sent {
+            self.give_up(Failure::Garbled(text), now);
+        } else if let Some(pending) = &mut self.pending {
+            // Noise between two commands: what comes next begins after a pause.
+            pending.is_damaged = true;
+            pending.at = pending.at.max(now + DRAIN);
+        }
+    }
+
+    /// Sends the command again after a pause, if it was sent and not too often.
+    fn send_again(&mut self, now: Moment) -> bool {
+        match &mut self.pending {
+            Some(pending) if pending.is_sent && pending.resends < MAX_RESENDS => {
+                pending.resends += 1;
+                pending.is_sent = false;
+                pending.is_damaged = true;
+                pending.at = now + DRAIN;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// The command under way brought nothing.
+    fn give_up(&mut self, failure: Failure, now: Moment) {
+        self.unanswered = self.unanswered.saturating_add(1);
+        match self.phase {
+            Phase::Closed => {}
+            Phase::SetUp(_) => self.lose(failure),
+            Phase::Idle if self.unanswered >= MAX_UNANSWERED => self.lose(failure),
+            Phase::Idle => {
+                self.rest(now);
+                self.mark_damaged();
+            }
+            Phase::Shot { .. } => {
+                self.fail(failure, now);
+                self.mark_damaged();
+            }
+        }
+    }
+
+    /// The rest of a message may still come: it is thrown away before the next command.
+    const fn mark_damaged(&mut self) {
+        if let Some(pending) = &mut self.pending {
+            pending.is_damaged = true;
+        }
+    }
+
+    fn fail(&mut self, failure: Failure, now: Moment) {
+        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.rest(now);
+    }
+
+    fn lose(&mut self, failure: Failure) {
+        self.phase = Phase::Closed;
+        self.pending = None;
+        self.outbox.push(ProtocolEvent::Lost(failure));
+    }
+
+    fn time_out(&mut self, now: Moment) {
+        let what = match &self.phase {
+            Phase::SetUp(step) => format!("waiting for the answer to {}", step.command()),
+            _ => "waiting for a position".to_owned(),
+        };
+        self.pending = None;
+        self.owed = (self.owed + 1).min(MAX_OWED);
+        self.give_up(Failure::Silent { what, seconds: self.timeout.as_secs_f64() }, now);
+    }
+}
+
+/// Number of an `ERRORxx` reply.
+fn error_of(frame: &Frame) -> Option<u8> {
+    match frame {
+        Frame::Text(text) => text.strip_prefix("ERROR").map(|code| u8::from_str_radix(code, 16).unwrap_or(0)),
+        _ => None,
+    }
+}
+
+impl Protocol for NdiProtocol {
+    fn start(&mut self, now: Moment) {
+        self.decoder.resync();
+        self.outbox.clear_output();
+        self.set_up = SetUp::default();
+        self.owed = 0;
+        self.unanswered = 0;
+        self.bad_in_a_row = 0;
+        let first = Step::Initialise;
+        let command = first.command();
+        self.phase = Phase::SetUp(first);
+        self.ask(command, now);
+    }
+
+    fn feed(&mut self, bytes: &[u8], now: Moment) {
+        for &byte in bytes {
+            if let Some(frame) = self.decoder.push(byte) {
+                self.take(frame, now);
+            }
+        }
+    }
+
+    fn tick(&mut self, now: Moment) {
+        match &self.pending {
+            Some(pending) if pending.at <= now && pending.is_sent => self.time_out(now),
+            Some(pending) if pending.at <= now => self.send(now),
+            _ => {}
+        }
+    }
+
+    fn trigger(&mut self, now: Moment) {
+        if !matches!(self.phase, Phase::Idle) {
+            let is_set_up = matches!(self.phase, Phase::Shot { .. });
+            let text = if is_set_up { "another shot is under way" } else { "the set-up is not complete" };
+            return self.outbox.push(ProtocolEvent::Failed(Failure::TooEarly(text.to_owned())));
+        }
+        // A live position that is on its way belongs to a frame before the trigger: it is not looked at.
+        let is_asked = self.pending.as_ref().is_some_and(|pending| pending.is_sent);
+        self.phase = Phase::Shot {
+            deadline: now + self.timeout,
+            to_skip: self.owed + u32::from(is_asked),
+            frame_at_trigger: None,
+        };
+        if let Some(pending) = self.pending.as_mut().filter(|pending| !pending.is_sent) {
+            pending.at = if pending.is_damaged { now + DRAIN } else { now };
+        }
+        self.tick(now);
+    }
+
+    fn cancel(&mut self, now: Moment) {
+        if matches!(self.phase, Phase::Shot { .. }) {
+            let is_asked = self.pending.as_ref().is_some_and(|pending| pending.is_sent);
+            self.owed = (self.owed + u32::from(is_asked)).min(MAX_OWED);
+            self.rest(now);
+        }
+    }
+
+    fn next_output(&mut self) -> Option<Vec<u8>> {
+        self.outbox.next_output()
+    }
+
+    fn next_event(&mut self) -> Option<ProtocolEvent> {
+        self.outbox.next_event()
+    }
+
+    fn next_deadline(&self) -> Option<Moment> {
+        self.pending.as_ref().map(|pending| pending.at)
+    }
+}

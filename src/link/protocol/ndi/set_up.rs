@@ -1,0 +1,159 @@
+//! The way from a fresh connection to tracking.
+
+use super::super::Failure;
+use super::super::Identity;
+use super::options::NdiOptions;
+use super::options::ReplyFormat;
+
+/// Commands of the set-up, in their order.
+#[derive(Clone, Debug)]
+pub(super) enum Step {
+    Initialise,
+    Version,
+    FindTools,
+    InitialiseTool(u8, Vec<u8>),
+    FindInitialised,
+    EnableTool(u8, Vec<u8>),
+    StartTracking,
+}
+
+/// What comes after a step.
+#[derive(Debug)]
+pub(super) enum Next {
+    Step(Step),
+    Ready(u8),
+}
+
+/// What the set-up learns.
+#[derive(Debug, Default)]
+pub(super) struct SetUp {
+    version: Option<String>,
+    enabled: Vec<u8>,
+}
+
+impl Step {
+    pub(super) fn command(&self) -> String {
+        match self {
+            Self::Initialise => "INIT:".to_owned(),
+            Self::Version => "APIREV:".to_owned(),
+            Self::FindTools => "PHSR:02".to_owned(),
+            Self::InitialiseTool(handle, _) => format!("PINIT:{handle:02X}"),
+            Self::FindInitialised => "PHSR:03".to_owned(),
+            Self::EnableTool(handle, _) => format!("PENA:{handle:02X}D"),
+            Self::StartTracking => "TSTART:".to_owned(),
+        }
+    }
+
+    /// Whether an error of the instrument at this step does not matter.
+    pub(super) const fn is_optional(&self) -> bool {
+        matches!(self, Self::Version)
+    }
+}
+
+impl SetUp {
+    /// Takes the reply to a step; none where an error did not matter.
+    pub(super) fn advance(&mut self, step: Step, reply: Option<&str>, options: &NdiOptions) -> Result<Next, Failure> {
+        let reply = reply.unwrap_or_default();
+        Ok(Next::Step(match step {
+            Step::Initialise => {
+                okay(reply)?;
+                Step::Version
+            }
+            Step::Version => {
+                self.version = (!reply.is_empty()).then(|| reply.escape_default().to_string());
+                Step::FindTools
+            }
+            Step::FindTools => initialise_next(handles(reply)?),
+            Step::InitialiseTool(_, left) => {
+                okay(reply)?;
+                initialise_next(left)
+            }
+            Step::FindInitialised => self.enable_next(handles(reply)?)?,
+            Step::EnableTool(handle, left) => {
+                okay(reply)?;
+                self.enabled.push(handle);
+                self.enable_next(left)?
+            }
+            Step::StartTracking => {
+                okay(reply)?;
+                return self.choose(options).map(Next::Ready);
+            }
+        }))
+    }
+
+    fn enable_next(&self, mut left: Vec<u8>) -> Result<Step, Failure> {
+        if let Some(handle) = left.pop() {
+            return Ok(Step::EnableTool(handle, left));
+        }
+        if self.enabled.is_empty() {
+            let text =
+                "it knows no tool: plug one in, or load the definition file of a passive one with the maker's program";
+            return Err(Failure::Settings(text.to_owned()));
+        }
+        Ok(Step::StartTracking)
+    }
+
+    fn choose(&self, options: &NdiOptions) -> Result<u8, Failure> {
+        let known = self.enabled.iter().map(|handle| format!("{handle:02X}")).collect::<Vec<_>>().join(", ");
+        match (options.handle, self.enabled.as_slice()) {
+            (Some(handle), enabled) if enabled.contains(&handle) => Ok(handle),
+            (Some(handle), _) => Err(Failure::Settings(format!("there is no tool {handle:02X}; there are: {known}"))),
+            (None, [only]) => Ok(*only),
+            (None, _) => Err(Failure::Settings(format!("there are several tools ({known}): choose a handle"))),
+        }
+    }
+
+    pub(super) fn identity(self, handle: u8, options: &NdiOptions) -> Identity {
+        let mut warnings =
+            vec!["optical and magnetic trackers are of the 0.1 to 1 mm class: see the data sheet".to_owned()];
+        if options.reply == ReplyFormat::Text {
+            warnings.push("TX gives positions in steps of 0.01 mm; BX is finer".to_owned());
+        }
+        if options.tip_mm.iter().all(|value| *value == 0.0) {
+            warnings.push("no tip is set: the point is the origin of the tool, not what it touches".to_owned());
+        }
+        let [x, y, z] = options.tip_mm;
+        Identity {
+            name: format!("NDI tracker, version {}", self.version.as_deref().unwrap_or("unknown")),
+            reflector: None,
+            checked: vec![
+                "units: mm (fixed in the interface)".to_owned(),
+                format!("tool: {handle:02X}, initialised and enabled"),
+                format!("tip: {x:.3}, {y:.3}, {z:.3} mm in the frame of the tool (as set)"),
+            ],
+            warnings,
+        }
+    }
+}
+
+fn initialise_next(mut left: Vec<u8>) -> Step {
+    left.pop().map_or(Step::FindInitialised, |handle| Step::InitialiseTool(handle, left))
+}
+
+fn okay(reply: &str) -> Result<(), Failure> {
+    match reply {
+        "OKAY" => Ok(()),
+        warning if warning.starts_with("WARNING") => Ok(()),
+        other => Err(Failure::Garbled(format!("`{}` instead of OKAY", other.escape_default()))),
+    }
+}
+
+/// Handles of a `PHSR` reply: their number, then two digits of handle and three of status each.
+fn handles(reply: &str) -> Result<Vec<u8>, Failure> {
+    let garbled = || Failure::Garbled(format!("`{}` is not a list of port handles", reply.escape_default()));
+    let byte = |text: &str| u8::from_str_radix(text, 16).map_err(|_not_hexadecimal| garbled());
+    let (count, mut rest) = reply.split_at_checked(2).ok_or_else(garbled)?;
+    let mut handles = Vec::new();
+    for _ in 0..byte(count)? {
+        let (entry, after) = rest.split_at_checked(5).ok_or_else(garbled)?;
+        let (handle, _status) = entry.split_at_checked(2).ok_or_else(garbled)?;
+        handles.push(byte(handle)?);
+        rest = after;
+    }
+    if !rest.is_empty() {
+        return Err(garbled());
+    }
+    // The last one is taken first.
+    handles.reverse();
+    Ok(handles)
+}

@@ -1,0 +1,337 @@
+//! Tests of the robot link: literal bytes, the stream, faults, cut and damaged streams.
+
+use std::time::Duration;
+
+use proptest::prelude::*;
+
+use super::packet::{
+    Framer, Packet, PacketError, Record, TextMessage, encode, packet_type, request_version, set_up_outputs,
+};
+use super::{Rtde, RtdeOptions, Stillness};
+use crate::link::protocol::{Failure, JointState, Moment, Protocol as _, ProtocolEvent};
+use crate::link::simulator::Simulator as _;
+use crate::link::simulator::bench::fuzz::{
+    assert_same_at_every_cut, assert_same_in_pieces, fuzz_protocol, fuzz_simulator,
+};
+use crate::link::simulator::bench::{Bench, Cell};
+use crate::link::simulator::occasion::Planned;
+use crate::link::simulator::rtde::{RtdeFault, RtdeSimulator};
+
+type RtdeBench = Bench<Rtde, RtdeSimulator>;
+
+fn bench(faults: &[Planned<RtdeFault>]) -> RtdeBench {
+    Bench::new(Rtde::default(), RtdeSimulator::new(faults.to_vec()))
+}
+
+/// A bench whose stream has been started.
+fn ready(faults: &[Planned<RtdeFault>]) -> RtdeBench {
+    let mut bench = bench(faults);
+    let events = bench.settle();
+    assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))), "{events:?}");
+    bench
+}
+
+fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
+    let mut states = Vec::new();
+    for event in events {
+        if let ProtocolEvent::Joints(state) = event {
+            states.push(state);
+        }
+    }
+    states
+}
+
+fn decode(bytes: &[u8]) -> Packet {
+    let mut framer = Framer::default();
+    framer.feed(bytes);
+    let (kind, content) = framer.next_packet().unwrap().unwrap();
+    assert_eq!(framer.pending(), 0);
+    Packet::decode(kind, &content).unwrap()
+}
+
+#[test]
+fn requests_have_the_bytes_of_the_published_examples() {
+    assert_eq!(request_version(), [0x00, 0x05, 0x56, 0x00, 0x02]);
+    let head = [0x00, 0x1d, 0x4f, 0x40, 0x5f, 0x40, 0x00, 0x00, 0x00, 0x00, 0x00];
+    assert_eq!(set_up_outputs(125.0, &["timestamp", "actual_q"]), [&head[..], b"timestamp,actual_q"].concat());
+    assert_eq!(encode(packet_type::CONTROL_PACKAGE_START, &[]), [0x00, 0x03, 0x53]);
+}
+
+#[test]
+fn answers_read_as_published() {
+    assert_eq!(decode(&[0x00, 0x04, 0x56, 0x01]), Packet::ProtocolVersion(true));
+    assert_eq!(decode(&[0x00, 0x04, 0x56, 0x00]), Packet::ProtocolVersion(false));
+    assert_eq!(decode(&[0x00, 0x04, 0x53, 0x01]), Packet::Started(true));
+    let outputs = [&[0x00, 0x13, 0x4f, 0x01][..], b"DOUBLE,VECTOR6D"].concat();
+    assert_eq!(
+        decode(&outputs),
+        Packet::Outputs { recipe: 1, types: vec!["DOUBLE".to_owned(), "VECTOR6D".to_owned()] }
+    );
+    let values: Vec<u8> = (0..7).flat_map(|number| f64::from(number).to_be_bytes()).collect();
+    let data = [&[0x00, 0x3c, 0x55, 0x01][..], &values].concat();
+    assert_eq!(data.len(), 60);
+    assert_eq!(decode(&data), Packet::Data { recipe: 1, values });
+    let version = [0, 19, 118, 0, 0, 0, 5, 0, 0, 0, 11, 0, 0, 0, 0, 0, 0, 0, 108];
+    assert_eq!(decode(&version), Packet::ControllerVersion([5, 11, 0, 108]));
+    let text = [0, 10, 77, 3, b'a', 0x1b, b'c', 1, b'x', 1];
+    let expected = TextMessage { text: "a\u{fffd}c".to_owned(), source: "x".to_owned(), level: 1 };
+    assert_eq!(decode(&text), Packet::Text(expected));
+}
+
+#[test]
+fn packets_that_cannot_be_are_errors() {
+    for size in 0..3_u8 {
+        let mut framer = Framer::default();
+        framer.feed(&[0, size]);
+        assert_eq!(framer.next_packet(), Err(PacketError::Size(u16::from(size))));
+    }
+    for (kind, content) in
+        [(b'V', &[][..]), (b'v', &[0; 15]), (b'M', &[5, b'a']), (b'O', &[]), (b'U', &[]), (b'S', &[])]
+    {
+        assert!(matches!(Packet::decode(kind, content), Err(PacketError::Short { .. })), "{kind}");
+    }
+    assert_eq!(Record::decode(&[0; Record::SIZE - 1]), None);
+    assert_eq!(Record::decode(&[0; Record::SIZE + 1]), None);
+}
+
+#[test]
+fn values_stand_in_the_order_in_which_they_were_asked_for() {
+    let mut bytes: Vec<u8> = (0..13).flat_map(|number| f64::from(number).to_be_bytes()).collect();
+    bytes.extend([0, 0, 0, 7, 0xff, 0xff, 0xff, 0xfe]);
+    let expected = Record {
+        timestamp: 0.0,
+        actual_q: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        actual_qd: [7.0, 8.0, 9.0, 10.0, 11.0, 12.0],
+        robot_mode: 7,
+        safety_status: -2,
+    };
+    assert_eq!(Record::decode(&bytes), Some(expected));
+}
+
+#[test]
+fn the_stream_brings_the_joints_of_the_robot_at_the_frequency_that_was_asked_for() {
+    let mut bench = ready(&[]);
+    let events = bench.run_for(Duration::from_secs(2));
+    let states = joints(&events);
+    assert_eq!((events.len(), states.len()), (50, 50));
+    for state in states {
+        assert_eq!(state.positions, bench.cell.joints.positions);
+        assert_eq!((state.speeds.as_deref(), &state.stopped), (Some(&[0.0; 6][..]), &None));
+    }
+    let name = "Universal Robots controller, version 5.11.0.108";
+    let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!() };
+    assert_eq!(identity.name, name);
+}
+
+#[test]
+fn a_frequency_beyond_the_limits_is_taken_to_the_limit() {
+    for (asked, used) in [(500.0, 25.0), (0.0, 1.0), (f64::NAN, 1.0), (8.0, 8.0)] {
+        let rtde = Rtde::new(RtdeOptions { frequency: asked, ..RtdeOptions::default() });
+        assert!((rtde.options.frequency - used).abs() < 1e-12, "{asked}");
+    }
+    let slow = Rtde::new(RtdeOptions { frequency: 1.0, ..RtdeOptions::default() });
+    let mut bench = Bench::new(slow, RtdeSimulator::new(Vec::new()));
+    bench.settle();
+    assert_eq!(joints(&bench.run_for(Duration::from_secs(10))).len(), 10);
+}
+
+#[test]
+fn a_robot_has_no_shots() {
+    let mut bench = ready(&[]);
+    assert!(matches!(bench.shoot().last(), Some(ProtocolEvent::Failed(Failure::Refused(_)))));
+}
+
+#[test]
+fn refusals_end_the_set_up_with_the_reason_and_a_new_connection_is_good() {
+    let cases = [
+        (
+            RtdeFault::OldProtocol,
+            "the instrument refused: version 2 of the interface; the controller needs newer software",
+        ),
+        (RtdeFault::NotFound, "the instrument refused: the controller does not know actual_qd"),
+        (RtdeFault::InUse, "the instrument is in use by another program (another program has actual_qd)"),
+        (
+            RtdeFault::WrongType,
+            "cannot read what the instrument sends: the controller announced values of other types: \
+             DOUBLE,VECTOR6D,VECTOR6INT32,INT32,INT32",
+        ),
+        (RtdeFault::StartRefused, "the instrument refused: the controller does not start the stream"),
+    ];
+    for (fault, words) in cases {
+        let mut bench = bench(&[Planned::once(fault)]);
+        let events = bench.settle();
+        let [ProtocolEvent::Lost(failure)] = events.as_slice() else { panic!("{fault}: {events:?}") };
+        assert_eq!(failure.to_string(), words);
+        assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))), "{fault}");
+    }
+}
+
+#[test]
+fn faults_of_the_stream_lose_the_link_and_a_new_connection_is_good() {
+    let cases = [
+        (RtdeFault::Silence, "the instrument said nothing for 1 s while joint values were awaited"),
+        (RtdeFault::Cut, "the connection is lost: closed by the other side"),
+        (
+            RtdeFault::SizeZero,
+            "cannot read what the instrument sends: a packet of 0 bytes was announced; three are the least, so the stream is out \
+             of step",
+        ),
+        (
+            RtdeFault::ShortData,
+            "cannot read what the instrument sends: a data packet has 108 bytes of values instead of 112",
+        ),
+    ];
+    for (fault, words) in cases {
+        let mut bench = ready(&[Planned::from(fault, 10, 1)]);
+        let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
+        let Some(ProtocolEvent::Lost(failure)) = events.last() else { panic!("{fault}: {events:?}") };
+        assert_eq!(failure.to_string(), words);
+        assert_eq!(joints(&events).len(), 9, "{fault}");
+        assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))), "{fault}");
+        assert_eq!(joints(&bench.run_for(Duration::from_secs(1))).len(), 25, "{fault}");
+    }
+}
+
+#[test]
+fn data_of_another_recipe_are_skipped_and_count_as_silence() {
+    let mut bench = ready(&[Planned::always(RtdeFault::WrongRecipe)]);
+    let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
+    assert_eq!(joints(&events).len(), 0);
+    assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))));
+    let mut bench = ready(&[Planned::from(RtdeFault::WrongRecipe, 2, 1)]);
+    assert_eq!(joints(&bench.run_for(Duration::from_secs(1))).len(), 24);
+}
+
+#[test]
+fn a_stop_a_mode_and_a_broken_number_are_said_and_the_stream_goes_on() {
+    let cases = [
+        (RtdeFault::ProtectiveStop, vec!["safety status: protective stop (3)", "safety status: normal (1)"], 50),
+        (RtdeFault::PowerOff, vec!["robot mode: power off (3)", "robot mode: running (7)"], 50),
+        (RtdeFault::NotFinite, vec!["the controller reported a joint value that is no finite number"; 5], 45),
+    ];
+    for (fault, expected, states) in cases {
+        let mut bench = ready(&[Planned::from(fault, 10, 5)]);
+        let events = bench.run_for(Duration::from_secs(2));
+        let said = events.iter().filter_map(|event| match event {
+            ProtocolEvent::Status(status) => Some(status.text.as_str()),
+            _ => None,
+        });
+        assert_eq!(said.collect::<Vec<_>>(), expected);
+        let stopped = joints(&events).iter().filter(|state| state.stopped.is_some()).count();
+        assert_eq!(stopped, if fault == RtdeFault::ProtectiveStop { 5 } else { 0 });
+        assert_eq!(joints(&events).len(), states, "{fault}");
+    }
+}
+
+#[test]
+fn drip_and_a_flood_of_messages_change_nothing() {
+    for fault in [RtdeFault::Drip, RtdeFault::TextFlood] {
+        let mut bench = ready(&[Planned::once(fault)]);
+        assert_eq!(joints(&bench.run_for(Duration::from_secs(2))).len(), 50, "{fault}");
+    }
+}
+
+#[test]
+fn a_robot_is_at_rest_half_a_second_after_it_stopped() {
+    let mut bench = ready(&[Planned::from(RtdeFault::Moving, 11, 10)]);
+    let events = bench.run_for(Duration::from_secs(3));
+    let mut stillness = Stillness::default();
+    let states = joints(&events);
+    let rests: Vec<bool> = states.iter().map(|state| stillness.feed(state)).collect();
+    // 25 Hz: ten states at rest, ten moving, the first at rest again is number 20, and 13 intervals are more than 0.5 s.
+    assert_eq!(rests.iter().position(|rest| *rest), Some(33));
+    assert!(rests[33..].iter().all(|rest| *rest));
+    assert!((states[74].positions[0] - states[0].positions[0] - 10.0 * 0.2 * 0.04).abs() < 1e-12);
+}
+
+#[test]
+fn nobody_says_rest_without_speeds_across_a_gap_or_in_a_stop() {
+    let state = |time: f64| JointState {
+        positions: vec![0.0; 6],
+        speeds: Some(vec![9e-4; 6]),
+        controller_time: time,
+        stopped: None,
+    };
+    let feed = |states: &[JointState]| {
+        let mut stillness = Stillness::default();
+        states.iter().map(|state| stillness.feed(state)).collect::<Vec<_>>()
+    };
+    assert_eq!(feed(&[state(1.0), state(1.25), state(1.5)]), [false, false, true]);
+    assert_eq!(feed(&[state(1.0), state(1.75), state(2.0)]), [false; 3], "gap");
+    assert_eq!(feed(&[state(5.0), state(5.4), state(1.0), state(1.4)]), [false; 4], "clock");
+    let bad = |change: fn(&mut JointState)| {
+        let mut middle = state(1.25);
+        change(&mut middle);
+        feed(&[state(1.0), middle, state(1.5)])
+    };
+    assert_eq!(bad(|state| state.speeds = None), [false; 3]);
+    assert_eq!(bad(|state| state.speeds = Some(Vec::new())), [false; 3]);
+    assert_eq!(bad(|state| state.speeds = Some(vec![0.0, -0.001])), [false; 3]);
+    assert_eq!(bad(|state| state.speeds = Some(vec![f64::NAN])), [false; 3]);
+    assert_eq!(bad(|state| state.stopped = Some("stop".to_owned())), [false; 3]);
+}
+
+/// A link that has started, and bytes from its beginning to some data.
+fn stream() -> (Rtde, Vec<u8>) {
+    let mut rtde = Rtde::default();
+    rtde.start(Moment::ZERO);
+    let mut bench = ready(&[Planned::from(RtdeFault::ProtectiveStop, 2, 1)]);
+    bench.run_for(Duration::from_millis(130));
+    (rtde, bench.received)
+}
+
+#[test]
+fn every_cut_gives_the_same() {
+    let (rtde, stream) = stream();
+    let events = assert_same_at_every_cut(&rtde, &stream);
+    assert!(matches!(events.first(), Some(ProtocolEvent::Ready(_))));
+    assert!(matches!(events.last(), Some(ProtocolEvent::Joints(_))));
+}
+
+proptest! {
+    #[test]
+    fn any_pieces_give_the_same(sizes in prop::collection::vec(1_usize..200, 1..20)) {
+        let (rtde, stream) = stream();
+        assert_same_in_pieces(&rtde, &stream, &sizes);
+    }
+}
+
+#[test]
+fn ten_thousand_packets_in_one_feed_leave_the_newest() {
+    let (mut rtde, stream) = stream();
+    rtde.feed(&stream, Moment::ZERO);
+    let data = stream[stream.len() - 116..].repeat(10_000);
+    rtde.feed(&data, Moment::ZERO);
+    let (pending, _, events) = rtde.buffered();
+    assert!(pending == 0 && events <= 5, "{pending} {events}");
+}
+
+#[test]
+fn a_simulated_controller_hangs_up_on_who_does_not_read() {
+    let mut simulator = RtdeSimulator::new(Vec::new());
+    simulator.accept(Moment::ZERO);
+    simulator.feed(&request_version().repeat(1_000_000), &mut Cell::default(), Moment::ZERO);
+    let (pending, waiting) = simulator.buffered();
+    assert!(pending == 0 && waiting < 2 << 20, "{pending} {waiting}");
+}
+
+#[test]
+fn no_bytes_make_the_link_panic_or_hoard() {
+    fuzz_protocol(Rtde::default, &stream().1, |rtde| {
+        let (pending, outputs, events) = rtde.buffered();
+        assert!(pending < 1 << 16 && outputs <= 10 && events <= 200, "{pending} {outputs} {events}");
+    });
+}
+
+#[test]
+fn no_bytes_make_the_simulated_controller_panic_or_hoard() {
+    let valid = ready(&[]).sent.concat();
+    fuzz_simulator(
+        || RtdeSimulator::new(RtdeFault::ALL.iter().map(|fault| Planned::from(*fault, 2, 1)).collect()),
+        &valid,
+        |simulator| {
+            let (pending, waiting) = simulator.buffered();
+            assert!(pending < 1 << 16 && waiting < 2 << 20, "{pending} {waiting}");
+        },
+    );
+}

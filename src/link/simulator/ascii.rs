@@ -1,0 +1,370 @@
+//! A program or gauge that prints one line per point, by the same settings as the driver.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::Output;
+use super::PointSource;
+use super::Simulator;
+use super::fault::FaultPlan;
+use super::fault::NamedFault;
+use super::fault::Scheduled;
+use super::fault::text_of_faults;
+use crate::link::protocol::Moment;
+use crate::link::protocol::Shot;
+use crate::link::protocol::ascii::AsciiOptions;
+use crate::link::protocol::ascii::Checksum;
+use crate::link::protocol::ascii::Column;
+use crate::link::protocol::ascii::DecimalSign;
+use crate::link::protocol::ascii::Layout;
+use crate::link::protocol::ascii::Mode;
+use crate::link::protocol::ascii::Separator;
+use crate::link::protocol::ascii::unescape;
+use crate::link::protocol::crc::crc16_arc;
+use crate::link::protocol::crc::nmea_xor;
+
+/// What it says when there is no point, in the words of T2SA.
+const ERROR_TEXT: &str = "ERR-305 point measurement failed";
+
+/// Time between two lines of a stream.
+const PERIOD: Duration = Duration::from_millis(100);
+
+/// Time from a trigger to its line.
+const MEASURING: Duration = Duration::from_millis(300);
+
+/// How late a late answer is: later than any driver waits.
+const LATE: Duration = Duration::from_secs(40);
+
+/// Pause in the middle of a halved line.
+const PAUSE: Duration = Duration::from_millis(700);
+
+/// Bytes kept of a trigger that is not complete.
+const MAX_RECEIVED: usize = 4096;
+
+/// Most lines that wait to be sent.
+const MAX_WAITING: usize = 256;
+
+/// What can go wrong with a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AsciiFault {
+    /// Half the line, a pause, the other half.
+    Halves,
+    /// Half the line, then its end: the rest is lost.
+    Cut,
+    /// Two lines in one write.
+    TwoInOne,
+    /// Two lines with no end between them.
+    Joined,
+    /// CR alone ends the line.
+    CarriageReturnOnly,
+    /// The other decimal sign than the one that was set.
+    DecimalComma,
+    /// `NaN` for a coordinate.
+    NotANumber,
+    /// Digits grouped in thousands: `1,234.5`.
+    Thousands,
+    /// Some empty lines before the line.
+    EmptyLines,
+    /// 10,000 bytes without an end before the line.
+    LongLine,
+    /// An error text in place of the line.
+    ErrorText,
+    /// The line before again.
+    StaleRepeat,
+    /// Hangs up in the middle of the line.
+    DisconnectMidLine,
+    /// 0, 0, 0: what some programs print when a measurement failed.
+    Origin,
+    /// A point a thousand times too far: metres taken for millimetres.
+    WrongUnit,
+    /// A digit that changed on the way; a check value shows it.
+    BitError,
+    /// Bytes as they look at a wrong baud rate.
+    Noise,
+    /// Nothing is sent.
+    Silent,
+    /// The line comes long after the driver gave up.
+    Late,
+}
+
+impl NamedFault for AsciiFault {
+    const ALL: &'static [Self] = &[
+        Self::Halves,
+        Self::Cut,
+        Self::TwoInOne,
+        Self::Joined,
+        Self::CarriageReturnOnly,
+        Self::DecimalComma,
+        Self::NotANumber,
+        Self::Thousands,
+        Self::EmptyLines,
+        Self::LongLine,
+        Self::ErrorText,
+        Self::StaleRepeat,
+        Self::DisconnectMidLine,
+        Self::Origin,
+        Self::WrongUnit,
+        Self::BitError,
+        Self::Noise,
+        Self::Silent,
+        Self::Late,
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Halves => "halves",
+            Self::Cut => "cut",
+            Self::TwoInOne => "two-in-one",
+            Self::Joined => "joined",
+            Self::CarriageReturnOnly => "carriage-return-only",
+            Self::DecimalComma => "decimal-comma",
+            Self::NotANumber => "not-a-number",
+            Self::Thousands => "thousands",
+            Self::EmptyLines => "empty-lines",
+            Self::LongLine => "long-line",
+            Self::ErrorText => "error-text",
+            Self::StaleRepeat => "stale-repeat",
+            Self::DisconnectMidLine => "disconnect-mid-line",
+            Self::Origin => "origin",
+            Self::WrongUnit => "wrong-unit",
+            Self::BitError => "bit-error",
+            Self::Noise => "noise",
+            Self::Silent => "silent",
+            Self::Late => "late",
+        }
+    }
+}
+
+text_of_faults!(AsciiFault);
+
+/// Prints lines: one for each trigger, or ten per second.
+#[derive(Debug)]
+pub struct AsciiSimulator {
+    options: AsciiOptions,
+    trigger: Vec<u8>,
+    faults: FaultPlan<AsciiFault>,
+    received: Vec<u8>,
+    measuring: VecDeque<Moment>,
+    next_line: Option<Moment>,
+    scheduled: VecDeque<(Moment, Output)>,
+    outputs: VecDeque<Output>,
+    last_body: Option<String>,
+    printed: u32,
+}
+
+impl AsciiSimulator {
+    /// Fails where [`AsciiOptions::validate`] does. A layout by regular expression is answered in the words of T2SA.
+    pub fn new(options: AsciiOptions, faults: impl IntoIterator<Item = Scheduled<AsciiFault>>) -> Result<Self, String> {
+        options.validate()?;
+        let trigger = match &options.mode {
+            Mode::Polled { trigger } => unescape(trigger)?,
+            Mode::Streamed { .. } => Vec::new(),
+        };
+        Ok(Self {
+            options,
+            trigger,
+            faults: FaultPlan::new(faults),
+            received: Vec::new(),
+            measuring: VecDeque::new(),
+            next_line: None,
+            scheduled: VecDeque::new(),
+            outputs: VecDeque::new(),
+            last_body: None,
+            printed: 0,
+        })
+    }
+
+    /// Bytes of a trigger that is not complete, for the bound of the memory.
+    pub const fn pending(&self) -> usize {
+        self.received.len()
+    }
+
+    /// Prints one line, with the fault that is due.
+    fn print(&mut self, source: &mut dyn PointSource, now: Moment) {
+        let fault = self.faults.occasion(|_| true);
+        self.printed = self.printed.saturating_add(1);
+        let Some(shot) = source.shot() else {
+            return self.send(now, self.line(ERROR_TEXT).into_bytes());
+        };
+        let body = self.body(&shot, fault, now);
+        self.send_body(&body, fault, now);
+        self.last_body = Some(body);
+    }
+
+    fn send_body(&mut self, body: &str, fault: Option<AsciiFault>, now: Moment) {
+        let line = self.line(body);
+        let bytes = line.clone().into_bytes();
+        let half = bytes.len() / 2;
+        let (first, rest) = bytes.split_at_checked(half).unwrap_or((&bytes, &[]));
+        match fault {
+            Some(AsciiFault::Halves) => {
+                self.send(now, first.to_vec());
+                self.send(now + PAUSE, rest.to_vec());
+            }
+            Some(AsciiFault::Cut) => self.send(now, [first, b"\r\n"].concat()),
+            Some(AsciiFault::TwoInOne) => self.send(now, line.repeat(2).into_bytes()),
+            Some(AsciiFault::Joined) => self.send(now, [line.trim_end().as_bytes(), &bytes].concat()),
+            Some(AsciiFault::CarriageReturnOnly) => self.send(now, format!("{}\r", line.trim_end()).into_bytes()),
+            Some(AsciiFault::EmptyLines) => self.send(now, format!("\r\n\n\r{line}").into_bytes()),
+            Some(AsciiFault::LongLine) => self.send(now, format!("{}\r\n{line}", "x".repeat(10_000)).into_bytes()),
+            Some(AsciiFault::ErrorText) => self.send(now, self.line(ERROR_TEXT).into_bytes()),
+            Some(AsciiFault::StaleRepeat) => {
+                let stale = self.last_body.as_ref().map_or(line, |last| self.line(last));
+                self.send(now, stale.into_bytes());
+            }
+            Some(AsciiFault::DisconnectMidLine) => {
+                self.send(now, first.to_vec());
+                self.schedule(now, Output::Close);
+            }
+            Some(AsciiFault::BitError) => self.send(now, with_digit_changed(bytes)),
+            Some(AsciiFault::Noise) => self.send(now, [b"\xF8\x80\x78\xFE\x98\r".as_slice(), b"\x06\xE6\n"].concat()),
+            Some(AsciiFault::Silent) => {}
+            Some(AsciiFault::Late) => self.send(now + LATE, bytes),
+            _ => self.send(now, bytes),
+        }
+    }
+
+    /// The values as text.
+    fn body(&self, shot: &Shot, fault: Option<AsciiFault>, now: Moment) -> String {
+        let mut values = shot.point.coords.map(|value| value / self.options.unit.metres());
+        match fault {
+            Some(AsciiFault::Origin) => values.fill(0.0),
+            Some(AsciiFault::WrongUnit) => values *= 1e6,
+            _ => {}
+        }
+        let mut texts = [values.x, values.y, values.z].map(|value| self.number(value, fault));
+        if let (Some(AsciiFault::NotANumber), [_, y, _]) = (fault, &mut texts) {
+            "NaN".clone_into(y);
+        }
+        match &self.options.layout {
+            Layout::Columns(columns) => self.columns(columns, &texts, shot, now),
+            Layout::Regex(_) => format!("ACK-300 measured; result {}", texts.join(",")),
+        }
+    }
+
+    fn columns(&self, columns: &[Column], texts: &[String; 3], shot: &Shot, now: Moment) -> String {
+        let [x, y, z] = texts;
+        let sigma = shot.sigma.map(|sigma| sigma.map(|value| self.number(value / self.options.unit.metres(), None)));
+        let [sx, sy, sz] = sigma.unwrap_or_default();
+        let values: Vec<String> = columns
+            .iter()
+            .map(|column| match column {
+                Column::Skip => "-".to_owned(),
+                Column::Literal(text) => text.clone(),
+                Column::Name => format!("P{}", self.printed),
+                Column::X => x.clone(),
+                Column::Y => y.clone(),
+                Column::Z => z.clone(),
+                Column::Sigma | Column::SigmaX => sx.clone(),
+                Column::SigmaY => sy.clone(),
+                Column::SigmaZ => sz.clone(),
+                Column::Time => self.number(now.as_secs_f64() + 1.0, None),
+                Column::Status => self.options.valid_statuses.first().cloned().unwrap_or_default(),
+            })
+            .collect();
+        values.join(match self.options.separator {
+            Separator::Comma => ",",
+            Separator::Semicolon => ";",
+            Separator::Tab => "\t",
+            Separator::Spaces => " ",
+        })
+    }
+
+    /// Ten digits after the point: less than a nanometre in every unit.
+    fn number(&self, value: f64, fault: Option<AsciiFault>) -> String {
+        let text = format!("{value:.10}");
+        let own = if self.options.decimal_sign == DecimalSign::Comma { "," } else { "." };
+        match fault {
+            Some(AsciiFault::DecimalComma) => text.replace('.', if own == "," { "." } else { "," }),
+            Some(AsciiFault::Thousands) => "1,234.5".to_owned(),
+            _ => text.replace('.', own),
+        }
+    }
+
+    /// The line with its check value and end.
+    fn line(&self, body: &str) -> String {
+        match self.options.checksum {
+            Checksum::None => format!("{body}\r\n"),
+            Checksum::Nmea => format!("${body}*{:02X}\r\n", nmea_xor(body.as_bytes())),
+            Checksum::Crc16 => format!("{body}{:04X}\r\n", crc16_arc(body.as_bytes())),
+        }
+    }
+
+    fn send(&mut self, at: Moment, bytes: Vec<u8>) {
+        self.schedule(at, Output::Bytes(bytes));
+    }
+
+    fn schedule(&mut self, at: Moment, output: Output) {
+        if self.scheduled.len() < MAX_WAITING {
+            let place = self.scheduled.partition_point(|(other, _)| *other <= at);
+            self.scheduled.insert(place, (at, output));
+        }
+    }
+
+    fn release(&mut self, now: Moment) {
+        while let Some((_, output)) = self.scheduled.pop_front_if(|(at, _)| *at <= now) {
+            if self.outputs.len() < MAX_WAITING {
+                self.outputs.push_back(output);
+            }
+        }
+    }
+}
+
+/// The last digit plus one: still a number, but another.
+fn with_digit_changed(mut bytes: Vec<u8>) -> Vec<u8> {
+    if let Some(digit) = bytes.iter_mut().find(|byte| byte.is_ascii_digit()) {
+        *digit = if *digit == b'9' { b'0' } else { *digit + 1 };
+    }
+    bytes
+}
+
+impl Simulator for AsciiSimulator {
+    fn accept(&mut self, now: Moment) {
+        self.received.clear();
+        self.measuring.clear();
+        self.scheduled.clear();
+        self.outputs.clear();
+        self.next_line = self.trigger.is_empty().then_some(now + PERIOD);
+    }
+
+    fn feed(&mut self, bytes: &[u8], _source: &mut dyn PointSource, now: Moment) {
+        let Some(&end) = self.trigger.last() else {
+            return;
+        };
+        for &byte in bytes {
+            if self.received.len() >= MAX_RECEIVED {
+                self.received.clear();
+            }
+            self.received.push(byte);
+            if byte == end && self.received.ends_with(&self.trigger) {
+                self.received.clear();
+                if self.measuring.len() < MAX_WAITING {
+                    self.measuring.push_back(now + MEASURING);
+                }
+            }
+        }
+    }
+
+    fn tick(&mut self, source: &mut dyn PointSource, now: Moment) {
+        while self.measuring.pop_front_if(|at| *at <= now).is_some() {
+            self.print(source, now);
+        }
+        if self.next_line.is_some_and(|at| at <= now) {
+            self.next_line = Some(now + PERIOD);
+            self.print(source, now);
+        }
+        self.release(now);
+    }
+
+    fn next_output(&mut self) -> Option<Output> {
+        self.outputs.pop_front()
+    }
+
+    fn next_deadline(&self) -> Option<Moment> {
+        let scheduled = self.scheduled.front().map(|(at, _)| *at);
+        [self.measuring.front().copied(), self.next_line, scheduled].into_iter().flatten().min()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! Results of the simulated tracker, right ones and wrong ones.
+
+use super::super::PointSource;
+use super::EmsconSimulator;
+use super::fault::EmsconFault;
+use super::wire::PacketWriter;
+use crate::link::protocol::Shot;
+use crate::link::protocol::emscon::{CommandId, MeasurementMode, PacketType, ResultStatus, SystemEvent};
+
+/// Positions in a flood.
+const FLOOD: usize = 2000;
+
+/// What a result says beside the point.
+#[derive(Clone, Copy, Debug, Default)]
+struct Marks {
+    status: i32,
+    mode: i32,
+    try_mode: i32,
+}
+
+impl EmsconSimulator {
+    /// The measurement time is over.
+    pub(super) fn measure(&mut self, source: &mut dyn PointSource) {
+        if self.faults.strikes(EmsconFault::Silence) {
+            return;
+        }
+        if self.faults.strikes(EmsconFault::Closing) {
+            self.tell(SystemEvent::ServerClosing);
+            self.hang_up();
+            return;
+        }
+        if self.faults.strikes(EmsconFault::LostBeam) {
+            self.tell(SystemEvent::MeasStatusNotReady);
+            return;
+        }
+        for (fault, status) in [
+            (EmsconFault::LateError, ResultStatus::NoStationaryMeasurementResult),
+            (EmsconFault::UnlistedError, ResultStatus::Other(4242)),
+        ] {
+            if self.faults.strikes(fault) {
+                self.send(PacketWriter::error(CommandId::StartMeasurement, status).finish());
+                return;
+            }
+        }
+        if self.faults.strikes(EmsconFault::Flood) {
+            (0..FLOOD).for_each(|_| self.send_position(source));
+        }
+        if self.faults.strikes(EmsconFault::UnknownType) {
+            self.send(PacketWriter::new(PacketType::Other(42)).zeros(20).finish());
+        }
+        self.disturb();
+        self.send_result(source);
+    }
+
+    /// One result, or *not ready* where the beam is broken.
+    pub(super) fn send_result(&mut self, source: &mut dyn PointSource) {
+        let Some(shot) = source.shot() else {
+            self.tell(SystemEvent::MeasStatusNotReady);
+            return;
+        };
+        let marks = self.marks();
+        let values = self.values(&shot);
+        let is_extended = self.faults.strikes(EmsconFault::ExtendedResult);
+        let packet = self.result(&shot, values, marks, is_extended);
+        if self.faults.strikes(EmsconFault::CutAfter20) {
+            self.send(packet.finish().into_iter().take(20).collect());
+            self.hang_up();
+            return;
+        }
+        self.send_sized(packet);
+        self.tell(SystemEvent::MeasStatusReady);
+    }
+
+    /// Sends a result with the size that is planned.
+    fn send_sized(&mut self, packet: PacketWriter) {
+        let wrong_sizes =
+            [(EmsconFault::SizeZero, 0), (EmsconFault::SizeNegative, -1), (EmsconFault::SizeHuge, i32::MAX)];
+        for (fault, size) in wrong_sizes {
+            if self.faults.strikes(fault) {
+                self.send(packet.finish_with_size(size));
+                return;
+            }
+        }
+        let packet = if self.faults.strikes(EmsconFault::LongResult) { packet.zeros(16) } else { packet };
+        if self.faults.strikes(EmsconFault::ShortResult) {
+            let bytes = packet.finish_with_size(100);
+            self.send(bytes.into_iter().take(100).collect());
+        } else {
+            self.send(packet.finish());
+        }
+    }
+
+    fn marks(&mut self) -> Marks {
+        let mut marks = Marks { mode: self.tracker.mode, try_mode: self.tracker.settings[6], ..Marks::default() };
+        if self.faults.strikes(EmsconFault::TryMode) {
+            marks.try_mode = 1;
+        }
+        if self.faults.strikes(EmsconFault::WrongMode) {
+            marks.mode = MeasurementMode::SphereCenter.number();
+        }
+        if self.faults.strikes(EmsconFault::BadStatus) {
+            marks.status = ResultStatus::SensorNotStable.number();
+        }
+        marks
+    }
+
+    fn values(&mut self, shot: &Shot) -> [f64; 3] {
+        let [x, y, z] = self.tracker.coordinates(&shot.point);
+        if self.faults.strikes(EmsconFault::ZeroPoint) {
+            [0.0; 3]
+        } else if self.faults.strikes(EmsconFault::NotFinite) {
+            [x, f64::NAN, z]
+        } else if self.faults.strikes(EmsconFault::SilentMetres) {
+            shot.point.coords.into()
+        } else {
+            [x, y, z]
+        }
+    }
+
+    /// The two kinds of result: the head, coordinates, standard deviations, pointing errors, a-priori values and weather.
+    fn result(&self, shot: &Shot, values: [f64; 3], marks: Marks, is_extended: bool) -> PacketWriter {
+        let sigma = shot.sigma.unwrap_or_default().map(|value| value * self.tracker.units_per_metre());
+        let total = sigma.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let weather =
+            [shot.temperature.unwrap_or(20.0), shot.pressure.unwrap_or(1013.25), shot.humidity.unwrap_or(50.0)];
+        let kind = if is_extended { PacketType::SingleMeasResult2 } else { PacketType::SingleMeasResult };
+        // Extended statistics have three covariances behind either total.
+        let covariances = if is_extended { 24 } else { 0 };
+        PacketWriter::new(kind)
+            .integers(&[marks.status, marks.mode, marks.try_mode])
+            .numbers(&values)
+            .numbers(&sigma)
+            .numbers(&[total])
+            .zeros(covariances + 24)
+            .numbers(&sigma)
+            .numbers(&[total])
+            .zeros(covariances)
+            .numbers(&weather)
+    }
+
+    /// Where the reflector is now, if the beam is whole.
+    pub(super) fn send_position(&mut self, source: &mut dyn PointSource) {
+        if let Some(shot) = source.look() {
+            let values = self.tracker.coordinates(&shot.point);
+            self.send(PacketWriter::new(PacketType::ReflectorPosResult).i32(0).numbers(&values).finish());
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! The driver against its other end: points, faults, splits, noise.
+
+use std::time::Duration;
+
+use super::super::bench2::Bench;
+use super::super::bench2::Helix;
+use super::super::bench2::streams;
+use super::GeocomFault;
+use super::GeocomSimulator;
+use super::MAX_RECEIVED;
+use super::NamedFault as _;
+use super::Scheduled;
+use crate::link::protocol::Failure;
+use crate::link::protocol::Identity;
+use crate::link::protocol::ProtocolEvent;
+use crate::link::protocol::Shot;
+use crate::link::protocol::geocom::GeocomOptions;
+use crate::link::protocol::geocom::GeocomProtocol;
+use crate::link::protocol::geocom::Measurement;
+use crate::link::protocol::lines::MAX_LINE;
+
+type GeocomBench = Bench<GeocomProtocol, GeocomSimulator>;
+
+fn connected(options: &GeocomOptions, faults: impl IntoIterator<Item = Scheduled<GeocomFault>>) -> GeocomBench {
+    Bench::new(GeocomProtocol::new(options.clone()).unwrap(), GeocomSimulator::new(faults))
+}
+
+#[track_caller]
+fn identity(bench: &mut GeocomBench) -> Identity {
+    match bench.until(|event| matches!(event, ProtocolEvent::Ready(_) | ProtocolEvent::Lost(_))).pop() {
+        Some(ProtocolEvent::Ready(identity)) => identity,
+        other => panic!("not ready: {other:?}"),
+    }
+}
+
+fn bench(faults: impl IntoIterator<Item = Scheduled<GeocomFault>>) -> GeocomBench {
+    let mut bench = connected(&GeocomOptions::default(), faults);
+    identity(&mut bench);
+    bench
+}
+
+#[track_caller]
+fn shot(bench: &mut GeocomBench) -> Shot {
+    match bench.shoot() {
+        (Some(ProtocolEvent::Shot(shot)), _) => {
+            let error = (shot.point - Helix::point(bench.source.taken())).norm();
+            assert!(error < 1e-9, "{error} m from the newest point");
+            shot
+        }
+        other => panic!("no shot: {other:?}"),
+    }
+}
+
+#[test]
+fn a_point_comes_back_by_every_way_of_measuring() {
+    for measurement in [Measurement::FineAdjust, Measurement::DistanceAngle, Measurement::Simple] {
+        for checksum in [false, true] {
+            let mut bench = connected(&GeocomOptions { measurement, checksum, ..GeocomOptions::default() }, []);
+            identity(&mut bench);
+            for _ in 0..10 {
+                assert_eq!(shot(&mut bench).face, Some(1));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_set_up_says_who_answers_and_what_it_cannot_do() {
+    let identity = identity(&mut connected(&GeocomOptions::default(), []));
+    assert_eq!(identity.name, "TS30, simulated, serial number 362541, GeoCOM 1.50.3");
+    assert!(identity.warnings.iter().any(|text| text.contains("0.5 to 1 mm")));
+    assert!(identity.checked.iter().any(|text| text == "prism constant: -34.40 mm (read back)"), "{identity:?}");
+    assert_eq!(identity.reflector.map(|reflector| reflector.offset), Some(-0.0344));
+}
+
+#[test]
+fn what_is_set_is_read_back() {
+    let options = GeocomOptions {
+        target_recognition: Some(true),
+        edm_mode: Some(7),
+        prism_constant_mm: Some(-17.5),
+        ..GeocomOptions::default()
+    };
+    let identity = identity(&mut connected(&options, []));
+    assert_eq!(
+        identity.checked.get(2..),
+        Some(
+            ["target recognition: on", "EDM mode: 7 (read back)", "prism constant: -17.50 mm (read back)", "face: 1"]
+                .map(str::to_owned)
+                .as_slice()
+        )
+    );
+}
+
+/// What a shot with the fault says; `None`: it succeeds all the same.
+const fn expected(fault: GeocomFault) -> Option<&'static str> {
+    Some(match fault {
+        GeocomFault::CrcError
+        | GeocomFault::HalfLine
+        | GeocomFault::CarriageReturnOnly
+        | GeocomFault::Busy
+        | GeocomFault::AccuracyNotGuaranteed
+        | GeocomFault::NoFullCorrection
+        | GeocomFault::TransportTimeout
+        | GeocomFault::Echo
+        | GeocomFault::Asleep => return None,
+        GeocomFault::WrongTransaction | GeocomFault::LateReply | GeocomFault::Silent | GeocomFault::Noise => {
+            "said nothing for 60 s while measuring"
+        }
+        GeocomFault::AngleOnly => "code 1285: only angles",
+        GeocomFault::NoTarget => "no reflector (code 8710",
+        GeocomFault::LicenceMissing => "licence is missing",
+        GeocomFault::StaleRepeat => "equal to the point before",
+        GeocomFault::NotANumber => "angle",
+        GeocomFault::DisconnectMidLine | GeocomFault::Dead => "",
+    })
+}
+
+#[test]
+fn every_fault_is_said_and_passes() {
+    for &fault in GeocomFault::ALL.iter().filter(|fault| **fault != GeocomFault::Dead) {
+        let from = if fault == GeocomFault::Asleep { 1 } else { 2 };
+        let mut bench = bench([Scheduled::once(fault, from)]);
+        shot(&mut bench);
+        let (answer, _) = bench.shoot();
+        match (expected(fault), answer) {
+            (Some(""), None) => bench.connect(),
+            (None, Some(ProtocolEvent::Shot(shot))) => {
+                assert!((shot.point - Helix::point(bench.source.taken())).norm() < 1e-9, "{fault}");
+                let is_doubtful = matches!(fault, GeocomFault::AccuracyNotGuaranteed | GeocomFault::NoFullCorrection);
+                assert_eq!(shot.remark.is_some(), is_doubtful, "{fault}");
+            }
+            (Some(text), Some(ProtocolEvent::Failed(failure))) => {
+                assert!(failure.to_string().contains(text), "{fault}: {failure}");
+            }
+            (_, answer) => panic!("{fault}: {answer:?}"),
+        }
+        bench.run(Duration::from_secs(3));
+        shot(&mut bench);
+        shot(&mut bench);
+    }
+}
+
+#[test]
+fn three_times_busy_costs_patience_only() {
+    let mut bench = bench([Scheduled { fault: GeocomFault::Busy, from: 1, times: 3 }]);
+    let before = bench.now;
+    shot(&mut bench);
+    assert!(bench.now < before + Duration::from_secs(10));
+}
+
+#[test]
+fn busy_for_ever_is_said_and_the_link_stays() {
+    let mut bench = bench([Scheduled { fault: GeocomFault::Busy, from: 1, times: 40 }]);
+    match bench.shoot().0 {
+        Some(ProtocolEvent::Failed(Failure::NotReady(text))) => assert_eq!(text, "code 1293: a measurement is busy"),
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(bench.run(Duration::from_secs(30)), []);
+}
+
+#[test]
+fn a_damaged_link_is_said_after_three_attempts() {
+    let mut bench = bench([Scheduled { fault: GeocomFault::CrcError, from: 1, times: 3 }]);
+    let (answer, said) = bench.shoot();
+    assert!(matches!(answer, Some(ProtocolEvent::Failed(Failure::Garbled(_)))), "{answer:?}");
+    assert!(format!("{said:?}").contains("check baud rate"), "{said:?}");
+    bench.run(Duration::from_secs(3));
+    shot(&mut bench);
+}
+
+#[test]
+fn a_late_answer_is_thrown_away_and_said() {
+    let mut bench = bench([Scheduled::once(GeocomFault::LateReply, 1)]);
+    assert!(matches!(bench.shoot().0, Some(ProtocolEvent::Failed(Failure::Silent { .. }))));
+    let said = format!("{:?}", bench.run(Duration::from_secs(3)));
+    assert!(said.contains("late or foreign answer") && said.contains("answers again"), "{said}");
+    shot(&mut bench);
+}
+
+#[test]
+fn a_dead_instrument_is_given_up_and_found_again() {
+    let mut bench = connected(&GeocomOptions::default(), [Scheduled { fault: GeocomFault::Dead, from: 1, times: 16 }]);
+    let events = bench.until(|event| matches!(event, ProtocolEvent::Lost(_)));
+    assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
+    bench.connect();
+    identity(&mut bench);
+}
+
+#[test]
+fn a_pulled_cable_is_noticed_when_idle() {
+    let mut bench = bench([Scheduled { fault: GeocomFault::Dead, from: 12, times: 1000 }]);
+    let events = bench.run(Duration::from_mins(1));
+    assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
+}
+
+#[test]
+fn a_shot_asked_for_during_the_keep_alive_is_taken_after_it() {
+    let mut bench = bench([]);
+    bench.run(Duration::from_millis(5010));
+    shot(&mut bench);
+}
+
+#[test]
+fn a_cancelled_shot_is_swallowed() {
+    let mut bench = bench([]);
+    bench.trigger();
+    bench.run(Duration::from_millis(500));
+    bench.cancel();
+    let events = bench.run(Duration::from_secs(4));
+    assert!(events.iter().all(|event| matches!(event, ProtocolEvent::Status(_))), "{events:?}");
+    shot(&mut bench);
+}
+
+#[test]
+fn a_broken_beam_gives_no_point() {
+    let mut bench = bench([]);
+    shot(&mut bench);
+    bench.source.is_blocked = true;
+    assert!(matches!(bench.shoot().0, Some(ProtocolEvent::Failed(Failure::NoTarget(_)))));
+    bench.source.is_blocked = false;
+    shot(&mut bench);
+}
+
+fn conversation(checksum: bool) -> GeocomBench {
+    let faults =
+        GeocomFault::ALL.iter().filter(|fault| !matches!(fault, GeocomFault::DisconnectMidLine | GeocomFault::Dead));
+    let faults = faults.zip(2..).map(|(&fault, at)| Scheduled::once(fault, at));
+    let mut bench = connected(&GeocomOptions { checksum, ..GeocomOptions::default() }, faults);
+    identity(&mut bench);
+    for _ in 0..24 {
+        bench.shoot();
+        bench.run(Duration::from_secs(2));
+    }
+    bench
+}
+
+#[test]
+fn splits_change_nothing() {
+    for checksum in [false, true] {
+        let options = GeocomOptions { checksum, ..GeocomOptions::default() };
+        let tape = conversation(checksum).tape;
+        streams::assert_splits_change_nothing(|| GeocomProtocol::new(options.clone()).unwrap(), &tape);
+    }
+}
+
+#[test]
+fn noise_breaks_nothing() {
+    for checksum in [false, true] {
+        let options = GeocomOptions { checksum, ..GeocomOptions::default() };
+        let bench = conversation(checksum);
+        let make = || GeocomProtocol::new(options.clone()).unwrap();
+        streams::fuzz_protocol(make, &bench.tape, GeocomProtocol::pending, MAX_LINE);
+        streams::fuzz_simulator(|| GeocomSimulator::new([]), &bench.sent, GeocomSimulator::pending, MAX_RECEIVED);
+    }
+}

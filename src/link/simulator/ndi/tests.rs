@@ -1,0 +1,238 @@
+//! The driver against its other end: points, faults, splits, noise.
+
+use std::time::Duration;
+
+use super::super::bench2::Bench;
+use super::super::bench2::Helix;
+use super::super::bench2::streams;
+use super::NamedFault as _;
+use super::NdiFault;
+use super::NdiSimulator;
+use super::Scheduled;
+use crate::link::protocol::Failure;
+use crate::link::protocol::ProtocolEvent;
+use crate::link::protocol::Shot;
+use crate::link::protocol::ndi::MAX_TEXT;
+use crate::link::protocol::ndi::NdiOptions;
+use crate::link::protocol::ndi::NdiProtocol;
+use crate::link::protocol::ndi::ReplyFormat;
+
+type NdiBench = Bench<NdiProtocol, NdiSimulator>;
+
+/// A tip that shows a forgotten or wrongly turned offset.
+const TIP_MM: [f64; 3] = [12.5, -40.0, 151.0];
+
+/// Largest error by the resolution of the replies (m): 0.01 mm and 0.0001 on a lever of 0.16 m, or single precision.
+const fn resolution(reply: ReplyFormat) -> f64 {
+    match reply {
+        ReplyFormat::Text => 4e-5,
+        ReplyFormat::Binary => 5e-7,
+    }
+}
+
+fn options(reply: ReplyFormat) -> NdiOptions {
+    NdiOptions { reply, tip_mm: TIP_MM, ..NdiOptions::default() }
+}
+
+fn bench(reply: ReplyFormat, faults: impl IntoIterator<Item = Scheduled<NdiFault>>) -> NdiBench {
+    let mut bench = Bench::new(NdiProtocol::new(options(reply)).unwrap(), NdiSimulator::new(TIP_MM, faults));
+    let events = bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+    assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))), "{events:?}");
+    bench
+}
+
+/// A shot must show the point of a frame after the trigger: one that the source gave after it.
+#[track_caller]
+fn assert_fresh(shot: &Shot, before: u32, bench: &NdiBench, reply: ReplyFormat) {
+    let nearest =
+        (before + 1..=bench.source.taken()).map(|n| (shot.point - Helix::point(n)).norm()).fold(f64::MAX, f64::min);
+    assert!(nearest < resolution(reply), "{nearest} m from every fresh point");
+}
+
+#[track_caller]
+fn shoot(bench: &mut NdiBench, reply: ReplyFormat) {
+    let before = bench.source.taken();
+    match bench.shoot() {
+        (Some(ProtocolEvent::Shot(shot)), _) => assert_fresh(&shot, before, bench, reply),
+        other => panic!("no shot: {other:?}"),
+    }
+}
+
+const BOTH: [ReplyFormat; 2] = [ReplyFormat::Text, ReplyFormat::Binary];
+
+#[test]
+fn the_tip_comes_back_in_both_formats() {
+    for reply in BOTH {
+        let mut bench = bench(reply, []);
+        for _ in 0..10 {
+            shoot(&mut bench, reply);
+        }
+    }
+}
+
+#[test]
+fn the_identity_says_what_text_cannot() {
+    for reply in BOTH {
+        let mut bench = Bench::new(NdiProtocol::new(options(reply)).unwrap(), NdiSimulator::new(TIP_MM, []));
+        let Some(ProtocolEvent::Ready(identity)) = bench.until(|event| matches!(event, ProtocolEvent::Ready(_))).pop()
+        else {
+            panic!("not ready");
+        };
+        assert_eq!(identity.name, "NDI tracker, version G.003.001");
+        assert_eq!(identity.warnings.iter().any(|text| text.contains("0.01 mm")), reply == ReplyFormat::Text);
+    }
+}
+
+#[test]
+fn a_handle_that_is_not_there_ends_the_set_up() {
+    let options = NdiOptions { handle: Some(3), ..options(ReplyFormat::Binary) };
+    let mut bench = Bench::new(NdiProtocol::new(options).unwrap(), NdiSimulator::new(TIP_MM, []));
+    let lost = bench.until(|event| matches!(event, ProtocolEvent::Lost(_))).pop();
+    assert_eq!(lost, Some(ProtocolEvent::Lost(Failure::Settings("there is no tool 03; there are: 0A".to_owned()))));
+}
+
+#[test]
+fn a_failed_initialisation_is_said() {
+    let fault = Scheduled::once(NdiFault::InitialisationFails, 1);
+    let mut bench =
+        Bench::new(NdiProtocol::new(options(ReplyFormat::Text)).unwrap(), NdiSimulator::new(TIP_MM, [fault]));
+    let lost = bench.until(|event| matches!(event, ProtocolEvent::Lost(_))).pop();
+    let text = "ERROR15: the instrument cannot be initialised".to_owned();
+    assert_eq!(lost, Some(ProtocolEvent::Lost(Failure::Refused(text))));
+    bench.connect();
+    bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+    shoot(&mut bench, ReplyFormat::Text);
+}
+
+/// What a shot says when all its positions have the fault; `None`: it succeeds all the same, or the fault is no matter.
+const fn expected(fault: NdiFault, reply: ReplyFormat) -> &'static str {
+    match (fault, reply) {
+        (NdiFault::BadCrc, ReplyFormat::Text) => "CRC of a text reply",
+        (NdiFault::BadCrc, ReplyFormat::Binary) => "CRC of a binary reply",
+        (NdiFault::Missing, _) => "sees no reflector (tool 0A is not seen)",
+        (NdiFault::Disabled, _) => "tool 0A is disabled",
+        (NdiFault::WrongMode, _) => "ERROR0C: not possible in this mode",
+        (NdiFault::CommandDamaged, _) => "ERROR04: the command arrived damaged",
+        (NdiFault::CommandTimeout, _) => "ERROR05: the command took too long",
+        (NdiFault::WrongBody | NdiFault::WrongLength, ReplyFormat::Text) => "characters too many",
+        (NdiFault::WrongBody, ReplyFormat::Binary) => "length is wrong",
+        (NdiFault::LateReply | NdiFault::Cut | NdiFault::Silent, _) | (NdiFault::WrongLength, ReplyFormat::Binary) => {
+            "said nothing for 2 s while waiting for a position"
+        }
+        (NdiFault::Halves, _) => "",
+        (NdiFault::FrozenFrame, _) => "no new frame comes",
+        (NdiFault::NotANumber, ReplyFormat::Text) => "not a signed number",
+        (NdiFault::NotANumber, ReplyFormat::Binary) => "out of every range",
+        (NdiFault::NoRotation, _) => "rotation of the tool is none",
+        (NdiFault::Origin, _) => "0, 0, 0",
+        (NdiFault::Reset | NdiFault::DisconnectMidPacket | NdiFault::InitialisationFails, _) => "lost",
+    }
+}
+
+/// The first position answers a live question; the fault lasts for the whole shot after it.
+fn faulty_shot(fault: NdiFault, reply: ReplyFormat, times: u32) {
+    let mut bench = bench(reply, [Scheduled { fault, from: 3, times }]);
+    shoot(&mut bench, reply);
+    let before = bench.source.taken();
+    match bench.shoot().0 {
+        Some(ProtocolEvent::Shot(shot)) => assert_fresh(&shot, before, &bench, reply),
+        Some(ProtocolEvent::Failed(failure)) => {
+            let text = expected(fault, reply);
+            assert!(!text.is_empty() && failure.to_string().contains(text), "{fault} {reply:?}: {failure}");
+        }
+        None | Some(ProtocolEvent::Lost(_)) if expected(fault, reply) == "lost" => {
+            bench.connect();
+            bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+        }
+        other => panic!("{fault} {reply:?}: {other:?}"),
+    }
+    for _ in 0..20 {
+        let before = bench.source.taken();
+        match bench.shoot().0 {
+            Some(ProtocolEvent::Shot(shot)) => assert_fresh(&shot, before, &bench, reply),
+            Some(ProtocolEvent::Failed(_)) => {}
+            None | Some(ProtocolEvent::Lost(_)) if expected(fault, reply) == "lost" => bench.connect(),
+            other => panic!("{fault} {reply:?}: {other:?}"),
+        }
+        bench.run(Duration::from_millis(300));
+    }
+    shoot(&mut bench, reply);
+}
+
+#[test]
+fn every_fault_is_said_and_passes() {
+    for reply in BOTH {
+        for &fault in NdiFault::ALL.iter().filter(|fault| **fault != NdiFault::InitialisationFails) {
+            for times in [1, 2, 4] {
+                faulty_shot(fault, reply, times);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lasting_fault_is_said_in_its_words() {
+    for reply in BOTH {
+        for &fault in NdiFault::ALL {
+            if matches!(expected(fault, reply), "" | "lost") {
+                continue;
+            }
+            let mut bench = bench(reply, [Scheduled { fault, from: 2, times: 1000 }]);
+            match bench.shoot().0 {
+                Some(ProtocolEvent::Failed(failure)) => {
+                    assert!(failure.to_string().contains(expected(fault, reply)), "{fault} {reply:?}: {failure}");
+                }
+                other => panic!("{fault} {reply:?}: {other:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_silent_instrument_is_lost_when_idle() {
+    let mut bench = bench(ReplyFormat::Binary, [Scheduled { fault: NdiFault::Silent, from: 2, times: 1000 }]);
+    let events = bench.run(Duration::from_secs(30));
+    assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
+}
+
+#[test]
+fn a_cancelled_shot_is_swallowed() {
+    for reply in BOTH {
+        let mut bench = bench(reply, []);
+        bench.trigger();
+        bench.cancel();
+        let events = bench.run(Duration::from_secs(3));
+        assert!(events.iter().all(|event| matches!(event, ProtocolEvent::Live(_))), "{events:?}");
+        shoot(&mut bench, reply);
+    }
+}
+
+fn conversation(reply: ReplyFormat) -> NdiBench {
+    let is_left_out = |fault: NdiFault| {
+        matches!(fault, NdiFault::DisconnectMidPacket | NdiFault::Reset | NdiFault::InitialisationFails)
+    };
+    let faults = NdiFault::ALL.iter().filter(|fault| !is_left_out(**fault)).zip(1..);
+    let mut bench = bench(reply, faults.map(|(&fault, at)| Scheduled::once(fault, 4 * at)));
+    for _ in 0..20 {
+        bench.shoot();
+    }
+    bench
+}
+
+#[test]
+fn splits_change_nothing() {
+    for reply in BOTH {
+        let tape = conversation(reply).tape;
+        streams::assert_splits_change_nothing(|| NdiProtocol::new(options(reply)).unwrap(), &tape);
+    }
+}
+
+#[test]
+fn noise_breaks_nothing() {
+    for reply in BOTH {
+        let bench = conversation(reply);
+        let make = || NdiProtocol::new(options(reply)).unwrap();
+        streams::fuzz_protocol(make, &bench.tape, NdiProtocol::pending, MAX_TEXT);
+        streams::fuzz_simulator(|| NdiSimulator::new(TIP_MM, []), &bench.sent, NdiSimulator::pending, MAX_TEXT);
+    }
+}

@@ -1,0 +1,313 @@
+//! A Universal Robots controller that is not there: the other end of [`crate::link::protocol::rtde`].
+//!
+//! It knows the time, the joint values and speeds, the robot mode and the safety status; every other name is not found. A robot
+//! with fewer than six joints has zeros behind them, one with more shows the first six. As a real controller it hangs up on a
+//! client that does not read.
+
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use super::occasion::{FaultPlan, Planned, faults};
+use super::outbox::Outbox;
+use super::{Output, PointSource, Simulator};
+use crate::link::protocol::Moment;
+use crate::link::protocol::rtde::mode::{MODE_RUNNING, SAFETY_NORMAL};
+use crate::link::protocol::rtde::packet::{Framer, encode, packet_type};
+
+faults! {
+    /// A fault of the simulated controller. The occasion is a packet of data unless its text says otherwise.
+    pub RtdeFault {
+        Drip "drip" "Sends every byte in a write of its own. Occasion: a connection.",
+        OldProtocol "old-protocol" "Refuses version 2 of the protocol. Occasion: a connection.",
+        NotFound "not-found" "Does not know the joint speeds. Occasion: a set-up of the outputs.",
+        InUse "in-use" "Says that the joint speeds are in use. Occasion: a set-up of the outputs.",
+        WrongType "wrong-type" "Announces integers as the joint speeds. Occasion: a set-up of the outputs.",
+        StartRefused "start-refused" "Does not start the stream. Occasion: a start.",
+        TextFlood "text-flood" "Sends 1000 different messages before the data.",
+        ProtectiveStop "protective-stop" "Reports a protective stop.",
+        PowerOff "power-off" "Reports that the power is off.",
+        Moving "moving" "Reports that the first joint turns at 0.2 rad/s.",
+        NotFinite "not-finite" "Reports a joint value that is no number.",
+        WrongRecipe "wrong-recipe" "Sends the data under another recipe.",
+        ShortData "short-data" "Sends data that lack their last value.",
+        Silence "silence" "Sends no data any more until somebody connects again.",
+        Cut "cut" "Hangs up in the middle of the data.",
+        SizeZero "size-zero" "Sends data whose size field is 0.",
+    }
+}
+
+/// The recipe of the outputs; there is one.
+const RECIPE: u8 = 1;
+
+/// The most that a controller sends (Hz).
+const MAX_FREQUENCY: f64 = 500.0;
+
+/// Messages in a flood.
+const FLOOD: usize = 1000;
+
+/// Speed of the joint that moves (rad/s).
+const SPEED: f64 = 0.2;
+
+/// A protective stop.
+const SAFETY_PROTECTIVE_STOP: i32 = 3;
+
+/// The robot is without power.
+const MODE_POWER_OFF: i32 = 3;
+
+/// Values that the controller knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Field {
+    Timestamp,
+    ActualQ,
+    ActualQd,
+    RobotMode,
+    SafetyStatus,
+}
+
+impl Field {
+    /// Name, type and value that belong together.
+    const ALL: [(&'static str, &'static str, Self); 5] = [
+        ("timestamp", "DOUBLE", Self::Timestamp),
+        ("actual_q", "VECTOR6D", Self::ActualQ),
+        ("actual_qd", "VECTOR6D", Self::ActualQd),
+        ("robot_mode", "INT32", Self::RobotMode),
+        ("safety_status", "INT32", Self::SafetyStatus),
+    ];
+}
+
+/// What is reported.
+#[derive(Clone, Copy, Debug)]
+struct Report {
+    time: f64,
+    positions: [f64; 6],
+    speeds: [f64; 6],
+    robot_mode: i32,
+    safety_status: i32,
+}
+
+impl Report {
+    /// A value as it stands on the wire.
+    fn bytes(&self, field: Field) -> Vec<u8> {
+        let numbers = |values: &[f64]| values.iter().flat_map(|value| value.to_be_bytes()).collect();
+        match field {
+            Field::Timestamp => numbers(&[self.time]),
+            Field::ActualQ => numbers(&self.positions),
+            Field::ActualQd => numbers(&self.speeds),
+            Field::RobotMode => self.robot_mode.to_be_bytes().to_vec(),
+            Field::SafetyStatus => self.safety_status.to_be_bytes().to_vec(),
+        }
+    }
+}
+
+/// A simulated controller.
+#[derive(Clone, Debug)]
+pub struct RtdeSimulator {
+    faults: FaultPlan<RtdeFault>,
+    framer: Framer,
+    outbox: Outbox,
+    fields: Vec<Field>,
+    interval: Duration,
+    next_data: Option<Moment>,
+    is_connected: bool,
+    /// How far the first joint was turned by a fault (rad).
+    travel: f64,
+}
+
+impl RtdeSimulator {
+    /// A controller with planned faults.
+    pub fn new(faults: Vec<Planned<RtdeFault>>) -> Self {
+        Self {
+            faults: FaultPlan::new(faults),
+            framer: Framer::default(),
+            outbox: Outbox::default(),
+            fields: Vec::new(),
+            interval: Duration::from_millis(40),
+            next_data: None,
+            is_connected: false,
+            travel: 0.0,
+        }
+    }
+
+    fn answer(&mut self, kind: u8, content: &[u8]) {
+        self.outbox.send(encode(kind, content));
+    }
+
+    fn hang_up(&mut self) {
+        self.is_connected = false;
+        self.next_data = None;
+        self.framer.clear();
+        self.outbox.close();
+    }
+
+    fn obey(&mut self, kind: u8, content: &[u8], now: Moment) {
+        match kind {
+            packet_type::REQUEST_PROTOCOL_VERSION => {
+                let is_accepted = content == [0, 2] && !self.faults.strikes(RtdeFault::OldProtocol);
+                self.answer(kind, &[u8::from(is_accepted)]);
+            }
+            packet_type::GET_URCONTROL_VERSION => {
+                let version: Vec<u8> = [5_u32, 11, 0, 108].iter().flat_map(|number| number.to_be_bytes()).collect();
+                self.answer(kind, &version);
+            }
+            packet_type::CONTROL_PACKAGE_SETUP_OUTPUTS => self.set_up(content),
+            packet_type::CONTROL_PACKAGE_SETUP_INPUTS => self.answer(kind, b"\0NOT_FOUND"),
+            packet_type::CONTROL_PACKAGE_START => {
+                let is_started = !self.fields.is_empty() && !self.faults.strikes(RtdeFault::StartRefused);
+                self.next_data = is_started.then(|| now + self.interval);
+                self.answer(kind, &[u8::from(is_started)]);
+            }
+            packet_type::CONTROL_PACKAGE_PAUSE => {
+                self.next_data = None;
+                self.answer(kind, &[1]);
+            }
+            _ => {}
+        }
+    }
+
+    /// A recipe: a frequency and names. It counts only if every name is known.
+    fn set_up(&mut self, content: &[u8]) {
+        let Some((frequency, names)) = content.split_first_chunk::<8>() else { return };
+        let names = String::from_utf8_lossy(names);
+        let mut fields = Vec::new();
+        let mut types = Vec::new();
+        for name in names.split(',') {
+            let known = Field::ALL.iter().find(|(known, ..)| *known == name.trim());
+            fields.extend(known.map(|(.., field)| *field));
+            types.push(known.map_or("NOT_FOUND", |(_, kind, _)| *kind));
+        }
+        for (fault, answer) in
+            [(RtdeFault::NotFound, "NOT_FOUND"), (RtdeFault::InUse, "IN_USE"), (RtdeFault::WrongType, "VECTOR6INT32")]
+        {
+            if self.faults.strikes(fault)
+                && let Some(speeds) = fields.iter().position(|field| *field == Field::ActualQd)
+                && let Some(kind) = types.get_mut(speeds)
+            {
+                *kind = answer;
+            }
+        }
+        let is_known = !types.iter().any(|kind| ["NOT_FOUND", "IN_USE"].contains(kind));
+        self.fields = if is_known { fields } else { Vec::new() };
+        let frequency = f64::from_be_bytes(*frequency);
+        let frequency = if frequency.is_finite() { frequency.clamp(1.0, MAX_FREQUENCY) } else { 1.0 };
+        self.interval = Duration::from_secs_f64(1.0 / frequency);
+        let recipe = if is_known { RECIPE } else { 0 };
+        let content = [&[recipe][..], types.join(",").as_bytes()].concat();
+        self.answer(packet_type::CONTROL_PACKAGE_SETUP_OUTPUTS, &content);
+    }
+
+    fn report(&mut self, source: &mut dyn PointSource, now: Moment) -> Report {
+        let state = source.joints();
+        let six = |values: &[f64]| std::array::from_fn(|joint| values.get(joint).copied().unwrap_or(0.0));
+        let mut report = Report {
+            time: now.as_secs_f64(),
+            positions: six(&state.positions),
+            speeds: six(state.speeds.as_deref().unwrap_or_default()),
+            robot_mode: MODE_RUNNING,
+            safety_status: if state.stopped.is_some() { SAFETY_PROTECTIVE_STOP } else { SAFETY_NORMAL },
+        };
+        if self.faults.strikes(RtdeFault::Moving) {
+            self.travel += SPEED * self.interval.as_secs_f64();
+            report.speeds[0] = SPEED;
+        }
+        report.positions[0] += self.travel;
+        if self.faults.strikes(RtdeFault::NotFinite) {
+            report.positions[5] = f64::NAN;
+        }
+        if self.faults.strikes(RtdeFault::ProtectiveStop) {
+            report.safety_status = SAFETY_PROTECTIVE_STOP;
+        }
+        if self.faults.strikes(RtdeFault::PowerOff) {
+            report.robot_mode = MODE_POWER_OFF;
+        }
+        report
+    }
+
+    fn send_data(&mut self, source: &mut dyn PointSource, now: Moment) {
+        let report = self.report(source, now);
+        let recipe = if self.faults.strikes(RtdeFault::WrongRecipe) { RECIPE + 1 } else { RECIPE };
+        let mut content = vec![recipe];
+        content.extend(self.fields.iter().flat_map(|field| report.bytes(*field)));
+        if self.faults.strikes(RtdeFault::TextFlood) {
+            (0..FLOOD).for_each(|number| self.send_text(&format!("message {number}")));
+        }
+        if self.faults.strikes(RtdeFault::ShortData) {
+            content.truncate(content.len().saturating_sub(4));
+        }
+        let mut packet = encode(packet_type::DATA_PACKAGE, &content);
+        if self.faults.strikes(RtdeFault::SizeZero) {
+            packet.iter_mut().take(2).for_each(|byte| *byte = 0);
+        }
+        if self.faults.strikes(RtdeFault::Silence) {
+            self.next_data = None;
+        } else if self.faults.strikes(RtdeFault::Cut) {
+            packet.truncate(packet.len() / 2);
+            self.outbox.send(packet);
+            self.hang_up();
+        } else {
+            self.outbox.send(packet);
+        }
+    }
+
+    /// A warning in words.
+    fn send_text(&mut self, text: &str) {
+        let source = "simulator";
+        let counted = |text: &str| [&[u8::try_from(text.len()).unwrap_or(0)][..], text.as_bytes()].concat();
+        let content = [counted(text), counted(source), vec![2]].concat();
+        self.answer(packet_type::TEXT_MESSAGE, &content);
+    }
+}
+
+impl Simulator for RtdeSimulator {
+    fn accept(&mut self, _now: Moment) {
+        self.framer.clear();
+        self.outbox = Outbox::default();
+        self.outbox.is_dripping = self.faults.strikes(RtdeFault::Drip);
+        self.fields.clear();
+        self.next_data = None;
+        self.is_connected = true;
+    }
+
+    fn feed(&mut self, bytes: &[u8], _source: &mut dyn PointSource, now: Moment) {
+        if self.is_connected {
+            self.framer.feed(bytes);
+        }
+        while self.is_connected {
+            match self.framer.next_packet() {
+                Ok(Some((kind, content))) => self.obey(kind, &content, now),
+                Ok(None) => return,
+                Err(_) => self.hang_up(),
+            }
+            if self.outbox.is_overfull() {
+                self.hang_up();
+            }
+        }
+    }
+
+    fn tick(&mut self, source: &mut dyn PointSource, now: Moment) {
+        if self.next_data.is_some_and(|next| now >= next) {
+            self.next_data = Some(now + self.interval);
+            self.send_data(source, now);
+        }
+        if self.is_connected && self.outbox.is_overfull() {
+            self.hang_up();
+        }
+    }
+
+    fn next_output(&mut self) -> Option<Output> {
+        self.outbox.next()
+    }
+
+    fn next_deadline(&self) -> Option<Moment> {
+        self.next_data
+    }
+}
+
+#[cfg(test)]
+impl RtdeSimulator {
+    /// Bytes that wait for the rest of a request, and bytes that wait to be fetched.
+    pub fn buffered(&self) -> (usize, usize) {
+        (self.framer.pending(), self.outbox.waiting())
+    }
+}

@@ -1,0 +1,360 @@
+//! Instruments on a wire: what the wizard asks for, in the words of a protocol, with the gates that every point passes.
+
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
+
+use nalgebra::{Point3, Vector3};
+
+use super::protocol::{Failure, Identity, Severity, Shot};
+use super::wire::{Latest, RawLog, Wire, WireEvent};
+use super::{Link, LinkError, LinkNews, LiveReading, build};
+use crate::session::reading::{MeasureRequest, Reading};
+use crate::session::wire::{LinkChoice, WireAddress};
+
+/// Longest time of a set-up: trackers initialise for more than a minute.
+const SET_UP: Duration = Duration::from_secs(120);
+/// Longest time for a shot; protocols answer earlier by their own limits.
+const SHOT: Duration = Duration::from_secs(120);
+/// A reading that was not steady is tried so often in all, with this pause between.
+const TRIES: (u32, Duration) = (3, Duration::from_secs(2));
+/// The robot comes to rest within this.
+const REST: Duration = Duration::from_secs(20);
+/// What is older than this is not now.
+const FRESH: Duration = Duration::from_secs(1);
+/// A wait looks so often whether it is still wanted.
+const LOOK: Duration = Duration::from_millis(50);
+/// No instrument measures nearer or farther (m).
+const RANGE: (f64, f64) = (0.05, 100.0);
+
+/// An instrument on a wire, and the robot's controller on another if it tells its joint angles.
+#[derive(Debug)]
+pub struct Wired {
+    instrument: Wire,
+    address: String,
+    robot: Option<Wire>,
+    identity: Option<Identity>,
+    /// Why the instrument cannot be asked.
+    down: Option<Failure>,
+    robot_down: Option<Failure>,
+    news: Vec<LinkNews>,
+    /// The shot before this one: an instrument that is stuck gives the same again.
+    before: Option<Point3<f64>>,
+    /// Whether waits for settling pass in earnest.
+    is_real: bool,
+}
+
+impl Wired {
+    /// The instrument of a choice. `log` takes every byte.
+    ///
+    /// # Errors
+    /// [`LinkError::SetUp`]: an address or an option that cannot be; the system refuses a thread.
+    pub fn new(choice: &LinkChoice, log: Option<RawLog>) -> Result<Self, LinkError> {
+        let address: WireAddress = choice.address.parse().map_err(LinkError::SetUp)?;
+        if address.protocol.is_robot() {
+            let message = format!("'{address}' is a robot: it tells where it stands, but not where the SMR is");
+            return Err(LinkError::SetUp(message));
+        }
+        let robot = choice.robot.as_deref().map(str::parse::<WireAddress>).transpose().map_err(LinkError::SetUp)?;
+        if let Some(robot) = robot.as_ref().filter(|robot| !robot.protocol.is_robot()) {
+            return Err(LinkError::SetUp(format!("'{robot}' is no robot; 'rtde:HOST' is one")));
+        }
+        let start = |address: WireAddress, options: Option<&str>| {
+            let protocol = build::protocol(&address, options).map_err(LinkError::SetUp)?;
+            Wire::start(address, protocol, log.clone())
+                .map_err(|error| LinkError::SetUp(format!("the link cannot be started: {error}")))
+        };
+        let shown = address.to_string();
+        Ok(Self {
+            instrument: start(address, choice.options.as_deref())?,
+            address: shown,
+            robot: robot.map(|robot| start(robot, None)).transpose()?,
+            identity: None,
+            down: None,
+            robot_down: None,
+            news: Vec::new(),
+            before: None,
+            is_real: true,
+        })
+    }
+
+    /// The same for a simulated instrument, where nothing has to settle.
+    #[must_use]
+    pub(super) const fn simulated(mut self) -> Self {
+        self.is_real = false;
+        self
+    }
+
+    /// Who answers, once it does.
+    pub const fn identity(&self) -> Option<&Identity> {
+        self.identity.as_ref()
+    }
+
+    /// Takes what has happened; an answer to a trigger is given back.
+    fn drain(&mut self, wait: Duration) -> Option<Result<Shot, Failure>> {
+        if let Some(robot) = &self.robot {
+            while let Ok(event) = robot.events.try_recv() {
+                match event {
+                    WireEvent::Up(identity) => {
+                        self.robot_down = None;
+                        self.news.push(LinkNews::Up(format!("robot: {}", identity.name)));
+                    }
+                    WireEvent::Down(failure) => {
+                        self.news.push(LinkNews::Down(format!("robot: {failure}")));
+                        self.robot_down = Some(failure);
+                    }
+                    WireEvent::Status(status) => self.news.push(LinkNews::Status(format!("robot: {}", status.text))),
+                    WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_) => {}
+                }
+            }
+        }
+        loop {
+            let event = match self.instrument.events.recv_timeout(wait) {
+                Ok(event) => event,
+                Err(RecvTimeoutError::Timeout) => return None,
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.down = Some(Failure::Disconnected("the link has ended".to_owned()));
+                    return Some(Err(Failure::Disconnected("the link has ended".to_owned())));
+                }
+            };
+            match event {
+                WireEvent::Up(identity) => {
+                    self.down = None;
+                    self.news.push(LinkNews::Up(identity.name.clone()));
+                    self.news.extend(identity.warnings.iter().cloned().map(LinkNews::Status));
+                    self.identity = Some(identity);
+                }
+                WireEvent::Down(failure) => {
+                    self.news.push(LinkNews::Down(failure.to_string()));
+                    self.down = Some(failure.clone());
+                    return Some(Err(failure));
+                }
+                WireEvent::Shot(shot) => return Some(Ok(shot)),
+                WireEvent::Failed(failure) => return Some(Err(failure)),
+                WireEvent::Offered(_) => {
+                    let text = "somebody has measured at the instrument itself; the point was not taken".to_owned();
+                    self.news.push(LinkNews::Status(text));
+                }
+                WireEvent::Status(status) if status.severity == Severity::Warning => {
+                    self.news.push(LinkNews::Status(status.text));
+                }
+                WireEvent::Status(_) => {}
+            }
+        }
+    }
+
+    /// Waits for `time`, or until it is not wanted any more.
+    fn pause(&mut self, time: Duration, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        let until = self.instrument.now() + time;
+        while self.instrument.now() < until {
+            if !keep_going() {
+                return Err(LinkError::Cancelled);
+            }
+            if let Some(Err(failure)) = self.drain(LOOK.min(until.saturating_sub(self.instrument.now()))) {
+                return Err(LinkError::Instrument(failure));
+            }
+        }
+        Ok(())
+    }
+
+    /// The joints of the robot once it stands, if it tells them.
+    fn standing(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, LinkError> {
+        if self.robot.is_none() {
+            return Ok(None);
+        }
+        let until = self.instrument.now() + REST;
+        loop {
+            // What happens meanwhile at the instrument is told later.
+            drop(self.drain(LOOK));
+            let Some(robot) = &self.robot else { return Ok(None) };
+            let (latest, now) = (robot.latest(), robot.now());
+            let fresh = latest.joints.filter(|(at, _)| now.saturating_sub(*at) <= FRESH);
+            if let Some((_, state)) = &fresh {
+                if let Some(why) = &state.stopped {
+                    return Err(LinkError::Robot(format!("it does not move on: {why}")));
+                }
+                if latest.is_still {
+                    return Ok(Some(state.positions.clone()));
+                }
+            }
+            if !keep_going() {
+                return Err(LinkError::Cancelled);
+            }
+            if self.instrument.now() > until {
+                let why = match (fresh, &self.robot_down) {
+                    (_, Some(failure)) => failure.to_string(),
+                    (Some(_), None) => format!("it still moves after {} s", REST.as_secs()),
+                    (None, None) => "it tells no joint angles".to_owned(),
+                };
+                return Err(LinkError::Robot(why));
+            }
+        }
+    }
+
+    /// One shot that passes the gates; what is not steady is tried again.
+    fn shot(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Shot, LinkError> {
+        for left in (0..TRIES.0).rev() {
+            match self.one_shot(keep_going)? {
+                Ok(shot) => return Ok(shot),
+                Err(failure) if failure.is_transient() && left > 0 => self.pause(TRIES.1, keep_going)?,
+                Err(failure) => return Err(LinkError::Instrument(failure)),
+            }
+        }
+        Err(LinkError::Instrument(Failure::Unstable("tried several times".to_owned())))
+    }
+
+    fn one_shot(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Result<Shot, Failure>, LinkError> {
+        // Nothing that came before this is an answer to it.
+        drop(self.drain(Duration::ZERO));
+        if let Some(failure) = &self.down {
+            return Ok(Err(failure.clone()));
+        }
+        if !self.instrument.trigger() {
+            return Ok(Err(Failure::Disconnected("the link does not take orders".to_owned())));
+        }
+        let until = self.instrument.now() + SHOT;
+        loop {
+            match self.drain(LOOK) {
+                Some(Ok(shot)) => return Ok(self.gate(shot)),
+                Some(Err(failure)) => return Ok(Err(failure)),
+                None => {}
+            }
+            if !keep_going() {
+                self.instrument.cancel();
+                return Err(LinkError::Cancelled);
+            }
+            if self.instrument.now() > until {
+                self.instrument.cancel();
+                return Ok(Err(Failure::Silent { what: "measuring".to_owned(), seconds: SHOT.as_secs_f64() }));
+            }
+        }
+    }
+
+    /// What every point must be, whoever gave it.
+    fn gate(&mut self, shot: Shot) -> Result<Shot, Failure> {
+        let point = shot.point;
+        let distance = point.coords.norm();
+        let reason = match () {
+            () if !point.coords.iter().all(|value| value.is_finite()) => "it is not a number".to_owned(),
+            () if point.coords.amax() <= f64::EPSILON => "it is 0, 0, 0".to_owned(),
+            () if !(RANGE.0..=RANGE.1).contains(&distance) => {
+                format!("it is {distance:.3} m away; {} to {} m can be", RANGE.0, RANGE.1)
+            }
+            () if self.before == Some(point) => {
+                "it is the same to the last digit as the one before: the instrument has not measured again".to_owned()
+            }
+            () => {
+                self.before = Some(point);
+                return Ok(shot);
+            }
+        };
+        Err(Failure::Unusable(reason))
+    }
+
+    /// What there is to see now.
+    fn live(&self) -> LiveReading {
+        let Latest { live, .. } = self.instrument.latest();
+        let now = self.instrument.now();
+        let fresh = |at: Duration| now.saturating_sub(at) <= FRESH;
+        let robot = self.robot.as_ref().map(|robot| (robot.latest(), robot.now()));
+        let joints = robot.as_ref().and_then(|(latest, now)| {
+            let (at, state) = latest.joints.as_ref()?;
+            (now.saturating_sub(*at) <= FRESH).then(|| state.positions.clone())
+        });
+        LiveReading {
+            seconds: now.as_secs_f64(),
+            point: live.filter(|(at, _)| fresh(*at)).map(|(_, shot)| shot.point),
+            is_still: robot.as_ref().map(|(latest, _)| latest.is_still && joints.is_some()),
+            joints,
+            down: self.down.as_ref().map(ToString::to_string),
+        }
+    }
+}
+
+impl Link for Wired {
+    fn connect(&mut self) -> Result<String, LinkError> {
+        let until = self.instrument.now() + SET_UP;
+        while self.identity.is_none() {
+            if let Some(Err(failure)) = self.drain(LOOK) {
+                return Err(LinkError::Instrument(failure));
+            }
+            if self.instrument.now() > until {
+                let what = format!("'{}' was being set up", self.address);
+                return Err(LinkError::Instrument(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
+            }
+        }
+        if self.robot.is_some() {
+            self.standing_robot(until)?;
+        }
+        let identity = self.identity.clone().unwrap_or_default();
+        let reflector = identity.reflector.map_or_else(String::new, |reflector| {
+            format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
+        });
+        let warnings: String = identity.warnings.iter().map(|warning| format!("; {warning}")).collect();
+        let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
+        Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
+    }
+
+    fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
+        let began = self.instrument.now();
+        let joints = self.standing(keep_going)?;
+        if self.is_real {
+            self.pause(Duration::try_from_secs_f64(request.settle).unwrap_or_default(), keep_going)?;
+        }
+        let count = request.shots.max(1);
+        let shots = (0..count).map(|_| self.shot(keep_going)).collect::<Result<Vec<Shot>, _>>()?;
+        if let (Some(before), Some(after)) = (&joints, self.standing(keep_going)?) {
+            let moved = before.iter().zip(&after).any(|(before, after)| (before - after).abs() > STANDING);
+            if moved {
+                return Err(LinkError::Robot("it has moved while the point was measured".to_owned()));
+            }
+        }
+        let reading = mean(&shots, joints, (self.instrument.now() - began).as_secs_f64());
+        Ok(reading)
+    }
+
+    fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
+        // An answer without a question is one that came too late.
+        drop(self.drain(wait));
+        Some((self.live(), std::mem::take(&mut self.news)))
+    }
+}
+
+/// A robot at rest does not move by more during a measurement (rad).
+const STANDING: f64 = 1e-4;
+
+impl Wired {
+    /// Waits until the robot tells its joints.
+    fn standing_robot(&mut self, until: Duration) -> Result<(), LinkError> {
+        loop {
+            drop(self.drain(LOOK));
+            if let Some(failure) = &self.robot_down {
+                return Err(LinkError::Robot(failure.to_string()));
+            }
+            if self.robot.as_ref().is_none_or(|robot| robot.latest().joints.is_some()) {
+                return Ok(());
+            }
+            if self.instrument.now() > until {
+                return Err(LinkError::Robot("it tells no joint angles".to_owned()));
+            }
+        }
+    }
+}
+
+/// The mean of shots with its scatter, and its σ where every shot states one.
+fn mean(shots: &[Shot], configuration: Option<Vec<f64>>, seconds: f64) -> Reading {
+    let count = shots.len().max(1) as f64;
+    let mean = shots.iter().map(|shot| shot.point.coords).sum::<Vector3<f64>>() / count;
+    let square = shots.iter().map(|shot| (shot.point.coords - mean).norm_squared()).sum::<f64>() / count;
+    let variances: Option<Vec<f64>> =
+        shots.iter().map(|shot| shot.sigma.map(|[x, y, z]| (x * x + y * y + z * z) / 3.0)).collect();
+    let sigma = variances.map(|variances| (variances.iter().sum::<f64>() / count / count).sqrt());
+    Reading {
+        point: Point3::from(mean),
+        sigma: sigma.filter(|sigma| *sigma > 0.0),
+        scatter: (shots.len() > 1).then(|| square.sqrt()),
+        shots: u32::try_from(shots.len()).unwrap_or(u32::MAX),
+        temperature: shots.iter().find_map(|shot| shot.temperature),
+        configuration,
+        seconds,
+    }
+}
