@@ -68,6 +68,9 @@ pub trait Screen: fmt::Debug {
     /// Takes pasted text.
     fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply;
 
+    /// Whether the robot is shown in `area`, so that it can be turned.
+    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool;
+
     /// Draws itself; any size must do.
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer);
 }
@@ -88,5 +91,7 @@ pub fn of(step: Step) -> Box<dyn Screen> {
 
 #[cfg(test)]
 pub(crate) mod bench;
+#[cfg(test)]
+pub(crate) use capture::tests as capture_tests;
 #[cfg(test)]
 mod tests;

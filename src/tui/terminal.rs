@@ -116,6 +116,16 @@ fn write_leave(out: &mut impl Write, entered: u8) -> io::Result<()> {
     out.flush()
 }
 
+/// Rings the bell.
+///
+/// # Errors
+/// The terminal is gone.
+pub(super) fn ring() -> io::Result<()> {
+    let mut out = io::stdout();
+    out.write_all(b"\x07")?;
+    out.flush()
+}
+
 /// Tells the panic hook where the session is.
 pub(super) fn note_folder(folder: Option<&str>) {
     if let Ok(mut held) = FOLDER.lock() {

@@ -118,6 +118,10 @@ impl Screen for DeliverScreen {
         Reply::Ignored
     }
 
+    fn has_picture(&self, _cx: &ScreenCx<'_>, _area: Rect) -> bool {
+        false
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         page(cx, area.width, area.height).draw(self.scroll.0, area, buf);
     }

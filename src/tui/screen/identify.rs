@@ -71,6 +71,11 @@ impl Screen for IdentifyScreen {
         Reply::Ignored
     }
 
+    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
+        let is_alone = has_result(cx) && self.tabs.at == PICTURE;
+        cx.scene.is_some() && (is_alone || split(area, TEXT, true).1.is_some())
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let area = if has_result(cx) { self.tabs.draw(cx.theme, area, buf) } else { area };
         let (text, side) = split(area, TEXT, cx.scene.is_some());

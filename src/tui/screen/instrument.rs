@@ -137,6 +137,10 @@ impl Screen for InstrumentScreen {
         Reply::Ignored
     }
 
+    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
+        split(area, TEXT, cx.scene.is_some()).1.is_some()
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let (text, side) = split(area, TEXT, cx.scene.is_some());
         self.page(cx, text.width).draw(self.scroll.0, text, buf);

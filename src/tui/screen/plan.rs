@@ -184,6 +184,12 @@ impl Screen for Plan {
         Reply::Ignored
     }
 
+    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
+        // The arrows are for the settings while there are any to change.
+        let is_beside = area.width >= WIDE && !(self.tab == Tab::Plan && can_make(cx.view));
+        cx.scene.is_some() && (self.tab == Tab::Picture || is_beside)
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let Some(content) = content(cx.view) else { return };
         let is_wide = area.width >= WIDE && cx.scene.is_some();
@@ -241,4 +247,4 @@ impl Plan {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -24,7 +24,10 @@ use crate::wizard::view::{
     CircleView, CirclesResult, CirclesView, Content, DeliverView, IdentifyView, InstrumentView, JointShown,
     ProfileCard, TargetView, VerifyView,
 };
+use crate::wizard::view::purpose;
 use crate::wizard::{IntentInfo, Notice, Wizard};
+
+mod steps;
 
 static SOOCHOW: LazyLock<Profile> = LazyLock::new(|| Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap().0);
 
@@ -33,6 +36,7 @@ fn view(step: Step, content: Content, offers: Vec<IntentInfo>) -> ViewModel {
     let mut view = Wizard::new(jiff::Timestamp::UNIX_EPOCH).view();
     view.header.step = step;
     view.header.number = step.number();
+    view.purpose = purpose(step);
     view.header.robot = Some(SOOCHOW.title().to_owned());
     view.header.session = Some("demo".to_owned());
     view.header.folder = Some("/home/op/sessions/demo".to_owned());
@@ -140,6 +144,7 @@ fn circles(is_complete: bool) -> CirclesView {
             residual_rms_mm: 0.0118,
         }),
         problem: None,
+        typed_unit: None,
     }
 }
 

@@ -98,6 +98,10 @@ impl Screen for VerifyScreen {
         Reply::Ignored
     }
 
+    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
+        cx.scene.is_some() && (self.tabs.at == PICTURE || split(area, TEXT, true).1.is_some())
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let area = self.tabs.draw(cx.theme, area, buf);
         let (text, side) = split(area, TEXT, cx.scene.is_some());

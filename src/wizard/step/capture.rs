@@ -288,6 +288,7 @@ impl StepMachine for CaptureStep {
                     ratio: 0.0,
                     message: reason,
                     remedy: None,
+                    worst: Vec::new(),
                 });
                 let keep = Entry::Decision { sample: number, decision: Decision::Keep };
                 let entries = std::iter::once(Entry::Sample(noted)).chain(is_settled.then_some(keep));

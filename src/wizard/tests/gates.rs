@@ -249,6 +249,7 @@ fn one_question_after_the_other_is_asked() {
         ratio: 9.0,
         message: format!("measurement {about} is odd"),
         remedy: None,
+        worst: Vec::new(),
     };
     let last = bench.journal.last_mut().unwrap();
     let Entry::Sample(noted) = &mut last.entry else { panic!() };

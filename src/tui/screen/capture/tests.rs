@@ -5,7 +5,7 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::tui::dialog::Answer;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
-use crate::wizard::view::{DriftView, FindingView, JointShown, PredictionView, RowState, RowView, SampleView};
+use crate::wizard::view::{DriftView, FindingView, JointShown, PairView, PredictionView, RowState, RowView, SampleView};
 use crate::wizard::{IntentInfo, Notice};
 
 fn joints() -> Vec<JointShown> {
@@ -105,7 +105,11 @@ fn of(content: CaptureView) -> ViewModel {
     view(Step::Capture, Content::Capture(Box::new(content)), intents)
 }
 
-fn in_question() -> ViewModel {
+pub(crate) fn usual() -> ViewModel {
+    of(normal())
+}
+
+pub(crate) fn in_question() -> ViewModel {
     let message = "pose 14 does not fit the other poses: its point fits pose 15; was the robot at another pose?";
     let mut view = of(CaptureView {
         row: Some(14),
@@ -116,6 +120,16 @@ fn in_question() -> ViewModel {
             cause: "wrong_pose".to_owned(),
             message: message.to_owned(),
             has_remedy: true,
+            worst: [(3, 1234.567, -3.125), (11, 987.654, 2.871), (1, 1502.9, 1.44), (9, 640.0, -0.903)]
+                .map(|(pose, measured_mm, difference_mm)| PairView {
+                    pose: pose.to_string(),
+                    is_drift: pose == 1,
+                    measured_mm,
+                    predicted_mm: measured_mm - difference_mm,
+                    difference_mm,
+                    expected_mm: 0.41,
+                })
+                .to_vec(),
         }),
         ..normal()
     });

@@ -56,35 +56,47 @@ fn named(name: &str, value: &str) -> (Role, String) {
 }
 
 fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, String)> {
+    if let (Some(summary), Some(condition), Some(sigma)) =
+        (summary, figures.condition_number, figures.predicted_error_sigma)
+    {
+        return compared(figures, summary, condition, sigma);
+    }
     let mut lines = vec![named("poses", &format!("{} + {} to verify", figures.identification, figures.verification))];
     if let Some(condition) = figures.condition_number {
-        let random = summary.map_or_else(String::new, |summary| {
-            let random = &summary.random.condition_number;
-            format!(" (random {:.1})", random.median)
-        });
-        lines.push(named("condition number", &format!("{condition:.1}{random}")));
+        lines.push(named("condition number", &format!("{condition:.1}")));
     }
     if let Some(sigma) = figures.predicted_error_sigma {
-        // σ to mm, where the instrument is known.
-        let mm = summary.and_then(|summary| summary.predicted_rms_mm).map(|mm| mm / sigma).filter(|mm| mm.is_finite());
-        let (factor, unit) = mm.map_or((1.0, "sigma"), |mm| (mm, "mm"));
-        let random = summary.map_or_else(String::new, |summary| {
-            let random = &summary.random.predicted_error_sigma;
-            format!(" (random {:.4})", random.median * factor)
-        });
-        lines.push(named("predicted error", &format!("{:.4} {unit}{random}", sigma * factor)));
+        lines.push(named("predicted error", &format!("{sigma:.4} sigma")));
     }
     if let Some(minutes) = figures.minutes {
         lines.push(named("time", &format!("about {}", time(minutes))));
     }
-    if let Some(summary) = summary {
-        lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
-        let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
-        if weak + warnings > 0 {
-            lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: see Tab")));
-        }
-    } else {
-        lines.push((Role::Dim, figures.origin.clone()));
+    lines.push((Role::Dim, figures.origin.clone()));
+    lines
+}
+
+/// The figures beside those of random sets of the same size: the median one and the best one.
+fn compared(figures: &PlanFigures, summary: &PlanSummary, condition: f64, sigma: f64) -> Vec<(Role, String)> {
+    let random = &summary.random;
+    // σ to mm, where the instrument is known.
+    let mm = summary.predicted_rms_mm.map(|mm| mm / sigma).filter(|mm| mm.is_finite());
+    let (factor, unit) = mm.map_or((1.0, "sigma"), |mm| (mm, "mm"));
+    let row = |name: &str, [plan, median, best]: [String; 3]| format!("{name:<NAMES$}{plan:>7}{median:>7}{best:>12}");
+    let head = ["plan".to_owned(), "random".to_owned(), format!("best of {}", random.sets)];
+    let of_condition = [condition, random.condition_number.median, random.condition_number.best];
+    let error = &random.predicted_error_sigma;
+    let of_error = [sigma, error.median, error.best].map(|sigma| format!("{:.4}", sigma * factor));
+    let mut lines = vec![
+        named("poses", &format!("{} + {} to verify", figures.identification, figures.verification)),
+        (Role::Dim, row("", head)),
+        (Role::Plain, row("condition number", of_condition.map(|value| format!("{value:.1}")))),
+        (Role::Plain, row(&format!("predicted, {unit}"), of_error)),
+    ];
+    lines.extend(figures.minutes.map(|minutes| named("time", &format!("about {}", time(minutes)))));
+    lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
+    let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
+    if weak + warnings > 0 {
+        lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: see Tab")));
     }
     lines
 }
