@@ -65,7 +65,8 @@ pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut
     header(&view.header, theme, area, buf);
     let rule = |buf: &mut Buffer, row: u16| paint::rule(buf, area, row, theme.glyphs.rule(), theme.style(Role::Dim));
     rule(buf, 2);
-    paint::text(buf, area, (0, 3), view.purpose, theme.style(Role::Hint));
+    let purpose = shortened(view.purpose, usize::from(area.width), theme.glyphs);
+    paint::text(buf, area, (0, 3), &purpose, theme.style(Role::Hint));
 
     footer(keys, theme, area, buf);
     let mut row = TOP + content.height;

@@ -515,8 +515,8 @@ pub(crate) const fn purpose(step: Step) -> &'static str {
         Step::Target => "Say where the reflector (SMR) sits on the flange.",
         Step::Plan => "Choose the poses to measure.",
         Step::Capture => "Move the robot to the configuration shown, then measure.",
-        Step::Identify => "Identify the kinematic errors of the arm from the measured points.",
-        Step::Verify => "See how accurate the arm is at points that the identification never saw.",
+        Step::Identify => "Identify the kinematic errors of the arm.",
+        Step::Verify => "See how accurate the arm is at points not used so far.",
         Step::Deliver => "Write the results.",
     }
 }

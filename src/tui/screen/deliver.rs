@@ -68,7 +68,9 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         if file.starts_with('/') { file.to_owned() } else { format!("{}/{file}", folder.trim_end_matches('/')) }
     };
     if content.files.is_empty() {
-        page.title("Nothing is written yet. Enter writes the results into:");
+        let is_writing = cx.view.busy.is_some();
+        let nothing = "Nothing is written yet. Enter writes the results into:";
+        page.title(if is_writing { "The results are being written into:" } else { nothing });
         page.paragraph(folder, Role::Plain);
         page.gap();
         page.paragraph("calibration.ron is the identified arm; report.json has all numbers; plan.csv and measurements.csv are the data.", Role::Plain);

@@ -40,7 +40,7 @@ impl IdentifyScreen {
         let mut page = Page::new(cx.theme, columns);
         let Some(content) = content(cx) else { return page };
         match (&content.summary, self.tabs.at) {
-            (None, _) => pages::before(content, &mut page),
+            (None, _) => pages::before(content, cx.view.busy.is_some(), &mut page),
             (Some(summary), 0 | PICTURE) => pages::result(content, summary, &mut page),
             (Some(summary), 1) => pages::parameters(summary, &mut page),
             (Some(summary), _) => pages::limits(summary, &mut page),

@@ -30,10 +30,10 @@ use crate::wizard::{Intent, PlanSettings};
 use form::Form;
 use search::Search;
 
-/// Content columns from which on the picture stands beside the views (a terminal of 100).
-const WIDE: u16 = 98;
+/// Content columns from which on the picture stands beside the views (a terminal of 108).
+const WIDE: u16 = 106;
 /// Columns of the views beside the picture.
-const VIEWS: u16 = 74;
+const VIEWS: u16 = 78;
 /// Columns of the settings.
 const SETTINGS: u16 = 34;
 /// Lines of settings and figures.

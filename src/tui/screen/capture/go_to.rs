@@ -19,8 +19,8 @@ const KEYS: usize = 12;
 const TALL: u16 = 26;
 /// Lines of a message before it is cut off.
 const MESSAGE: usize = 4;
-/// Distances that are shown where there is little room, and rows that they need with their heading.
-const PAIRS: (usize, u16) = (3, 4);
+/// Distances that are shown at most.
+const PAIRS: u16 = 5;
 
 /// Draws it.
 pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
@@ -28,7 +28,8 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     let room = usize::from(area.width);
     let is_tall = area.height >= TALL;
     let mut lines: Vec<(String, Role)> = Vec::new();
-    lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, Role::Title)));
+    let role = if content.finding.is_some() { Role::Warn } else { Role::Title };
+    lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, role)));
     lines.extend(joined(&count(content, is_tall), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
     lines.extend(panel(cx, content, room));
     // While something is in question, that and the configuration are what matters.
@@ -44,12 +45,11 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     // The joints are what matters, but never so large that what is to be decided has no room.
     let kept = if is_tall { height(status.len()) } else { u16::from(!status.is_empty()) };
     let pairs = content.finding.as_ref().map_or(&[][..], |finding| &finding.worst);
-    let of_table = if pairs.is_empty() { 0 } else { height(pairs.len()).saturating_add(1).min(PAIRS.1) };
-    let free = area.height.saturating_sub(height(lines.len()));
     let small = joints::layout(&content.joints, area.width, 0).rows;
-    let has_table = of_table > 0 && free >= small.saturating_add(of_table);
-    if has_table {
-        lines.extend(table(content, if is_tall { pairs.len() } else { PAIRS.0 }));
+    let free = area.height.saturating_sub(height(lines.len()).saturating_add(small));
+    let most = height(pairs.len()).min(PAIRS).min(free.saturating_sub(1));
+    if most > 0 {
+        lines.extend(table(content, usize::from(most)));
     }
     let needed = height(lines.len()).saturating_add(kept);
     let layout = joints::layout(&content.joints, area.width, area.height.saturating_sub(needed));
@@ -93,7 +93,8 @@ fn height(lines: usize) -> u16 {
 /// Where to go, and through which poses.
 fn heading(content: &CaptureView) -> Vec<String> {
     if let Some(finding) = &content.finding {
-        return vec![format!("Pose {} is in question: decide before going on", finding.pose)];
+        let cause = finding.cause.replace('_', " ");
+        return vec![format!("Pose {} is in question: {cause}", finding.pose), "decide before going on".to_owned()];
     }
     let Some(pose) = &content.pose else { return vec!["All poses of the plan are measured.".to_owned()] };
     let mut parts = vec![format!("Go to pose {pose}")];
@@ -168,11 +169,7 @@ fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, 
 }
 
 fn question(cx: &ScreenCx<'_>, finding: &FindingView, room: usize) -> Vec<(String, Role)> {
-    let cause = finding.cause.replace('_', " ");
-    let title =
-        format!("{}Pose {}, measurement {}: {cause}", cx.theme.glyphs.pointer(), finding.pose, finding.measurement);
-    let mut lines = vec![(cx.theme.glyphs.show(&title), Role::Warn)];
-    lines.extend(message(cx, &finding.message, room));
+    let mut lines = message(cx, &finding.message, room);
     if finding.has_remedy {
         lines.extend(choice(cx, "correct it as proposed", |intent| *intent == Intent::ApplyRemedy));
     }

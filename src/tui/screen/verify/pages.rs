@@ -68,7 +68,8 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.gap();
     let which = if *independent { "the identification never saw" } else { "the identification SAW, in part or all" };
     page.paragraph(&format!("Errors at {samples} poses that {which}: {basis}."), Role::Plain);
-    page.line(vec![(format!("{:<32}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
+    let names = names(page);
+    page.line(vec![(format!("{:<names$}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
     let pairs: [(&str, Pick); 3] = [
         ("position error", |model| model.position_mm),
         ("distance error", |model| model.distance_mm),
@@ -93,6 +94,11 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.paragraph("before: nominal model; after: identified model. Distance errors need no frame.", Role::Dim);
 }
 
+/// Columns of the names of the errors; the numbers come first where there is little room.
+fn names(page: &Page) -> usize {
+    page.columns().saturating_sub(29).clamp(26, 32)
+}
+
 fn row(page: &mut Page, name: &str, before: f64, after: f64) {
     let ratio = before / after;
     let (better, role) = match ratio {
@@ -101,7 +107,8 @@ fn row(page: &mut Page, name: &str, before: f64, after: f64) {
         ratio if ratio < 10.0 => (format!("{ratio:.1} x"), Role::Plain),
         ratio => (format!("{ratio:.0} x"), Role::Plain),
     };
-    let line = format!("{name:<32}{:>10}{:>10}", fixed(before, 4), fixed(after, 4));
+    let names = names(page);
+    let line = format!("{name:<names$}{:>10}{:>10}", fixed(before, 4), fixed(after, 4));
     page.line(vec![(line, Role::Plain), (format!("{better:>9}"), role)]);
 }
 
