@@ -8,7 +8,7 @@ use super::dialog::{Answer, Dialog};
 use super::input::Input;
 use super::keymap::{self, Item, Key, Local, Meaning};
 use super::preview::{Camera, Scene};
-use super::screen::{self, Reply, Screen, ScreenCx};
+use super::screen::{self, PicturePlace, Reply, Screen, ScreenCx};
 use super::theme::Theme;
 use super::{frame, help};
 use crate::profile::{Profile, builtin};
@@ -248,13 +248,16 @@ impl Ui {
         let takes_up_and_down = own.iter().any(|item| item.key == "Up/Down");
         let arrows = if takes_up_and_down { glyphs.sideways() } else { glyphs.arrows() };
         items.extend(own);
-        let turn = Item::new(arrows, "turn the picture", 5);
-        items.push(turn.clone());
         items.sort_by_key(|item| item.rank);
         let content = frame::room(cx.view, &items, self.theme, area);
-        if !content.is_some_and(|content| self.screen.has_picture(cx, content)) {
-            items.retain(|item| *item != turn);
-        }
+        let place = content.map_or(PicturePlace::Nowhere, |content| self.screen.picture_place(cx, content));
+        let rank = match place {
+            PicturePlace::Nowhere => return items,
+            PicturePlace::Beside => 8,
+            PicturePlace::Alone => 3,
+        };
+        items.push(Item::new(arrows, "turn the picture", rank));
+        items.sort_by_key(|item| item.rank);
         items
     }
 

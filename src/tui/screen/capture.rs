@@ -19,7 +19,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::tui::dialog::ask;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::paint;
@@ -184,9 +184,9 @@ impl Screen for Capture {
         }
     }
 
-    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
         let beside = content(cx.view).and_then(|content| parts(cx, content, area).1);
-        cx.scene.is_some() && (self.tab == Tab::Picture || beside.is_some())
+        PicturePlace::of(cx.scene.is_some() && self.tab == Tab::Picture, beside.is_some())
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

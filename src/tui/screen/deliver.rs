@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll};
-use super::{Reply, Screen, ScreenCx, verify};
+use super::{PicturePlace, Reply, Screen, ScreenCx, verify};
 use crate::tui::dialog::Dialog;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::theme::Role;
@@ -120,8 +120,8 @@ impl Screen for DeliverScreen {
         Reply::Ignored
     }
 
-    fn has_picture(&self, _cx: &ScreenCx<'_>, _area: Rect) -> bool {
-        false
+    fn picture_place(&self, _cx: &ScreenCx<'_>, _area: Rect) -> PicturePlace {
+        PicturePlace::Nowhere
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

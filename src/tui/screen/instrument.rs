@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 
 use super::menu::Menu;
 use super::page::{Page, Scroll, counted, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::tui::dialog::ask;
 use crate::tui::keymap::{Item, Key};
@@ -137,8 +137,8 @@ impl Screen for InstrumentScreen {
         Reply::Ignored
     }
 
-    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
-        split(area, TEXT, cx.scene.is_some()).1.is_some()
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        PicturePlace::of(false, split(area, TEXT, cx.scene.is_some()).1.is_some())
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

@@ -18,7 +18,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::tui::glyphs::wrapped;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::paint;
@@ -184,10 +184,10 @@ impl Screen for Plan {
         Reply::Ignored
     }
 
-    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
         // The arrows are for the settings while there are any to change.
         let is_beside = area.width >= WIDE && !(self.tab == Tab::Plan && can_make(cx.view));
-        cx.scene.is_some() && (self.tab == Tab::Picture || is_beside)
+        PicturePlace::of(cx.scene.is_some() && self.tab == Tab::Picture, cx.scene.is_some() && is_beside)
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

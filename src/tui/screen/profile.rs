@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::tui::dialog::Dialog;
 use crate::tui::form::TextField;
 use crate::tui::keymap::{Item, Key};
@@ -147,8 +147,8 @@ impl Screen for ProfileScreen {
         Reply::Changed
     }
 
-    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
-        content(cx).is_some_and(|content| self.parts(content, cx, area).picture.is_some())
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        PicturePlace::of(false, content(cx).is_some_and(|content| self.parts(content, cx, area).picture.is_some()))
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 
 use super::menu::Menu;
 use super::page::{Page, Scroll, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::session::set_up::TargetChoice;
 use crate::tui::dialog::ask;
 use crate::tui::keymap::{Item, Key};
@@ -171,8 +171,8 @@ impl Screen for TargetScreen {
         Reply::Ignored
     }
 
-    fn has_picture(&self, cx: &ScreenCx<'_>, area: Rect) -> bool {
-        split(area, columns(cx), cx.scene.is_some()).1.is_some()
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        PicturePlace::of(false, split(area, columns(cx), cx.scene.is_some()).1.is_some())
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

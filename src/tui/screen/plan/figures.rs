@@ -94,7 +94,7 @@ fn in_short(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, 
     lines.extend(mm.or(sigma).map(|error| line("error", &error)));
     if let Some(summary) = summary {
         let best = &summary.random;
-        lines.push((Role::Dim, format!("best of {} random sets:", best.sets)));
+        lines.push((Role::Dim, format!("best of {} random:", best.sets)));
         let scale = summary.predicted_rms_mm.map_or(1.0, |mm| mm / summary.predicted_error_sigma);
         let error = best.predicted_error_sigma.best * scale;
         lines.push((Role::Dim, format!("{:<SHORT_NAMES$} {:.1}, {error:.4}", "", best.condition_number.best)));
