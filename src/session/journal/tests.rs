@@ -92,6 +92,13 @@ fn sample(number: u64) -> MeasuredText {
     }
 }
 
+#[test]
+fn findings_of_journals_before_there_was_a_table_are_read() {
+    let text = r#"(about: 3, cause: "wrong_pose", ratio: 9.5, message: "it does not fit")"#;
+    let found: FindingText = ron::from_str(text).unwrap();
+    assert_eq!((found.about, found.worst), (3, Vec::new()));
+}
+
 fn plan() -> PlanText {
     let row = |kind, xyz_mm| PlannedText { pose: "12b".to_owned(), kind, joints: vec![1.5, -0.000_000_001], xyz_mm };
     PlanText {

@@ -214,6 +214,38 @@ fn digits_and_paste_open_the_question_for_coordinates() {
 }
 
 #[test]
+fn coordinates_are_checked_as_they_are_typed() {
+    // In inch, as the instrument of this session counts.
+    let view = manual();
+    let mut screen = on(Tab::GoTo);
+    let Reply::Ask(mut dialog) = press(&mut screen, &view, Key::char('1')) else { panic!("no question") };
+    let drawn = |dialog: &crate::tui::dialog::Dialog| {
+        let mut buf = Buffer::empty(Rect::new(0, 0, 78, 10));
+        dialog.draw(themes()[1], buf.area, &mut buf);
+        shown(&buf)
+    };
+    for (text, reason) in [
+        ("0.5 20", "found 2 numbers"),
+        (" 30 mm", "the reading is in mm, but in was chosen"),
+        ("000", "'10.5 20 30 mm000' is not a point"),
+    ] {
+        dialog.paste(text);
+        assert!(drawn(&dialog).contains(reason), "{}", drawn(&dialog));
+        assert_eq!(dialog.on_key(Key::plain_code(KeyCode::Enter)), Answer::Open);
+    }
+    for _ in 0..6 {
+        dialog.on_key(Key::plain_code(KeyCode::Backspace));
+    }
+    assert!(!drawn(&dialog).contains("not"), "{}", drawn(&dialog));
+    let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
+    assert_eq!(answer, Answer::Intend(Intent::TypeReading("10.5 20 30".to_owned())));
+    // The key of the table asks the same.
+    let offer = view.intents.iter().find(|info| matches!(info.intent, Intent::TypeReading(_))).unwrap();
+    let asked = crate::tui::dialog::Dialog::before(offer, &view).unwrap();
+    assert!(drawn(&asked).starts_with("Coordinates x y z of the SMR at pose 15 (in)"), "{}", drawn(&asked));
+}
+
+#[test]
 fn a_pose_is_chosen_from_the_list() {
     let view = of(normal());
     let mut screen = on(Tab::GoTo);
