@@ -100,7 +100,13 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
     let events = engine.sender();
     let inputs = input::start(move || events.wake())?;
     let screen = Terminal::new(CrosstermBackend::new(io::stdout()))?;
-    let mut driver = Driver { engine: &mut engine, inputs, screen, guard: &guard, ui: Ui::new(options.theme).with_bell(options.has_bell) };
+    let mut driver = Driver {
+        engine: &mut engine,
+        inputs,
+        screen,
+        guard: &guard,
+        ui: Ui::new(options.theme).with_bell(options.has_bell),
+    };
     let end = driver.run(&received);
     // Its drop would write to the terminal once more, which may be gone.
     let Driver { screen, .. } = driver;

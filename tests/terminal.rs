@@ -254,13 +254,12 @@ fn any_size_will_do_and_a_small_one_says_what_it_needs() {
 fn a_key_that_comes_together_with_a_new_size_is_taken_at_once() {
     let place = Place::new();
     let mut terminal = place.wizard(&[], &[]);
-    for turn in 0_u16..8 {
-        // Both are there when the program looks.
-        terminal.signal("STOP");
-        terminal.wait_until_stopped();
-        terminal.resize((80 + turn % 2, 24));
+    // Whether both are there when the program looks is a matter of luck: it gets many chances.
+    for turn in 0_u16..40 {
+        terminal.resize((0, 0));
         terminal.send("?");
-        terminal.signal("CONT");
+        terminal.resize((1, 1));
+        terminal.resize(SIZE);
         let is_help = turn % 2 == 0;
         terminal.wait_for("the key", |shown| shown.step() == Some(1) && shown.has("draw the screen anew") == is_help);
     }
@@ -271,9 +270,7 @@ fn a_key_that_comes_together_with_a_new_size_is_taken_at_once() {
 #[test]
 fn the_bell_rings_only_when_it_is_asked_for() {
     let rings = |terminal: &Terminal| terminal.raw().iter().filter(|byte| **byte == 7).count();
-    for (arguments, keys, expected) in
-        [(&["--bell"][..], "\u{2}\u{2}", 1), (&[], "\u{2}", 1), (&["--bell"], "", 0), (&[], "\u{2}\u{2}\u{2}", 2)]
-    {
+    for (arguments, keys, expected) in [(&["--bell"][..], "\u{2}\u{2}", 1), (&[], "\u{2}", 1), (&["--bell"], "", 0)] {
         let place = Place::new();
         let mut terminal = place.wizard(arguments, &[]);
         terminal.send(keys);

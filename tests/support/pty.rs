@@ -238,16 +238,6 @@ impl Terminal {
         self.child.process_id().unwrap()
     }
 
-    /// Waits until all of the program stands still.
-    #[track_caller]
-    pub(crate) fn wait_until_stopped(&self) {
-        let end = Instant::now() + PATIENCE;
-        while stat(self.process())[0] != "T" {
-            assert!(Instant::now() < end, "it does not stop");
-            thread::yield_now();
-        }
-    }
-
     pub(crate) fn signal(&self, name: &str) {
         signal(self.process(), name);
     }

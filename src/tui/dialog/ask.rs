@@ -1,11 +1,11 @@
 //! The questions that screens ask: coordinates, a known target, a simulated cell, recorded measurements.
 
 use super::{Dialog, Form};
-use crate::tui::form::{Check, TextField};
 use crate::session::filter::Filter;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
+use crate::tui::form::{Check, TextField};
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Intent, reading};
 

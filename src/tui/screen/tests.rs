@@ -20,11 +20,11 @@ use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
 use crate::tui::preview::Checked;
 use crate::tui::ui::{Ui, Wish};
+use crate::wizard::view::purpose;
 use crate::wizard::view::{
     CircleView, CirclesResult, CirclesView, Content, DeliverView, IdentifyView, InstrumentView, JointShown,
     ProfileCard, TargetView, VerifyView,
 };
-use crate::wizard::view::purpose;
 use crate::wizard::{IntentInfo, Notice, Wizard};
 
 mod steps;

@@ -5,7 +5,9 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::tui::dialog::Answer;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
-use crate::wizard::view::{DriftView, FindingView, JointShown, PairView, PredictionView, RowState, RowView, SampleView};
+use crate::wizard::view::{
+    DriftView, FindingView, JointShown, PairView, PredictionView, RowState, RowView, SampleView,
+};
 use crate::wizard::{IntentInfo, Notice};
 
 fn joints() -> Vec<JointShown> {

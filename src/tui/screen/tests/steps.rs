@@ -44,8 +44,10 @@ fn states(step: Step) -> [Shown; 3] {
                 "error",
                 said(
                     profile(false),
-                    Notice::error("profile 'cell7.ron', line 12: joint 3: lower limit 90 deg is above upper limit -90 deg")
-                        .hint("exchange the two, then load the file again"),
+                    Notice::error(
+                        "profile 'cell7.ron', line 12: joint 3: lower limit 90 deg is above upper limit -90 deg",
+                    )
+                    .hint("exchange the two, then load the file again"),
                 ),
                 vec![],
             ),
@@ -69,8 +71,9 @@ fn states(step: Step) -> [Shown; 3] {
             ]
         }
         Step::Plan => {
-            let notice = Notice::error("of 5000 candidates only 12 can be measured: the SMR faces away from the tracker")
-                .hint("turn the SMR on the flange, or move the tracker, and say so in the profile");
+            let notice =
+                Notice::error("of 5000 candidates only 12 can be measured: the SMR faces away from the tracker")
+                    .hint("turn the SMR on the flange, or move the tracker, and say so in the profile");
             [
                 ("normal", plan::tests::proposal(), vec![]),
                 ("busy", plan::tests::searching(69.1), vec![]),
@@ -132,7 +135,10 @@ fn every_step_in_every_state_at_80x24() {
             .iter()
             .map(|(name, view, keys)| format!("== {name}\n{}", terminal(view, keys, SMALL, theme(false))))
             .collect();
-        insta::assert_snapshot!(format!("step_{}_{}", step.number(), step.to_string().to_lowercase()), shown.join("\n"));
+        insta::assert_snapshot!(
+            format!("step_{}_{}", step.number(), step.to_string().to_lowercase()),
+            shown.join("\n")
+        );
     }
 }
 
