@@ -161,7 +161,7 @@ fn notice_lines(notice: &Notice, theme: Theme, area: Rect) -> Vec<(String, Role)
 
 fn busy_line(busy: &BusyView, theme: Theme, area: Rect, buf: &mut Buffer) {
     let glyphs = theme.glyphs;
-    let what = if busy.is_cancelled { format!("cancelling {}", busy.what) } else { busy.what.to_owned() };
+    let what = if busy.is_cancelled { format!("stopping: {}", busy.what) } else { busy.what.to_owned() };
     let mut column = paint::text(buf, area, (0, 0), &what, theme.style(Role::Title)) + 2;
     if let Some(part) = busy.part.filter(|part| part.is_finite()) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 20")]

@@ -182,6 +182,10 @@ mod tests {
         assert!(undone(MOUSE).contains("^[?1003l"));
     }
 
+    fn named<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
+        thread::Builder::new().name("of the test".to_owned()).spawn(work).unwrap()
+    }
+
     /// Says to [`panics_in_a_terminal`] that it runs in a terminal of its own.
     const IN_TERMINAL: &str = "TRUPOSE_TEST_PANICS_HERE";
 
@@ -192,10 +196,11 @@ mod tests {
         }
         note_folder(Some("sessions/a"));
         install_panic_hook();
-        assert!(thread::spawn(|| panic!("of another thread")).join().is_err());
+        let panics = |text: &'static str| named(move || panic!("{text}")).join().is_err();
+        assert!(panics("of another thread"));
         let _guard = TerminalGuard::enter(true).unwrap();
         // Noted, and the screen is left alone.
-        drop(thread::spawn(|| panic!("behind the screen")).join());
+        assert!(panics("behind the screen"));
         assert!(take_remarks().concat().contains("behind the screen"));
         panic!("in front of the screen");
     }
@@ -218,7 +223,7 @@ mod tests {
         let mut child = pair.slave.spawn_command(command).unwrap();
         let mut written = Vec::new();
         let mut output = pair.master.try_clone_reader().unwrap();
-        let reader = thread::spawn(move || {
+        let reader = named(move || {
             let mut bytes = [0; 4096];
             // With the last one at the other end gone, Linux says EIO.
             while let Some(count) = output.read(&mut bytes).ok().filter(|count| *count > 0) {

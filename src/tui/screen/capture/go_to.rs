@@ -90,10 +90,29 @@ fn height(lines: usize) -> u16 {
     u16::try_from(lines).unwrap_or(u16::MAX)
 }
 
+/// The short name of a cause in words.
+fn in_words(cause: &str) -> String {
+    let words = match cause {
+        "unit" => "another unit",
+        "joint_sign" => "a joint turns the other way",
+        "mistyped_joint" => "one joint stood elsewhere",
+        "wrong_pose" => "taken at another pose",
+        "stayed_at_previous" => "the robot had not moved",
+        "swapped_rows" => "exchanged with another pose",
+        "target_moved" => "the SMR has moved",
+        "instrument_moved" => "the tracker has moved",
+        "not_at_rest" => "the robot still moved",
+        "unexplained" => "its reading does not fit",
+        "drift" => "it has drifted",
+        other => return other.replace('_', " "),
+    };
+    words.to_owned()
+}
+
 /// Where to go, and through which poses.
 fn heading(content: &CaptureView) -> Vec<String> {
     if let Some(finding) = &content.finding {
-        let cause = finding.cause.replace('_', " ");
+        let cause = in_words(&finding.cause);
         return vec![format!("Pose {} is in question: {cause}", finding.pose), "decide before going on".to_owned()];
     }
     let Some(pose) = &content.pose else { return vec!["All poses of the plan are measured.".to_owned()] };

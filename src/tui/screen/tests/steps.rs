@@ -186,3 +186,17 @@ fn the_picture_is_turned_only_where_it_is_seen() {
     assert_eq!(has_hint(Step::Instrument, &[], wide), (true, false));
     assert_eq!(has_hint(Step::Deliver, &[], wide), (false, false));
 }
+
+#[test]
+fn the_focus_of_a_list_stays_in_view() {
+    for (view, last) in
+        [(target(None, None), "circle-point analysis"), (instrument(None, None), "recorded measurements")]
+    {
+        for count in 0..6 {
+            let shown = terminal(&view, &vec![Key::plain_code(KeyCode::Down); count], (60, 18), theme(true));
+            let focus =
+                shown.lines().find(|line| line.starts_with(" > ")).unwrap_or_else(|| panic!("{count}: {shown}"));
+            assert!(count < 4 || focus.contains(last), "{count}: {shown}");
+        }
+    }
+}
