@@ -6,6 +6,7 @@ use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll};
 use super::{PicturePlace, Reply, Screen, ScreenCx, verify};
+use crate::session::summary::VerdictStatus;
 use crate::tui::dialog::Dialog;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::theme::Role;
@@ -60,7 +61,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         );
     }
     match &content.verdict {
-        Some(verdict) => verify::status(verdict, &mut page),
+        Some(verdict) => verify::status(verdict, "see the step Verify", &mut page),
         None => page.paragraph("There is no result yet: go back and identify.", Role::Warn),
     }
     let folder = cx.view.header.folder.as_deref().unwrap_or(".");
@@ -83,7 +84,14 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             }
         }
         page.title("What to do next");
-        page.marked(("1 ", Role::Dim), "apply calibration.ron to the controller or the offline program", Role::Plain);
+        let is_accepted = content.verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
+        if is_accepted {
+            let apply = "apply calibration.ron to the controller or the offline program";
+            page.marked(("1 ", Role::Dim), apply, Role::Plain);
+        } else {
+            let wait = "do not apply it yet: b goes back to Verify, which says what is missing";
+            page.marked(("1 ", Role::Dim), wait, Role::Warn);
+        }
         page.marked(("2 ", Role::Dim), "verify on new points, later or after a collision:", Role::Plain);
         let verify = format!("trupose verify --calibration {} --measurements NEW.csv", path("calibration.ron"));
         page.paragraph(&verify, Role::Plain);

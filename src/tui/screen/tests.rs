@@ -468,6 +468,13 @@ fn the_delivery() {
     insta::assert_snapshot!("deliver_before", whole(&deliver(&[]), &[], SMALL));
     insta::assert_snapshot!("deliver_written", whole(&deliver(&FILES), &[], SMALL));
     insta::assert_snapshot!("deliver_error", whole(&failed(deliver(&[])), &[], SMALL));
+    let mut refused = deliver(&FILES);
+    if let Content::Deliver(content) = &mut refused.content {
+        let mut verdict = verdict(VerdictStatus::NotAccepted);
+        verdict.reasons = ["poor_data", "few_data"].map(|code| format!("see the warning '{code}'")).to_vec();
+        content.verdict = Some(Box::new(verdict));
+    }
+    insta::assert_snapshot!("deliver_refused", whole(&refused, &[], SMALL));
     insta::assert_snapshot!("deliver_quit", whole(&deliver(&FILES), &[Key::plain_code(KeyCode::Enter)], SMALL));
 }
 

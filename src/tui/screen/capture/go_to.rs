@@ -234,8 +234,8 @@ fn status(content: &CaptureView, is_tall: bool) -> Vec<(String, Role)> {
         lines.push((text, Role::Plain));
     }
     if let Some(prediction) = &content.prediction {
-        let role = if prediction.is_enough { Role::Ok } else { Role::Plain };
-        lines.push((in_short(prediction), role));
+        let role = if prediction.is_enough && content.open > 0 { Role::Ok } else { Role::Plain };
+        lines.push((in_short(prediction, content.open), role));
     }
     if let Some(drift) = content.drift.last().filter(|_| is_tall) {
         let checked = match content.drift.len() {

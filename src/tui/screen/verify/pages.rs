@@ -1,7 +1,7 @@
 //! Verdict and tables of the verification.
 
 use crate::session::summary::{ModelSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationSummary};
-use crate::tui::screen::page::{Page, fixed};
+use crate::tui::screen::page::{Page, counted, fixed};
 use crate::tui::theme::Role;
 use crate::wizard::view::VerifyView;
 
@@ -23,7 +23,7 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
         page.marked(("UNKNOWN: ", Role::Warn), too_few, Role::Plain);
     }
     if let Some(verdict) = &content.verdict {
-        status(verdict, page);
+        status(verdict, "see below", page);
         limits(verdict, page);
     }
     for warning in &content.warnings {
@@ -35,14 +35,24 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
     }
 }
 
-/// The verdict in words.
-pub(in crate::tui::screen) fn status(verdict: &Verdict, page: &mut Page) {
+/// How a reason begins that is a warning, called by its code.
+const BY_CODE: &str = "see the warning '";
+
+/// The verdict in words; `place` says where the warnings can be read, as their codes are shown nowhere.
+pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut Page) {
     let (mark, role) = match verdict.status {
         VerdictStatus::Accepted => ("ACCEPTED: ", Role::Ok),
         VerdictStatus::NotAccepted => ("NOT ACCEPTED: ", Role::Alarm),
         VerdictStatus::NotEvaluated => ("NOT EVALUATED: ", Role::Warn),
     };
-    page.marked((mark, role), &verdict.reasons.join("; "), Role::Plain);
+    let by_code = verdict.reasons.iter().filter(|reason| reason.starts_with(BY_CODE)).count();
+    let mut reasons: Vec<String> =
+        verdict.reasons.iter().filter(|reason| !reason.starts_with(BY_CODE)).cloned().collect();
+    if by_code > 0 {
+        let stand = if by_code == 1 { "stands" } else { "stand" };
+        reasons.push(format!("{} {stand} against it, {place}", counted(by_code, "warning")));
+    }
+    page.marked((mark, role), &reasons.join("; "), Role::Plain);
 }
 
 fn limits(verdict: &Verdict, page: &mut Page) {
