@@ -23,7 +23,10 @@ pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
             (content.typed_unit.as_deref(), pose.map_or_else(String::new, |pose| format!(" at pose {pose}")))
         }
         Content::Target(content) => {
-            (content.circles.as_ref().and_then(|circles| circles.typed_unit.as_deref()), String::new())
+            let circles = content.circles.as_ref();
+            let joint = circles.and_then(|circles| circles.joint.as_deref());
+            let place = joint.map_or_else(String::new, |joint| format!(" on the circle of {joint}"));
+            (circles.and_then(|circles| circles.typed_unit.as_deref()), place)
         }
         _ => (None, String::new()),
     };
