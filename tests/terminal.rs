@@ -148,7 +148,8 @@ fn the_whole_calibration_is_walked_by_keys() {
     terminal.send("d");
     let folder = fs::read_dir(place.0.path().join("sessions")).unwrap().next().unwrap().unwrap().path();
     terminal.wait_for("the files", |_| folder.join("calibration.ron").exists());
-    terminal.wait_for("what was done is saved", |shown| shown.has("· saved ·"));
+    // The files are there before the entry that says so.
+    terminal.wait_for("what was done is saved", |shown| shown.has("Written") && shown.has("· saved ·"));
     terminal.send("q");
     terminal.send("y");
     terminal.wait_for_text("over");
