@@ -65,6 +65,8 @@ pub struct Options {
     pub has_mouse: bool,
     /// Colours even if the environment is against them.
     pub forces_colour: bool,
+    /// Whether the bell rings when a reading needs attention.
+    pub has_bell: bool,
 }
 
 /// Why the program ends.
@@ -98,7 +100,13 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
     let events = engine.sender();
     let inputs = input::start(move || events.wake())?;
     let screen = Terminal::new(CrosstermBackend::new(io::stdout()))?;
-    let mut driver = Driver { engine: &mut engine, inputs, screen, guard: &guard, ui: Ui::new(options.theme) };
+    let mut driver = Driver {
+        engine: &mut engine,
+        inputs,
+        screen,
+        guard: &guard,
+        ui: Ui::new(options.theme).with_bell(options.has_bell),
+    };
     let end = driver.run(&received);
     // Its drop would write to the terminal once more, which may be gone.
     let Driver { screen, .. } = driver;
@@ -160,6 +168,9 @@ impl Driver<'_> {
             let mut early = drawn.map_or(Duration::ZERO, |drawn| FRAME.saturating_sub(since(drawn)));
             if is_due && !self.engine.wizard().is_idle() {
                 early = early.max(SETTLE.saturating_sub(since(*changed.get_or_insert_with(now))));
+            }
+            if self.ui.take_bell() && terminal::ring().is_err() {
+                return End::Gone;
             }
             if is_due && early.is_zero() {
                 if self.draw(&view).is_err() {

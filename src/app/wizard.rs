@@ -94,7 +94,7 @@ fn tui_options(args: TerminalArgs, environment: &TerminalEnvironment) -> tui::Op
         () => Glyphs::Unicode,
     };
     let theme = Theme { has_colour, glyphs };
-    tui::Options { theme, has_mouse: args.mouse, forces_colour: args.color == ColorArg::Always }
+    tui::Options { theme, has_mouse: args.mouse, forces_colour: args.color == ColorArg::Always, has_bell: args.bell }
 }
 
 fn play<O: Write, E: Write>(

@@ -18,6 +18,9 @@ pub struct TerminalArgs {
     /// Take the mouse wheel; the terminal's own selection then needs Shift
     #[arg(long)]
     pub mouse: bool,
+    /// Ring the bell when a reading needs attention; Ctrl-B turns it on and off
+    #[arg(long, conflicts_with = "plain")]
+    pub bell: bool,
     /// Plain lines instead of a full screen [default: only where TERM is 'dumb']
     #[arg(long)]
     pub plain: bool,

@@ -26,6 +26,8 @@ use crate::wizard::{Notice, Severity};
 
 /// Smallest size that shows everything needed.
 pub const SMALLEST: (u16, u16) = (60, 18);
+/// First row of the content.
+const TOP: u16 = 5;
 /// Lines of a message.
 const MOST_NOTICE: usize = 6;
 /// Lines of the footer.
@@ -40,31 +42,43 @@ pub const fn fits(area: Rect) -> bool {
     area.width >= SMALLEST.0 && area.height >= SMALLEST.1
 }
 
-/// Draws everything but the content; gives back where that goes. None: the terminal is too small, which is said.
-pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut Buffer) -> Option<Rect> {
+/// Where the content goes with these keys in the footer; none: the terminal is too small.
+pub fn room(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect) -> Option<Rect> {
     if !fits(area) {
-        say_too_small(theme, area, buf);
         return None;
     }
+    let area = paint::inset(area, 1);
+    let footer = footer_lines(keys, usize::from(area.width), MOST_FOOTER).len();
+    let notice = view.notice.as_ref().map_or(0, |notice| notice_lines(notice, theme, area).len());
+    let below = footer + 1 + notice + usize::from(view.busy.is_some());
+    let bottom = area.height.saturating_sub(u16::try_from(below).unwrap_or(u16::MAX));
+    Some(paint::band(area, TOP, bottom.saturating_sub(TOP)))
+}
+
+/// Draws everything but the content; gives back where that goes. None: the terminal is too small, which is said.
+pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut Buffer) -> Option<Rect> {
+    let Some(content) = room(view, keys, theme, area) else {
+        say_too_small(theme, area, buf);
+        return None;
+    };
     let area = paint::inset(area, 1);
     header(&view.header, theme, area, buf);
     let rule = |buf: &mut Buffer, row: u16| paint::rule(buf, area, row, theme.glyphs.rule(), theme.style(Role::Dim));
     rule(buf, 2);
-    paint::text(buf, area, (0, 3), view.purpose, theme.style(Role::Hint));
+    let purpose = shortened(view.purpose, usize::from(area.width), theme.glyphs);
+    paint::text(buf, area, (0, 3), &purpose, theme.style(Role::Hint));
 
+    footer(keys, theme, area, buf);
+    let mut row = TOP + content.height;
+    if let Some(busy) = &view.busy {
+        busy_line(busy, theme, paint::band(area, row, 1), buf);
+        row += 1;
+    }
     let notice = view.notice.as_ref().map_or_else(Vec::new, |notice| notice_lines(notice, theme, area));
-    let below = |lines: usize| u16::try_from(lines).unwrap_or(0);
-    let mut bottom = footer(keys, theme, area, buf);
-    bottom = bottom.saturating_sub(below(notice.len()));
-    for (row, (text, role)) in (bottom..).zip(&notice) {
+    for (row, (text, role)) in (row..).zip(&notice) {
         paint::text(buf, area, (0, row), text, theme.style(*role));
     }
-    if let Some(busy) = &view.busy {
-        bottom = bottom.saturating_sub(1);
-        busy_line(busy, theme, paint::band(area, bottom, 1), buf);
-    }
-    let top = 5;
-    Some(paint::band(area, top, bottom.saturating_sub(top)))
+    Some(content)
 }
 
 /// Says how large a terminal has to be.
@@ -147,7 +161,7 @@ fn notice_lines(notice: &Notice, theme: Theme, area: Rect) -> Vec<(String, Role)
 
 fn busy_line(busy: &BusyView, theme: Theme, area: Rect, buf: &mut Buffer) {
     let glyphs = theme.glyphs;
-    let what = if busy.is_cancelled { format!("cancelling {}", busy.what) } else { busy.what.to_owned() };
+    let what = if busy.is_cancelled { format!("stopping: {}", busy.what) } else { busy.what.to_owned() };
     let mut column = paint::text(buf, area, (0, 0), &what, theme.style(Role::Title)) + 2;
     if let Some(part) = busy.part.filter(|part| part.is_finite()) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 20")]

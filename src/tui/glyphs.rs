@@ -74,6 +74,11 @@ impl Glyphs {
         self.choose("←↑↓→", "arrows")
     }
 
+    /// The arrow keys left and right.
+    pub const fn sideways(self) -> &'static str {
+        self.choose("←→", "Left/Right")
+    }
+
     /// A text that this terminal can show: no control characters; without Unicode, nothing but ASCII.
     pub fn show(self, text: &str) -> String {
         let clean = printable(text);

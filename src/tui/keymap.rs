@@ -76,6 +76,8 @@ pub enum Local {
     Suspend,
     /// Draw everything anew.
     Redraw,
+    /// Bell on or off.
+    Bell,
 }
 
 /// What a key does.
@@ -105,8 +107,11 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
     bind(Key::char(c), rank, Does::Offer(accepts))
 }
 
+/// Turns the bell on and off.
+pub const BELL: Key = Key::ctrl('b');
+
 /// The table. Of several with one key the first whose intent is possible is meant.
-const BINDINGS: [Binding; 40] = [
+const BINDINGS: [Binding; 41] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Does::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Does::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Does::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -147,6 +152,7 @@ const BINDINGS: [Binding; 40] = [
     bind(Key::plain_code(KeyCode::F(1)), 9, Does::Local(Local::Help, "help")),
     bind(Key::ctrl('z'), 9, Does::Local(Local::Suspend, "to the shell, back with 'fg'")),
     bind(Key::ctrl('l'), 9, Does::Local(Local::Redraw, "draw the screen anew")),
+    bind(BELL, 9, Does::Local(Local::Bell, "bell when a reading needs attention, on or off")),
 ];
 
 /// Least importance that is still worth a place in the footer.

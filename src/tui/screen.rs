@@ -41,6 +41,28 @@ pub struct ScreenCx<'a> {
     pub theme: Theme,
 }
 
+/// Where the picture of the robot is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PicturePlace {
+    /// Not shown, or its keys mean something else.
+    Nowhere,
+    /// Beside or below something else.
+    Beside,
+    /// It is what the page is for.
+    Alone,
+}
+
+impl PicturePlace {
+    /// Alone on its page, or beside something else.
+    const fn of(is_alone: bool, is_beside: bool) -> Self {
+        match (is_alone, is_beside) {
+            (true, _) => Self::Alone,
+            (false, true) => Self::Beside,
+            (false, false) => Self::Nowhere,
+        }
+    }
+}
+
 /// What a screen makes of a key.
 #[derive(Debug)]
 pub enum Reply {
@@ -68,6 +90,9 @@ pub trait Screen: fmt::Debug {
     /// Takes pasted text.
     fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply;
 
+    /// Where in `area` the robot is shown, so that its keys have a sense.
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace;
+
     /// Draws itself; any size must do.
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer);
 }
@@ -88,5 +113,7 @@ pub fn of(step: Step) -> Box<dyn Screen> {
 
 #[cfg(test)]
 pub(crate) mod bench;
+#[cfg(test)]
+pub(crate) use capture::tests as capture_tests;
 #[cfg(test)]
 mod tests;

@@ -116,6 +116,16 @@ fn write_leave(out: &mut impl Write, entered: u8) -> io::Result<()> {
     out.flush()
 }
 
+/// Rings the bell.
+///
+/// # Errors
+/// The terminal is gone.
+pub(super) fn ring() -> io::Result<()> {
+    let mut out = io::stdout();
+    out.write_all(b"\x07")?;
+    out.flush()
+}
+
 /// Tells the panic hook where the session is.
 pub(super) fn note_folder(folder: Option<&str>) {
     if let Ok(mut held) = FOLDER.lock() {
@@ -170,6 +180,73 @@ mod tests {
         assert_eq!(undone(SCREEN), "^[?1049l");
         assert_eq!(undone(RAW | SCREEN | PASTE | CURSOR), "^[?25h^[?2004l^[?1049l");
         assert!(undone(MOUSE).contains("^[?1003l"));
+    }
+
+    fn named<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
+        thread::Builder::new().name("of the test".to_owned()).spawn(work).unwrap()
+    }
+
+    /// Says to [`panics_in_a_terminal`] that it runs in a terminal of its own.
+    const IN_TERMINAL: &str = "TRUPOSE_TEST_PANICS_HERE";
+
+    #[test]
+    fn panics_in_a_terminal() {
+        if std::env::var_os(IN_TERMINAL).is_none() {
+            return;
+        }
+        note_folder(Some("sessions/a"));
+        install_panic_hook();
+        let panics = |text: &'static str| named(move || panic!("{text}")).join().is_err();
+        assert!(panics("of another thread"));
+        let _guard = TerminalGuard::enter(true).unwrap();
+        // Noted, and the screen is left alone.
+        assert!(panics("behind the screen"));
+        assert!(take_remarks().concat().contains("behind the screen"));
+        panic!("in front of the screen");
+    }
+
+    #[test]
+    fn a_panic_gives_the_terminal_back() {
+        use std::io::Read as _;
+
+        use portable_pty::{CommandBuilder, PtySize, native_pty_system};
+
+        let pair = native_pty_system().openpty(PtySize::default()).unwrap();
+        let modes = || format!("{:?}", pair.master.get_termios().unwrap());
+        let before = modes();
+        // This very program, with that one test.
+        let mut command = CommandBuilder::new(std::env::current_exe().unwrap());
+        command.args(["--exact", "tui::terminal::tests::panics_in_a_terminal", "--nocapture", "--test-threads=1"]);
+        command.cwd(std::env::current_dir().unwrap());
+        command.env(IN_TERMINAL, "1");
+        command.env("TERM", "xterm-256color");
+        let mut child = pair.slave.spawn_command(command).unwrap();
+        let mut written = Vec::new();
+        let mut output = pair.master.try_clone_reader().unwrap();
+        let reader = named(move || {
+            let mut bytes = [0; 4096];
+            // With the last one at the other end gone, Linux says EIO.
+            while let Some(count) = output.read(&mut bytes).ok().filter(|count| *count > 0) {
+                written.extend_from_slice(&bytes[..count]);
+            }
+            written
+        });
+        let status = child.wait().unwrap();
+        let after = modes();
+        drop(pair.slave);
+        let written = String::from_utf8_lossy(&reader.join().unwrap()).replace('\u{1b}', "^");
+        assert_eq!((status.exit_code(), status.signal()), (101, None), "{written}");
+        assert_eq!(after, before);
+        let (before_screen, rest) = written.split_once("^[?1049h").unwrap();
+        let (on_screen, after_screen) = rest.split_once("^[?1049l").unwrap();
+        assert!(before_screen.contains("of another thread"), "{written}");
+        assert!(!on_screen.contains("behind the screen"), "{written}");
+        for undone in ["^[?1003l", "^[?25h", "^[?2004l"] {
+            assert!(on_screen.contains(undone), "{undone}: {written}");
+        }
+        for said in ["in front of the screen", "src/tui/terminal.rs:", "trupose resume sessions/a"] {
+            assert!(after_screen.contains(said), "{said}: {written}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::dialog::{Answer, Dialog};
 use super::input::Input;
 use super::keymap::{self, Item, Key, Local, Meaning};
 use super::preview::{Camera, Scene};
-use super::screen::{self, Reply, Screen, ScreenCx};
+use super::screen::{self, PicturePlace, Reply, Screen, ScreenCx};
 use super::theme::Theme;
 use super::{frame, help};
 use crate::profile::{Profile, builtin};
@@ -48,6 +48,29 @@ pub struct Ui {
     scene: Option<Scene>,
     /// Something local changed since it was drawn.
     is_dirty: bool,
+    /// Whether the bell rings when something needs attention.
+    has_bell: bool,
+    /// What needs attention.
+    attention: Option<Attention>,
+    /// The bell is to ring.
+    is_ringing: bool,
+}
+
+/// Something in the capture step that nobody should miss with the back to the screen.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Attention {
+    /// The sample of this measurement is in question.
+    Finding(u64),
+    /// A reading is held back.
+    Held(String),
+}
+
+impl Attention {
+    fn of(view: &ViewModel) -> Option<Self> {
+        let Content::Capture(content) = &view.content else { return None };
+        let finding = content.finding.as_ref().map(|finding| Self::Finding(finding.measurement));
+        finding.or_else(|| content.held.clone().map(Self::Held))
+    }
 }
 
 impl Ui {
@@ -62,7 +85,22 @@ impl Ui {
             camera: Camera::default(),
             scene: None,
             is_dirty: true,
+            has_bell: false,
+            attention: None,
+            is_ringing: false,
         }
+    }
+
+    /// With the bell on or off.
+    #[must_use]
+    pub const fn with_bell(mut self, has_bell: bool) -> Self {
+        self.has_bell = has_bell;
+        self
+    }
+
+    /// Whether the bell is to ring since it was asked last.
+    pub const fn take_bell(&mut self) -> bool {
+        std::mem::replace(&mut self.is_ringing, false)
     }
 
     /// Takes note of a new view. The session gives the preview its numbers and nothing else.
@@ -75,6 +113,9 @@ impl Ui {
         }
         self.screen.see(view);
         self.scene = scene(view, session);
+        let attention = Attention::of(view);
+        self.is_ringing |= self.has_bell && attention.is_some() && attention != self.attention;
+        self.attention = attention;
         self.is_dirty = true;
     }
 
@@ -156,6 +197,12 @@ impl Ui {
             }
             Some(Meaning::Local(Local::Suspend)) => Wish::Suspend,
             Some(Meaning::Local(Local::Redraw)) => Wish::Redraw,
+            Some(Meaning::Local(Local::Bell)) => {
+                self.has_bell = !self.has_bell;
+                // It shows what it is like.
+                self.is_ringing = self.has_bell;
+                Wish::None
+            }
             None => {
                 self.is_dirty = self.scene.is_some() && self.camera.on_key(key);
                 Wish::None
@@ -176,26 +223,40 @@ impl Ui {
         }
     }
 
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+    fn items(&self, cx: &ScreenCx<'_>, area: Rect) -> Vec<Item> {
         match (&self.dialog, self.help) {
             (Some(dialog), _) => dialog.items(),
             (None, Some(_)) => {
                 vec![Item::new("any key", "back", 0), Item::new("Up/Down", "scroll", 1)]
             }
-            (None, None) => self.page_items(cx),
+            (None, None) => self.page_items(cx, area),
         }
     }
 
     /// Keys of the screen itself.
-    fn page_items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+    fn page_items(&self, cx: &ScreenCx<'_>, area: Rect) -> Vec<Item> {
         let own = self.screen.items(cx);
         let mut items = keymap::items(&cx.view.intents, self.theme.glyphs);
         // The screen is asked first: its keys hide those of the table.
         items.retain(|item| !own.iter().any(|one| one.key == item.key));
-        items.extend(own);
-        if self.scene.is_some() {
-            items.push(Item::new(self.theme.glyphs.arrows(), "turn the picture", 8));
+        let bell = keymap::BELL.name(self.theme.glyphs);
+        for item in items.iter_mut().filter(|item| item.key == bell) {
+            let now = if self.has_bell { "on" } else { "off" };
+            item.label = format!("bell when a reading needs attention: now {now}");
         }
+        let glyphs = self.theme.glyphs;
+        let takes_up_and_down = own.iter().any(|item| item.key == "Up/Down");
+        let arrows = if takes_up_and_down { glyphs.sideways() } else { glyphs.arrows() };
+        items.extend(own);
+        items.sort_by_key(|item| item.rank);
+        let content = frame::room(cx.view, &items, self.theme, area);
+        let place = content.map_or(PicturePlace::Nowhere, |content| self.screen.picture_place(cx, content));
+        let rank = match place {
+            PicturePlace::Nowhere => return items,
+            PicturePlace::Beside => 8,
+            PicturePlace::Alone => 3,
+        };
+        items.push(Item::new(arrows, "turn the picture", rank));
         items.sort_by_key(|item| item.rank);
         items
     }
@@ -203,11 +264,11 @@ impl Ui {
     /// Draws everything; nothing changes by it.
     pub fn draw(&self, view: &ViewModel, area: Rect, buf: &mut Buffer) {
         let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
-        let Some(content) = frame::draw(view, &self.items(&cx), self.theme, area, buf) else { return };
+        let Some(content) = frame::draw(view, &self.items(&cx, area), self.theme, area, buf) else { return };
         match (&self.dialog, self.help) {
             (Some(dialog), _) => dialog.draw(self.theme, content, buf),
             (None, Some(scroll)) => {
-                help::draw(&self.page_items(&cx), scroll, self.theme, content, buf);
+                help::draw(&self.page_items(&cx, area), scroll, self.theme, content, buf);
             }
             (None, None) => self.screen.draw(&cx, content, buf),
         }

@@ -67,6 +67,15 @@ pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
     }
 }
 
+/// Whether a text would be taken as the coordinates of a measured point in `unit`.
+///
+/// # Errors
+/// Why not: it is no point, or a point that no instrument measures.
+pub fn check(text: &str, unit: CoordinateUnit) -> Result<(), String> {
+    let point = parse(text, unit)?;
+    gate(&point, None).map_or(Ok(()), Err)
+}
+
 /// The words of a point. A comma separates numbers, or stands before decimals: which one must be clear.
 fn separate(text: &str) -> Option<Vec<String>> {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
@@ -215,6 +224,20 @@ mod tests {
             ("1 2 3 in", "was chosen in the instrument step"),
         ] {
             let error = mm(text).unwrap_err();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn what_would_be_refused_is_known_before_it_is_sent() {
+        assert_eq!(check("1234.5 -20 88", CoordinateUnit::Millimetre), Ok(()));
+        for (text, unit, part) in [
+            ("1 2", CoordinateUnit::Millimetre, "found 2 numbers"),
+            ("1 2 3 in", CoordinateUnit::Millimetre, "was chosen in the instrument step"),
+            ("0 0 0", CoordinateUnit::Inch, "0, 0, 0"),
+            ("1234.5 -20 88", CoordinateUnit::Metre, "m away"),
+        ] {
+            let error = check(text, unit).unwrap_err();
             assert!(error.contains(part), "{text}: {error}");
         }
     }

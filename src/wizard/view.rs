@@ -196,6 +196,8 @@ pub struct CirclesView {
     pub result: Option<CirclesResult>,
     /// Why there is no result.
     pub problem: Option<String>,
+    /// Unit of the coordinates, where they are typed in.
+    pub typed_unit: Option<String>,
 }
 
 /// A fitted circle, in the tracker frame.
@@ -354,6 +356,25 @@ pub struct FindingView {
     pub message: String,
     /// Whether a correction is proposed.
     pub has_remedy: bool,
+    /// The distances from this sample that fit least, worst first.
+    pub worst: Vec<PairView>,
+}
+
+/// A measured distance against its prediction.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PairView {
+    /// Pose at the other end.
+    pub pose: String,
+    /// The other end is a later measurement of the pose, to see drift.
+    pub is_drift: bool,
+    /// As it was measured.
+    pub measured_mm: f64,
+    /// As the nominal arm and the points before let expect.
+    pub predicted_mm: f64,
+    /// Measured less predicted.
+    pub difference_mm: f64,
+    /// Standard deviation that the difference should have.
+    pub expected_mm: f64,
 }
 
 /// How far a pose has moved since it was measured first.
@@ -487,15 +508,15 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
     }
 }
 
-const fn purpose(step: Step) -> &'static str {
+pub(crate) const fn purpose(step: Step) -> &'static str {
     match step {
         Step::Profile => "Choose the robot to calibrate.",
         Step::Instrument => "Choose what measures the reflector (SMR).",
         Step::Target => "Say where the reflector (SMR) sits on the flange.",
         Step::Plan => "Choose the poses to measure.",
         Step::Capture => "Move the robot to the configuration shown, then measure.",
-        Step::Identify => "Identify the kinematic errors of the arm from the measured points.",
-        Step::Verify => "See how accurate the arm is at points that the identification never saw.",
+        Step::Identify => "Identify the kinematic errors of the arm.",
+        Step::Verify => "See how accurate the arm is at points not used so far.",
         Step::Deliver => "Write the results.",
     }
 }

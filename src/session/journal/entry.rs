@@ -183,6 +183,11 @@ pub fn to_xyz_mm(point: &Point3<f64>, decimals: i32) -> (f64, f64, f64) {
     (edge(point.x), edge(point.y), edge(point.z))
 }
 
+/// A length (m) in mm, rounded to 0.1 µm.
+pub fn to_length_mm(length: f64) -> f64 {
+    rounded(to_mm(length), 4)
+}
+
 /// A point (m) from mm.
 pub const fn from_xyz_mm((x, y, z): (f64, f64, f64)) -> Point3<f64> {
     Point3::new(from_mm(x), from_mm(y), from_mm(z))
@@ -249,6 +254,22 @@ pub struct FindingText {
     /// What would set it right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remedy: Option<Correction>,
+    /// The distances that fit least, worst first. Not in journals of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub worst: Vec<PairText>,
+}
+
+/// A measured distance against what the earlier points let expect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PairText {
+    /// Number of the measurement at the other end.
+    pub other: u64,
+    /// The distance as it was measured.
+    pub measured_mm: f64,
+    /// The distance as it was predicted.
+    pub predicted_mm: f64,
+    /// Standard deviation that the difference should have.
+    pub expected_mm: f64,
 }
 
 /// What the operator decides about a sample.

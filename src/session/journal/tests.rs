@@ -75,10 +75,30 @@ fn sample(number: u64) -> MeasuredText {
                 ratio: f64::INFINITY,
                 message: TRICKY.to_owned(),
                 remedy: Some(Correction::Swap { first: 1, second: 2 }),
+                worst: vec![PairText {
+                    other: 1,
+                    measured_mm: 1234.5678,
+                    predicted_mm: -0.0,
+                    expected_mm: f64::MIN_POSITIVE,
+                }],
             },
-            FindingText { about: 1, cause: "outlier".to_owned(), ratio: 7.5, message: String::new(), remedy: None },
+            FindingText {
+                about: 1,
+                cause: "outlier".to_owned(),
+                ratio: 7.5,
+                message: String::new(),
+                remedy: None,
+                worst: Vec::new(),
+            },
         ],
     }
+}
+
+#[test]
+fn findings_of_journals_before_there_was_a_table_are_read() {
+    let text = r#"(about: 3, cause: "wrong_pose", ratio: 9.5, message: "it does not fit")"#;
+    let found: FindingText = ron::from_str(text).unwrap();
+    assert_eq!((found.about, found.worst), (3, Vec::new()));
 }
 
 fn plan() -> PlanText {

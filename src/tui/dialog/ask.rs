@@ -1,17 +1,49 @@
-//! The forms that screens ask with: a known target, a simulated cell, recorded measurements.
+//! The questions that screens ask: coordinates, a known target, a simulated cell, recorded measurements.
 
 use super::{Dialog, Form};
 use crate::session::filter::Filter;
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{InstrumentChoice, RecordedSet, TargetChoice};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
-use crate::wizard::Intent;
+use crate::tui::form::{Check, TextField};
+use crate::wizard::view::{Content, ViewModel};
+use crate::wizard::{Intent, reading};
 
 /// Words for [`Truth`], in the order of [`TRUTHS`].
 const TRUTH_WORDS: &[&str] = &["random", "paper", "nominal"];
 const TRUTHS: [Truth; 3] = [Truth::Drawn, Truth::Paper, Truth::Nominal];
 /// Layouts of tables.
 const LAYOUTS: &[&str] = &["named", "robodk", "delmia"];
+
+/// The coordinates of a reading, begun with what was typed or pasted; they are checked against the unit as they are typed.
+pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
+    let (unit, place) = match &view.content {
+        Content::Capture(content) => {
+            let pose = content.finding.as_ref().map(|finding| finding.pose.as_str()).or(content.pose.as_deref());
+            (content.typed_unit.as_deref(), pose.map_or_else(String::new, |pose| format!(" at pose {pose}")))
+        }
+        Content::Target(content) => {
+            let circles = content.circles.as_ref();
+            let joint = circles.and_then(|circles| circles.joint.as_deref());
+            let place = joint.map_or_else(String::new, |joint| format!(" on the circle of {joint}"));
+            (circles.and_then(|circles| circles.typed_unit.as_deref()), place)
+        }
+        _ => (None, String::new()),
+    };
+    let unit = CoordinateUnit::ALL.into_iter().find(|one| Some(one.sign()) == unit).unwrap_or_default();
+    let label = format!("Coordinates x y z of the SMR{place} ({})", unit.sign());
+    Dialog::Text { field: TextField::new(label, begun).checked(check_of(unit)), intent: Intent::TypeReading }
+}
+
+/// What is wrong with coordinates in a unit.
+fn check_of(unit: CoordinateUnit) -> Check {
+    match unit {
+        CoordinateUnit::Millimetre => |text| reading::check(text, CoordinateUnit::Millimetre),
+        CoordinateUnit::Metre => |text| reading::check(text, CoordinateUnit::Metre),
+        CoordinateUnit::Inch => |text| reading::check(text, CoordinateUnit::Inch),
+        CoordinateUnit::Micrometre => |text| reading::check(text, CoordinateUnit::Micrometre),
+    }
+}
 
 /// Where the SMR is known to be.
 pub fn known_target(nominal_mm: [f64; 3]) -> Dialog {

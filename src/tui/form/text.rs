@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::Reaction;
-use crate::tui::glyphs::width;
+use crate::tui::glyphs::{width, wrapped};
 use crate::tui::keymap::Key;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
@@ -117,12 +117,15 @@ impl TextField {
         self.cursor = start;
     }
 
-    /// Draws it: the label, the text with its cursor, what is wrong. Takes three lines.
+    /// Draws it: the label, the text with its cursor, what is wrong. Takes three lines or more.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         paint::text(buf, area, (0, 0), &theme.glyphs.show(&self.label), theme.style(Role::Title));
         self.draw_line(theme, paint::band(area, 1, 1), buf);
         if let Some(problem) = self.problem().filter(|_| !self.characters.is_empty()) {
-            paint::text(buf, area, (0, 2), &theme.glyphs.show(&problem), theme.style(Role::Warn));
+            let lines = wrapped(&theme.glyphs.show(&problem), usize::from(area.width));
+            for (row, line) in (2..area.height).zip(&lines) {
+                paint::text(buf, area, (0, row), line, theme.style(Role::Warn));
+            }
         }
     }
 

@@ -12,7 +12,7 @@ use crate::tui::preview::{Camera, Scene};
 use crate::tui::theme::Theme;
 use crate::tui::{frame, paint};
 use crate::units::DEGREE;
-use crate::wizard::view::{Content, ViewModel};
+use crate::wizard::view::{Content, ViewModel, purpose};
 use crate::wizard::{IntentInfo, Wizard};
 
 pub(crate) fn themes() -> [Theme; 2] {
@@ -24,6 +24,7 @@ pub(crate) fn view(step: Step, content: Content, intents: Vec<IntentInfo>) -> Vi
     let mut view = Wizard::new(jiff::Timestamp::UNIX_EPOCH).view();
     view.header.step = step;
     view.header.number = step.number();
+    view.purpose = purpose(step);
     view.header.robot = Some("Soochow six-axis arm of the method paper".to_owned());
     view.header.session = Some("soochow-20260105".to_owned());
     view.header.instrument = Some("simulated tracker, seed 1".to_owned());

@@ -19,9 +19,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
-use super::{Reply, Screen, ScreenCx};
-use crate::tui::dialog::Dialog;
-use crate::tui::form::TextField;
+use super::{PicturePlace, Reply, Screen, ScreenCx};
+use crate::tui::dialog::ask;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::paint;
 use crate::tui::preview::Preview;
@@ -89,11 +88,8 @@ fn takes_typing(view: &ViewModel) -> bool {
 }
 
 /// The question for coordinates, begun with what was typed or pasted.
-fn reading_dialog(content: &CaptureView, begun: &str) -> Reply {
-    let unit = content.typed_unit.as_deref().unwrap_or("mm");
-    let pose = content.finding.as_ref().map(|finding| finding.pose.as_str()).or(content.pose.as_deref());
-    let label = format!("Coordinates x y z of the SMR at pose {} ({unit})", pose.unwrap_or("?"));
-    Reply::Ask(Box::new(Dialog::Text { field: TextField::new(label, begun), intent: Intent::TypeReading }))
+fn reading_dialog(cx: &ScreenCx<'_>, begun: &str) -> Reply {
+    Reply::Ask(Box::new(ask::coordinates(cx.view, begun)))
 }
 
 impl Capture {
@@ -167,7 +163,7 @@ impl Screen for Capture {
             KeyCode::Char(c @ ('0'..='9' | '-' | '+' | '.' | ','))
                 if self.tab != Tab::Picture && takes_typing(cx.view) =>
             {
-                return reading_dialog(content, &c.to_string());
+                return reading_dialog(cx, &c.to_string());
             }
             code => {
                 return match self.tab {
@@ -183,9 +179,14 @@ impl Screen for Capture {
 
     fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply {
         match content(cx.view) {
-            Some(content) if takes_typing(cx.view) => reading_dialog(content, text.trim()),
+            Some(_) if takes_typing(cx.view) => reading_dialog(cx, text.trim()),
             _ => Reply::Ignored,
         }
+    }
+
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        let beside = content(cx.view).and_then(|content| parts(cx, content, area).1);
+        PicturePlace::of(cx.scene.is_some() && self.tab == Tab::Picture, beside.is_some())
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
@@ -228,4 +229,4 @@ fn parts(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect) -> (Rect, Option<
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

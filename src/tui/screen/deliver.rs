@@ -5,7 +5,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll};
-use super::{Reply, Screen, ScreenCx, verify};
+use super::{PicturePlace, Reply, Screen, ScreenCx, verify};
+use crate::session::summary::VerdictStatus;
 use crate::tui::dialog::Dialog;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::theme::Role;
@@ -60,7 +61,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         );
     }
     match &content.verdict {
-        Some(verdict) => verify::status(verdict, &mut page),
+        Some(verdict) => verify::status(verdict, "see the step Verify", &mut page),
         None => page.paragraph("There is no result yet: go back and identify.", Role::Warn),
     }
     let folder = cx.view.header.folder.as_deref().unwrap_or(".");
@@ -68,7 +69,9 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         if file.starts_with('/') { file.to_owned() } else { format!("{}/{file}", folder.trim_end_matches('/')) }
     };
     if content.files.is_empty() {
-        page.title("Nothing is written yet. Enter writes the results into:");
+        let is_writing = cx.view.busy.is_some();
+        let nothing = "Nothing is written yet. Enter writes the results into:";
+        page.title(if is_writing { "The results are being written into:" } else { nothing });
         page.paragraph(folder, Role::Plain);
         page.gap();
         page.paragraph("calibration.ron is the identified arm; report.json has all numbers; plan.csv and measurements.csv are the data.", Role::Plain);
@@ -81,7 +84,14 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             }
         }
         page.title("What to do next");
-        page.marked(("1 ", Role::Dim), "apply calibration.ron to the controller or the offline program", Role::Plain);
+        let is_accepted = content.verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
+        if is_accepted {
+            let apply = "apply calibration.ron to the controller or the offline program";
+            page.marked(("1 ", Role::Dim), apply, Role::Plain);
+        } else {
+            let wait = "do not apply it yet: b goes back to Verify, which says what is missing";
+            page.marked(("1 ", Role::Dim), wait, Role::Warn);
+        }
         page.marked(("2 ", Role::Dim), "verify on new points, later or after a collision:", Role::Plain);
         let verify = format!("trupose verify --calibration {} --measurements NEW.csv", path("calibration.ron"));
         page.paragraph(&verify, Role::Plain);
@@ -116,6 +126,10 @@ impl Screen for DeliverScreen {
 
     fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
         Reply::Ignored
+    }
+
+    fn picture_place(&self, _cx: &ScreenCx<'_>, _area: Rect) -> PicturePlace {
+        PicturePlace::Nowhere
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

@@ -6,7 +6,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll, Tabs, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::tui::keymap::{Item, Key};
 use crate::wizard::view::{Content, IdentifyView};
 
@@ -40,7 +40,7 @@ impl IdentifyScreen {
         let mut page = Page::new(cx.theme, columns);
         let Some(content) = content(cx) else { return page };
         match (&content.summary, self.tabs.at) {
-            (None, _) => pages::before(content, &mut page),
+            (None, _) => pages::before(content, cx.view.busy.is_some(), &mut page),
             (Some(summary), 0 | PICTURE) => pages::result(content, summary, &mut page),
             (Some(summary), 1) => pages::parameters(summary, &mut page),
             (Some(summary), _) => pages::limits(summary, &mut page),
@@ -69,6 +69,12 @@ impl Screen for IdentifyScreen {
 
     fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
         Reply::Ignored
+    }
+
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        let is_beside = split(area, TEXT, cx.scene.is_some()).1.is_some();
+        let is_alone = cx.scene.is_some() && has_result(cx) && self.tabs.at == PICTURE;
+        PicturePlace::of(is_alone && !is_beside, is_beside)
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

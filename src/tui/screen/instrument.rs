@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 
 use super::menu::Menu;
 use super::page::{Page, Scroll, counted, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::tui::dialog::ask;
 use crate::tui::keymap::{Item, Key};
@@ -135,6 +135,10 @@ impl Screen for InstrumentScreen {
 
     fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
         Reply::Ignored
+    }
+
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        PicturePlace::of(false, split(area, TEXT, cx.scene.is_some()).1.is_some())
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

@@ -31,8 +31,12 @@ impl Menu {
             let has_focus = has_focus && index == self.at.unwrap_or(0);
             let lead = if has_focus { pointer } else { "  " };
             let role = if has_focus { Role::Focus } else { Role::Title };
+            let first = page.len();
             page.line(vec![(lead.to_owned(), Role::Hint), ((*title).to_owned(), role)]);
             page.marked(("    ", Role::Dim), about, Role::Dim);
+            if has_focus && self.at.is_some() {
+                page.keep_from(first);
+            }
         }
     }
 }

@@ -26,12 +26,19 @@ pub(super) struct Page {
     theme: Theme,
     columns: usize,
     lines: Vec<Vec<(String, Role)>>,
+    /// First and last line that stay in view, wherever it is scrolled to.
+    kept: Option<(usize, usize)>,
 }
 
 impl Page {
     /// An empty page of so many columns.
     pub(super) const fn new(theme: Theme, columns: u16) -> Self {
-        Self { theme, columns: columns as usize, lines: Vec::new() }
+        Self { theme, columns: columns as usize, lines: Vec::new(), kept: None }
+    }
+
+    /// Keeps the lines from `first` to the last one so far in view.
+    pub(super) const fn keep_from(&mut self, first: usize) {
+        self.kept = Some((first, self.lines.len().saturating_sub(1)));
     }
 
     /// Number of lines.
@@ -98,6 +105,13 @@ impl Page {
     pub(super) fn draw(&self, first: usize, area: Rect, buf: &mut Buffer) {
         let rows = usize::from(area.height);
         let first = if self.len() <= rows { 0 } else { first.min(self.len().saturating_sub(KEPT)) };
+        // The last row may be needed to say that there is more.
+        let whole = rows.saturating_sub(1).max(1);
+        let first = match self.kept.filter(|_| self.len() > rows) {
+            Some((from, _)) if from < first => from,
+            Some((from, to)) if to >= first + whole => from.min((to + 1).saturating_sub(whole)),
+            _ => first,
+        };
         for (row, line) in (0..area.height).zip(self.lines.iter().skip(first)) {
             let mut column = 0;
             for (text, role) in line {

@@ -18,7 +18,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::tui::glyphs::wrapped;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::paint;
@@ -30,10 +30,10 @@ use crate::wizard::{Intent, PlanSettings};
 use form::Form;
 use search::Search;
 
-/// Content columns from which on the picture stands beside the views (a terminal of 100).
-const WIDE: u16 = 98;
+/// Content columns from which on the picture stands beside the views (a terminal of 108).
+const WIDE: u16 = 106;
 /// Columns of the views beside the picture.
-const VIEWS: u16 = 74;
+const VIEWS: u16 = 78;
 /// Columns of the settings.
 const SETTINGS: u16 = 34;
 /// Lines of settings and figures.
@@ -184,6 +184,12 @@ impl Screen for Plan {
         Reply::Ignored
     }
 
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        // The arrows are for the settings while there are any to change.
+        let is_beside = area.width >= WIDE && !(self.tab == Tab::Plan && can_make(cx.view));
+        PicturePlace::of(cx.scene.is_some() && self.tab == Tab::Picture, cx.scene.is_some() && is_beside)
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let Some(content) = content(cx.view) else { return };
         let is_wide = area.width >= WIDE && cx.scene.is_some();
@@ -241,4 +247,4 @@ impl Plan {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::tui::dialog::Dialog;
 use crate::tui::form::TextField;
 use crate::tui::keymap::{Item, Key};
@@ -147,26 +147,43 @@ impl Screen for ProfileScreen {
         Reply::Changed
     }
 
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        PicturePlace::of(false, content(cx).is_some_and(|content| self.parts(content, cx, area).picture.is_some()))
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let Some(content) = content(cx) else { return };
+        let parts = self.parts(content, cx, area);
+        self.draw_list(content, cx, parts.list, buf);
+        let Some(card) = &content.chosen else { return introduction(cx, parts.text, buf) };
+        card_page(card, content, cx, parts.text.width).draw(0, parts.text, buf);
+        if let (Some(scene), Some(area)) = (cx.scene, parts.picture) {
+            picture(cx, scene, area, buf);
+        }
+    }
+}
+
+/// Where everything goes.
+struct Parts {
+    list: Rect,
+    text: Rect,
+    picture: Option<Rect>,
+}
+
+impl ProfileScreen {
+    fn parts(&self, content: &ProfileView, cx: &ScreenCx<'_>, area: Rect) -> Parts {
         let (list, right) = match &content.chosen {
             Some(_) if content.is_fixed || !self.is_browsing() && area.width < ALL => (Rect::ZERO, area),
             _ => columns(area),
         };
-        self.draw_list(content, cx, list, buf);
-        let Some(card) = &content.chosen else { return introduction(cx, right, buf) };
-        let (text, side) = split(right, CARD, cx.scene.is_some());
-        let page = card_page(card, content, cx, text.width);
-        page.draw(0, text, buf);
-        let Some(scene) = cx.scene else { return };
-        let used = u16::try_from(page.len()).unwrap_or(u16::MAX).saturating_add(1);
-        match side {
-            Some(side) => picture(cx, scene, side, buf),
-            None if text.height >= used.saturating_add(PICTURE_ROWS) => {
-                picture(cx, scene, paint::band(text, used, text.height), buf);
-            }
-            None => {}
-        }
+        let Some(card) = content.chosen.as_ref().filter(|_| cx.scene.is_some()) else {
+            return Parts { list, text: right, picture: None };
+        };
+        let (text, side) = split(right, CARD, true);
+        let used = u16::try_from(card_page(card, content, cx, text.width).len()).unwrap_or(u16::MAX).saturating_add(1);
+        let has_room = text.height >= used.saturating_add(PICTURE_ROWS);
+        let picture = side.or_else(|| has_room.then(|| paint::band(text, used, text.height)));
+        Parts { list, text, picture }
     }
 }
 

@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 
 use super::menu::Menu;
 use super::page::{Page, Scroll, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::session::set_up::TargetChoice;
 use crate::tui::dialog::ask;
 use crate::tui::keymap::{Item, Key};
@@ -16,6 +16,8 @@ use crate::tui::theme::Role;
 use crate::wizard::Intent;
 use crate::wizard::view::{Content, TargetView};
 
+/// Columns of the configuration beside the picture.
+const CIRCLES: u16 = 44;
 /// Columns of the text beside the picture.
 const TEXT: u16 = 62;
 /// The ways, with when to take each.
@@ -119,6 +121,11 @@ impl TargetScreen {
     }
 }
 
+/// Columns of the text beside the picture.
+fn columns(cx: &ScreenCx<'_>) -> u16 {
+    if is_in_circles(cx) { CIRCLES } else { TEXT }
+}
+
 /// Asks for coordinates, the profile's to begin with.
 fn known(cx: &ScreenCx<'_>) -> Reply {
     content(cx).map_or(Reply::Ignored, |content| Reply::Ask(Box::new(ask::known_target(content.nominal_mm))))
@@ -164,9 +171,12 @@ impl Screen for TargetScreen {
         Reply::Ignored
     }
 
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        PicturePlace::of(false, split(area, columns(cx), cx.scene.is_some()).1.is_some())
+    }
+
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
-        let wanted = if is_in_circles(cx) { 44 } else { TEXT };
-        let (text, side) = split(area, wanted, cx.scene.is_some());
+        let (text, side) = split(area, columns(cx), cx.scene.is_some());
         self.page(cx, text.width).draw(self.scroll.0, text, buf);
         if let (Some(side), Some(scene)) = (side, cx.scene) {
             picture(cx, scene, side, buf);

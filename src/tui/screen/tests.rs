@@ -20,11 +20,14 @@ use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
 use crate::tui::preview::Checked;
 use crate::tui::ui::{Ui, Wish};
+use crate::wizard::view::purpose;
 use crate::wizard::view::{
     CircleView, CirclesResult, CirclesView, Content, DeliverView, IdentifyView, InstrumentView, JointShown,
     ProfileCard, TargetView, VerifyView,
 };
 use crate::wizard::{IntentInfo, Notice, Wizard};
+
+mod steps;
 
 static SOOCHOW: LazyLock<Profile> = LazyLock::new(|| Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap().0);
 
@@ -33,6 +36,7 @@ fn view(step: Step, content: Content, offers: Vec<IntentInfo>) -> ViewModel {
     let mut view = Wizard::new(jiff::Timestamp::UNIX_EPOCH).view();
     view.header.step = step;
     view.header.number = step.number();
+    view.purpose = purpose(step);
     view.header.robot = Some(SOOCHOW.title().to_owned());
     view.header.session = Some("demo".to_owned());
     view.header.folder = Some("/home/op/sessions/demo".to_owned());
@@ -140,6 +144,7 @@ fn circles(is_complete: bool) -> CirclesView {
             residual_rms_mm: 0.0118,
         }),
         problem: None,
+        typed_unit: None,
     }
 }
 
@@ -463,6 +468,13 @@ fn the_delivery() {
     insta::assert_snapshot!("deliver_before", whole(&deliver(&[]), &[], SMALL));
     insta::assert_snapshot!("deliver_written", whole(&deliver(&FILES), &[], SMALL));
     insta::assert_snapshot!("deliver_error", whole(&failed(deliver(&[])), &[], SMALL));
+    let mut refused = deliver(&FILES);
+    if let Content::Deliver(content) = &mut refused.content {
+        let mut verdict = verdict(VerdictStatus::NotAccepted);
+        verdict.reasons = ["poor_data", "few_data"].map(|code| format!("see the warning '{code}'")).to_vec();
+        content.verdict = Some(Box::new(verdict));
+    }
+    insta::assert_snapshot!("deliver_refused", whole(&refused, &[], SMALL));
     insta::assert_snapshot!("deliver_quit", whole(&deliver(&FILES), &[Key::plain_code(KeyCode::Enter)], SMALL));
 }
 

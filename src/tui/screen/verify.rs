@@ -10,7 +10,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll, Tabs, picture, split};
-use super::{Reply, Screen, ScreenCx};
+use super::{PicturePlace, Reply, Screen, ScreenCx};
 use crate::tui::keymap::{Item, Key};
 use crate::tui::paint;
 use crate::tui::preview::Scene;
@@ -96,6 +96,12 @@ impl Screen for VerifyScreen {
 
     fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
         Reply::Ignored
+    }
+
+    fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
+        let is_beside = split(area, TEXT, cx.scene.is_some()).1.is_some();
+        let is_alone = cx.scene.is_some() && self.tabs.at == PICTURE;
+        PicturePlace::of(is_alone && !is_beside, is_beside)
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {

@@ -62,6 +62,43 @@ fn drawn(view: &ViewModel, theme: Theme, keys: &[Key], width: u16, height: u16) 
     buffer
 }
 
+impl Ui {
+    /// With a robot in the picture, whatever the session is.
+    pub(crate) fn put_scene(&mut self, scene: Scene) {
+        self.scene = Some(scene);
+    }
+}
+
+#[test]
+fn the_bell_rings_once_for_what_needs_attention() {
+    let usual = screen::capture_tests::usual();
+    let asked = screen::capture_tests::in_question();
+    let rings = |has_bell: bool, views: &[&ViewModel]| -> Vec<bool> {
+        let mut ui = Ui::new(themes()[0]).with_bell(has_bell);
+        let ring = |view: &&ViewModel| {
+            ui.refresh(view, &Session::default());
+            ui.take_bell()
+        };
+        views.iter().map(ring).collect()
+    };
+    assert_eq!(rings(true, &[&usual, &asked, &asked, &usual, &asked]), [false, true, false, false, true]);
+    assert_eq!(rings(false, &[&usual, &asked]), [false, false]);
+    // By key, with a proof.
+    let mut ui = Ui::new(themes()[0]);
+    ui.refresh(&usual, &Session::default());
+    let help = |ui: &mut Ui| {
+        ui.on_input(Input::Key(Key::char('?')), &usual);
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 80, 60));
+        ui.draw(&usual, buffer.area, &mut buffer);
+        ui.on_input(Input::Key(Key::plain_code(KeyCode::Esc)), &usual);
+        paint::snapshot(&buffer)
+    };
+    assert!(help(&mut ui).contains("needs attention: now off"));
+    ui.on_input(Input::Key(keymap::BELL), &usual);
+    assert!(ui.take_bell() && !ui.take_bell());
+    assert!(help(&mut ui).contains("needs attention: now on"));
+}
+
 #[test]
 fn the_skeleton_at_80x24() {
     let [unicode, ascii] = themes();

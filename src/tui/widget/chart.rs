@@ -63,7 +63,6 @@ impl Chart<'_> {
         let points: Vec<(f64, f64)> =
             self.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
         let level = self.level.filter(|level| level.is_finite());
-        paint::text(buf, area, (0, 0), &theme.glyphs.show(self.y_title), theme.style(Role::Dim));
         let x = range(points.iter().map(|point| point.0));
         let y = range(points.iter().map(|point| point.1).chain(level));
         let label = |value: f64| format!("{value:.*}", self.digits);
@@ -76,6 +75,7 @@ impl Chart<'_> {
             return;
         }
         let dim = theme.style(Role::Dim);
+        paint::text(buf, area, (0, 0), &theme.glyphs.show(self.y_title), dim);
         let right = |label: &str| u16::try_from(usize::from(left - 1).saturating_sub(width(label))).unwrap_or(0);
         paint::text(buf, area, (right(&labels[0]), 1), &labels[0], dim);
         paint::text(buf, area, (right(&labels[1]), plot.height), &labels[1], dim);

@@ -304,6 +304,7 @@ impl StepMachine for CaptureStep {
                     ratio: 0.0,
                     message: reason,
                     remedy: None,
+                    worst: Vec::new(),
                 });
                 let keep = Entry::Decision { sample: number, decision: Decision::Keep };
                 let entries = std::iter::once(self.sample(noted, cx)).chain(is_settled.then_some(keep));

@@ -369,6 +369,10 @@ impl TargetStep {
                 sigma_mm: [found.sigma().x, found.sigma().y, found.sigma().z].map(to_mm),
                 residual_rms_mm: to_mm(found.rms),
             }),
+            typed_unit: match session.instrument {
+                Some(InstrumentChoice::Manual { unit }) => Some(unit.sign().to_owned()),
+                _ => None,
+            },
             problem: located.and_then(Result::err).map(|error| error.to_string()),
         })
     }

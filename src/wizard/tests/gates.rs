@@ -190,6 +190,13 @@ fn a_sample_in_question_has_to_be_decided_about() {
     let finding = view.finding.unwrap();
     assert_eq!((finding.pose.as_str(), finding.measurement, finding.cause.as_str()), ("13", 13, "unexplained"));
     assert!(!finding.has_remedy);
+    // The distances that fit least: to the poses before, with what was expected.
+    let [first, second, ..] = finding.worst.as_slice() else { panic!("{:?}", finding.worst) };
+    assert!(finding.worst.iter().all(|pair| pair.pose != "13" && pair.measured_mm > 0.0 && !pair.is_drift));
+    let share = |pair: &crate::wizard::view::PairView| (pair.difference_mm / pair.expected_mm).abs();
+    assert!(share(first) >= share(second) && share(first) > 5.0, "{first:?}");
+    assert!((first.measured_mm - first.predicted_mm - first.difference_mm).abs() < 1e-9);
+    assert!(finding.message.contains(&format!("{:.2} mm", first.difference_mm.abs())), "{}", finding.message);
     assert_eq!(view.pose.as_deref(), Some("13"), "the pose in question stays on the screen");
     let first = "decide first about the sample in question: keep it, measure again, or leave it out";
     assert_eq!(blocked(&bench.wizard, "Measure"), first);
@@ -249,6 +256,7 @@ fn one_question_after_the_other_is_asked() {
         ratio: 9.0,
         message: format!("measurement {about} is odd"),
         remedy: None,
+        worst: Vec::new(),
     };
     let last = bench.journal.last_mut().unwrap();
     let Entry::Sample(noted) = &mut last.entry else { panic!() };

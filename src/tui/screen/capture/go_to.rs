@@ -11,7 +11,7 @@ use crate::tui::paint;
 use crate::tui::screen::ScreenCx;
 use crate::tui::theme::{Role, Theme};
 use crate::wizard::Intent;
-use crate::wizard::view::{CaptureView, FindingView};
+use crate::wizard::view::{CaptureView, FindingView, PairView};
 
 /// Columns of the names of keys in a list of what can be done.
 const KEYS: usize = 12;
@@ -19,6 +19,8 @@ const KEYS: usize = 12;
 const TALL: u16 = 26;
 /// Lines of a message before it is cut off.
 const MESSAGE: usize = 4;
+/// Distances that are shown at most.
+const PAIRS: u16 = 5;
 
 /// Draws it.
 pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
@@ -26,10 +28,13 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     let room = usize::from(area.width);
     let is_tall = area.height >= TALL;
     let mut lines: Vec<(String, Role)> = Vec::new();
-    lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, Role::Title)));
-    lines.extend(joined(&count(content), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
+    let role = if content.finding.is_some() { Role::Warn } else { Role::Title };
+    lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, role)));
+    lines.extend(joined(&count(content, is_tall), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
     lines.extend(panel(cx, content, room));
-    let status: Vec<(String, Role)> = status(content)
+    // While something is in question, that and the configuration are what matters.
+    let status = if content.finding.is_some() && !is_tall { Vec::new() } else { status(content, is_tall) };
+    let status: Vec<(String, Role)> = status
         .into_iter()
         .flat_map(|(text, role)| {
             let text = theme.glyphs.show(&text);
@@ -38,7 +43,15 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
         })
         .collect();
     // The joints are what matters, but never so large that what is to be decided has no room.
-    let needed = height(lines.len()).saturating_add(u16::from(!status.is_empty()));
+    let kept = if is_tall { height(status.len()) } else { u16::from(!status.is_empty()) };
+    let pairs = content.finding.as_ref().map_or(&[][..], |finding| &finding.worst);
+    let small = joints::layout(&content.joints, area.width, 0).rows;
+    let free = area.height.saturating_sub(height(lines.len()).saturating_add(small));
+    let most = height(pairs.len()).min(PAIRS).min(free.saturating_sub(1));
+    if most > 0 {
+        lines.extend(table(content, usize::from(most)));
+    }
+    let needed = height(lines.len()).saturating_add(kept);
     let layout = joints::layout(&content.joints, area.width, area.height.saturating_sub(needed));
     let mut row = 0;
     for (text, role) in &lines {
@@ -77,32 +90,77 @@ fn height(lines: usize) -> u16 {
     u16::try_from(lines).unwrap_or(u16::MAX)
 }
 
+/// The short name of a cause in words.
+fn in_words(cause: &str) -> String {
+    let words = match cause {
+        "unit" => "another unit",
+        "joint_sign" => "a joint turns the other way",
+        "mistyped_joint" => "one joint stood elsewhere",
+        "wrong_pose" => "taken at another pose",
+        "stayed_at_previous" => "the robot had not moved",
+        "swapped_rows" => "exchanged with another pose",
+        "target_moved" => "the SMR has moved",
+        "instrument_moved" => "the tracker has moved",
+        "not_at_rest" => "the robot still moved",
+        "unexplained" => "its reading does not fit",
+        "drift" => "it has drifted",
+        other => return other.replace('_', " "),
+    };
+    words.to_owned()
+}
+
 /// Where to go, and through which poses.
 fn heading(content: &CaptureView) -> Vec<String> {
     if let Some(finding) = &content.finding {
-        return vec![format!("Pose {} is in question: decide before going on", finding.pose)];
+        let cause = in_words(&finding.cause);
+        return vec![format!("Pose {} is in question: {cause}", finding.pose), "decide before going on".to_owned()];
     }
     let Some(pose) = &content.pose else { return vec!["All poses of the plan are measured.".to_owned()] };
     let mut parts = vec![format!("Go to pose {pose}")];
     parts.extend(content.kind.map(|kind| kind.name().to_owned()));
     if !content.on_the_way.is_empty() {
-        parts.push(format!("pass through {} first", content.on_the_way.join(", ")));
+        parts.push(format!("through {}", content.on_the_way.join(", ")));
     }
     let most = content.joints.iter().find(|joint| joint.moves_most);
     parts.extend(most.map(|joint| format!("{} moves most: {:.1} {}", joint.name, joint.moves, joint.unit)));
     parts
 }
 
-fn count(content: &CaptureView) -> Vec<String> {
+fn count(content: &CaptureView, is_tall: bool) -> Vec<String> {
     let all = content.measured + content.open;
-    let mut parts = vec![format!("{} of {all} measured", content.measured), format!("{} open", content.open)];
+    let mut parts = vec![format!("{} of {all} measured", content.measured)];
     if content.skipped > 0 {
         parts.push(format!("{} skipped", content.skipped));
     }
     if content.open > 0 {
         parts.extend(content.minutes_left.map(|minutes| format!("about {:.0} min left", minutes.ceil())));
     }
+    // Where there is room it is a line of its own.
+    if let Some(drift) = content.drift.last().filter(|_| !is_tall) {
+        parts.push(format!("drift {:.3} mm", drift.moved_mm));
+    }
     parts
+}
+
+/// The distances that fit least, as a table.
+fn table(content: &CaptureView, most: usize) -> Vec<(String, Role)> {
+    let Some(finding) = &content.finding else { return Vec::new() };
+    let row = |pair: &PairView| {
+        let again = if pair.is_drift { " (again)" } else { "" };
+        let word = if pair.difference_mm < 0.0 { "too short" } else { "too long" };
+        format!(
+            "  {:<16}{:>10.3}{:>11.3}{:>9.3} {word:<9} {:>6.3}",
+            format!("pose {}{again}", pair.pose),
+            pair.measured_mm,
+            pair.predicted_mm,
+            pair.difference_mm.abs(),
+            pair.expected_mm
+        )
+    };
+    let from = format!("mm, from {}", finding.pose);
+    let head = format!("  {from:<16}{:>10}{:>11}{:>9} {:<9} {:>6}", "measured", "predicted", "differs", "", "usual");
+    let rows = finding.worst.iter().take(most).map(|pair| (row(pair), Role::Plain));
+    std::iter::once((head, Role::Dim)).chain(rows).collect()
 }
 
 /// What has to be decided, with the keys for it.
@@ -130,11 +188,7 @@ fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, 
 }
 
 fn question(cx: &ScreenCx<'_>, finding: &FindingView, room: usize) -> Vec<(String, Role)> {
-    let cause = finding.cause.replace('_', " ");
-    let title =
-        format!("{}Pose {}, measurement {}: {cause}", cx.theme.glyphs.pointer(), finding.pose, finding.measurement);
-    let mut lines = vec![(cx.theme.glyphs.show(&title), Role::Warn)];
-    lines.extend(message(cx, &finding.message, room));
+    let mut lines = message(cx, &finding.message, room);
     if finding.has_remedy {
         lines.extend(choice(cx, "correct it as proposed", |intent| *intent == Intent::ApplyRemedy));
     }
@@ -169,8 +223,8 @@ fn choice(cx: &ScreenCx<'_>, label: &str, accepts: impl Fn(&Intent) -> bool) -> 
     (!keys.is_empty()).then(|| (format!("  {:<KEYS$} {label}", keys.join(" or ")), Role::Plain))
 }
 
-/// Last reading, drift and prediction in a line each.
-fn status(content: &CaptureView) -> Vec<(String, Role)> {
+/// Last reading, prediction and drift in a line each.
+fn status(content: &CaptureView, is_tall: bool) -> Vec<(String, Role)> {
     let mut lines = Vec::new();
     if let Some(last) = &content.last {
         let scatter = last.scatter_mm.map_or_else(String::new, |scatter| format!(", scatter {scatter:.3} mm"));
@@ -180,15 +234,17 @@ fn status(content: &CaptureView) -> Vec<(String, Role)> {
         lines.push((text, Role::Plain));
     }
     if let Some(prediction) = &content.prediction {
-        let role = if prediction.is_enough { Role::Ok } else { Role::Plain };
-        lines.push((in_short(prediction), role));
+        let role = if prediction.is_enough && content.open > 0 { Role::Ok } else { Role::Plain };
+        lines.push((in_short(prediction, content.open), role));
     }
-    if let Some(drift) = content.drift.last() {
+    if let Some(drift) = content.drift.last().filter(|_| is_tall) {
+        let checked = match content.drift.len() {
+            1 => "once".to_owned(),
+            count => format!("{count} times"),
+        };
         let text = format!(
-            "drift: pose {} has moved {:.3} mm since it was measured first (checked {} times)",
-            drift.pose,
-            drift.moved_mm,
-            content.drift.len()
+            "drift: pose {} has moved {:.3} mm since it was measured first (checked {checked})",
+            drift.pose, drift.moved_mm
         );
         lines.push((text, Role::Plain));
     }

@@ -20,12 +20,16 @@ fn error(sigma: f64, mm: Option<f64>) -> String {
 
 /// Whether the rest is worth its time.
 fn verdict(prediction: &PredictionView) -> &'static str {
-    if prediction.is_enough { "enough (the rest gains less than 5 %)" } else { "not enough yet" }
+    if prediction.is_enough { "enough (rest gains < 5 %)" } else { "not enough yet" }
 }
 
 /// The prediction in a line.
-pub(super) fn in_short(prediction: &PredictionView) -> String {
+pub(super) fn in_short(prediction: &PredictionView, open: usize) -> String {
     let now = error(prediction.now_sigma, prediction.now_mm);
+    if open == 0 {
+        // Whether more of them would be worth it is another question than the rest of this plan.
+        return format!("predicted error {now} with all poses of the plan");
+    }
     let all = prediction.with_all_sigma.map(|sigma| error(sigma, prediction.with_all_mm));
     let all = all.map_or_else(String::new, |all| format!(", {all} with all"));
     format!("predicted error {now}{all}: {}", verdict(prediction))
@@ -43,11 +47,12 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
     };
     let now = error(prediction.now_sigma, prediction.now_mm);
     lines.push((format!("now, {} identification poses: {now}", content.identification), Role::Title));
-    if let Some(sigma) = prediction.with_all_sigma {
+    if let Some(sigma) = prediction.with_all_sigma.filter(|_| content.open > 0) {
         lines.push((format!("with all poses of the plan: {}", error(sigma, prediction.with_all_mm)), Role::Plain));
     }
     let role = if prediction.is_enough { Role::Ok } else { Role::Hint };
-    lines.push((verdict(prediction).to_owned(), role));
+    let said = if content.open == 0 { "all poses of the plan are measured" } else { verdict(prediction) };
+    lines.push((said.to_owned(), role));
     lines.push((MEANING.to_owned(), Role::Dim));
     let used = text(theme, &lines, room, area, buf);
 

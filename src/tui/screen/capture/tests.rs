@@ -5,7 +5,9 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::tui::dialog::Answer;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
-use crate::wizard::view::{DriftView, FindingView, JointShown, PredictionView, RowState, RowView, SampleView};
+use crate::wizard::view::{
+    DriftView, FindingView, JointShown, PairView, PredictionView, RowState, RowView, SampleView,
+};
 use crate::wizard::{IntentInfo, Notice};
 
 fn joints() -> Vec<JointShown> {
@@ -105,7 +107,11 @@ fn of(content: CaptureView) -> ViewModel {
     view(Step::Capture, Content::Capture(Box::new(content)), intents)
 }
 
-fn in_question() -> ViewModel {
+pub(crate) fn usual() -> ViewModel {
+    of(normal())
+}
+
+pub(crate) fn in_question() -> ViewModel {
     let message = "pose 14 does not fit the other poses: its point fits pose 15; was the robot at another pose?";
     let mut view = of(CaptureView {
         row: Some(14),
@@ -116,6 +122,16 @@ fn in_question() -> ViewModel {
             cause: "wrong_pose".to_owned(),
             message: message.to_owned(),
             has_remedy: true,
+            worst: [(3, 1234.567, -3.125), (11, 987.654, 2.871), (1, 1502.9, 1.44), (9, 640.0, -0.903)]
+                .map(|(pose, measured_mm, difference_mm)| PairView {
+                    pose: pose.to_string(),
+                    is_drift: pose == 1,
+                    measured_mm,
+                    predicted_mm: measured_mm - difference_mm,
+                    difference_mm,
+                    expected_mm: 0.41,
+                })
+                .to_vec(),
         }),
         ..normal()
     });
@@ -197,6 +213,38 @@ fn digits_and_paste_open_the_question_for_coordinates() {
     // An instrument that measures by itself takes no numbers.
     assert!(matches!(press(&mut screen, &of(normal()), Key::char('1')), Reply::Ignored));
     assert!(matches!(paste(&mut screen, &of(normal()), "1 2 3"), Reply::Ignored));
+}
+
+#[test]
+fn coordinates_are_checked_as_they_are_typed() {
+    // In inch, as the instrument of this session counts.
+    let view = manual();
+    let mut screen = on(Tab::GoTo);
+    let Reply::Ask(mut dialog) = press(&mut screen, &view, Key::char('1')) else { panic!("no question") };
+    let drawn = |dialog: &crate::tui::dialog::Dialog| {
+        let mut buf = Buffer::empty(Rect::new(0, 0, 78, 10));
+        dialog.draw(themes()[1], buf.area, &mut buf);
+        shown(&buf)
+    };
+    for (text, reason) in [
+        ("0.5 20", "found 2 numbers"),
+        (" 30 mm", "the reading is in mm, but in was chosen"),
+        ("000", "'10.5 20 30 mm000' is not a point"),
+    ] {
+        dialog.paste(text);
+        assert!(drawn(&dialog).contains(reason), "{}", drawn(&dialog));
+        assert_eq!(dialog.on_key(Key::plain_code(KeyCode::Enter)), Answer::Open);
+    }
+    for _ in 0..6 {
+        dialog.on_key(Key::plain_code(KeyCode::Backspace));
+    }
+    assert!(!drawn(&dialog).contains("not"), "{}", drawn(&dialog));
+    let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
+    assert_eq!(answer, Answer::Intend(Intent::TypeReading("10.5 20 30".to_owned())));
+    // The key of the table asks the same.
+    let offer = view.intents.iter().find(|info| matches!(info.intent, Intent::TypeReading(_))).unwrap();
+    let asked = crate::tui::dialog::Dialog::before(offer, &view).unwrap();
+    assert!(drawn(&asked).starts_with("Coordinates x y z of the SMR at pose 15 (in)"), "{}", drawn(&asked));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::wizard::view::IdentifyView;
 const WEAK: f64 = 0.5;
 
 /// Nothing is identified yet.
-pub(super) fn before(content: &IdentifyView, page: &mut Page) {
+pub(super) fn before(content: &IdentifyView, is_busy: bool, page: &mut Page) {
     page.pair("samples", &format!("{} to identify from", counted(content.samples, "pose")));
     page.gap();
     page.title("What is identified");
@@ -29,7 +29,8 @@ pub(super) fn before(content: &IdentifyView, page: &mut Page) {
         Role::Plain,
     );
     page.gap();
-    page.paragraph("Enter begins; it takes some seconds.", Role::Hint);
+    let text = if is_busy { "This takes some seconds. Esc stops it." } else { "Enter begins; it takes some seconds." };
+    page.paragraph(text, Role::Hint);
 }
 
 /// Warnings first, then what the result rests on.

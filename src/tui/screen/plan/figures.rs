@@ -11,6 +11,10 @@ use crate::wizard::view::{PlanFigures, PlanView};
 
 /// Columns of the names of the numbers.
 const NAMES: usize = 16;
+/// Columns of the comparison with random sets.
+const COMPARED: u16 = 42;
+/// Columns of the names where there is little room.
+const SHORT_NAMES: usize = 9;
 /// Said where there is no plan.
 const NO_PLAN: &str = "No plan yet. Enter chooses poses with the settings beside; l takes the poses of a file.";
 /// Said while one is made.
@@ -28,13 +32,15 @@ pub(super) fn time(minutes: f64) -> String {
 pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: Rect, buf: &mut Buffer) {
     let mut lines = match (&content.proposal, &content.accepted) {
         (Some(figures), _) => {
-            let mut lines = vec![(Role::Title, "Proposed, not accepted yet".to_owned())];
-            lines.extend(numbers(figures, content.summary.as_deref()));
+            let is_narrow = area.width < COMPARED;
+            let title = if is_narrow { "Proposed" } else { "Proposed, not accepted yet" };
+            let mut lines = vec![(Role::Title, title.to_owned())];
+            lines.extend(numbers(figures, content.summary.as_deref(), is_narrow));
             lines
         }
         (None, Some(figures)) => {
             let mut lines = vec![(Role::Title, "This plan is being measured".to_owned())];
-            lines.extend(numbers(figures, None));
+            lines.extend(numbers(figures, None, area.width < COMPARED));
             lines.push(named("measured", &format!("{}, {} left", content.measured, content.left)));
             lines
         }
@@ -55,36 +61,70 @@ fn named(name: &str, value: &str) -> (Role, String) {
     (Role::Plain, format!("{name:<NAMES$} {value}"))
 }
 
-fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, String)> {
+fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>, is_narrow: bool) -> Vec<(Role, String)> {
+    if is_narrow {
+        return in_short(figures, summary);
+    }
+    if let (Some(summary), Some(condition), Some(sigma)) =
+        (summary, figures.condition_number, figures.predicted_error_sigma)
+    {
+        return compared(figures, summary, condition, sigma);
+    }
     let mut lines = vec![named("poses", &format!("{} + {} to verify", figures.identification, figures.verification))];
     if let Some(condition) = figures.condition_number {
-        let random = summary.map_or_else(String::new, |summary| {
-            let random = &summary.random.condition_number;
-            format!(" (random {:.1})", random.median)
-        });
-        lines.push(named("condition number", &format!("{condition:.1}{random}")));
+        lines.push(named("condition number", &format!("{condition:.1}")));
     }
     if let Some(sigma) = figures.predicted_error_sigma {
-        // σ to mm, where the instrument is known.
-        let mm = summary.and_then(|summary| summary.predicted_rms_mm).map(|mm| mm / sigma).filter(|mm| mm.is_finite());
-        let (factor, unit) = mm.map_or((1.0, "sigma"), |mm| (mm, "mm"));
-        let random = summary.map_or_else(String::new, |summary| {
-            let random = &summary.random.predicted_error_sigma;
-            format!(" (random {:.4})", random.median * factor)
-        });
-        lines.push(named("predicted error", &format!("{:.4} {unit}{random}", sigma * factor)));
+        lines.push(named("predicted error", &format!("{sigma:.4} sigma")));
     }
     if let Some(minutes) = figures.minutes {
         lines.push(named("time", &format!("about {}", time(minutes))));
     }
+    lines.push((Role::Dim, figures.origin.clone()));
+    lines
+}
+
+/// The figures in few columns.
+fn in_short(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, String)> {
+    let line = |name: &str, value: &str| (Role::Plain, format!("{name:<SHORT_NAMES$} {value}"));
+    let mut lines = vec![line("poses", &format!("{} + {}", figures.identification, figures.verification))];
+    lines.extend(figures.condition_number.map(|condition| line("condition", &format!("{condition:.1}"))));
+    let mm = summary.and_then(|summary| summary.predicted_rms_mm).map(|mm| format!("{mm:.4} mm"));
+    let sigma = figures.predicted_error_sigma.map(|sigma| format!("{sigma:.4} sigma"));
+    lines.extend(mm.or(sigma).map(|error| line("error", &error)));
     if let Some(summary) = summary {
-        lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
-        let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
-        if weak + warnings > 0 {
-            lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: see Tab")));
-        }
-    } else {
-        lines.push((Role::Dim, figures.origin.clone()));
+        let best = &summary.random;
+        lines.push((Role::Dim, format!("best of {} random:", best.sets)));
+        let scale = summary.predicted_rms_mm.map_or(1.0, |mm| mm / summary.predicted_error_sigma);
+        let error = best.predicted_error_sigma.best * scale;
+        lines.push((Role::Dim, format!("{:<SHORT_NAMES$} {:.1}, {error:.4}", "", best.condition_number.best)));
+    }
+    lines.extend(figures.minutes.map(|minutes| line("time", &time(minutes))));
+    lines
+}
+
+/// The figures beside those of random sets of the same size: the median one and the best one.
+fn compared(figures: &PlanFigures, summary: &PlanSummary, condition: f64, sigma: f64) -> Vec<(Role, String)> {
+    let random = &summary.random;
+    // σ to mm, where the instrument is known.
+    let mm = summary.predicted_rms_mm.map(|mm| mm / sigma).filter(|mm| mm.is_finite());
+    let (factor, unit) = mm.map_or((1.0, "sigma"), |mm| (mm, "mm"));
+    let row = |name: &str, [plan, median, best]: [String; 3]| format!("{name:<NAMES$}{plan:>7}{median:>7}{best:>12}");
+    let head = ["plan".to_owned(), "random".to_owned(), format!("best of {}", random.sets)];
+    let of_condition = [condition, random.condition_number.median, random.condition_number.best];
+    let error = &random.predicted_error_sigma;
+    let of_error = [sigma, error.median, error.best].map(|sigma| format!("{:.4}", sigma * factor));
+    let mut lines = vec![
+        named("poses", &format!("{} + {} to verify", figures.identification, figures.verification)),
+        (Role::Dim, row("", head)),
+        (Role::Plain, row("condition number", of_condition.map(|value| format!("{value:.1}")))),
+        (Role::Plain, row(&format!("predicted, {unit}"), of_error)),
+    ];
+    lines.extend(figures.minutes.map(|minutes| named("time", &format!("about {}", time(minutes)))));
+    lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
+    let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
+    if weak + warnings > 0 {
+        lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: see Tab")));
     }
     lines
 }

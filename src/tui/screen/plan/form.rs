@@ -29,7 +29,7 @@ const FIELDS: [Field; 5] = [
     Field { label: "poses to verify", range: (0, 200), step: 1 },
     Field { label: "candidates", range: (50, 200_000), step: 500 },
     Field { label: "seed", range: (0, 999_999_999), step: 1 },
-    Field { label: "drift check every ... poses", range: (0, 500), step: 5 },
+    Field { label: "poses between drift checks", range: (0, 500), step: 5 },
 ];
 
 /// What each setting means.

@@ -107,7 +107,7 @@ fn of(content: PlanView) -> ViewModel {
     view(Step::Plan, Content::Plan(content), intents)
 }
 
-fn proposal() -> ViewModel {
+pub(in crate::tui::screen) fn proposal() -> ViewModel {
     of(PlanView { proposal: Some(figures()), summary: Some(Box::new(summary())), ..nothing() })
 }
 
@@ -115,7 +115,11 @@ fn accepted() -> ViewModel {
     of(PlanView { accepted: Some(figures()), left: 64, measured: 12, ..nothing() })
 }
 
-fn searching(condition: f64) -> ViewModel {
+pub(in crate::tui::screen) fn empty() -> ViewModel {
+    of(nothing())
+}
+
+pub(in crate::tui::screen) fn searching(condition: f64) -> ViewModel {
     let mut view = of(nothing());
     for info in &mut view.intents {
         info.blocked = Some("planning is under way".to_owned());

@@ -1,7 +1,7 @@
 //! Verdict and tables of the verification.
 
 use crate::session::summary::{ModelSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationSummary};
-use crate::tui::screen::page::{Page, fixed};
+use crate::tui::screen::page::{Page, counted, fixed};
 use crate::tui::theme::Role;
 use crate::wizard::view::VerifyView;
 
@@ -23,7 +23,7 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
         page.marked(("UNKNOWN: ", Role::Warn), too_few, Role::Plain);
     }
     if let Some(verdict) = &content.verdict {
-        status(verdict, page);
+        status(verdict, "see below", page);
         limits(verdict, page);
     }
     for warning in &content.warnings {
@@ -35,14 +35,24 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
     }
 }
 
-/// The verdict in words.
-pub(in crate::tui::screen) fn status(verdict: &Verdict, page: &mut Page) {
+/// How a reason begins that is a warning, called by its code.
+const BY_CODE: &str = "see the warning '";
+
+/// The verdict in words; `place` says where the warnings can be read, as their codes are shown nowhere.
+pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut Page) {
     let (mark, role) = match verdict.status {
         VerdictStatus::Accepted => ("ACCEPTED: ", Role::Ok),
         VerdictStatus::NotAccepted => ("NOT ACCEPTED: ", Role::Alarm),
         VerdictStatus::NotEvaluated => ("NOT EVALUATED: ", Role::Warn),
     };
-    page.marked((mark, role), &verdict.reasons.join("; "), Role::Plain);
+    let by_code = verdict.reasons.iter().filter(|reason| reason.starts_with(BY_CODE)).count();
+    let mut reasons: Vec<String> =
+        verdict.reasons.iter().filter(|reason| !reason.starts_with(BY_CODE)).cloned().collect();
+    if by_code > 0 {
+        let stand = if by_code == 1 { "stands" } else { "stand" };
+        reasons.push(format!("{} {stand} against it, {place}", counted(by_code, "warning")));
+    }
+    page.marked((mark, role), &reasons.join("; "), Role::Plain);
 }
 
 fn limits(verdict: &Verdict, page: &mut Page) {
@@ -68,7 +78,8 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.gap();
     let which = if *independent { "the identification never saw" } else { "the identification SAW, in part or all" };
     page.paragraph(&format!("Errors at {samples} poses that {which}: {basis}."), Role::Plain);
-    page.line(vec![(format!("{:<32}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
+    let names = names(page);
+    page.line(vec![(format!("{:<names$}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
     let pairs: [(&str, Pick); 3] = [
         ("position error", |model| model.position_mm),
         ("distance error", |model| model.distance_mm),
@@ -93,6 +104,11 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.paragraph("before: nominal model; after: identified model. Distance errors need no frame.", Role::Dim);
 }
 
+/// Columns of the names of the errors; the numbers come first where there is little room.
+fn names(page: &Page) -> usize {
+    page.columns().saturating_sub(29).clamp(26, 32)
+}
+
 fn row(page: &mut Page, name: &str, before: f64, after: f64) {
     let ratio = before / after;
     let (better, role) = match ratio {
@@ -101,7 +117,8 @@ fn row(page: &mut Page, name: &str, before: f64, after: f64) {
         ratio if ratio < 10.0 => (format!("{ratio:.1} x"), Role::Plain),
         ratio => (format!("{ratio:.0} x"), Role::Plain),
     };
-    let line = format!("{name:<32}{:>10}{:>10}", fixed(before, 4), fixed(after, 4));
+    let names = names(page);
+    let line = format!("{name:<names$}{:>10}{:>10}", fixed(before, 4), fixed(after, 4));
     page.line(vec![(line, Role::Plain), (format!("{better:>9}"), role)]);
 }
 

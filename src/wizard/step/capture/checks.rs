@@ -1,9 +1,9 @@
 //! What the checks say about a new point: live triage by distance, and drift where a pose is measured again.
 
-use crate::identification::triage::{Cause, Finding, Names, Triage, triage};
+use crate::identification::triage::{Cause, Finding, Names, PairDeviation, Triage, triage};
 use crate::identification::{PointSample, TargetAt};
 use crate::profile::{Level, Profile};
-use crate::session::journal::{Correction, FindingText, MeasuredText, from_edge, to_edge};
+use crate::session::journal::{Correction, FindingText, MeasuredText, PairText, from_edge, to_edge, to_length_mm};
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, Session};
 use crate::units::{MILLIMETRE, to_mm};
@@ -90,7 +90,22 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
         ratio: (found.ratio * 10.0).round() / 10.0,
         message: found.describe(&names),
         remedy: remedy(&found, cx, &number, &samples, &rows),
+        worst: worst(&found, &number, &samples),
     })
+}
+
+/// The distances that fit least.
+fn worst(found: &Finding, number: &dyn Fn(usize) -> u64, samples: &[PointSample]) -> Vec<PairText> {
+    let text = |pair: &PairDeviation| {
+        let measured = (samples.get(found.sample)?.point - samples.get(pair.other)?.point).norm();
+        Some(PairText {
+            other: number(pair.other),
+            measured_mm: to_length_mm(measured),
+            predicted_mm: to_length_mm(measured - pair.deviation),
+            expected_mm: to_length_mm(pair.expected),
+        })
+    };
+    found.worst.iter().filter_map(text).collect()
 }
 
 /// Short name of a cause, stable.
@@ -168,5 +183,11 @@ fn drift(session: &Session, noted: &MeasuredText, profile: &Profile) -> Option<F
             to_mm(limit)
         ),
         remedy: None,
+        worst: vec![PairText {
+            other: first.noted.number,
+            measured_mm: to_length_mm(moved),
+            predicted_mm: 0.0,
+            expected_mm: to_length_mm(expected),
+        }],
     })
 }

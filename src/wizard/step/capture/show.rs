@@ -1,12 +1,13 @@
 //! What the capture step shows.
 
 use super::{CaptureStep, too_few};
+use crate::session::journal::PairText;
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, SampleState, Session};
 use crate::units::to_mm;
 use crate::wizard::step::Cx;
 use crate::wizard::view::{
-    CaptureView, DriftView, FindingView, JointShown, PredictionView, RowState, RowView, SampleView,
+    CaptureView, DriftView, FindingView, JointShown, PairView, PredictionView, RowState, RowView, SampleView,
 };
 
 /// The view of a capture step.
@@ -40,6 +41,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
             cause: finding.cause.clone(),
             message: finding.message.clone(),
             has_remedy: finding.remedy.is_some(),
+            worst: finding.worst.iter().map(|pair| pair_view(session, pair)).collect(),
         }),
         drift: drift(session),
         prediction: prediction(step, session),
@@ -120,6 +122,19 @@ fn sample_view(session: &Session, sample: &Sample) -> SampleView {
         xyz_mm: [to_mm(point.x), to_mm(point.y), to_mm(point.z)],
         scatter_mm: sample.noted.scatter_mm,
         counts: sample.state == SampleState::Counts,
+    }
+}
+
+/// A distance with the name of the pose at its other end.
+fn pair_view(session: &Session, pair: &PairText) -> PairView {
+    let other = session.sample(pair.other);
+    PairView {
+        pose: other.map_or_else(|| "?".to_owned(), |other| session.pose_of(other).to_owned()),
+        is_drift: other.is_some_and(|other| session.kind_of(other) == PoseKind::Drift),
+        measured_mm: pair.measured_mm,
+        predicted_mm: pair.predicted_mm,
+        difference_mm: pair.measured_mm - pair.predicted_mm,
+        expected_mm: pair.expected_mm,
     }
 }
 
