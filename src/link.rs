@@ -8,6 +8,7 @@
 
 mod build;
 pub mod protocol;
+mod rehearsal;
 mod replay;
 mod simulated;
 pub mod simulator;
@@ -17,15 +18,15 @@ mod wired;
 
 use std::time::Duration;
 
-use nalgebra::Point3;
 use thiserror::Error;
 
+pub use rehearsal::Rehearsal;
 pub use replay::{Replay, ReplayRow};
 pub use simulated::{HiddenArm, SimulatedCell};
 pub use wire::RawLog;
 pub use wired::Wired;
 
-use crate::session::reading::{MeasureRequest, Reading};
+use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 
 /// Something that measures.
 pub trait Link: Send {
@@ -48,21 +49,6 @@ pub trait Link: Send {
         let _nothing = wait;
         None
     }
-}
-
-/// What a link sees now.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LiveReading {
-    /// Time by the link's own clock (s); only differences matter.
-    pub seconds: f64,
-    /// The reflector in the frame of the instrument (m), if it is seen. Never a measurement.
-    pub point: Option<Point3<f64>>,
-    /// Joints of the robot: pendant values (rad), if it tells them.
-    pub joints: Option<Vec<f64>>,
-    /// Whether the robot rests; `None`: it does not tell.
-    pub is_still: Option<bool>,
-    /// Why the instrument cannot be asked now.
-    pub down: Option<String>,
 }
 
 /// Something that happened at a link.

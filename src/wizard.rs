@@ -23,6 +23,7 @@
 
 pub mod effect;
 pub mod intent;
+mod live;
 pub mod notice;
 pub mod reading;
 mod step;
@@ -38,8 +39,10 @@ pub use notice::{Notice, Problem, Severity};
 pub use view::ViewModel;
 
 use crate::session::journal::{Entry, Line, SCHEMA};
-use crate::session::set_up::Step;
+use crate::session::reading::LiveReading;
+use crate::session::set_up::{InstrumentChoice, Step};
 use crate::session::state::Session;
+use live::Live;
 use step::{Action, Connection, Cx, Phase};
 
 /// Intents that wait while the journal is being written; more than a person can type in that time.
@@ -65,6 +68,7 @@ pub struct Wizard {
     actions: VecDeque<Action>,
     waiting: VecDeque<Intent>,
     notice: Option<Notice>,
+    live: Live,
     ended: Option<String>,
 }
 
@@ -108,6 +112,7 @@ impl Wizard {
             actions: VecDeque::new(),
             waiting: VecDeque::new(),
             notice: None,
+            live: Live::default(),
             ended: None,
         }
     }
@@ -180,12 +185,30 @@ impl Wizard {
                 }
                 Vec::new()
             }
+            Event::Live(reading) => self.on_live(reading),
             Event::Remark(notice) => {
                 self.notice = Some(notice);
                 Vec::new()
             }
             Event::Shutdown { cause } => self.shut_down(cause),
         }
+    }
+
+    /// A look through the instrument. It may be time to measure.
+    fn on_live(&mut self, reading: LiveReading) -> Vec<Effect> {
+        self.live.take(reading);
+        let is_wanted =
+            matches!(&self.session.instrument, Some(InstrumentChoice::Linked(choice)) if choice.is_automatic);
+        let Some(row) = self.phase.shown_row().filter(|_| is_wanted && self.is_idle() && self.ended.is_none()) else {
+            return Vec::new();
+        };
+        let can_measure =
+            self.phase.intents(&self.cx()).iter().any(|info| info.intent == Intent::Measure && info.is_enabled());
+        if !can_measure || !self.live.is_time(&self.session, row) {
+            return Vec::new();
+        }
+        self.live.measures();
+        self.on_intent(Intent::Measure)
     }
 
     /// What can be done now, with what cannot and why.
@@ -413,7 +436,10 @@ impl Wizard {
                     self.busy = Some(Busy { id, what: request.what(), progress: None, cancelled: false });
                     effects.push(Effect::Start { id, request });
                 }
-                Action::Disconnect => self.connection = None,
+                Action::Disconnect => {
+                    self.connection = None;
+                    self.live.clear();
+                }
                 Action::Say(notice) => self.notice = Some(notice),
                 Action::Exit => {
                     effects.push(Effect::Exit);

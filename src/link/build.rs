@@ -1,12 +1,20 @@
 //! Protocols from their names and options.
 
 use super::protocol::Protocol;
-use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Preset};
+use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Checksum, Mode, Preset};
 use super::protocol::emscon::{Emscon, EmsconOptions};
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::{Rtde, RtdeOptions};
+use super::simulator::Simulator;
+use super::simulator::ascii::AsciiSimulator;
+use super::simulator::emscon::EmsconSimulator;
+use super::simulator::geocom::GeocomSimulator;
+use super::simulator::ndi::NdiSimulator;
+use super::simulator::rtde::RtdeSimulator;
 use crate::session::wire::{Route, WireAddress, WireProtocol};
+use std::str::FromStr;
+
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -67,8 +75,7 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
             // Its positions are what the live display shows.
             let reflector_positions = true;
             let usual = EmsconOptions::default();
-            let options =
-                EmsconOptions { measure_ms, use_adm, reflector, initialize, reflector_positions, ..usual };
+            let options = EmsconOptions { measure_ms, use_adm, reflector, initialize, reflector_positions, ..usual };
             Ok(Box::new(Emscon::new(options)))
         }
         WireProtocol::Rtde => {
@@ -92,5 +99,45 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
             let options: NdiOptions = read(options)?;
             Ok(Box::new(NdiProtocol::new(options)?))
         }
+    }
+}
+
+/// The other end of a protocol, for rehearsals; `faults` by their names, see the kinds of faults of each simulator.
+///
+/// # Errors
+/// A fault that this simulator does not have.
+pub(super) fn simulator(protocol: WireProtocol, faults: &[String]) -> Result<Box<dyn Simulator>, String> {
+    Ok(match protocol {
+        WireProtocol::Emscon => Box::new(EmsconSimulator::new(parsed(faults)?)),
+        WireProtocol::Rtde => Box::new(RtdeSimulator::new(parsed(faults)?)),
+        WireProtocol::Ascii => Box::new(AsciiSimulator::new(rehearsal_ascii(), parsed(faults)?)?),
+        WireProtocol::Geocom => Box::new(GeocomSimulator::new(parsed(faults)?)),
+        WireProtocol::Ndi => Box::new(NdiSimulator::new([0.0; 3], parsed(faults)?)),
+    })
+}
+
+fn parsed<F>(faults: &[String]) -> Result<Vec<F>, String>
+where
+    F: FromStr,
+    F::Err: std::fmt::Display,
+{
+    faults.iter().map(|fault| fault.parse().map_err(|error: F::Err| error.to_string())).collect()
+}
+
+/// How lines are written in a rehearsal: asked for one by one, with a check sum.
+fn rehearsal_ascii() -> AsciiOptions {
+    AsciiOptions {
+        mode: Mode::Polled { trigger: "M\\r".to_owned() },
+        checksum: Checksum::Crc16,
+        ..AsciiOptions::default()
+    }
+}
+
+/// The options with which a rehearsal speaks to its simulator, as text.
+pub(super) fn rehearsal_options(protocol: WireProtocol) -> Option<String> {
+    match protocol {
+        WireProtocol::Ascii => ron::to_string(&rehearsal_ascii()).ok(),
+        WireProtocol::Emscon => Some(format!("(measure_ms: {})", MEASURE_MS.0)),
+        WireProtocol::Geocom | WireProtocol::Ndi | WireProtocol::Rtde => None,
     }
 }

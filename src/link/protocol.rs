@@ -9,15 +9,15 @@
 //! [`ProtocolEvent::Lost`] nothing is valid until the owner has connected again and called `start`. A point is given only on
 //! an explicit success of the instrument.
 
-pub mod emscon;
-pub mod mailbox;
-pub mod rtde;
 pub mod ascii;
 pub mod crc;
+pub mod emscon;
 pub mod geocom;
 pub mod lines;
+pub mod mailbox;
 pub mod ndi;
 pub mod outbox;
+pub mod rtde;
 
 use std::fmt::Debug;
 use std::time::Duration;

@@ -115,7 +115,7 @@ impl SimulatedCell {
     }
 
     /// Where the robot really stands, in its own joint values.
-    fn standing(&self, request: &MeasureRequest) -> Vec<f64> {
+    pub(super) fn standing(&self, request: &MeasureRequest) -> Vec<f64> {
         let mut here = request.configuration.clone();
         for fault in &self.faults {
             let is_second = fault.first.checked_add(1) == Some(request.number);
@@ -220,7 +220,7 @@ impl SimulatedCell {
     }
 
     /// Time of a measurement and of the move onward (s).
-    fn time(&self, request: &MeasureRequest, shots: u32) -> f64 {
+    pub(super) fn time(&self, request: &MeasureRequest, shots: u32) -> f64 {
         let onward = request.following.as_deref().unwrap_or(&request.configuration);
         let joints = self.truth.chain.joints().iter().zip(&self.joints);
         let slowest = joints.zip(request.configuration.iter().zip(onward)).fold(
@@ -285,10 +285,32 @@ impl Link for SimulatedCell {
     }
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
-        self.check(request)?;
         if !keep_going() {
             return Err(LinkError::Cancelled);
         }
+        let (shots, sigma) = self.single_shots(request)?;
+        let count = u32::try_from(shots.len()).unwrap_or(u32::MAX);
+        let mean = shots.iter().sum::<Vector3<f64>>() / f64::from(count);
+        let square = shots.iter().map(|shot| (shot - mean).norm_squared()).sum::<f64>() / f64::from(count);
+        Ok(Reading {
+            point: Point3::from(mean),
+            sigma: (sigma > 0.0).then(|| sigma / f64::from(count).sqrt()),
+            scatter: (count > 1).then(|| square.sqrt()),
+            shots: count,
+            temperature: None,
+            configuration: None,
+            seconds: self.time(request, count),
+        })
+    }
+}
+
+impl SimulatedCell {
+    /// The shots of a measurement in the tracker frame (m) and their σ per coordinate (m), as the instrument gives them.
+    ///
+    /// # Errors
+    /// The request is none for this cell, or the beam is broken.
+    pub(super) fn single_shots(&mut self, request: &MeasureRequest) -> Result<(Vec<Vector3<f64>>, f64), LinkError> {
+        self.check(request)?;
         let true_point = self.true_point(request);
         self.before = Some((request.number, request.configuration.clone()));
         let Some(true_point) = true_point else {
@@ -304,21 +326,11 @@ impl Link for SimulatedCell {
         let (offset, motion) = self.errors(request.number);
         let count = request.shots.max(1);
         let mut random = Random::new(self.seed, Use::Noise(request.number));
-        let shots: Vec<Vector3<f64>> = along_line(count)
-            .map(|place| true_point.coords + offset + motion * place + random.normals() * sigma)
-            .collect();
         let factor = self.unit_factor(request.number);
-        let mean = shots.iter().sum::<Vector3<f64>>() / f64::from(count);
-        let square = shots.iter().map(|shot| (shot - mean).norm_squared()).sum::<f64>() / f64::from(count);
-        Ok(Reading {
-            point: Point3::from(mean * factor),
-            sigma: (sigma > 0.0).then(|| factor * sigma / f64::from(count).sqrt()),
-            scatter: (count > 1).then(|| factor * square.sqrt()),
-            shots: count,
-            temperature: None,
-            configuration: None,
-            seconds: self.time(request, count),
-        })
+        let shots = along_line(count)
+            .map(|place| (true_point.coords + offset + motion * place + random.normals() * sigma) * factor)
+            .collect();
+        Ok((shots, sigma * factor))
     }
 }
 

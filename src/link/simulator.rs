@@ -3,18 +3,18 @@
 //! As sans-IO as the protocols: a [`Simulator`] gets bytes and gives bytes. What it measures comes from a [`PointSource`], so
 //! the same simulated cell is behind each of them. Faults are named and counted, never random, so a test can rely on them.
 
+pub mod ascii;
 #[cfg(test)]
 pub mod bench;
+#[cfg(test)]
+mod bench2;
 pub mod emscon;
-pub mod occasion;
-mod outbox;
-pub mod rtde;
-pub mod ascii;
 pub mod fault;
 pub mod geocom;
 pub mod ndi;
-#[cfg(test)]
-mod bench2;
+pub mod occasion;
+mod outbox;
+pub mod rtde;
 
 use std::fmt::Debug;
 

@@ -100,8 +100,7 @@ impl Wire {
 
     /// Gives the shot under way up.
     pub(super) fn cancel(&self) {
-        // A thread that does not listen has nothing under way.
-        drop(self.commands.try_send(Command::Cancel).is_ok());
+        let _nothing_under_way = self.commands.try_send(Command::Cancel);
     }
 
     /// What came last.
@@ -144,7 +143,7 @@ impl RawLog {
         line.push('\n');
         let mut file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         // The log is a help for later; a full disk is no reason to stop measuring.
-        drop(file.write_all(line.as_bytes()).is_ok());
+        let _best_effort = file.write_all(line.as_bytes());
     }
 }
 

@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::protocol::{Failure, Identity, Severity, Shot};
 use super::wire::{Latest, RawLog, Wire, WireEvent};
-use super::{Link, LinkError, LinkNews, LiveReading, build};
-use crate::session::reading::{MeasureRequest, Reading};
+use super::{Link, LinkError, LinkNews, build};
+use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::wire::{LinkChoice, WireAddress};
 
 /// Longest time of a set-up: trackers initialise for more than a minute.
@@ -27,7 +27,6 @@ const LOOK: Duration = Duration::from_millis(50);
 const RANGE: (f64, f64) = (0.05, 100.0);
 
 /// An instrument on a wire, and the robot's controller on another if it tells its joint angles.
-#[derive(Debug)]
 pub struct Wired {
     instrument: Wire,
     address: String,
@@ -39,8 +38,20 @@ pub struct Wired {
     news: Vec<LinkNews>,
     /// The shot before this one: an instrument that is stuck gives the same again.
     before: Option<Point3<f64>>,
-    /// Whether waits for settling pass in earnest.
-    is_real: bool,
+    /// For a simulated instrument: told before every shot.
+    before_shot: Option<BeforeShot>,
+}
+
+/// Told before a shot is asked for.
+type BeforeShot = Box<dyn FnMut() + Send>;
+
+impl std::fmt::Debug for Wired {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Wired")
+            .field("address", &self.address)
+            .field("identity", &self.identity)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Wired {
@@ -73,14 +84,14 @@ impl Wired {
             robot_down: None,
             news: Vec::new(),
             before: None,
-            is_real: true,
+            before_shot: None,
         })
     }
 
-    /// The same for a simulated instrument, where nothing has to settle.
+    /// The same for a simulated instrument, where nothing has to settle and which is told of every shot.
     #[must_use]
-    pub(super) const fn simulated(mut self) -> Self {
-        self.is_real = false;
+    pub(super) fn simulated(mut self, before_shot: BeforeShot) -> Self {
+        self.before_shot = Some(before_shot);
         self
     }
 
@@ -107,8 +118,11 @@ impl Wired {
                 }
             }
         }
+        let until = self.instrument.now() + wait;
         loop {
-            let event = match self.instrument.events.recv_timeout(wait) {
+            // However much comes, the wait ends.
+            let left = until.saturating_sub(self.instrument.now());
+            let event = match self.instrument.events.recv_timeout(left) {
                 Ok(event) => event,
                 Err(RecvTimeoutError::Timeout) => return None,
                 Err(RecvTimeoutError::Disconnected) => {
@@ -208,6 +222,9 @@ impl Wired {
         if let Some(failure) = &self.down {
             return Ok(Err(failure.clone()));
         }
+        if let Some(before_shot) = &mut self.before_shot {
+            before_shot();
+        }
         if !self.instrument.trigger() {
             return Ok(Err(Failure::Disconnected("the link does not take orders".to_owned())));
         }
@@ -297,7 +314,7 @@ impl Link for Wired {
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
         let began = self.instrument.now();
         let joints = self.standing(keep_going)?;
-        if self.is_real {
+        if self.before_shot.is_none() {
             self.pause(Duration::try_from_secs_f64(request.settle).unwrap_or_default(), keep_going)?;
         }
         let count = request.shots.max(1);

@@ -5,11 +5,12 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread;
+use std::time::Duration;
 
 use super::engine::Events;
-use crate::link::{Link, LinkError, Replay, SimulatedCell};
+use crate::link::{Link, LinkError, LinkNews, Rehearsal, Replay, SimulatedCell, Wired};
 use crate::profile::Profile;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, read_bytes_as};
@@ -17,10 +18,13 @@ use crate::session::plan::PlannedPose;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{InstrumentChoice, RecordedSet};
 use crate::store;
-use crate::wizard::{Answer, Event, Problem, RequestId};
+use crate::wizard::{Answer, Event, Notice, Problem, RequestId};
 
 /// Commands that wait; the wizard never has more than one under way.
 const WAITING: usize = 4;
+
+/// A link is looked at so often while nothing is measured.
+const WATCH: Duration = Duration::from_millis(100);
 
 enum Command {
     Connect { id: RequestId, instrument: InstrumentChoice, profile: Box<Profile> },
@@ -51,7 +55,7 @@ impl LinkThread {
 
 fn work(commands: &Receiver<Command>, events: &Events) {
     let mut link: Option<Box<dyn Link>> = None;
-    while let Ok(command) = commands.recv() {
+    while let Some(command) = next(commands, link.as_deref_mut(), events) {
         let (id, answer) = match command {
             Command::Connect { id, instrument, profile } => {
                 link = None;
@@ -81,12 +85,42 @@ fn work(commands: &Receiver<Command>, events: &Events) {
     }
 }
 
+/// The next command. While nobody asks, the wizard sees what the link sees.
+fn next(commands: &Receiver<Command>, link: Option<&mut (dyn Link + 'static)>, events: &Events) -> Option<Command> {
+    let Some(link) = link else { return commands.recv().ok() };
+    loop {
+        match commands.try_recv() {
+            Ok(command) => return Some(command),
+            Err(TryRecvError::Disconnected) => return None,
+            Err(TryRecvError::Empty) => {}
+        }
+        let Some((live, news)) = link.watch(WATCH) else { return commands.recv().ok() };
+        // The next look says more than one that nobody has room for.
+        events.offer(Event::Live(live));
+        for one in news {
+            events.offer(Event::Remark(remark(one)));
+        }
+    }
+}
+
+/// What the operator is told about a link.
+fn remark(news: LinkNews) -> Notice {
+    match news {
+        LinkNews::Up(identity) => Notice::info(format!("connected: {identity}")),
+        LinkNews::Down(cause) => Notice::attention(format!("the link is down: {cause}"))
+            .hint("it is connected again by itself; what was measured is safe"),
+        LinkNews::Status(text) => Notice::attention(text),
+    }
+}
+
 /// What an error of a link means to the operator.
 fn failed(error: &LinkError) -> Answer {
     let hints = match error {
         LinkError::BeamBroken => {
             vec!["return the SMR to the nest until the tracker has it again, then measure again".to_owned()]
         }
+        LinkError::Instrument(failure) => vec![failure.hint().to_owned()],
+        LinkError::Robot(_) => vec!["bring the robot to rest at the pose, then measure again".to_owned()],
         LinkError::NoReading { .. } => vec!["skip the pose, or take the poses of the recording as plan".to_owned()],
         _ => Vec::new(),
     };
@@ -99,6 +133,16 @@ fn connect(instrument: &InstrumentChoice, profile: &Profile) -> Result<Connected
     match instrument {
         InstrumentChoice::Manual { unit } => {
             Ok((None, format!("coordinates typed in, in {}", unit.sign()), Vec::new()))
+        }
+        InstrumentChoice::Simulated(simulation) if !simulation.wires.is_empty() => {
+            let mut rehearsal = Rehearsal::new(profile, simulation)?;
+            let identity = rehearsal.connect()?;
+            Ok((Some(Box::new(rehearsal)), identity, Vec::new()))
+        }
+        InstrumentChoice::Linked(choice) => {
+            let mut wired = Wired::new(choice, None)?;
+            let identity = wired.connect()?;
+            Ok((Some(Box::new(wired)), identity, Vec::new()))
         }
         InstrumentChoice::Simulated(simulation) => {
             let mut cell = SimulatedCell::new(profile, simulation)?;

@@ -39,3 +39,18 @@ pub struct Reading {
     /// Time that it took, motion and settling included (s).
     pub seconds: f64,
 }
+
+/// What a link sees now.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LiveReading {
+    /// Time by the link's own clock (s); only differences matter.
+    pub seconds: f64,
+    /// The reflector in the frame of the instrument (m), if it is seen. Never a measurement.
+    pub point: Option<Point3<f64>>,
+    /// Joints of the robot: pendant values (rad), if it tells them.
+    pub joints: Option<Vec<f64>>,
+    /// Whether the robot rests; `None`: it does not tell.
+    pub is_still: Option<bool>,
+    /// Why the instrument cannot be asked now.
+    pub down: Option<String>,
+}

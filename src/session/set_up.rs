@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::PoseKind;
 use super::simulation::Simulation;
+use super::wire::LinkChoice;
 use crate::units::{INCH, MICROMETRE, MILLIMETRE};
 
 /// A step of the wizard.
@@ -123,6 +124,8 @@ pub enum InstrumentChoice {
     },
     /// A simulated cell, to rehearse on.
     Simulated(Simulation),
+    /// An instrument that answers over a wire.
+    Linked(LinkChoice),
     /// Measurements of earlier days, played as if they were captured.
     Replay {
         /// The tables, in the order in which their poses are played.

@@ -9,6 +9,7 @@ mod text;
 
 use serde::{Deserialize, Serialize};
 
+use super::wire::WireProtocol;
 use crate::units::Quantity;
 pub use text::FaultError;
 
@@ -28,6 +29,32 @@ pub struct Simulation {
     /// What goes wrong.
     #[serde(default)]
     pub faults: Vec<Fault>,
+    /// Wires that instrument and robot are spoken to over; none: not over a wire.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wires: Vec<SimulatedWire>,
+}
+
+/// A wire of a rehearsal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SimulatedWire {
+    /// Over TCP on this machine.
+    Tcp(WireProtocol),
+    /// Over a pseudo-terminal, as a serial line.
+    Serial(WireProtocol),
+}
+
+impl SimulatedWire {
+    /// What is spoken.
+    pub const fn protocol(self) -> WireProtocol {
+        match self {
+            Self::Tcp(protocol) | Self::Serial(protocol) => protocol,
+        }
+    }
+
+    /// Whether it is a serial line.
+    pub const fn is_serial(self) -> bool {
+        matches!(self, Self::Serial(_))
+    }
 }
 
 const fn first_seed() -> u64 {
@@ -36,7 +63,7 @@ const fn first_seed() -> u64 {
 
 impl Default for Simulation {
     fn default() -> Self {
-        Self { seed: first_seed(), truth: Truth::default(), noise_mm: None, faults: Vec::new() }
+        Self { seed: first_seed(), truth: Truth::default(), noise_mm: None, faults: Vec::new(), wires: Vec::new() }
     }
 }
 

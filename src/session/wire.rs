@@ -143,9 +143,9 @@ impl FromStr for WireAddress {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let text = text.trim();
-        let (protocol, rest) = text.split_once(':').ok_or_else(|| {
-            format!("'{}' is no address; it reads like 'emscon:192.168.0.2'", super::printable(text))
-        })?;
+        let (protocol, rest) = text
+            .split_once(':')
+            .ok_or_else(|| format!("'{}' is no address; it reads like 'emscon:192.168.0.2'", super::printable(text)))?;
         let protocol: WireProtocol = protocol.parse()?;
         let route = match rest.split_once(':') {
             Some(("serial", device)) => serial(protocol, device)?,
@@ -206,12 +206,12 @@ fn place_of(protocol: WireProtocol, text: &str) -> Result<(String, u16), String>
         return Err(format!("'{}' names no host", super::printable(text)));
     }
     let port = match port {
-        Some(port) => port.parse().ok().ok_or_else(|| {
-            format!("'{}' is no port; ports are 1 to 65535", super::printable(port))
+        Some(port) => {
+            port.parse().ok().ok_or_else(|| format!("'{}' is no port; ports are 1 to 65535", super::printable(port)))?
+        }
+        None => protocol.usual_port().ok_or_else(|| {
+            format!("the port is missing, as in '{protocol}:tcp:{host}:5000': {protocol} has no usual one")
         })?,
-        None => protocol
-            .usual_port()
-            .ok_or_else(|| format!("the port is missing, as in '{protocol}:tcp:{host}:5000': {protocol} has no usual one"))?,
     };
     Ok((host.to_owned(), port))
 }

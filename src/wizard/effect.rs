@@ -12,7 +12,7 @@ use crate::profile::Profile;
 use crate::session::journal::Line;
 use crate::session::plan::PlannedPose;
 use crate::session::plan_summary::PlanSummary;
-use crate::session::reading::{MeasureRequest, Reading};
+use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::set_up::InstrumentChoice;
 
 /// Tells answers apart: an answer to anything but the open request is dropped.
@@ -42,6 +42,8 @@ pub enum Event {
         /// How far it is.
         progress: Progress,
     },
+    /// What the link sees while nothing is measured.
+    Live(LiveReading),
     /// Something beside the calibration that the operator should know, such as a recording that stopped.
     Remark(Notice),
     /// The program has to end.

@@ -125,6 +125,20 @@ impl Phase {
         }
     }
 
+    /// Row of the plan that is shown, where there is one.
+    pub(super) const fn shown_row(&self) -> Option<usize> {
+        match self {
+            Self::Capture(step) => step.shown_row(),
+            Self::Profile(_)
+            | Self::Instrument(_)
+            | Self::Target(_)
+            | Self::Plan(_)
+            | Self::Identify(_)
+            | Self::Verify(_)
+            | Self::Deliver(_) => None,
+        }
+    }
+
     /// Which one it is.
     pub(super) const fn step(&self) -> Step {
         match self {

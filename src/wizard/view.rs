@@ -25,6 +25,8 @@ pub struct ViewModel {
     pub purpose: &'static str,
     /// The step's own part.
     pub content: Content,
+    /// What the instrument sees while nothing is measured, if it shows that.
+    pub live: Option<LiveView>,
     /// What is under way.
     pub busy: Option<BusyView>,
     /// What the operator is to be told.
@@ -33,6 +35,38 @@ pub struct ViewModel {
     pub intents: Vec<IntentInfo>,
     /// Why the program ends, if it does.
     pub ended: Option<String>,
+}
+
+/// What the instrument sees while nothing is measured. Never a measurement.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LiveView {
+    /// The SMR in the frame of the instrument, if it is seen.
+    pub point_mm: Option<[f64; 3]>,
+    /// How long it has rested where it is.
+    pub rest_s: Option<f64>,
+    /// How much it scattered meanwhile, root mean square.
+    pub scatter_mm: Option<f64>,
+    /// Its distance from where the pose shown should have it, once the samples tell where the tracker stands.
+    pub from_predicted_mm: Option<f64>,
+    /// Joints that the robot tells: pendant values (rad).
+    pub joints: Option<Vec<f64>>,
+    /// The joint that is farthest from the pose shown, from 0, and by how much (deg).
+    pub joint_difference: Option<(usize, f64)>,
+    /// Whether the robot rests, if it tells.
+    pub is_still: Option<bool>,
+    /// Why the instrument cannot be asked.
+    pub down: Option<String>,
+    /// The last seconds.
+    pub track: Vec<LivePoint>,
+}
+
+/// Where the SMR was.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LivePoint {
+    /// When, counted back from the last one (s).
+    pub seconds: f64,
+    /// Distance from where it is now.
+    pub offset_mm: f64,
 }
 
 /// Where one is.
@@ -494,6 +528,7 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
         },
         purpose: purpose(step),
         content: wizard.phase.content(&wizard.cx()),
+        live: wizard.live.view(session, wizard.phase.shown_row()),
         busy: wizard.busy.as_ref().map(|busy| BusyView {
             what: busy.what,
             progress: busy.progress.as_ref().map(progress_text),

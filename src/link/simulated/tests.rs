@@ -225,7 +225,7 @@ fn time_counts_settling_shots_and_the_way_onward() {
 fn what_cannot_be_simulated_is_said() {
     let refused = |name: &str, truth, noise_mm, fault: &str| {
         let faults = if fault.is_empty() { Vec::new() } else { vec![fault.parse().unwrap()] };
-        let simulation = Simulation { seed: 1, truth, noise_mm, faults };
+        let simulation = Simulation { seed: 1, truth, noise_mm, faults, wires: Vec::new() };
         SimulatedCell::new(&profile(name), &simulation).unwrap_err().to_string()
     };
     let messages = [

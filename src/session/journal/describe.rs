@@ -4,6 +4,7 @@ use super::entry::{Correction, Decision, Entry, MeasuredText, PlanText};
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, TargetChoice};
 use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictStatus};
+use crate::session::wire::LinkChoice;
 
 impl Entry {
     /// What happened, in one line without a full stop.
@@ -135,7 +136,14 @@ pub fn instrument_text(instrument: &InstrumentChoice) -> String {
         InstrumentChoice::Simulated(simulation) => {
             let faults: Vec<String> = simulation.faults.iter().map(ToString::to_string).collect();
             let faults = if faults.is_empty() { String::new() } else { format!(", with {}", faults.join(", ")) };
-            format!("simulated cell, seed {}{faults}", simulation.seed)
+            let wires: Vec<&str> = simulation.wires.iter().map(|wire| wire.protocol().name()).collect();
+            let wires = if wires.is_empty() { String::new() } else { format!(", over {}", wires.join(" and ")) };
+            format!("simulated cell, seed {}{wires}{faults}", simulation.seed)
+        }
+        InstrumentChoice::Linked(LinkChoice { address, robot, is_automatic, .. }) => {
+            let robot = robot.as_ref().map_or_else(String::new, |robot| format!(", robot {robot}"));
+            let by_itself = if *is_automatic { ", measuring by itself" } else { "" };
+            crate::session::printable(&format!("{address}{robot}{by_itself}"))
         }
         InstrumentChoice::Replay { sets } => {
             let files: Vec<&str> = sets.iter().map(|set| set.file.as_str()).collect();

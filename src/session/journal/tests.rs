@@ -184,7 +184,13 @@ fn all_entries() -> Vec<Entry> {
             .chain([fault("inch@2")])
             .collect();
     let instruments = CoordinateUnit::ALL.map(|unit| InstrumentChoice::Manual { unit }).into_iter().chain([
-        InstrumentChoice::Simulated(Simulation { seed: u64::MAX, truth: Truth::Paper, noise_mm: Some(0.5), faults }),
+        InstrumentChoice::Simulated(Simulation {
+            seed: u64::MAX,
+            truth: Truth::Paper,
+            noise_mm: Some(0.5),
+            faults,
+            wires: vec![SimulatedWire::Serial(WireProtocol::Geocom)],
+        }),
         InstrumentChoice::Simulated(Simulation::default()),
         InstrumentChoice::Replay { sets: vec![recorded("delmia", Some("pose % 17 == 0")), recorded("named", None)] },
     ]);

@@ -94,7 +94,13 @@ fn simulation(values: &[String]) -> Result<Intent, String> {
     let faults = faults.split([',', ';']).map(str::trim).filter(|text| !text.is_empty());
     let faults =
         faults.map(|text| text.parse::<Fault>().map_err(|error| error.to_string())).collect::<Result<_, _>>()?;
-    Ok(Intent::ChooseInstrument(InstrumentChoice::Simulated(Simulation { seed, truth, noise_mm, faults })))
+    Ok(Intent::ChooseInstrument(InstrumentChoice::Simulated(Simulation {
+        seed,
+        truth,
+        noise_mm,
+        faults,
+        wires: Vec::new(),
+    })))
 }
 
 /// Tables of earlier days.

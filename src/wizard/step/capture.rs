@@ -10,10 +10,11 @@ use crate::session::journal::{Correction, Decision, Entry, FindingText, Line, Me
 use crate::session::plan::PoseKind;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
-use crate::session::state::{Sample, SampleState, Session};
+use crate::session::state::{Robot, Sample, SampleState, Session};
 use crate::units::{from_mm, to_mm};
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Danger, Intent, IntentInfo, PlanSettings};
+use crate::wizard::live::AS_PLANNED;
 use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
 use crate::wizard::view::Content;
@@ -59,6 +60,11 @@ pub(super) fn too_few(session: &Session) -> Option<String> {
 }
 
 impl CaptureStep {
+    /// Row of the plan that is shown.
+    pub(super) const fn shown_row(&self) -> Option<usize> {
+        self.row
+    }
+
     /// Begins where the operator was last, or at the next row that waits to be measured.
     pub(super) fn enter(session: &Session) -> Self {
         let last = session.shown.unwrap_or(0);
@@ -153,7 +159,8 @@ impl CaptureStep {
                 .hint("wait until it is at rest and measure again; or take the reading as it is");
             return vec![Action::Write(vec![entry]), Action::Say(notice)];
         }
-        self.write(noted, cx)
+        let remark = not_as_planned(&noted, robot);
+        self.write(noted, cx).into_iter().chain(remark.map(Action::Say)).collect()
     }
 
     /// Writes a sample with what the checks say about it.
@@ -210,6 +217,24 @@ impl CaptureStep {
             _ => None,
         }
     }
+}
+
+/// What to say about a robot that stands elsewhere than shown. What it tells counts; both are kept.
+fn not_as_planned(noted: &MeasuredText, robot: &Robot) -> Option<Notice> {
+    let reported = noted.reported_joints.as_ref()?;
+    let differences = reported.iter().zip(&noted.joints).map(|(reported, shown)| (reported - shown).abs());
+    let (joint, difference) = differences.enumerate().max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+    let joint = robot.profile.chain().joints().get(joint)?;
+    let quantity = joint.joint_type.quantity();
+    (quantity.from_edge(difference) > AS_PLANNED).then(|| {
+        Notice::attention(format!(
+            "pose {}: the robot stands {difference:.3} {} away from the plan at joint {}",
+            noted.pose,
+            quantity.unit(),
+            joint.name
+        ))
+        .hint("what the robot tells counts, the plan is kept beside it; measure again if this was not meant")
+    })
 }
 
 /// A reading that is no sample.
