@@ -10,6 +10,7 @@
 //!
 //! - [`units`], [`geometry`], [`kinematics`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
+//! - [`model`]: models of the arm in the formats of others, in and out.
 //! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
 //! - [`search`], [`error`]: a pose search on several threads; how a command ends and what the operator is told.
@@ -29,6 +30,7 @@ pub mod geometry;
 pub mod identification;
 pub mod kinematics;
 pub mod link;
+pub mod model;
 pub mod planning;
 pub mod procedure;
 pub mod profile;

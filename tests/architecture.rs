@@ -15,6 +15,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("profile", &["units", "geometry", "kinematics"]),
     ("session", &["units", "geometry", "kinematics", "profile"]),
     ("program", &["units", "kinematics", "session"]),
+    ("model", &["units", "kinematics", "profile", "session"]),
     ("search", &["planning"]),
     ("link", &["units", "geometry", "kinematics", "profile", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
@@ -74,6 +75,7 @@ const PURE: &[&str] = &[
     "profile",
     "session",
     "program",
+    "model",
     "procedure",
     "wizard",
 ];
