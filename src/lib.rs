@@ -8,7 +8,7 @@
 //!
 //! Layers, lowest first; a module knows only those before it (`tests/architecture.rs` checks it):
 //!
-//! - [`units`], [`geometry`], [`kinematics`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
+//! - [`units`], [`geometry`], [`kinematics`], [`compensation`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`model`]: models of the arm in the formats of others, in and out.
 //! - [`link`]: instruments, simulated and replayed ones among them.
@@ -25,6 +25,7 @@
 
 pub mod app;
 pub mod cli;
+pub mod compensation;
 pub mod error;
 pub mod geometry;
 pub mod identification;

@@ -17,9 +17,9 @@ use crate::session::printable;
 use crate::units::{MILLIMETRE, MILLIRADIAN, to_deg, to_mm};
 
 /// Link names of a fresh URDF.
-pub const BASE: &str = "base";
+pub(super) const BASE: &str = "base";
 /// The tip of a fresh URDF.
-pub const FLANGE: &str = "flange";
+pub(super) const FLANGE: &str = "flange";
 
 /// How far a given URDF may be from the nominal arm: makers round, but another robot is farther off.
 const SAME_ROBOT: Tolerance = Tolerance { position: MILLIMETRE, angle: 2.0 * MILLIRADIAN };
@@ -122,13 +122,13 @@ fn escaped(text: &str) -> String {
 
 /// A given URDF with other origins.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Patched {
+pub(super) struct Patched {
     /// The text.
-    pub text: String,
+    pub(super) text: String,
     /// The tip link seen from the flange of the arm; it stays as it is.
-    pub flange_from_tip: Isometry3<f64>,
+    pub(super) flange_from_tip: Isometry3<f64>,
     /// Joints whose origin was replaced.
-    pub joints: Vec<String>,
+    pub(super) joints: Vec<String>,
 }
 
 /// Puts the identified geometry into a URDF of the nominal arm.
@@ -136,7 +136,7 @@ pub struct Patched {
 /// # Errors
 /// No such chain, another number or kind of joints, another robot or zero position, or no fixed joint behind the last axis
 /// that could take what the axis cannot.
-pub fn patch(
+pub(super) fn patch(
     text: &str,
     base: &str,
     tip: &str,
