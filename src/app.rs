@@ -1,6 +1,8 @@
 //! Runs a command: loads its files, has the procedure done, writes the results.
 
+mod compensate;
 mod constraints;
+mod export;
 mod identify;
 mod load;
 mod plan;
@@ -82,6 +84,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Constraints(args) => constraints::run(&args, console),
         Command::Plan(args) => plan::run(&args, console),
         Command::Program(args) => program::run(&args, console),
+        Command::Compensate(args) => compensate::run(&args, console),
+        Command::Export(args) => export::run(&args, console),
         Command::Profile(command) => profile::run(&command, console),
     }
 }

@@ -21,6 +21,7 @@ pub mod set_up;
 pub mod simulation;
 pub mod state;
 pub mod summary;
+pub mod targets;
 mod table;
 
 pub use table::{Defect, TableErrors, TableProblem, printable};

@@ -41,15 +41,17 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("runtime", &["profile", "session", "procedure", "error", "link", "store", "wizard"]),
     ("script", &["session", "wizard", "runtime"]),
     ("tui", &["units", "geometry", "kinematics", "profile", "session", "wizard", "runtime"]),
-    ("cli", &["units", "identification", "planning", "profile", "session", "program"]),
+    ("cli", &["units", "kinematics", "identification", "planning", "profile", "session", "program", "model"]),
     (
         "app",
         &[
             "cli",
+            "compensation",
             "error",
             "geometry",
             "identification",
             "kinematics",
+            "model",
             "planning",
             "procedure",
             "profile",
