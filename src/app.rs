@@ -36,7 +36,12 @@ pub struct Console<O: Write, E: Write> {
 impl<O: Write, E: Write> Console<O, E> {
     /// Prints data. A reader that went away is not a failure.
     fn print(&mut self, text: &str) -> Result<(), Failure> {
-        match self.out.write_all(text.as_bytes()).and_then(|()| self.out.flush()) {
+        self.print_bytes(text.as_bytes())
+    }
+
+    /// As [`Console::print`], for what may be no UTF-8.
+    fn print_bytes(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        match self.out.write_all(bytes).and_then(|()| self.out.flush()) {
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
                 Err(Failure::new(ExitStatus::Store, format!("cannot write the output: {error}")))
             }

@@ -1,6 +1,9 @@
 //! `trupose compensate`: joint values to command so that the real arm reaches what was meant.
 
+mod program;
+
 use std::io::Write;
+use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3};
 
@@ -25,10 +28,24 @@ pub(super) fn run<O: Write, E: Write>(
     for effect in &arm.other_effects {
         console.remark(&format!("note: compensated for geometry only; identified, but not in it: {effect}"));
     }
-    let bytes = store::read(&args.targets).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-    let rows = read_bytes(&bytes, &args.targets.display().to_string(), &joint_types(&arm.profile))
+    match (&args.program, args.dialect, &args.targets) {
+        (Some(path), Some(dialect), _) => program::run(args, &arm, path, dialect, console),
+        (_, _, Some(path)) => table(args, &arm, path, console),
+        _ => Err(Failure::new(ExitStatus::Usage, "nothing to compensate").hint("give '--targets' or '--program'")),
+    }
+}
+
+/// A table of targets becomes a table of commands.
+fn table<O: Write, E: Write>(
+    args: &CompensateArgs,
+    arm: &CalibratedArm,
+    path: &Path,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    let rows = read_bytes(&bytes, &path.display().to_string(), &joint_types(&arm.profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
-    let (nominal, identified) = tool_arms(&arm, args.target.as_deref())?;
+    let (nominal, identified) = tool_arms(arm, args.target.as_deref())?;
     let limits: Vec<_> = arm.profile.joints().iter().map(|range| range.limits).collect();
     let settings = Settings { position_only: args.position_only, ..Settings::default() };
     let compensator = Compensator::new(&nominal, &identified, &limits, settings);

@@ -1,11 +1,13 @@
 //! Arguments of the commands that apply a calibration: `compensate`, `export`, and `profile import-urdf`.
 
 use std::path::PathBuf;
+use std::str::FromStr as _;
 
 use clap::{Args, ValueEnum};
 
 use crate::kinematics::Convention;
 use crate::model::Format;
+use crate::program::Dialect;
 
 /// Arguments of `compensate`.
 #[derive(Args, Debug)]
@@ -14,10 +16,19 @@ pub struct CompensateArgs {
     #[arg(long, value_name = "RON")]
     pub calibration: PathBuf,
     /// Targets: joint values, or positions with roll, pitch, yaw; CSV with units in the column names
-    #[arg(long, value_name = "CSV")]
-    pub targets: PathBuf,
-    /// File for the table of commands [default: print it]
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, value_name = "CSV", required_unless_present = "program", conflicts_with = "program")]
+    pub targets: Option<PathBuf>,
+    /// Robot program whose joint targets are corrected; everything else in it stays
+    #[arg(long, value_name = "FILE", requires = "dialect")]
+    pub program: Option<PathBuf>,
+    /// Language of the program
+    #[arg(long, value_parser = Dialect::from_str, value_name = "rapid|krl|fanuc|urscript|val3|inform|ros")]
+    pub dialect: Option<Dialect>,
+    /// ROS: names of the joints in the trajectory, from base to flange [default: those of the profile]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub joint_names: Vec<String>,
+    /// File for the table of commands, or the program [default: print it]
+    #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Reach the position only, whatever the orientation
     #[arg(long)]
