@@ -18,7 +18,8 @@ fn main() {
 fn joint_targets_1000(bencher: Bencher<'_, '_>, name: &str) {
     let profile = Profile::parse(builtin(name).unwrap(), name).unwrap().0;
     let free = profile.free_parameters(Level::Geometric);
-    let deviations = free.iter().zip([1.0, -1.0].into_iter().cycle()).map(|(free, sign)| (free.id, sign * free.expected));
+    let deviations =
+        free.iter().zip([1.0, -1.0].into_iter().cycle()).map(|(free, sign)| (free.id, sign * free.expected));
     let arm = |chain| ToolArm { chain, flange_from_tool: Isometry3::identity() };
     let (nominal, identified) =
         (arm(profile.chain().clone()), arm(profile.chain().with_deviations(deviations).unwrap()));

@@ -177,10 +177,8 @@ impl<'a> Compensator<'a> {
         limits: &[Option<(f64, f64)>],
         settings: Settings,
     ) -> Self {
-        let side = |arm: &'a ToolArm| Side {
-            arm: ForwardKinematics::new(&arm.chain),
-            flange_from_tool: arm.flange_from_tool,
-        };
+        let side =
+            |arm: &'a ToolArm| Side { arm: ForwardKinematics::new(&arm.chain), flange_from_tool: arm.flange_from_tool };
         let dof = nominal.chain.dof();
         Self {
             nominal: side(nominal),
@@ -443,8 +441,7 @@ impl<'a> Compensator<'a> {
     /// Joints whose value is beyond its limits, or no number.
     fn beyond(&self, q: &[f64]) -> Vec<usize> {
         let inside = |value: f64, limits: Option<(f64, f64)>| {
-            value.is_finite()
-                && limits.is_none_or(|(low, high)| (low - ROUNDING..=high + ROUNDING).contains(&value))
+            value.is_finite() && limits.is_none_or(|(low, high)| (low - ROUNDING..=high + ROUNDING).contains(&value))
         };
         let pairs = q.iter().zip(&self.limits).enumerate();
         pairs.filter(|(_, (value, limits))| !inside(**value, **limits)).map(|(index, _)| index).collect()

@@ -21,8 +21,8 @@ pub mod set_up;
 pub mod simulation;
 pub mod state;
 pub mod summary;
-pub mod targets;
 mod table;
+pub mod targets;
 
 pub use table::{Defect, TableErrors, TableProblem, printable};
 

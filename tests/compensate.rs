@@ -37,7 +37,8 @@ fn with_tool(chain: &KinematicChain, point: Option<&Point3<f64>>) -> ToolArm {
 fn errors(meant: &[Point3<f64>], reached: &[Point3<f64>]) -> (f64, f64) {
     let pairs = reached.iter().zip(meant).map(|(reached, meant)| (1.0, *reached, *meant));
     let frame = register(pairs).unwrap().to_from_from;
-    let distances: Vec<f64> = reached.iter().zip(meant).map(|(reached, meant)| (frame * reached - meant).norm()).collect();
+    let distances: Vec<f64> =
+        reached.iter().zip(meant).map(|(reached, meant)| (frame * reached - meant).norm()).collect();
     (distances.iter().sum::<f64>() / distances.len() as f64, distances.iter().copied().fold(0.0, f64::max))
 }
 
@@ -79,7 +80,13 @@ fn compensated_targets_bring_the_error_down_to_the_identified_level() {
     for (noise, position_only) in [(10.0, false), (50.0, false), (10.0, true)] {
         let [nominal, identified, compensated] = closed_loop(noise * MICROMETRE, 11, position_only);
         let cell = |(mean, max): (f64, f64)| format!("{:.4} / {:.4}", to_mm(mean), to_mm(max));
-        table = format!("{table}{noise}, {} | {} | {} | {}\n", !position_only, cell(nominal), cell(identified), cell(compensated));
+        table = format!(
+            "{table}{noise}, {} | {} | {} | {}\n",
+            !position_only,
+            cell(nominal),
+            cell(identified),
+            cell(compensated)
+        );
         assert!(nominal.0 > 20.0 * identified.0, "{table}");
         assert!((compensated.0 / identified.0 - 1.0).abs() < 0.05, "{table}");
     }
@@ -91,7 +98,8 @@ fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
     for name in builtin_names() {
         let profile = profile(name);
         let free = profile.free_parameters(Level::Geometric);
-        let deviations = free.iter().zip([0.5, -0.5].into_iter().cycle()).map(|(free, half)| (free.id, half * free.expected));
+        let deviations =
+            free.iter().zip([0.5, -0.5].into_iter().cycle()).map(|(free, half)| (free.id, half * free.expected));
         let arms = [profile.chain().clone(), profile.chain().with_deviations(deviations).unwrap()];
         let arms = arms.map(|chain| with_tool(&chain, None));
         let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
@@ -127,7 +135,8 @@ fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
 fn limits_singularities_and_reach_are_told_apart() {
     let ur = profile("ur5");
     let deviations = ur.free_parameters(Level::Geometric).into_iter().map(|free| (free.id, free.expected));
-    let arms = [ur.chain().clone(), ur.chain().with_deviations(deviations).unwrap()].map(|chain| with_tool(&chain, None));
+    let arms =
+        [ur.chain().clone(), ur.chain().with_deviations(deviations).unwrap()].map(|chain| with_tool(&chain, None));
     let limits: Vec<_> = ur.joints().iter().map(|range| range.limits).collect();
     let solve = |limits: &[Option<(f64, f64)>], goal: &Goal| {
         Compensator::new(&arms[0], &arms[1], limits, Settings::default()).solve(goal)
@@ -199,7 +208,8 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
     };
-    let (code, out, err) = run("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,20,-30,40,50,60\nb,0,0,0,0,400,0\n", &[]);
+    let (code, out, err) =
+        run("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,20,-30,40,50,60\nb,0,0,0,0,400,0\n", &[]);
     assert_eq!(code, 1, "{out}{err}");
     let lines: Vec<&str> = out.lines().collect();
     assert_eq!(lines[0], "pose,status,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,position_error_mm,angle_error_deg");
@@ -207,7 +217,8 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
     assert!(err.contains("pose b (line 3): not reached: J5 is meant to be beyond its limit"), "{err}");
     assert!(err.contains("1 of 2 targets reached"), "{err}");
     let commanded: Vec<f64> = lines[1].split(',').skip(2).take(6).map(|cell| cell.parse().unwrap()).collect();
-    let correction = commanded.iter().zip([10.0, 20.0, -30.0, 40.0, 50.0, 60.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let correction =
+        commanded.iter().zip([10.0, 20.0, -30.0, 40.0, 50.0, 60.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!((0.01..5.0).contains(&correction), "{out}");
 
     let (code, out, err) = run("pose,x_mm,y_mm,z_mm\nfar,9000,0,0\nnear,900,100,800\n", &["--target", "smr"]);
@@ -231,7 +242,8 @@ fn models_are_exported_and_a_urdf_is_imported() {
     let folder = tempfile::tempdir().unwrap();
     let calibration = calibrate(folder.path());
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    for (format, name) in [("corrected-profile", "c.ron"), ("urdf", "c.urdf"), ("dh-csv", "c.csv"), ("json", "c.json")] {
+    for (format, name) in [("corrected-profile", "c.ron"), ("urdf", "c.urdf"), ("dh-csv", "c.csv"), ("json", "c.json")]
+    {
         let out = path(name);
         let output = trupose(&["export", "--calibration", &calibration, "--format", format, "--out", &out]);
         assert!(output.status.success(), "{format}: {}", String::from_utf8_lossy(&output.stderr));
@@ -244,7 +256,8 @@ fn models_are_exported_and_a_urdf_is_imported() {
     // The corrected profile can be used, and the URDF comes back as a profile of the same arm.
     assert!(trupose(&["profile", "check", &path("c.ron")]).status.success());
     let imported = path("imported.ron");
-    let output = trupose(&["profile", "import-urdf", &path("c.urdf"), "--base", "base", "--tip", "flange", "--out", &imported]);
+    let output =
+        trupose(&["profile", "import-urdf", &path("c.urdf"), "--base", "base", "--tip", "flange", "--out", &imported]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let read = |name: &str| Profile::parse(&fs::read_to_string(path(name)).unwrap(), name).unwrap().0;
     let (corrected, back) = (read("c.ron"), read("imported.ron"));
@@ -255,11 +268,66 @@ fn models_are_exported_and_a_urdf_is_imported() {
         assert!((a.translation.vector - b.translation.vector).norm() < 1e-9 && a.rotation.angle_to(&b.rotation) < 1e-9);
     }
     assert!(trupose(&["profile", "show", &imported]).status.success());
-    let output = trupose(&["profile", "import-urdf", "tests/urdf/panda.urdf", "--base", "panda_link0", "--tip", "panda_rightfinger"]);
+    let output = trupose(&[
+        "profile",
+        "import-urdf",
+        "tests/urdf/panda.urdf",
+        "--base",
+        "panda_link0",
+        "--tip",
+        "panda_rightfinger",
+    ]);
     assert_eq!(output.status.code(), Some(2));
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(message.contains("line 45"), "{message}");
     // Into the nominal URDF of the arm: without '--into' there is no base to name.
-    let output = trupose(&["export", "--calibration", &calibration, "--format", "urdf", "--into", "tests/urdf/ur5.urdf", "--base", "base", "--out", &out]);
+    let output = trupose(&[
+        "export",
+        "--calibration",
+        &calibration,
+        "--format",
+        "urdf",
+        "--into",
+        "tests/urdf/ur5.urdf",
+        "--base",
+        "base",
+        "--out",
+        &out,
+    ]);
     assert!(output.status.code() == Some(2) && !Path::new(&out).exists());
+}
+
+#[test]
+fn a_robot_program_is_corrected_in_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibrate(folder.path());
+    let file = folder.path().join("part.src");
+    let text = b"DEF part()\r\n; M\xfcller\r\nPTP {A1 10,A2 20,A3 -30,A4 40,A5 50,A6 60}\r\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\r\nPTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\r\nEND\r\n";
+    fs::write(&file, text).unwrap();
+    let out = folder.path().join("corrected.src");
+    let output = trupose(&[
+        "compensate",
+        "--calibration",
+        &calibration,
+        "--program",
+        file.to_str().unwrap(),
+        "--dialect",
+        "krl",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("line 4: left as it is: a Cartesian target"), "{message}");
+    // The second target has a straight wrist.
+    assert!(message.contains("line 5: near a singularity only the position is reached"), "{message}");
+    assert!(
+        message.contains("2 of 2 joint targets replaced (1 in position only), 0 not reached, 1 other places left"),
+        "{message}"
+    );
+    let corrected = fs::read(&out).unwrap();
+    let lines = |text: &[u8]| text.split(|byte| *byte == b'\n').map(<[u8]>::to_vec).collect::<Vec<_>>();
+    let (before, after) = (lines(text), lines(&corrected));
+    let changed: Vec<usize> = (0..before.len()).filter(|line| before[*line] != after[*line]).collect();
+    assert_eq!((before.len(), changed), (after.len(), vec![2, 4]));
 }

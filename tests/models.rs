@@ -11,8 +11,8 @@ use rand_chacha::ChaCha8Rng;
 use trupose::kinematics::{Convention, ForwardKinematics, KinematicChain, ParameterId};
 use trupose::model::proof::{self, configurations, prove};
 use trupose::model::{
-    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, export, geometry_only, import,
-    link_values, urdf_text,
+    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, export,
+    geometry_only, import, link_values, urdf_text,
 };
 use trupose::profile::{Level, Profile, builtin, builtin_names};
 use trupose::units::{to_deg, to_mm};
@@ -80,12 +80,14 @@ fn shipped_profiles_survive_the_way_through_urdf() {
             let urdf = Urdf::parse(&text).unwrap();
             let way = urdf.chain("base", "flange").unwrap();
             for convention in BOTH {
-                let imported = import(&way, convention).unwrap_or_else(|error| panic!("{name} {convention:?}: {error}"));
+                let imported =
+                    import(&way, convention).unwrap_or_else(|error| panic!("{name} {convention:?}: {error}"));
                 let read = through_text(&imported);
                 let arm = ForwardKinematics::new(&read);
                 // Joint values of a URDF turn one link against the one before: a coupled arm is uncoupled by it.
                 let written = |q: &[f64]| arm.base_from_flange(&link_values(&chain, q));
-                prove(&chain, &limits(&profile), proof::IMPORT, written).unwrap_or_else(|error| panic!("{name}: {error}"));
+                prove(&chain, &limits(&profile), proof::IMPORT, written)
+                    .unwrap_or_else(|error| panic!("{name}: {error}"));
                 for (joint, own) in read.joints().iter().zip(chain.joints()) {
                     assert_eq!((&joint.name, joint.joint_type), (&own.name, own.joint_type));
                     let worst = joint.link.a.abs().max(joint.link.d.abs());
@@ -163,7 +165,11 @@ fn a_panda_is_craigs_table_again() {
 fn a_scara_with_a_sliding_joint_keeps_its_arm_lengths() {
     let arm = imported("scara.urdf", "table", "tool", Convention::Standard);
     let links: Vec<_> = arm.chain.joints().iter().map(|joint| joint.link).collect();
-    assert!((links[0].a.abs() - 0.225).abs() < 1e-3 && (links[1].a.abs() - 0.175).abs() < 1e-3, "{}", table(&arm.chain));
+    assert!(
+        (links[0].a.abs() - 0.225).abs() < 1e-3 && (links[1].a.abs() - 0.175).abs() < 1e-3,
+        "{}",
+        table(&arm.chain)
+    );
     assert_eq!(arm.beta_joints, [0, 1, 2]);
     assert_eq!(arm.notes, ["joint 'J4' is continuous: it has no limits; poses are planned only within limits"]);
     imported("scara.urdf", "pedestal", "shaft", Convention::Modified);
@@ -175,9 +181,15 @@ fn what_is_no_serial_chain_is_refused_with_its_place() {
     let urdf = Urdf::parse(&panda).unwrap();
     let refused = |base: &str, tip: &str| urdf.chain(base, tip).unwrap_err().to_string();
     let message = refused("panda_link0", "panda_rightfinger");
-    assert!(message.starts_with("line 45: joint 'panda_finger_joint2': it follows joint 'panda_finger_joint1'"), "{message}");
+    assert!(
+        message.starts_with("line 45: joint 'panda_finger_joint2': it follows joint 'panda_finger_joint1'"),
+        "{message}"
+    );
     let message = refused("panda_link3", "panda_link0");
-    assert!(message.contains("joint 'panda_joint3'") && message.contains("leads up over this revolute joint"), "{message}");
+    assert!(
+        message.contains("joint 'panda_joint3'") && message.contains("leads up over this revolute joint"),
+        "{message}"
+    );
     let message = refused("panda_link7", "panda_link8");
     assert!(message.contains("no joint moves between"), "{message}");
     let message = refused("panda_linkO", "panda_link8");
@@ -201,8 +213,14 @@ fn what_is_no_serial_chain_is_refused_with_its_place() {
             "<robot>\n<joint name='j' type='fixed'><parent link='x'/><child link='b'/></joint></robot>",
             "line 2: <parent> of joint 'j': there is no link 'x'",
         ),
-        (&joint("\n<origin xyz='0 1'/>"), "line 4: <origin> of joint 'j': attribute 'xyz' needs three numbers, it has 2"),
-        (&joint("\n<origin rpy='0 1 x'/>"), "line 4: <origin> of joint 'j': attribute 'rpy' has 'x', which is no number"),
+        (
+            &joint("\n<origin xyz='0 1'/>"),
+            "line 4: <origin> of joint 'j': attribute 'xyz' needs three numbers, it has 2",
+        ),
+        (
+            &joint("\n<origin rpy='0 1 x'/>"),
+            "line 4: <origin> of joint 'j': attribute 'rpy' has 'x', which is no number",
+        ),
         (&joint("<axis xyz='0 0 0'/>"), "line 2: <axis> of joint 'j': it has no direction"),
         (&joint("\n<limit lower='1' upper='-1'/>"), "line 4: <limit> of joint 'j': lower 1 is above upper -1"),
         (&joint("\n<origin/>\n<origin/>"), "line 5: <origin> of joint 'j': the joint has two of them"),
@@ -332,7 +350,10 @@ fn a_given_urdf_changes_in_the_origins_of_its_chain_only() {
         assert_eq!(without_origins(&done.text), without_origins(&given), "something else changed");
         let lines = done.text.lines().zip(given.lines()).filter(|(new, old)| new != old).count();
         assert!(lines >= changed, "{lines}");
-        assert!(done.text.contains("<joint name=\"elbow_joint\"><origin xyz=\"9 9 9\"/>"), "a transmission is no joint");
+        assert!(
+            done.text.contains("<joint name=\"elbow_joint\"><origin xyz=\"9 9 9\"/>"),
+            "a transmission is no joint"
+        );
         // Meshes stay on their links: every link frame moves by the size of the deviations only.
         let (old, new) = (Urdf::parse(&given).unwrap(), Urdf::parse(&done.text).unwrap());
         for joint in &old.joints {
@@ -348,7 +369,9 @@ fn a_given_urdf_changes_in_the_origins_of_its_chain_only() {
     };
     assert!(refused("base_link", "tool0", &arm).contains("not the nominal arm of the profile"));
     assert!(refused("base", "wrist_3_link", &arm).contains("no fixed joint behind it"));
-    assert!(refused("base", "tool0", &calibrated(&self::profile("ur10"))).contains("not the nominal arm of the profile"));
+    assert!(
+        refused("base", "tool0", &calibrated(&self::profile("ur10"))).contains("not the nominal arm of the profile")
+    );
     assert!(refused("base", "tool0", &calibrated(&self::profile("franka_panda"))).contains("has 6 moving joints"));
 }
 
@@ -382,7 +405,11 @@ fn urdfs_with_their_own_frames_are_patched_too() {
             let axis = own.rotation.inverse() * joint.axis.into_inner();
             let [roll, pitch, yaw] = trupose::model::roll_pitch_yaw(&origin.rotation);
             let p = origin.translation.vector;
-            edits.push((place, format!("<origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>", p.x, p.y, p.z), axis));
+            edits.push((
+                place,
+                format!("<origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>", p.x, p.y, p.z),
+                axis,
+            ));
             before = own;
         }
         for (place, origin, axis) in edits.into_iter().rev() {
@@ -400,7 +427,8 @@ fn urdfs_with_their_own_frames_are_patched_too() {
             into: Some(GivenUrdf { text: &given, base: "base", tip: "flange" }),
             ..ExportOptions::default()
         };
-        let done = export(&calibrated(&profile), Format::Urdf, &options).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let done =
+            export(&calibrated(&profile), Format::Urdf, &options).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(without_origins(&done.text), without_origins(&given), "{name}");
     }
 }

@@ -72,7 +72,8 @@ fn table<O: Write, E: Write>(
         }
         None => console.print(&text)?,
     }
-    let position_only = if orientation_left > 0 { format!(", {orientation_left} of them in position only") } else { String::new() };
+    let position_only =
+        if orientation_left > 0 { format!(", {orientation_left} of them in position only") } else { String::new() };
     console.remark(&format!("{} of {} targets reached{position_only}", rows.len() - failed, rows.len()));
     Ok(if failed == 0 { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
 }
@@ -143,7 +144,10 @@ fn reason(done: &Compensated, joints: &[Joint]) -> String {
     match &done.status {
         Status::Reached => "reached".to_owned(),
         Status::PositionOnly => {
-            format!("near a singularity only the position is reached; the orientation is off by {:.4} deg", to_deg(done.angle_error))
+            format!(
+                "near a singularity only the position is reached; the orientation is off by {:.4} deg",
+                to_deg(done.angle_error)
+            )
         }
         Status::AtLimit(held) => format!("not reached: {} would have to pass its limit; {left}", names(held)),
         Status::Singular => format!("not reached: near a singularity the corrections become too large; {left}"),

@@ -23,9 +23,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O
     let into = given.as_deref().map(|text| GivenUrdf { text, base: &args.base, tip: &args.tip });
     let options = ExportOptions { into, with_tool_offset: args.with_tool_offset };
     let done = export(&arm, format, &options).map_err(|error| match (&error, &args.into) {
-        (ModelError::Urdf(_), Some(path)) => {
-            Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()))
-        }
+        (ModelError::Urdf(_), Some(path)) => Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display())),
         (ModelError::Differs { .. } | ModelError::ReadBack(_), _) => Failure::from_error(ExitStatus::Internal, &error),
         _ => Failure::from_error(ExitStatus::Usage, &error),
     })?;

@@ -169,8 +169,8 @@ pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) 
     let (text, agreement) = match format {
         Format::CorrectedProfile => {
             let text = corrected_profile(arm);
-            let (read, _) = Profile::parse(&text, format.file_name())
-                .map_err(|errors| ModelError::ReadBack(errors.to_string()))?;
+            let (read, _) =
+                Profile::parse(&text, format.file_name()).map_err(|errors| ModelError::ReadBack(errors.to_string()))?;
             let agreement = proven(read.chain())?;
             (text, agreement)
         }
@@ -180,8 +180,7 @@ pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) 
             (text, agreement)
         }
         Format::Json => {
-            let text =
-                write_json(arm.profile.name(), &arm.about, arm.profile.chain(), identified, &arm.targets)?;
+            let text = write_json(arm.profile.name(), &arm.about, arm.profile.chain(), identified, &arm.targets)?;
             let agreement = proven(&read_json(&text)?)?;
             (text, agreement)
         }
@@ -201,7 +200,9 @@ pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) 
 fn corrected_profile(arm: &CalibratedArm) -> String {
     let profile = &arm.profile;
     let mut comments = arm.about.clone();
-    comments.push("The constants are the identified ones. Targets stand where they were identified: mount them anew,".to_owned());
+    comments.push(
+        "The constants are the identified ones. Targets stand where they were identified: mount them anew,".to_owned(),
+    );
     comments.push("measure them anew.".to_owned());
     let heading = Heading {
         comments: &comments,
@@ -220,7 +221,8 @@ fn ur_kinematics(
     let written = write_ur(&arm.about, &arm.identified)?;
     let rest = written.flange_in_wrist_3;
     let offset = offset_text(&rest);
-    let is_small = rest.translation.vector.norm() <= proof::EXPORT.position && rest.rotation.angle() <= proof::EXPORT.angle;
+    let is_small =
+        rest.translation.vector.norm() <= proof::EXPORT.position && rest.rotation.angle() <= proof::EXPORT.angle;
     if !is_small && !options.with_tool_offset {
         return Err(ModelError::Unsuitable(format!(
             "the file has no place for the flange beside axis 6: {offset} (alpha6, a6). Let the tool take it \
@@ -232,7 +234,8 @@ fn ur_kinematics(
     }
     let origins = read_ur(&written.text)?;
     let agreement = prove(&arm.identified, &arm.limits(), proof::EXPORT, |q| {
-        let joints = origins.iter().zip(q).map(|(origin, q)| origin * motion(JointType::Revolute, &Vector3::z_axis(), *q));
+        let joints =
+            origins.iter().zip(q).map(|(origin, q)| origin * motion(JointType::Revolute, &Vector3::z_axis(), *q));
         joints.fold(Isometry3::identity(), |pose, joint| pose * joint) * rest
     })?;
     Ok((written.text, agreement))

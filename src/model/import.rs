@@ -175,7 +175,9 @@ fn base_frame(axis: &Axis) -> Isometry3<f64> {
 
 /// From `frame`, whose z is the present axis, to the next one. `after` is the axis behind the next one.
 fn step(frame: &Isometry3<f64>, next: &Axis, after: Option<&Axis>) -> (Screw, Between) {
-    let seen = |axis: &Axis| (frame.inverse_transform_point(&axis.point), frame.inverse_transform_unit_vector(&axis.direction));
+    let seen = |axis: &Axis| {
+        (frame.inverse_transform_point(&axis.point), frame.inverse_transform_unit_vector(&axis.direction))
+    };
     let (point, u) = seen(next);
     let is_parallel = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(b).abs() > PARALLEL_TOLERANCE.cos();
     // Where a sliding axis is put, if that is not free.

@@ -180,8 +180,7 @@ pub(super) fn read_json(text: &str) -> Result<KinematicChain, ModelError> {
 }
 
 /// Columns of the CSV before those of the couplings.
-const COLUMNS: [&str; 8] =
-    ["joint", "type", "alpha_deg", "a_mm", "d_mm", "theta_deg", "beta_deg", "direction"];
+const COLUMNS: [&str; 8] = ["joint", "type", "alpha_deg", "a_mm", "d_mm", "theta_deg", "beta_deg", "direction"];
 
 /// The table of link constants. What concerns the whole arm stands above it, in lines `# name: value`.
 pub(super) fn write_csv(about: &[String], chain: &KinematicChain) -> Result<String, ModelError> {
@@ -241,14 +240,12 @@ pub(super) fn read_csv(text: &str) -> Result<KinematicChain, ModelError> {
     for record in reader.records() {
         let record = record.map_err(|error| ModelError::ReadBack(error.to_string()))?;
         let numbers: Vec<f64> = record.iter().skip(2).filter_map(|cell| cell.parse().ok()).collect();
-        let (Some(name), Some([alpha, a, d, theta, beta, direction, coupling @ ..])) =
-            (record.get(0), numbers.get(..))
+        let (Some(name), Some([alpha, a, d, theta, beta, direction, coupling @ ..])) = (record.get(0), numbers.get(..))
         else {
             return Err(missing("complete row"));
         };
         let link = LinkText { alpha_deg: *alpha, a_mm: *a, d_mm: *d, theta_deg: *theta, beta_deg: *beta };
-        let joint_type =
-            if record.get(1) == Some("prismatic") { JointType::Prismatic } else { JointType::Revolute };
+        let joint_type = if record.get(1) == Some("prismatic") { JointType::Prismatic } else { JointType::Revolute };
         joints.push(Joint {
             name: name.to_owned(),
             joint_type,
@@ -293,7 +290,9 @@ pub(super) fn write_ur(about: &[String], chain: &KinematicChain) -> Result<UrKin
         *last *= along;
     }
     let mut text: String = about.iter().map(|line| format!("# {}\n", printable(line))).collect();
-    text.push_str("# Metres and radians. There is no 'hash': the driver cannot tell whether it belongs to the robot. Check it.\n");
+    text.push_str(
+        "# Metres and radians. There is no 'hash': the driver cannot tell whether it belongs to the robot. Check it.\n",
+    );
     if rest != Isometry3::identity() {
         let PoseText { xyz_mm, rpy_deg } = (&rest).into();
         text.push_str(&format!(

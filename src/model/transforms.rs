@@ -38,10 +38,7 @@ pub fn from_roll_pitch_yaw(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> 
 
 /// A rotation about z and a translation along it.
 pub(super) fn screw_z(theta: f64, d: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::new(0.0, 0.0, d),
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), theta),
-    )
+    Isometry3::from_parts(Translation3::new(0.0, 0.0, d), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), theta))
 }
 
 /// `Trans(x,a) Rot(x,α) Rot(y,β)`: what is between the axes of two neighbouring joints, in both conventions.
@@ -54,10 +51,9 @@ pub(super) fn between_axes(link: &Link) -> Isometry3<f64> {
 /// What a joint does at this value ((rad) or (m)) along or about its axis.
 pub(super) fn motion(joint_type: JointType, axis: &Unit<Vector3<f64>>, value: f64) -> Isometry3<f64> {
     match joint_type {
-        JointType::Revolute => Isometry3::from_parts(
-            Translation3::identity(),
-            UnitQuaternion::from_axis_angle(axis, value),
-        ),
+        JointType::Revolute => {
+            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(axis, value))
+        }
         JointType::Prismatic => {
             Isometry3::from_parts(Translation3::from(axis.into_inner() * value), UnitQuaternion::identity())
         }
@@ -124,7 +120,9 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_never_minus_zero() {
-        for (value, text) in [(0.0, "0.0"), (-0.0, "0.0"), (-1e-15, "0.0"), (1.5, "1.5"), (-90.0, "-90.0"), (1e-12, "0.000000000001")] {
+        for (value, text) in
+            [(0.0, "0.0"), (-0.0, "0.0"), (-1e-15, "0.0"), (1.5, "1.5"), (-90.0, "-90.0"), (1e-12, "0.000000000001")]
+        {
             assert_eq!(number(value), text);
         }
     }

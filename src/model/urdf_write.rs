@@ -40,7 +40,9 @@ pub fn fresh(
     let frames = JointFrames::new(chain);
     let mut lines = vec!["<?xml version=\"1.0\" encoding=\"utf-8\"?>".to_owned(), "<!--".to_owned()];
     lines.extend(comments.iter().map(|line| format!("  {}", printable(line).replace("--", "__"))));
-    lines.push("  Shapes, masses and efforts are not known here: effort is 0, velocity is 0 where it is not known.".to_owned());
+    lines.push(
+        "  Shapes, masses and efforts are not known here: effort is 0, velocity is 0 where it is not known.".to_owned(),
+    );
     lines.push("-->".to_owned());
     lines.push(format!("<robot name=\"{}\">", escaped(name)));
     lines.push(format!("  <link name=\"{BASE}\"/>"));
@@ -65,11 +67,7 @@ pub fn fresh(
         lines.push(format!("    <axis xyz=\"0 0 {}\"/>", if joint.direction < 0.0 { "-1" } else { "1" }));
         let range = limits.map(|(low, high)| format!("lower=\"{}\" upper=\"{}\" ", number(low), number(high)));
         let speed = ranges.get(index).and_then(|range| range.max_speed).unwrap_or(0.0);
-        lines.push(format!(
-            "    <limit {}effort=\"0\" velocity=\"{}\"/>",
-            range.unwrap_or_default(),
-            number(speed)
-        ));
+        lines.push(format!("    <limit {}effort=\"0\" velocity=\"{}\"/>", range.unwrap_or_default(), number(speed)));
         lines.push("  </joint>".to_owned());
         parent = child;
     }

@@ -196,11 +196,7 @@ fn link_value(robot: &Robot<'_>, index: usize, q: &[f64]) -> f64 {
 }
 
 /// For each joint of the arm its place in the lists of the trajectory.
-fn ros_order(
-    robot: &Robot<'_>,
-    joint_names: Option<&[String]>,
-    program: &[u8],
-) -> Result<Vec<usize>, ProgramError> {
+fn ros_order(robot: &Robot<'_>, joint_names: Option<&[String]>, program: &[u8]) -> Result<Vec<usize>, ProgramError> {
     let own: Vec<String> = joint_names.map_or_else(
         || robot.chain.joints().iter().map(|joint| super::names::ascii(&joint.name)).collect(),
         <[String]>::to_vec,

@@ -11,8 +11,6 @@
 use super::table::{self, Defect, Header, Measure, NumberColumn, Numbers, Shape, TableErrors, TableProblem, decode};
 use crate::kinematics::JointType;
 
-
-
 /// What is to be reached.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TargetGoal {

@@ -21,8 +21,7 @@ pub(super) fn run<O: Write, E: Write>(
     dialect: Dialect,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let unusable =
-        |error: ProgramError| Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()));
+    let unusable = |error: ProgramError| Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()));
     let text = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let profile = &arm.profile;
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();

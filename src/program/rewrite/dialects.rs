@@ -60,7 +60,11 @@ fn rapid(dof: usize, text: &str) -> Found {
         let Some((values, end)) = items(text, inner, '[', ']') else { continue };
         let comma = after_blanks(text, end);
         let second = after_blanks(text, comma + 1);
-        let extra = if text.get(comma..).is_some_and(|rest| rest.starts_with(',')) { items(text, second, '[', ']') } else { None };
+        let extra = if text.get(comma..).is_some_and(|rest| rest.starts_with(',')) {
+            items(text, second, '[', ']')
+        } else {
+            None
+        };
         let Some((extra, _)) = extra else { continue };
         if values.len() == 6 && extra.len() == 6 {
             let line = line_of(text, at);
@@ -193,7 +197,9 @@ fn urscript(dof: usize, text: &str) -> Found {
             let rest = text.get(argument..).unwrap_or_default();
             if rest.starts_with('[') {
                 match items(text, argument, '[', ']') {
-                    Some((values, _)) if values.len() == dof && are_numbers(text, &values) => found.target(line, values),
+                    Some((values, _)) if values.len() == dof && are_numbers(text, &values) => {
+                        found.target(line, values)
+                    }
                     _ => found.leave(line, UNREADABLE),
                 }
             } else {

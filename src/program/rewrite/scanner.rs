@@ -6,10 +6,13 @@ use std::ops::Range;
 pub(super) fn masked(program: &[u8], comment: &str, block: Option<(&str, &str)>, hides_quotes: bool) -> String {
     let mut text = String::with_capacity(program.len());
     let mut at = 0;
-    let starts = |at: usize, mark: &str| !mark.is_empty() && program.get(at..).is_some_and(|rest| rest.starts_with(mark.as_bytes()));
+    let starts = |at: usize, mark: &str| {
+        !mark.is_empty() && program.get(at..).is_some_and(|rest| rest.starts_with(mark.as_bytes()))
+    };
     while let Some(byte) = program.get(at).copied() {
         let hidden = if let Some((_, end)) = block.filter(|(begin, _)| starts(at, begin)) {
-            let length = (at..program.len()).find(|place| starts(*place, end)).map_or(program.len(), |place| place + end.len());
+            let length =
+                (at..program.len()).find(|place| starts(*place, end)).map_or(program.len(), |place| place + end.len());
             length - at
         } else if starts(at, comment) {
             length_until(program, at, |byte| byte == b'\n')
