@@ -6,7 +6,6 @@
     reason = "a failure of a test is a panic; test files need no atomic writes"
 )]
 
-#[expect(dead_code, reason = "shared with other tests")]
 mod support;
 
 use std::fs;
@@ -127,7 +126,9 @@ fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
                 assert!(position_only || goal.rotation.angle_to(&there.rotation) < 1e-6, "{name}");
             }
         }
-        assert!(reached >= 400 && usable >= 450, "{name}: {reached} reached, {usable} usable of 500");
+        // The quill of the SCARA has 150 mm: some corrections would leave it.
+        let least = if position_only { 400 } else { 450 };
+        assert!(reached >= 400 && usable >= least, "{name}: {reached} reached, {usable} usable of 500");
     }
 }
 
@@ -232,7 +233,7 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
     assert_eq!(code, 0, "{out}{err}");
     assert!(fs::read_to_string(&file).unwrap().contains("near,reached,"));
     let (code, _, err) = run("pose,x_mm,y_mm\nnear,900,100\n", &[]);
-    assert!(code == 2 && err.contains("'z_mm'"), "{err}");
+    assert!(code == 2 && err.contains("z_mm is missing"), "{err}");
     let (code, _, err) = run("pose,x_mm,y_mm,z_mm\nnear,900,100,3\n", &["--target", "ball"]);
     assert!(code == 2 && err.contains("targets: "), "{err}");
 }
