@@ -195,7 +195,7 @@ impl<'a> Compensator<'a> {
             Goal::Configuration(meant) => {
                 let beyond = self.beyond(meant);
                 if !beyond.is_empty() || meant.len() != self.limits.len() {
-                    return self.unreached(meant, Status::BeyondLimit(beyond));
+                    return Self::unreached(meant, Status::BeyondLimit(beyond));
                 }
                 self.correct(meant, &self.nominal.base_from_tool(meant), !self.settings.position_only)
             }
@@ -209,7 +209,7 @@ impl<'a> Compensator<'a> {
         }
     }
 
-    fn unreached(&self, meant: &[f64], status: Status) -> Compensated {
+    fn unreached(meant: &[f64], status: Status) -> Compensated {
         Compensated {
             meant: Some(meant.to_vec()),
             command: meant.to_vec(),
@@ -250,7 +250,7 @@ impl<'a> Compensator<'a> {
                 break;
             }
         }
-        let Some(best) = best else { return self.unreached(first, Status::OutOfReach) };
+        let Some(best) = best else { return Self::unreached(first, Status::OutOfReach) };
         if self.is_reached(&best, with_angle) {
             return self.correct(&best.q, goal, with_angle);
         }
@@ -351,7 +351,7 @@ impl<'a> Compensator<'a> {
                 break;
             }
             let jacobian = side.arm.configuration_jacobian(&q, &point).matrix;
-            let step = self.step(&jacobian, &error, rows, &held, damping);
+            let step = Self::step(&jacobian, &error, rows, &held, damping);
             let mut trial = q.clone();
             let mut newly_held = Vec::new();
             for (index, (value, step)) in trial.iter_mut().zip(step.iter()).enumerate() {
@@ -395,7 +395,6 @@ impl<'a> Compensator<'a> {
 
     /// `(JᵀJ + λ I)⁻¹ Jᵀ e` over the joints that are free.
     fn step(
-        &self,
         jacobian: &Matrix6xX<f64>,
         error: &Vector6<f64>,
         rows: usize,

@@ -185,17 +185,17 @@ const COLUMNS: [&str; 8] = ["joint", "type", "alpha_deg", "a_mm", "d_mm", "theta
 /// The table of link constants. What concerns the whole arm stands above it, in lines `# name: value`.
 pub(super) fn write_csv(about: &[String], chain: &KinematicChain) -> Result<String, ModelError> {
     let failed = |error: &dyn std::error::Error| ModelError::ReadBack(error.to_string());
-    let mut text: String = about.iter().map(|line| format!("# {}\n", printable(line))).collect();
+    let mut text: String = about.iter().flat_map(|line| ["# ".to_owned(), printable(line), "\n".to_owned()]).collect();
     let (convention, product) = match chain.convention() {
         Convention::Standard => ("standard", "Rot(z,theta) Trans(z,d) Trans(x,a) Rot(x,alpha) Rot(y,beta)"),
         Convention::Modified => ("modified", "Rot(x,alpha) Trans(x,a) Rot(y,beta) Rot(z,theta) Trans(z,d)"),
     };
-    text.push_str(&format!("# {product}; joint values add to theta (revolute) or d (prismatic)\n"));
-    text.push_str(&format!("# convention: {convention}\n"));
+    text.extend([format!("# {product}; joint values add to theta (revolute) or d (prismatic)\n")]);
+    text.extend([format!("# convention: {convention}\n")]);
     for (name, pose) in [("base", chain.base()), ("flange", chain.flange())] {
         let PoseText { xyz_mm, rpy_deg } = pose.into();
         let values: Vec<String> = xyz_mm.into_iter().chain(rpy_deg).map(number).collect();
-        text.push_str(&format!("# {name} x y z (mm), roll pitch yaw (deg): {}\n", values.join(" ")));
+        text.extend([format!("# {name} x y z (mm), roll pitch yaw (deg): {}\n", values.join(" "))]);
     }
     let mut writer = csv::Writer::from_writer(Vec::new());
     let couplings = chain.joints().iter().map(|joint| format!("coupling_{}", joint.name));
@@ -289,25 +289,25 @@ pub(super) fn write_ur(about: &[String], chain: &KinematicChain) -> Result<UrKin
     if let Some(last) = frames.origins.last_mut() {
         *last *= along;
     }
-    let mut text: String = about.iter().map(|line| format!("# {}\n", printable(line))).collect();
+    let mut text: String = about.iter().flat_map(|line| ["# ".to_owned(), printable(line), "\n".to_owned()]).collect();
     text.push_str(
         "# Metres and radians. There is no 'hash': the driver cannot tell whether it belongs to the robot. Check it.\n",
     );
     if rest != Isometry3::identity() {
         let PoseText { xyz_mm, rpy_deg } = (&rest).into();
-        text.push_str(&format!(
+        text.extend([format!(
             "# The flange is not on axis 6: add to every tool, in front of it, x y z {} mm, roll pitch yaw {} deg.\n",
             xyz_mm.map(number).join(" "),
             rpy_deg.map(number).join(" ")
-        ));
+        )]);
     }
     text.push_str("kinematics:\n");
     for (name, origin) in UR_LINKS.iter().zip(&frames.origins) {
         let [x, y, z]: [f64; 3] = origin.translation.vector.into();
         let [roll, pitch, yaw] = roll_pitch_yaw(&origin.rotation);
-        text.push_str(&format!("  {name}:\n"));
+        text.extend([format!("  {name}:\n")]);
         for (field, value) in [("x", x), ("y", y), ("z", z), ("roll", roll), ("pitch", pitch), ("yaw", yaw)] {
-            text.push_str(&format!("    {field}: {}\n", number(value)));
+            text.extend([format!("    {field}: {}\n", number(value))]);
         }
     }
     Ok(UrKinematics { text, flange_in_wrist_3: rest })
