@@ -273,6 +273,9 @@ fn is_xacro(node: &Node<'_, '_>) -> bool {
     node.is_element() && node.tag_name().namespace().is_some_and(|space| space.contains("xacro"))
 }
 
+/// Lowest and highest value, and highest speed.
+type RangeAndSpeed = (Option<(f64, f64)>, Option<f64>);
+
 /// Gives lines to errors.
 struct Reader<'d, 'i> {
     document: &'d Document<'i>,
@@ -318,18 +321,15 @@ impl Reader<'_, '_> {
         if let Some(second) = origins.get(1) {
             return Err(self.element(*second, format!("<origin> of {what}"), "the joint has two of them"));
         }
-        let (origin, origin_bytes) = match origins.first() {
-            Some(origin) => {
-                let element = format!("<origin> of {what}");
-                let position = self.triple(*origin, &element, "xyz")?.unwrap_or([0.0; 3]);
-                let angles = self.triple(*origin, &element, "rpy")?.unwrap_or([0.0; 3]);
-                (from_roll_pitch_yaw(position, angles), origin.range())
-            }
-            None => {
-                // There is a child: <parent> was found.
-                let place = node.first_child().map_or(node.range().start, |child| child.range().start);
-                (Isometry3::identity(), place..place)
-            }
+        let (origin, origin_bytes) = if let Some(origin) = origins.first() {
+            let element = format!("<origin> of {what}");
+            let position = self.triple(*origin, &element, "xyz")?.unwrap_or([0.0; 3]);
+            let angles = self.triple(*origin, &element, "rpy")?.unwrap_or([0.0; 3]);
+            (from_roll_pitch_yaw(position, angles), origin.range())
+        } else {
+            // There is a child: <parent> was found.
+            let place = node.first_child().map_or_else(|| node.range().start, |child| child.range().start);
+            (Isometry3::identity(), place..place)
         };
         let axis = match elements(node, "axis").next() {
             Some(axis) => self.triple(axis, &format!("<axis> of {what}"), "xyz")?.unwrap_or([1.0, 0.0, 0.0]),
@@ -356,12 +356,7 @@ impl Reader<'_, '_> {
     }
 
     /// Range and speed. A range that is empty (as `lower="0" upper="0"`) is none.
-    fn limits(
-        &self,
-        node: Node<'_, '_>,
-        what: &str,
-        type_name: &str,
-    ) -> Result<(Option<(f64, f64)>, Option<f64>), UrdfError> {
+    fn limits(&self, node: Node<'_, '_>, what: &str, type_name: &str) -> Result<RangeAndSpeed, UrdfError> {
         let Some(limit) = elements(node, "limit").next() else { return Ok((None, None)) };
         let element = format!("<limit> of {what}");
         let value = |name: &str| match limit.attribute(name) {

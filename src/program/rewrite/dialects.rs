@@ -198,7 +198,7 @@ fn urscript(dof: usize, text: &str) -> Found {
             if rest.starts_with('[') {
                 match items(text, argument, '[', ']') {
                     Some((values, _)) if values.len() == dof && are_numbers(text, &values) => {
-                        found.target(line, values)
+                        found.target(line, values);
                     }
                     _ => found.leave(line, UNREADABLE),
                 }
