@@ -1,6 +1,8 @@
 //! Runs a command: loads its files, has the procedure done, writes the results.
 
+mod compensate;
 mod constraints;
+mod export;
 mod identify;
 mod load;
 mod plan;
@@ -35,7 +37,12 @@ pub struct Console<O: Write, E: Write> {
 impl<O: Write, E: Write> Console<O, E> {
     /// Prints data. A reader that went away is not a failure.
     fn print(&mut self, text: &str) -> Result<(), Failure> {
-        match self.out.write_all(text.as_bytes()).and_then(|()| self.out.flush()) {
+        self.print_bytes(text.as_bytes())
+    }
+
+    /// As [`Console::print`], for what may be no UTF-8.
+    fn print_bytes(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        match self.out.write_all(bytes).and_then(|()| self.out.flush()) {
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
                 Err(Failure::new(ExitStatus::Store, format!("cannot write the output: {error}")))
             }
@@ -85,6 +92,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Plan(args) => plan::run(&args, console),
         Command::Program(args) => program::run(&args, console),
         Command::Record(command) => record::run(&command, console),
+        Command::Compensate(args) => compensate::run(&args, console),
+        Command::Export(args) => export::run(&args, console),
         Command::Profile(command) => profile::run(&command, console),
     }
 }

@@ -3,6 +3,8 @@
 mod recording;
 mod terminal;
 
+pub mod compensate;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -175,6 +177,10 @@ pub enum Command {
     Plan(PlanArgs),
     /// Write a robot program that visits the poses of a plan
     Program(ProgramArgs),
+    /// Correct targets so that the real arm reaches what was meant
+    Compensate(compensate::CompensateArgs),
+    /// Write the identified arm as a profile, URDF or table
+    Export(compensate::ExportArgs),
     /// Guided calibration in the terminal; the same as no command at all
     Wizard(WizardArgs),
     /// Calibrate a simulated robot from profile to result, without a terminal
@@ -209,6 +215,8 @@ pub enum ProfileCommand {
         /// Path of the profile file, or name of a shipped profile
         file: PathBuf,
     },
+    /// Make a profile from the serial chain of a URDF
+    ImportUrdf(compensate::ImportUrdfArgs),
 }
 
 /// How to identify; shared by all commands that do.

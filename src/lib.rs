@@ -8,8 +8,9 @@
 //!
 //! Layers, lowest first; a module knows only those before it (`tests/architecture.rs` checks it):
 //!
-//! - [`units`], [`geometry`], [`kinematics`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
+//! - [`units`], [`geometry`], [`kinematics`], [`compensation`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
+//! - [`model`]: models of the arm in the formats of others, in and out.
 //! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
 //! - [`search`], [`error`]: a pose search on several threads; how a command ends and what the operator is told.
@@ -24,11 +25,13 @@
 
 pub mod app;
 pub mod cli;
+pub mod compensation;
 pub mod error;
 pub mod geometry;
 pub mod identification;
 pub mod kinematics;
 pub mod link;
+pub mod model;
 pub mod planning;
 pub mod procedure;
 pub mod profile;

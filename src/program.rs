@@ -22,6 +22,7 @@ mod inform;
 mod krl;
 mod names;
 mod rapid;
+pub mod rewrite;
 mod ros;
 mod urscript;
 mod val3;

@@ -22,6 +22,7 @@ pub mod simulation;
 pub mod state;
 pub mod summary;
 mod table;
+pub mod targets;
 pub mod wire;
 
 pub use table::{Defect, TableErrors, TableProblem, printable};

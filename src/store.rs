@@ -66,10 +66,18 @@ pub fn create_folder(path: &Path) -> Result<(), StoreError> {
 /// # Errors
 /// Any step failed; the old file is then still there.
 pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
+    replace_bytes(path, text.as_bytes())
+}
+
+/// As [`replace`], for what may be no UTF-8.
+///
+/// # Errors
+/// Any step failed; the old file is then still there.
+pub fn replace_bytes(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let written = || -> io::Result<()> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
         let mut file = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder)?;
-        file.write_all(text.as_bytes())?;
+        file.write_all(bytes)?;
         file.as_file().sync_all()?;
         set_readable(file.as_file())?;
         file.persist(path).map_err(|failed| failed.error)?;

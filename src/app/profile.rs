@@ -12,6 +12,7 @@ pub(super) fn run<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     match command {
+        ProfileCommand::ImportUrdf(args) => super::export::import_urdf(args, console),
         ProfileCommand::List => {
             let profiles: Vec<Profile> = builtin_names()
                 .filter_map(|name| Profile::parse(builtin(name)?, name).ok())

@@ -111,6 +111,17 @@ pub enum ProgramError {
     /// Nobody to wait for.
     #[error("a ROS trajectory cannot wait for the operator; use a dwell that is long enough to measure")]
     NoOperator,
+    /// A program that is no text.
+    #[error("the program has zero bytes: it is no text, or UTF-16; export it as plain text")]
+    NotText,
+    /// A trajectory for other joints.
+    #[error("the trajectory has the joints {}; the arm has {}; name those of the arm in the order from base to flange", found.join(", "), expected.join(", "))]
+    JointNames {
+        /// Names in the trajectory.
+        found: Vec<String>,
+        /// Names of the arm.
+        expected: Vec<String>,
+    },
 }
 
 fn joint_range(least: usize, most: usize) -> String {

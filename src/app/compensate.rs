@@ -1,0 +1,157 @@
+//! `trupose compensate`: joint values to command so that the real arm reaches what was meant.
+
+mod program;
+
+use std::io::Write;
+use std::path::Path;
+
+use nalgebra::{Isometry3, Point3, Translation3};
+
+use super::{Console, export};
+use crate::cli::compensate::CompensateArgs;
+use crate::compensation::{Compensated, Compensator, Goal, Settings, Status, ToolArm};
+use crate::error::{ExitStatus, Failure};
+use crate::kinematics::{Joint, KinematicChain};
+use crate::model::{CalibratedArm, from_roll_pitch_yaw};
+use crate::procedure::joint_types;
+use crate::profile::Target;
+use crate::session::printable;
+use crate::session::targets::{TargetGoal, decimal, quoted, read_bytes};
+use crate::store;
+use crate::units::{to_deg, to_mm};
+
+pub(super) fn run<O: Write, E: Write>(
+    args: &CompensateArgs,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let arm = export::calibrated_arm(&args.calibration)?;
+    for effect in &arm.other_effects {
+        console.remark(&format!("note: compensated for geometry only; identified, but not in it: {effect}"));
+    }
+    match (&args.program, args.dialect, &args.targets) {
+        (Some(path), Some(dialect), _) => program::run(args, &arm, path, dialect, console),
+        (_, _, Some(path)) => table(args, &arm, path, console),
+        _ => Err(Failure::new(ExitStatus::Usage, "nothing to compensate").hint("give '--targets' or '--program'")),
+    }
+}
+
+/// A table of targets becomes a table of commands.
+fn table<O: Write, E: Write>(
+    args: &CompensateArgs,
+    arm: &CalibratedArm,
+    path: &Path,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    let rows = read_bytes(&bytes, &path.display().to_string(), &joint_types(&arm.profile))
+        .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
+    let (nominal, identified) = tool_arms(arm, args.target.as_deref())?;
+    let limits: Vec<_> = arm.profile.joints().iter().map(|range| range.limits).collect();
+    let settings = Settings { position_only: args.position_only, ..Settings::default() };
+    let compensator = Compensator::new(&nominal, &identified, &limits, settings);
+    let joints = arm.identified.joints();
+    let mut lines = vec![header(joints)];
+    let mut failed = 0;
+    let mut orientation_left = 0;
+    for row in &rows {
+        let done = compensator.solve(&goal(&row.goal));
+        if !done.status.is_usable() {
+            failed += 1;
+            console.remark(&format!("pose {} (line {}): {}", row.pose, row.line, reason(&done, joints)));
+        } else if done.status == Status::PositionOnly {
+            orientation_left += 1;
+            console.remark(&format!("pose {} (line {}): {}", row.pose, row.line, reason(&done, joints)));
+        }
+        lines.push(line(&row.pose, &done, joints));
+    }
+    let text = lines.join("\n") + "\n";
+    match &args.out {
+        Some(path) => {
+            store::replace(path, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+            console.print(&format!("written: {}\n", path.display()))?;
+        }
+        None => console.print(&text)?,
+    }
+    let position_only =
+        if orientation_left > 0 { format!(", {orientation_left} of them in position only") } else { String::new() };
+    console.remark(&format!("{} of {} targets reached{position_only}", rows.len() - failed, rows.len()));
+    Ok(if failed == 0 { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
+}
+
+/// Both arms with the point that counts: the flange, or a target where each of them has it.
+fn tool_arms(arm: &CalibratedArm, target: Option<&str>) -> Result<(ToolArm, ToolArm), Failure> {
+    let place = match target {
+        None => None,
+        Some(name) => {
+            let known = arm.profile.targets().iter().zip(&arm.targets).find(|(target, _)| target.name == name);
+            Some(known.ok_or_else(|| {
+                let names: Vec<&str> = arm.targets.iter().map(|target| target.name.as_str()).collect();
+                Failure::new(ExitStatus::Usage, format!("the profile has no target '{}'", printable(name)))
+                    .hint(format!("targets: {}", names.join(", ")))
+            })?)
+        }
+    };
+    let tool = |target: Option<&Target>| {
+        target.map_or_else(Isometry3::identity, |target| {
+            Isometry3::from(Translation3::from(target.position_in_flange.coords))
+        })
+    };
+    let with = |chain: &KinematicChain, target| ToolArm { chain: chain.clone(), flange_from_tool: tool(target) };
+    Ok((
+        with(arm.profile.chain(), place.map(|(nominal, _)| nominal)),
+        with(&arm.identified, place.map(|(_, identified)| identified)),
+    ))
+}
+
+fn goal(goal: &TargetGoal) -> Goal {
+    match goal {
+        TargetGoal::Configuration(q) => Goal::Configuration(q.clone()),
+        TargetGoal::Cartesian { position, roll_pitch_yaw: Some(angles), near } => {
+            Goal::Pose { base_from_tool: from_roll_pitch_yaw(*position, *angles), near: near.clone() }
+        }
+        TargetGoal::Cartesian { position, roll_pitch_yaw: None, near } => {
+            Goal::Position { point_in_base: Point3::from(*position), near: near.clone() }
+        }
+    }
+}
+
+/// `pose,status,q1_deg,…,position_error_mm,angle_error_deg`.
+fn header(joints: &[Joint]) -> String {
+    let names = joints.iter().enumerate();
+    let names = names.map(|(index, joint)| format!("q{}_{}", index + 1, joint.joint_type.quantity().unit()));
+    format!("pose,status,{},position_error_mm,angle_error_deg", names.collect::<Vec<_>>().join(","))
+}
+
+/// A target that is not reached has no joint values: they must not be commanded.
+fn line(pose: &str, done: &Compensated, joints: &[Joint]) -> String {
+    let usable = done.status.is_usable();
+    let value = |(joint, q): (&Joint, &f64)| {
+        if usable { decimal(joint.joint_type.quantity().to_edge(*q), 6) } else { String::new() }
+    };
+    let error = |value: f64| if value.is_finite() { decimal(value, 6) } else { String::new() };
+    let mut cells = vec![quoted(pose), done.status.name().to_owned()];
+    cells.extend(joints.iter().zip(&done.command).map(value));
+    cells.extend([error(to_mm(done.position_error)), error(to_deg(done.angle_error))]);
+    cells.join(",")
+}
+
+fn reason(done: &Compensated, joints: &[Joint]) -> String {
+    let names = |held: &[usize]| {
+        let names = held.iter().filter_map(|index| joints.get(*index)).map(|joint| joint.name.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    let left = format!("{:.3} mm and {:.4} deg are left", to_mm(done.position_error), to_deg(done.angle_error));
+    match &done.status {
+        Status::Reached => "reached".to_owned(),
+        Status::PositionOnly => {
+            format!(
+                "near a singularity only the position is reached; the orientation is off by {:.4} deg",
+                to_deg(done.angle_error)
+            )
+        }
+        Status::AtLimit(held) => format!("not reached: {} would have to pass its limit; {left}", names(held)),
+        Status::Singular => format!("not reached: near a singularity the corrections become too large; {left}"),
+        Status::OutOfReach => "not reached: it is out of reach of this arm".to_owned(),
+        Status::BeyondLimit(held) => format!("not reached: {} is meant to be beyond its limit", names(held)),
+    }
+}

@@ -1,0 +1,90 @@
+//! `trupose export` and `trupose profile import-urdf`: models out and in.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::{Console, load};
+use crate::cli::compensate::{ExportArgs, ImportUrdfArgs};
+use crate::error::{ExitStatus, Failure};
+use crate::model::{
+    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ModelError, Urdf, export, geometry_only, import,
+};
+use crate::session::calibration::Calibration;
+use crate::store;
+use crate::units::{MICROMETRE, MILLIRADIAN};
+
+pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let arm = calibrated_arm(&args.calibration)?;
+    let given = args.into.as_deref().map(load::text).transpose()?;
+    let format = Format::from(args.format);
+    if given.is_some() && format != Format::Urdf {
+        return Err(Failure::new(ExitStatus::Usage, "'--into' is for '--format urdf'"));
+    }
+    let into = given.as_deref().map(|text| GivenUrdf { text, base: &args.base, tip: &args.tip });
+    let options = ExportOptions { into, with_tool_offset: args.with_tool_offset };
+    let done = export(&arm, format, &options).map_err(|error| match (&error, &args.into) {
+        (ModelError::Urdf(_), Some(path)) => Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display())),
+        (ModelError::Differs { .. } | ModelError::ReadBack(_), _) => Failure::from_error(ExitStatus::Internal, &error),
+        _ => Failure::from_error(ExitStatus::Usage, &error),
+    })?;
+    store::replace(&args.out, &done.text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+    console.print(&format!(
+        "written: {}\nread back: within {:.6} um and {:.6} urad of the identified arm at 1000 configurations\n",
+        args.out.display(),
+        done.agreement.position / MICROMETRE,
+        done.agreement.angle / MILLIRADIAN * 1e3,
+    ))?;
+    for remark in &done.remarks {
+        console.remark(&format!("note: {remark}"));
+    }
+    Ok(ExitStatus::Accepted)
+}
+
+/// The arm of a calibration file.
+pub(super) fn calibrated_arm(path: &Path) -> Result<CalibratedArm, Failure> {
+    let file = path.display().to_string();
+    let text = load::text(path)?;
+    let calibration = Calibration::parse(&text).map_err(|error| {
+        Failure::new(ExitStatus::Usage, format!("'{file}' is not a usable calibration: {error}"))
+            .hint("a calibration is written by 'trupose identify --out DIR'")
+    })?;
+    let loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
+    CalibratedArm::new(&calibration, &loaded.profile)
+        .map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))
+}
+
+/// `trupose profile import-urdf`.
+pub(super) fn import_urdf<O: Write, E: Write>(
+    args: &ImportUrdfArgs,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let text = load::text(&args.file)?;
+    let file = args.file.display().to_string();
+    let unusable = |error: &dyn std::error::Error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}"));
+    let urdf = Urdf::parse(&text).map_err(|error| unusable(&error))?;
+    let chain = urdf.chain(&args.base, &args.tip).map_err(|error| unusable(&error))?;
+    let arm = import(&chain, args.convention.into()).map_err(|error| unusable(&error))?;
+    let mut comments = vec![format!("From a URDF: links '{}' to '{}'.", args.base, args.tip)];
+    comments.extend(arm.notes.iter().cloned());
+    let heading = Heading {
+        comments: &comments,
+        name: &urdf.robot,
+        title: &urdf.robot,
+        source: &format!("URDF of '{}', from link '{}' to '{}'", urdf.robot, args.base, args.tip),
+    };
+    let part = Arm { chain: &arm.chain, ranges: &arm.ranges, beta_joints: &arm.beta_joints };
+    let profile = geometry_only(&heading, &part);
+    // What is handed out can be read.
+    load::parse_profile(profile.clone(), "the imported profile")?;
+    for note in &arm.notes {
+        console.remark(&format!("note: {note}"));
+    }
+    match &args.out {
+        Some(path) => {
+            store::replace(path, &profile).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+            console.print(&format!("written: {}\n", path.display()))?;
+        }
+        None => console.print(&profile)?,
+    }
+    Ok(ExitStatus::Accepted)
+}

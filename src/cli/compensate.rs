@@ -1,0 +1,130 @@
+//! Arguments of the commands that apply a calibration: `compensate`, `export`, and `profile import-urdf`.
+
+use std::path::PathBuf;
+use std::str::FromStr as _;
+
+use clap::{Args, ValueEnum};
+
+use crate::kinematics::Convention;
+use crate::model::Format;
+use crate::program::Dialect;
+
+/// Arguments of `compensate`.
+#[derive(Args, Debug)]
+pub struct CompensateArgs {
+    /// Calibration to apply (calibration.ron)
+    #[arg(long, value_name = "RON")]
+    pub calibration: PathBuf,
+    /// Targets: joint values, or positions with roll, pitch, yaw; CSV with units in the column names
+    #[arg(long, value_name = "CSV", required_unless_present = "program", conflicts_with = "program")]
+    pub targets: Option<PathBuf>,
+    /// Robot program whose joint targets are corrected; everything else in it stays
+    #[arg(long, value_name = "FILE", requires = "dialect")]
+    pub program: Option<PathBuf>,
+    /// Language of the program
+    #[arg(long, value_parser = Dialect::from_str, value_name = "rapid|krl|fanuc|urscript|val3|inform|ros")]
+    pub dialect: Option<Dialect>,
+    /// ROS: names of the joints in the trajectory, from base to flange [default: those of the profile]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub joint_names: Vec<String>,
+    /// File for the table of commands, or the program [default: print it]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Reach the position only, whatever the orientation
+    #[arg(long)]
+    pub position_only: bool,
+    /// Point that is to be reached: a target (SMR) of the profile [default: the flange]
+    #[arg(long, value_name = "NAME")]
+    pub target: Option<String>,
+}
+
+/// Arguments of `export`.
+#[derive(Args, Debug)]
+pub struct ExportArgs {
+    /// Calibration to export (calibration.ron)
+    #[arg(long, value_name = "RON")]
+    pub calibration: PathBuf,
+    /// Format of the model
+    #[arg(long, value_enum)]
+    pub format: FormatArg,
+    /// URDF that is to take the geometry; only the origins of its chain change
+    #[arg(long, value_name = "URDF")]
+    pub into: Option<PathBuf>,
+    /// Link of that URDF which is the base of the profile
+    #[arg(long, value_name = "LINK", default_value = "base_link", requires = "into")]
+    pub base: String,
+    /// Link of that URDF at the end of the arm
+    #[arg(long, value_name = "LINK", default_value = "tool0", requires = "into")]
+    pub tip: String,
+    /// UR kinematics: let the tool take what the file cannot say about the flange
+    #[arg(long)]
+    pub with_tool_offset: bool,
+    /// File to write
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// `--format`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FormatArg {
+    /// Robot profile with the identified geometry
+    CorrectedProfile,
+    /// URDF
+    Urdf,
+    /// default_kinematics.yaml of the ROS description of Universal Robots
+    UrKinematics,
+    /// Table of link constants
+    DhCsv,
+    /// Link constants for programs
+    Json,
+}
+
+impl From<FormatArg> for Format {
+    fn from(format: FormatArg) -> Self {
+        match format {
+            FormatArg::CorrectedProfile => Self::CorrectedProfile,
+            FormatArg::Urdf => Self::Urdf,
+            FormatArg::UrKinematics => Self::UrKinematics,
+            FormatArg::DhCsv => Self::DhCsv,
+            FormatArg::Json => Self::Json,
+        }
+    }
+}
+
+/// Arguments of `profile import-urdf`.
+#[derive(Args, Debug)]
+pub struct ImportUrdfArgs {
+    /// The robot description (xacro expanded)
+    pub file: PathBuf,
+    /// Link that is the robot base
+    #[arg(long, value_name = "LINK")]
+    pub base: String,
+    /// Link that is the flange
+    #[arg(long, value_name = "LINK")]
+    pub tip: String,
+    /// Order of the link constants
+    #[arg(long, value_enum, default_value_t)]
+    pub convention: ConventionArg,
+    /// File for the profile [default: print it]
+    #[arg(long, value_name = "RON")]
+    pub out: Option<PathBuf>,
+}
+
+/// `--convention`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ConventionArg {
+    /// Denavit and Hartenberg: theta, d, a, alpha
+    #[default]
+    Standard,
+    /// Craig: alpha, a, theta, d
+    Modified,
+}
+
+impl From<ConventionArg> for Convention {
+    fn from(convention: ConventionArg) -> Self {
+        match convention {
+            ConventionArg::Standard => Self::Standard,
+            ConventionArg::Modified => Self::Modified,
+        }
+    }
+}

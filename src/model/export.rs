@@ -1,0 +1,296 @@
+//! The identified arm in each format, with the proof.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::profile_text::{Heading, complete};
+use super::proof::{self, Agreement, prove};
+use super::tables::{read_csv, read_json, read_ur, write_csv, write_json, write_ur};
+use super::transforms::{is_coupled, link_values, motion, number, roll_pitch_yaw};
+use super::urdf::Urdf;
+use super::{ModelError, urdf_write};
+use crate::kinematics::{Axis, ForwardKinematics, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::profile::{Profile, Target};
+use crate::session::calibration::Calibration;
+use crate::units::{from_mm, to_deg, to_mm};
+
+/// A format of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Format {
+    /// A robot profile with the identified geometry.
+    CorrectedProfile,
+    /// URDF.
+    Urdf,
+    /// Parameter file of the ROS description of Universal Robots.
+    UrKinematics,
+    /// Table of link constants.
+    DhCsv,
+    /// Link constants for programs.
+    Json,
+}
+
+impl Format {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::CorrectedProfile, Self::Urdf, Self::UrKinematics, Self::DhCsv, Self::Json];
+
+    /// Name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::CorrectedProfile => "corrected-profile",
+            Self::Urdf => "urdf",
+            Self::UrKinematics => "ur-kinematics",
+            Self::DhCsv => "dh-csv",
+            Self::Json => "json",
+        }
+    }
+
+    /// Usual name of the file.
+    pub const fn file_name(self) -> &'static str {
+        match self {
+            Self::CorrectedProfile => "corrected.ron",
+            Self::Urdf => "corrected.urdf",
+            Self::UrKinematics => "default_kinematics.yaml",
+            Self::DhCsv => "corrected-dh.csv",
+            Self::Json => "corrected.json",
+        }
+    }
+
+    /// Whether the place of the targets on the flange is in it.
+    const fn has_targets(self) -> bool {
+        matches!(self, Self::CorrectedProfile | Self::Json)
+    }
+}
+
+/// A calibrated arm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibratedArm {
+    /// The robot as its maker says, with the targets as they were mounted.
+    pub profile: Profile,
+    /// The identified arm.
+    pub identified: KinematicChain,
+    /// The targets where they were identified.
+    pub targets: Vec<Target>,
+    /// Names of identified effects that are no link constants and no targets: no format here can carry them.
+    pub other_effects: Vec<String>,
+    /// Where the result comes from, a few lines.
+    pub about: Vec<String>,
+}
+
+impl CalibratedArm {
+    /// The arm of a calibration; `profile` is the one that the calibration carries.
+    ///
+    /// # Errors
+    /// The calibration has a parameter that this robot does not have.
+    pub fn new(calibration: &Calibration, profile: &Profile) -> Result<Self, ModelError> {
+        let profile = calibration.mounted.map_or_else(|| profile.clone(), |mounted| mounted.on(profile));
+        let identified = calibration.identified_chain(&profile).ok_or_else(|| {
+            ModelError::Unsuitable("the calibration has a parameter that its profile does not have".to_owned())
+        })?;
+        let mut targets = profile.targets().to_vec();
+        let mut other_effects = Vec::new();
+        for parameter in &calibration.parameters {
+            match parameter_id(&parameter.name) {
+                Some(ParameterId::Target { target, axis }) => {
+                    if let Some(target) = targets.get_mut(target) {
+                        target.position_in_flange[axis.index()] += from_mm(parameter.deviation);
+                    }
+                }
+                Some(ParameterId::Link { .. }) => {}
+                None => other_effects.push(parameter.name.clone()),
+            }
+        }
+        let provenance = &calibration.provenance;
+        let about = vec![
+            format!("Identified geometry of '{}'", profile.title()),
+            format!("profile {}, calibrated with {}", profile.name(), provenance.program),
+        ];
+        Ok(Self { profile, identified, targets, other_effects, about })
+    }
+
+    fn limits(&self) -> Vec<Option<(f64, f64)>> {
+        self.profile.joints().iter().map(|range| range.limits).collect()
+    }
+}
+
+/// The parameter of a printed name.
+fn parameter_id(name: &str) -> Option<ParameterId> {
+    if let Some((target, _)) = name.strip_prefix("target").and_then(|rest| rest.split_once('.')) {
+        let target = target.parse::<usize>().ok()?.checked_sub(1)?;
+        let id = |axis| ParameterId::Target { target, axis };
+        return Axis::ALL.map(id).into_iter().find(|id| id.to_string() == name);
+    }
+    let digits = name.trim_start_matches(|c: char| c.is_ascii_alphabetic());
+    let joint = digits.parse::<usize>().ok()?.checked_sub(1)?;
+    let id = |parameter| ParameterId::Link { joint, parameter };
+    LinkParameter::ALL.map(id).into_iter().find(|id| id.to_string() == name)
+}
+
+/// A URDF that is to take the identified geometry.
+#[derive(Clone, Copy, Debug)]
+pub struct GivenUrdf<'a> {
+    /// Its text.
+    pub text: &'a str,
+    /// Link that is the base of the profile.
+    pub base: &'a str,
+    /// Link at the end of the chain.
+    pub tip: &'a str,
+}
+
+/// What may be asked of an export.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ExportOptions<'a> {
+    /// URDF only: put the geometry into this one.
+    pub into: Option<GivenUrdf<'a>>,
+    /// UR kinematics only: leave to the tool what the format cannot say about the flange.
+    pub with_tool_offset: bool,
+}
+
+/// A proven model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Export {
+    /// Text of the file.
+    pub text: String,
+    /// How well it agrees with the identified arm, read back from the text.
+    pub agreement: Agreement,
+    /// What must be known to use it.
+    pub remarks: Vec<String>,
+}
+
+/// Writes a model, reads it back and compares it with the identified arm.
+///
+/// # Errors
+/// The arm does not fit the format, or the text does not agree with it to 1 µm and 1 µrad at 1,000 random configurations.
+pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) -> Result<Export, ModelError> {
+    let (identified, limits) = (&arm.identified, arm.limits());
+    let proven = |chain: &KinematicChain| {
+        let written = ForwardKinematics::new(chain);
+        prove(identified, &limits, proof::EXPORT, |q| written.base_from_flange(q))
+    };
+    let mut remarks = Vec::new();
+    let (text, agreement) = match format {
+        Format::CorrectedProfile => {
+            let text = corrected_profile(arm);
+            let (read, _) =
+                Profile::parse(&text, format.file_name()).map_err(|errors| ModelError::ReadBack(errors.to_string()))?;
+            let agreement = proven(read.chain())?;
+            (text, agreement)
+        }
+        Format::DhCsv => {
+            let text = write_csv(&arm.about, identified)?;
+            let agreement = proven(&read_csv(&text)?)?;
+            (text, agreement)
+        }
+        Format::Json => {
+            let text = write_json(arm.profile.name(), &arm.about, arm.profile.chain(), identified, &arm.targets)?;
+            let agreement = proven(&read_json(&text)?)?;
+            (text, agreement)
+        }
+        Format::UrKinematics => ur_kinematics(arm, options, &mut remarks)?,
+        Format::Urdf => urdf(arm, options, &mut remarks)?,
+    };
+    if !format.has_targets() {
+        remarks.push("the place of the target on the flange is not part of this format".to_owned());
+    }
+    if !arm.other_effects.is_empty() {
+        let names = arm.other_effects.join(", ");
+        remarks.push(format!("this format has geometry only; identified, but not in it: {names}"));
+    }
+    Ok(Export { text, agreement, remarks })
+}
+
+fn corrected_profile(arm: &CalibratedArm) -> String {
+    let profile = &arm.profile;
+    let mut comments = arm.about.clone();
+    comments.push(
+        "The constants are the identified ones. Targets stand where they were identified: mount them anew,".to_owned(),
+    );
+    comments.push("measure them anew.".to_owned());
+    let heading = Heading {
+        comments: &comments,
+        name: &format!("{}-corrected", profile.name()),
+        title: &format!("{}, corrected", profile.title()),
+        source: &format!("identified; nominal: {}", profile.source()),
+    };
+    complete(&heading, profile, &arm.identified, &arm.targets)
+}
+
+fn ur_kinematics(
+    arm: &CalibratedArm,
+    options: &ExportOptions<'_>,
+    remarks: &mut Vec<String>,
+) -> Result<(String, Agreement), ModelError> {
+    let written = write_ur(&arm.about, &arm.identified)?;
+    let rest = written.flange_in_wrist_3;
+    let offset = offset_text(&rest);
+    let is_small =
+        rest.translation.vector.norm() <= proof::EXPORT.position && rest.rotation.angle() <= proof::EXPORT.angle;
+    if !is_small && !options.with_tool_offset {
+        return Err(ModelError::Unsuitable(format!(
+            "the file has no place for the flange beside axis 6: {offset} (alpha6, a6). Let the tool take it \
+             ('--with-tool-offset'), or fix alpha6 and a6 in the profile and identify again"
+        )));
+    }
+    if !is_small {
+        remarks.push(format!("the tool must take what the file cannot say: in front of every tool {offset}"));
+    }
+    let origins = read_ur(&written.text)?;
+    let agreement = prove(&arm.identified, &arm.limits(), proof::EXPORT, |q| {
+        let joints =
+            origins.iter().zip(q).map(|(origin, q)| origin * motion(JointType::Revolute, &Vector3::z_axis(), *q));
+        joints.fold(Isometry3::identity(), |pose, joint| pose * joint) * rest
+    })?;
+    Ok((written.text, agreement))
+}
+
+fn offset_text(pose: &Isometry3<f64>) -> String {
+    format!(
+        "x y z {} mm, roll pitch yaw {} deg",
+        pose.translation.vector.iter().map(|value| rounded(to_mm(*value), 1e4)).collect::<Vec<_>>().join(" "),
+        roll_pitch_yaw(&pose.rotation).map(|value| rounded(to_deg(value), 1e6)).join(" ")
+    )
+}
+
+/// A number for a message, in parts of `scale`.
+fn rounded(value: f64, scale: f64) -> String {
+    number((value * scale).round() / scale)
+}
+
+fn urdf(
+    arm: &CalibratedArm,
+    options: &ExportOptions<'_>,
+    remarks: &mut Vec<String>,
+) -> Result<(String, Agreement), ModelError> {
+    let (nominal, identified, limits) = (arm.profile.chain(), &arm.identified, arm.limits());
+    let coupled: Vec<&str> =
+        identified.joints().iter().filter(|joint| is_coupled(joint)).map(|joint| joint.name.as_str()).collect();
+    let mut comments = arm.about.clone();
+    if !coupled.is_empty() {
+        let note = format!(
+            "Joint values of {} turn one link against the one before: they are not those of the pendant, where it is coupled.",
+            coupled.join(", ")
+        );
+        comments.push(note.clone());
+        remarks.push(note);
+    }
+    let (text, base, tip, flange_from_tip) = match options.into {
+        None => {
+            let text = urdf_write::fresh(arm.profile.name(), &comments, identified, arm.profile.joints())?;
+            (text, urdf_write::BASE, urdf_write::FLANGE, Isometry3::identity())
+        }
+        Some(GivenUrdf { text, base, tip }) => {
+            let patched = urdf_write::patch(text, base, tip, nominal, identified, &limits)?;
+            remarks.push(format!("origins replaced: {}", patched.joints.join(", ")));
+            if patched.flange_from_tip != Isometry3::identity() {
+                let offset = offset_text(&patched.flange_from_tip);
+                remarks.push(format!("link '{tip}' stays where it is on the flange of the profile: {offset}"));
+            }
+            (patched.text, base, tip, patched.flange_from_tip)
+        }
+    };
+    let read = Urdf::parse(&text).map_err(|error| ModelError::ReadBack(error.to_string()))?;
+    let chain = read.chain(base, tip).map_err(|error| ModelError::ReadBack(error.to_string()))?;
+    let tip_from_flange = flange_from_tip.inverse();
+    let agreement = prove(identified, &limits, proof::EXPORT, |q| {
+        chain.base_from_tip(&link_values(identified, q)) * tip_from_flange
+    })?;
+    Ok((text, agreement))
+}

@@ -1,0 +1,391 @@
+//! Reading URDF: the joints of a robot description, and the serial chain between two of its links.
+//!
+//! Only `<joint>` elements directly under `<robot>` are joints: transmissions, `ros2_control` and simulators have elements of
+//! the same name that mean something else. Metres and radians, as in the format.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Unit, Vector3};
+use roxmltree::{Document, Node};
+use thiserror::Error;
+
+use super::transforms::{from_roll_pitch_yaw, motion};
+use crate::kinematics::JointType;
+use crate::session::printable;
+
+/// What is wrong with a URDF.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum UrdfError {
+    /// Not well-formed XML.
+    #[error("line {line}, column {column}: not well-formed XML: {message}")]
+    Xml {
+        /// Line, from 1.
+        line: u32,
+        /// Column, from 1.
+        column: u32,
+        /// What the reader says.
+        message: String,
+    },
+    /// An element that cannot be used.
+    #[error("line {line}: {element}: {message}")]
+    Element {
+        /// Line, from 1.
+        line: u32,
+        /// The element with its name, such as `joint 'elbow'`.
+        element: String,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+    /// No chain between the links asked for.
+    #[error("{0}")]
+    Chain(String),
+}
+
+/// What a joint of a URDF can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UrdfJointType {
+    /// Nothing.
+    Fixed,
+    /// Turn or slide.
+    Moving(JointType),
+    /// `floating`, `planar` or an unknown word.
+    Unsupported,
+}
+
+/// A joint of a URDF.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UrdfJoint {
+    /// Name.
+    pub name: String,
+    /// What it can do.
+    pub joint_type: UrdfJointType,
+    /// The word for it in the file.
+    pub type_name: String,
+    /// Link before it.
+    pub parent: String,
+    /// Link after it.
+    pub child: String,
+    /// Frame of the joint at rest, in the link before it (m).
+    pub origin: Isometry3<f64>,
+    /// Axis in the frame of the joint.
+    pub axis: Unit<Vector3<f64>>,
+    /// Lowest and highest value ((rad) or (m)), if the file has a usable range.
+    pub limits: Option<(f64, f64)>,
+    /// Highest speed ((rad/s) or (m/s)).
+    pub max_speed: Option<f64>,
+    /// Joint that this one follows.
+    pub mimic: Option<String>,
+    /// Line in the file, from 1.
+    pub line: u32,
+    /// Bytes of its `<origin>` element, or the place where one can be put.
+    pub(super) origin_bytes: Range<usize>,
+}
+
+/// A robot description.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Urdf {
+    /// Name of the robot.
+    pub robot: String,
+    /// Links in the order of the file.
+    pub links: Vec<String>,
+    /// Joints in the order of the file.
+    pub joints: Vec<UrdfJoint>,
+}
+
+/// The way between two links.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UrdfChain<'u> {
+    /// From the base link up to the link where the way turns down; identity if the base is above the tip.
+    pub base_from_top: Isometry3<f64>,
+    /// The joints down to the tip, fixed ones among them.
+    pub joints: Vec<&'u UrdfJoint>,
+}
+
+impl Urdf {
+    /// Reads a URDF.
+    ///
+    /// # Errors
+    /// Not XML, not a URDF, or a joint that cannot be read.
+    pub fn parse(text: &str) -> Result<Self, UrdfError> {
+        let document = Document::parse(text).map_err(|error| UrdfError::Xml {
+            line: error.pos().row,
+            column: error.pos().col,
+            message: printable(&error.to_string()),
+        })?;
+        let root = document.root_element();
+        let reader = Reader { document: &document };
+        if root.tag_name().name() != "robot" {
+            let name = root.tag_name().name();
+            return Err(reader.element(root, format!("<{}>", printable(name)), "a URDF begins with <robot>"));
+        }
+        if let Some(node) = root.descendants().find(|node| is_xacro(node)) {
+            let message = "this is xacro, not URDF; expand it first: 'xacro FILE.xacro > FILE.urdf'";
+            return Err(reader.element(node, format!("<xacro:{}>", printable(node.tag_name().name())), message));
+        }
+        let mut links: BTreeMap<&str, u32> = BTreeMap::new();
+        let mut link_names = Vec::new();
+        for node in elements(root, "link") {
+            let name = reader.attribute(node, "<link>", "name")?;
+            if let Some(line) = links.insert(name, reader.line(node)) {
+                let message = format!("the link of line {line} has the same name");
+                return Err(reader.element(node, format!("link '{}'", printable(name)), message));
+            }
+            link_names.push(name.to_owned());
+        }
+        let mut joints: Vec<UrdfJoint> = Vec::new();
+        for node in elements(root, "joint") {
+            let joint = reader.joint(node, &links)?;
+            let what = || format!("joint '{}'", printable(&joint.name));
+            if let Some(other) = joints.iter().find(|other| other.name == joint.name) {
+                let message = format!("the joint of line {} has the same name", other.line);
+                return Err(reader.element(node, what(), message));
+            }
+            if let Some(other) = joints.iter().find(|other| other.child == joint.child) {
+                let message = format!(
+                    "link '{}' already hangs on joint '{}' (line {}); a URDF is a tree",
+                    printable(&joint.child),
+                    printable(&other.name),
+                    other.line
+                );
+                return Err(reader.element(node, what(), message));
+            }
+            joints.push(joint);
+        }
+        let robot = root.attribute("name").unwrap_or("robot").to_owned();
+        Ok(Self { robot, links: link_names, joints })
+    }
+
+    /// The chain from the frame of link `base` to that of link `tip`. From the base the way may lead up, but only over fixed
+    /// joints (as from `base` to `base_link` on some robots).
+    ///
+    /// # Errors
+    /// Links that do not exist or are not connected, a moving joint above the base, a joint that cannot be in a chain.
+    pub fn chain(&self, base: &str, tip: &str) -> Result<UrdfChain<'_>, UrdfError> {
+        for link in [base, tip] {
+            if !self.links.iter().any(|known| known == link) {
+                let known: Vec<String> = self.links.iter().map(|name| printable(name)).collect();
+                let message = format!("there is no link '{}'; links: {}", printable(link), known.join(", "));
+                return Err(UrdfError::Chain(message));
+            }
+        }
+        let (up, down) = (self.above(base)?, self.above(tip)?);
+        // Both lists end at the root: what they share at the end is above the turning point.
+        let shared = up.iter().rev().zip(down.iter().rev()).take_while(|(a, b)| a.name == b.name).count();
+        let is_connected = root_of(&up, base) == root_of(&down, tip);
+        let up: Vec<&UrdfJoint> = up.into_iter().rev().skip(shared).rev().collect();
+        let down: Vec<&UrdfJoint> = down.into_iter().rev().skip(shared).collect();
+        if !is_connected {
+            let message = format!("links '{}' and '{}' are not connected", printable(base), printable(tip));
+            return Err(UrdfError::Chain(message));
+        }
+        let mut base_from_top = Isometry3::identity();
+        for joint in up {
+            if joint.joint_type != UrdfJointType::Fixed {
+                let message = format!(
+                    "the way from '{}' to '{}' leads up over this {} joint; take a base link above it",
+                    printable(base),
+                    printable(tip),
+                    printable(&joint.type_name)
+                );
+                return Err(joint.error(message));
+            }
+            base_from_top *= joint.origin.inverse();
+        }
+        for joint in &down {
+            if joint.joint_type == UrdfJointType::Unsupported {
+                let message = format!(
+                    "type '{}' is not part of a serial arm; allowed: fixed, revolute, continuous, prismatic",
+                    printable(&joint.type_name)
+                );
+                return Err(joint.error(message));
+            }
+            if let Some(other) = &joint.mimic {
+                let message = format!(
+                    "it follows joint '{}' (<mimic>), so it is no joint of its own; take a tip link before it",
+                    printable(other)
+                );
+                return Err(joint.error(message));
+            }
+        }
+        let chain = UrdfChain { base_from_top, joints: down };
+        if chain.moving().next().is_none() {
+            let message = format!("no joint moves between '{}' and '{}'", printable(base), printable(tip));
+            return Err(UrdfError::Chain(message));
+        }
+        Ok(chain)
+    }
+
+    /// The joints above a link, nearest first.
+    fn above(&self, link: &str) -> Result<Vec<&UrdfJoint>, UrdfError> {
+        let mut joints: Vec<&UrdfJoint> = Vec::new();
+        let mut below = link;
+        while let Some(joint) = self.joints.iter().find(|joint| joint.child == below) {
+            if joints.len() > self.joints.len() {
+                return Err(joint.error("it is part of a ring; a URDF is a tree".to_owned()));
+            }
+            joints.push(joint);
+            below = &joint.parent;
+        }
+        Ok(joints)
+    }
+}
+
+fn root_of<'a>(above: &[&'a UrdfJoint], link: &'a str) -> &'a str {
+    above.last().map_or(link, |joint| joint.parent.as_str())
+}
+
+impl UrdfJoint {
+    pub(super) fn error(&self, message: String) -> UrdfError {
+        UrdfError::Element { line: self.line, element: format!("joint '{}'", printable(&self.name)), message }
+    }
+}
+
+impl<'u> UrdfChain<'u> {
+    /// The joints that move, with their types.
+    pub fn moving(&self) -> impl Iterator<Item = (&'u UrdfJoint, JointType)> {
+        self.joints.iter().filter_map(|joint| match joint.joint_type {
+            UrdfJointType::Moving(joint_type) => Some((*joint, joint_type)),
+            UrdfJointType::Fixed | UrdfJointType::Unsupported => None,
+        })
+    }
+
+    /// Pose of the tip in the base at these joint values ((rad) or (m)); missing ones are zero.
+    pub fn base_from_tip(&self, values: &[f64]) -> Isometry3<f64> {
+        let mut values = values.iter();
+        let mut pose = self.base_from_top;
+        for joint in &self.joints {
+            pose *= joint.origin;
+            if let UrdfJointType::Moving(joint_type) = joint.joint_type {
+                pose *= motion(joint_type, &joint.axis, values.next().copied().unwrap_or(0.0));
+            }
+        }
+        pose
+    }
+}
+
+fn elements<'a, 'i>(parent: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
+    parent.children().filter(move |node| node.is_element() && node.tag_name().name() == name)
+}
+
+fn is_xacro(node: &Node<'_, '_>) -> bool {
+    node.is_element() && node.tag_name().namespace().is_some_and(|space| space.contains("xacro"))
+}
+
+/// Lowest and highest value, and highest speed.
+type RangeAndSpeed = (Option<(f64, f64)>, Option<f64>);
+
+/// Gives lines to errors.
+struct Reader<'d, 'i> {
+    document: &'d Document<'i>,
+}
+
+impl Reader<'_, '_> {
+    fn line(&self, node: Node<'_, '_>) -> u32 {
+        self.document.text_pos_at(node.range().start).row
+    }
+
+    fn element(&self, node: Node<'_, '_>, element: String, message: impl Into<String>) -> UrdfError {
+        UrdfError::Element { line: self.line(node), element, message: message.into() }
+    }
+
+    fn attribute<'a>(&self, node: Node<'a, '_>, element: &str, name: &str) -> Result<&'a str, UrdfError> {
+        let value = node.attribute(name).filter(|value| !value.trim().is_empty());
+        value.ok_or_else(|| self.element(node, element.to_owned(), format!("has no attribute '{name}'")))
+    }
+
+    fn joint(&self, node: Node<'_, '_>, links: &BTreeMap<&str, u32>) -> Result<UrdfJoint, UrdfError> {
+        let name = self.attribute(node, "<joint>", "name")?;
+        let what = format!("joint '{}'", printable(name));
+        let type_name = self.attribute(node, &what, "type")?;
+        let joint_type = match type_name {
+            "fixed" => UrdfJointType::Fixed,
+            "revolute" | "continuous" => UrdfJointType::Moving(JointType::Revolute),
+            "prismatic" => UrdfJointType::Moving(JointType::Prismatic),
+            _ => UrdfJointType::Unsupported,
+        };
+        let link = |tag: &'static str| {
+            let Some(node) = elements(node, tag).next() else {
+                return Err(self.element(node, what.clone(), format!("has no <{tag}>")));
+            };
+            let link = self.attribute(node, &format!("<{tag}> of {what}"), "link")?;
+            if links.contains_key(link) {
+                return Ok(link.to_owned());
+            }
+            let message = format!("there is no link '{}'", printable(link));
+            Err(self.element(node, format!("<{tag}> of {what}"), message))
+        };
+        let (parent, child) = (link("parent")?, link("child")?);
+        let origins: Vec<Node<'_, '_>> = elements(node, "origin").collect();
+        if let Some(second) = origins.get(1) {
+            return Err(self.element(*second, format!("<origin> of {what}"), "the joint has two of them"));
+        }
+        let (origin, origin_bytes) = if let Some(origin) = origins.first() {
+            let element = format!("<origin> of {what}");
+            let position = self.triple(*origin, &element, "xyz")?.unwrap_or([0.0; 3]);
+            let angles = self.triple(*origin, &element, "rpy")?.unwrap_or([0.0; 3]);
+            (from_roll_pitch_yaw(position, angles), origin.range())
+        } else {
+            // There is a child: <parent> was found.
+            let place = node.first_child().map_or_else(|| node.range().start, |child| child.range().start);
+            (Isometry3::identity(), place..place)
+        };
+        let axis = match elements(node, "axis").next() {
+            Some(axis) => self.triple(axis, &format!("<axis> of {what}"), "xyz")?.unwrap_or([1.0, 0.0, 0.0]),
+            None => [1.0, 0.0, 0.0],
+        };
+        let axis = Unit::try_new(Vector3::from(axis), 1e-9);
+        let axis = axis.ok_or_else(|| self.element(node, format!("<axis> of {what}"), "it has no direction"))?;
+        let (limits, max_speed) = self.limits(node, &what, type_name)?;
+        let mimic = elements(node, "mimic").next().map(|mimic| mimic.attribute("joint").unwrap_or("?").to_owned());
+        Ok(UrdfJoint {
+            name: name.to_owned(),
+            joint_type,
+            type_name: type_name.to_owned(),
+            parent,
+            child,
+            origin,
+            axis,
+            limits,
+            max_speed,
+            mimic,
+            line: self.line(node),
+            origin_bytes,
+        })
+    }
+
+    /// Range and speed. A range that is empty (as `lower="0" upper="0"`) is none.
+    fn limits(&self, node: Node<'_, '_>, what: &str, type_name: &str) -> Result<RangeAndSpeed, UrdfError> {
+        let Some(limit) = elements(node, "limit").next() else { return Ok((None, None)) };
+        let element = format!("<limit> of {what}");
+        let value = |name: &str| match limit.attribute(name) {
+            Some(text) => self.finite(limit, &element, name, text).map(Some),
+            None => Ok(None),
+        };
+        let (low, high) = (value("lower")?.unwrap_or(0.0), value("upper")?.unwrap_or(0.0));
+        let speed = value("velocity")?.filter(|speed| *speed > 0.0);
+        if low > high {
+            return Err(self.element(limit, element, format!("lower {low} is above upper {high}")));
+        }
+        Ok(((low < high && type_name != "continuous").then_some((low, high)), speed))
+    }
+
+    fn finite(&self, node: Node<'_, '_>, element: &str, name: &str, text: &str) -> Result<f64, UrdfError> {
+        let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+        value.ok_or_else(|| {
+            let message = format!("attribute '{name}' has '{}', which is no number", printable(text));
+            self.element(node, element.to_owned(), message)
+        })
+    }
+
+    fn triple(&self, node: Node<'_, '_>, element: &str, name: &str) -> Result<Option<[f64; 3]>, UrdfError> {
+        let Some(text) = node.attribute(name) else { return Ok(None) };
+        let values: Result<Vec<f64>, _> =
+            text.split_whitespace().map(|word| self.finite(node, element, name, word)).collect();
+        <[f64; 3]>::try_from(values?).map(Some).map_err(|values| {
+            let message = format!("attribute '{name}' needs three numbers, it has {}", values.len());
+            self.element(node, element.to_owned(), message)
+        })
+    }
+}

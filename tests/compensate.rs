@@ -1,0 +1,334 @@
+//! Compensation: closed loop on a simulated arm, what is not reachable, and the commands that apply a calibration.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    reason = "a failure of a test is a panic; test files need no atomic writes"
+)]
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use nalgebra::{DVector, Isometry3, Point3, Translation3};
+use support::{PaperCase, RANGES, paper_deviations, random_configurations, seeded};
+use trupose::compensation::{Compensator, Goal, Settings, Status, ToolArm};
+use trupose::geometry::register;
+use trupose::identification::{ArmModel, identify};
+use trupose::kinematics::{ForwardKinematics, KinematicChain};
+use trupose::model::proof::configurations;
+use trupose::profile::{Level, Profile, builtin, builtin_names};
+use trupose::units::{MICROMETRE, from_deg, to_mm};
+
+fn profile(name: &str) -> Profile {
+    Profile::parse(builtin(name).unwrap(), name).unwrap().0
+}
+
+fn with_tool(chain: &KinematicChain, point: Option<&Point3<f64>>) -> ToolArm {
+    let flange_from_tool =
+        point.map_or_else(Isometry3::identity, |point| Isometry3::from(Translation3::from(point.coords)));
+    ToolArm { chain: chain.clone(), flange_from_tool }
+}
+
+/// Mean and largest distance (m) of points from where they were meant, the base frame aside: distances cannot know it.
+fn errors(meant: &[Point3<f64>], reached: &[Point3<f64>]) -> (f64, f64) {
+    let pairs = reached.iter().zip(meant).map(|(reached, meant)| (1.0, *reached, *meant));
+    let frame = register(pairs).unwrap().to_from_from;
+    let distances: Vec<f64> =
+        reached.iter().zip(meant).map(|(reached, meant)| (frame * reached - meant).norm()).collect();
+    (distances.iter().sum::<f64>() / distances.len() as f64, distances.iter().copied().fold(0.0, f64::max))
+}
+
+/// Errors of the arm as it is commanded naively, of the identified model, and of the arm commanded with compensation.
+fn closed_loop(noise: f64, seed: u64, position_only: bool) -> [(f64, f64); 3] {
+    let mut rng = seeded(seed);
+    let truth = paper_deviations();
+    let case = PaperCase::simulated(&truth, 56, noise, &mut rng);
+    let found = identify(&case.problem(), &trupose::identification::Settings::default(), &mut |_| {}).unwrap();
+    let deviations = DVector::from_iterator(found.estimates.len(), found.estimates.iter().map(|e| e.deviation));
+    let nominal = ArmModel { chain: case.chain.clone(), targets: case.targets.clone() };
+    let identified = ArmModel::with_deviations(&case.problem(), &deviations);
+    let real = ArmModel::with_deviations(&case.problem(), &truth);
+    let limits: Vec<_> = RANGES.iter().map(|(low, high)| Some((from_deg(*low) - 0.2, from_deg(*high) + 0.2))).collect();
+    let arms = [&nominal, &identified].map(|model| with_tool(&model.chain, model.targets.first()));
+    let settings = Settings { position_only, ..Settings::default() };
+    let compensator = Compensator::new(&arms[0], &arms[1], &limits, settings);
+    let point = |model: &ArmModel, q: &[f64]| ForwardKinematics::new(&model.chain).point_in_base(q, &model.targets[0]);
+    let (mut meant, mut naive, mut predicted, mut compensated) = (vec![], vec![], vec![], vec![]);
+    for q in random_configurations(2000, &mut rng) {
+        let done = compensator.solve(&Goal::Configuration(q.clone()));
+        if done.status != Status::Reached {
+            // Wrist singularities are inside the ranges of this case.
+            continue;
+        }
+        meant.push(point(&nominal, &q));
+        naive.push(point(&real, &q));
+        predicted.push((point(&identified, &q), point(&real, &q)));
+        compensated.push(point(&real, &done.command));
+    }
+    assert!(meant.len() > 1700, "{}", meant.len());
+    let (models, truths): (Vec<_>, Vec<_>) = predicted.into_iter().unzip();
+    [errors(&meant, &naive), errors(&models, &truths), errors(&meant, &compensated)]
+}
+
+#[test]
+fn compensated_targets_bring_the_error_down_to_the_identified_level() {
+    let mut table = "noise um, orientation | nominal | identified | compensated (mean / max mm)\n".to_owned();
+    for (noise, position_only) in [(10.0, false), (50.0, false), (10.0, true)] {
+        let [nominal, identified, compensated] = closed_loop(noise * MICROMETRE, 11, position_only);
+        let cell = |(mean, max): (f64, f64)| format!("{:.4} / {:.4}", to_mm(mean), to_mm(max));
+        table = format!(
+            "{table}{noise}, {} | {} | {} | {}\n",
+            !position_only,
+            cell(nominal),
+            cell(identified),
+            cell(compensated)
+        );
+        assert!(nominal.0 > 20.0 * identified.0, "{table}");
+        assert!((compensated.0 / identified.0 - 1.0).abs() < 0.05, "{table}");
+    }
+    println!("{table}");
+}
+
+#[test]
+fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
+    for name in builtin_names() {
+        let profile = profile(name);
+        let free = profile.free_parameters(Level::Geometric);
+        let deviations =
+            free.iter().zip([0.5, -0.5].into_iter().cycle()).map(|(free, half)| (free.id, half * free.expected));
+        let arms = [profile.chain().clone(), profile.chain().with_deviations(deviations).unwrap()];
+        let arms = arms.map(|chain| with_tool(&chain, None));
+        let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
+        let planning: Vec<_> = profile.joints().iter().map(|range| range.planning_limits).collect();
+        // A SCARA cannot tilt its tool: its position only.
+        let position_only = profile.chain().dof() < 6;
+        let settings = Settings { position_only, ..Settings::default() };
+        let compensator = Compensator::new(&arms[0], &arms[1], &limits, settings);
+        let (nominal, identified) = (ForwardKinematics::new(&arms[0].chain), ForwardKinematics::new(&arms[1].chain));
+        let (mut reached, mut usable) = (0, 0);
+        for q in configurations(profile.chain(), &planning, 500) {
+            let done = compensator.solve(&Goal::Configuration(q.clone()));
+            for (value, limit) in done.command.iter().zip(&limits) {
+                assert!(limit.is_none_or(|(low, high)| (low..=high).contains(value)), "{name}: beyond its limit");
+            }
+            let (goal, there) = (nominal.base_from_flange(&q), identified.base_from_flange(&done.command));
+            let apart = (goal.translation.vector - there.translation.vector).norm();
+            assert!((apart - done.position_error).abs() < 1e-9, "{name}");
+            if done.status.is_usable() {
+                usable += 1;
+                assert!(apart < MICROMETRE, "{name}: {apart}");
+            }
+            if done.status == Status::Reached {
+                reached += 1;
+                assert!(position_only || goal.rotation.angle_to(&there.rotation) < 1e-6, "{name}");
+            }
+        }
+        // The quill of the SCARA has 150 mm: some corrections would leave it.
+        let least = if position_only { 400 } else { 450 };
+        assert!(reached >= 400 && usable >= least, "{name}: {reached} reached, {usable} usable of 500");
+    }
+}
+
+#[test]
+fn limits_singularities_and_reach_are_told_apart() {
+    let ur = profile("ur5");
+    let deviations = ur.free_parameters(Level::Geometric).into_iter().map(|free| (free.id, free.expected));
+    let arms =
+        [ur.chain().clone(), ur.chain().with_deviations(deviations).unwrap()].map(|chain| with_tool(&chain, None));
+    let limits: Vec<_> = ur.joints().iter().map(|range| range.limits).collect();
+    let solve = |limits: &[Option<(f64, f64)>], goal: &Goal| {
+        Compensator::new(&arms[0], &arms[1], limits, Settings::default()).solve(goal)
+    };
+    let away = [0.3, -1.2, 1.4, -1.0, 1.1, 0.2];
+    let free = solve(&limits, &Goal::Configuration(away.to_vec()));
+    assert_eq!(free.status, Status::Reached);
+    // The same target with a joint that already stands at its limit on the side to which it would be corrected.
+    let mut tight = limits.clone();
+    let correction = free.command[1] - away[1];
+    tight[1] = Some(if correction > 0.0 { (-3.0, away[1]) } else { (away[1], 3.0) });
+    let held = solve(&tight, &Goal::Configuration(away.to_vec()));
+    assert!(matches!(held.status, Status::PositionOnly) || held.status == Status::AtLimit(vec![1]), "{held:?}");
+    assert!((held.command[1] - away[1]).abs() < 1e-6 || held.status == Status::PositionOnly);
+    let beyond = solve(&limits, &Goal::Configuration(vec![0.0, 0.0, 7.0, 0.0, f64::NAN, 0.0]));
+    assert_eq!(beyond.status, Status::BeyondLimit(vec![2, 4]));
+    // Wrist straight: axes 4 and 6 in line. The orientation would need a large turn of both, the position does not.
+    let straight = solve(&limits, &Goal::Configuration(vec![0.3, -1.2, 1.4, -1.0, 1e-4, 0.2]));
+    assert_eq!(straight.status, Status::PositionOnly, "{straight:?}");
+    assert!(straight.position_error < MICROMETRE && straight.angle_error > 1e-5);
+    // Cartesian: what the nominal arm reaches, with and without a hint of the branch, and what nobody reaches.
+    let pose = ForwardKinematics::new(ur.chain()).base_from_flange(&away);
+    let near = solve(&limits, &Goal::Pose { base_from_tool: pose, near: Some(away.map(|q| q + 0.1).to_vec()) });
+    assert_eq!(near.status, Status::Reached);
+    assert!(near.meant.unwrap().iter().zip(away).all(|(a, b)| (a - b).abs() < 1e-5));
+    assert!(near.command.iter().zip(&free.command).all(|(a, b)| (a - b).abs() < 1e-5));
+    let anywhere = solve(&limits, &Goal::Pose { base_from_tool: pose, near: None });
+    assert_eq!(anywhere.status, Status::Reached);
+    let point = Goal::Position { point_in_base: Point3::new(0.3, 0.4, 0.5), near: None };
+    assert_eq!(solve(&limits, &point).status, Status::Reached);
+    let far = Goal::Position { point_in_base: Point3::new(3.0, 0.4, 0.5), near: None };
+    assert_eq!(solve(&limits, &far).status, Status::OutOfReach);
+}
+
+fn trupose(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_trupose"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn calibrate(folder: &Path) -> String {
+    let output = trupose(&[
+        "identify",
+        "--profile",
+        "soochow",
+        "--measurements",
+        "sessions/soochow-example/measurements.csv",
+        "--verify",
+        "sessions/soochow-example/verification.csv",
+        "--out",
+        folder.to_str().unwrap(),
+    ]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    folder.join("calibration.ron").to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_table_of_targets_becomes_a_table_of_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibrate(folder.path());
+    let targets = folder.path().join("targets.csv");
+    let run = |text: &str, more: &[&str]| {
+        fs::write(&targets, text).unwrap();
+        let mut arguments = vec!["compensate", "--calibration", &calibration, "--targets", targets.to_str().unwrap()];
+        arguments.extend(more);
+        let output = trupose(&arguments);
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    };
+    let (code, out, err) =
+        run("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,20,-30,40,50,60\nb,0,0,0,0,400,0\n", &[]);
+    assert_eq!(code, 1, "{out}{err}");
+    let lines: Vec<&str> = out.lines().collect();
+    assert_eq!(lines[0], "pose,status,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,position_error_mm,angle_error_deg");
+    assert!(lines[1].starts_with("a,reached,") && lines[2] == "b,beyond_limit,,,,,,,,", "{out}");
+    assert!(err.contains("pose b (line 3): not reached: J5 is meant to be beyond its limit"), "{err}");
+    assert!(err.contains("1 of 2 targets reached"), "{err}");
+    let commanded: Vec<f64> = lines[1].split(',').skip(2).take(6).map(|cell| cell.parse().unwrap()).collect();
+    let correction =
+        commanded.iter().zip([10.0, 20.0, -30.0, 40.0, 50.0, 60.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!((0.01..5.0).contains(&correction), "{out}");
+
+    let (code, out, err) = run("pose,x_mm,y_mm,z_mm\nfar,9000,0,0\nnear,900,100,800\n", &["--target", "smr"]);
+    assert_eq!(code, 1, "{out}{err}");
+    assert!(out.contains("far,out_of_reach,,") && out.contains("near,reached,"), "{out}");
+    let file = folder.path().join("out.csv");
+    let (code, out, err) = run(
+        "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\nnear,900,100,800,10,160,20\n",
+        &["--out", file.to_str().unwrap()],
+    );
+    assert_eq!(code, 0, "{out}{err}");
+    assert!(fs::read_to_string(&file).unwrap().contains("near,reached,"));
+    let (code, _, err) = run("pose,x_mm,y_mm\nnear,900,100\n", &[]);
+    assert!(code == 2 && err.contains("z_mm is missing"), "{err}");
+    let (code, _, err) = run("pose,x_mm,y_mm,z_mm\nnear,900,100,3\n", &["--target", "ball"]);
+    assert!(code == 2 && err.contains("targets: "), "{err}");
+}
+
+#[test]
+fn models_are_exported_and_a_urdf_is_imported() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibrate(folder.path());
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for (format, name) in [("corrected-profile", "c.ron"), ("urdf", "c.urdf"), ("dh-csv", "c.csv"), ("json", "c.json")]
+    {
+        let out = path(name);
+        let output = trupose(&["export", "--calibration", &calibration, "--format", format, "--out", &out]);
+        assert!(output.status.success(), "{format}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(String::from_utf8(output.stdout).unwrap().contains("read back: within"));
+    }
+    let out = path("c.yaml");
+    let output = trupose(&["export", "--calibration", &calibration, "--format", "ur-kinematics", "--out", &out]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!Path::new(&out).exists());
+    // The corrected profile can be used, and the URDF comes back as a profile of the same arm.
+    assert!(trupose(&["profile", "check", &path("c.ron")]).status.success());
+    let imported = path("imported.ron");
+    let output =
+        trupose(&["profile", "import-urdf", &path("c.urdf"), "--base", "base", "--tip", "flange", "--out", &imported]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| Profile::parse(&fs::read_to_string(path(name)).unwrap(), name).unwrap().0;
+    let (corrected, back) = (read("c.ron"), read("imported.ron"));
+    let (a, b) = (ForwardKinematics::new(corrected.chain()), ForwardKinematics::new(back.chain()));
+    let limits: Vec<_> = corrected.joints().iter().map(|range| range.limits).collect();
+    for q in configurations(corrected.chain(), &limits, 100) {
+        let (a, b) = (a.base_from_flange(&q), b.base_from_flange(&q));
+        assert!((a.translation.vector - b.translation.vector).norm() < 1e-9 && a.rotation.angle_to(&b.rotation) < 1e-9);
+    }
+    assert!(trupose(&["profile", "show", &imported]).status.success());
+    let output = trupose(&[
+        "profile",
+        "import-urdf",
+        "tests/urdf/panda.urdf",
+        "--base",
+        "panda_link0",
+        "--tip",
+        "panda_rightfinger",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("line 45"), "{message}");
+    // Into the nominal URDF of the arm: without '--into' there is no base to name.
+    let output = trupose(&[
+        "export",
+        "--calibration",
+        &calibration,
+        "--format",
+        "urdf",
+        "--into",
+        "tests/urdf/ur5.urdf",
+        "--base",
+        "base",
+        "--out",
+        &out,
+    ]);
+    assert!(output.status.code() == Some(2) && !Path::new(&out).exists());
+}
+
+#[test]
+fn a_robot_program_is_corrected_in_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibrate(folder.path());
+    let file = folder.path().join("part.src");
+    let text = b"DEF part()\r\n; M\xfcller\r\nPTP {A1 10,A2 20,A3 -30,A4 40,A5 50,A6 60}\r\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\r\nPTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\r\nEND\r\n";
+    fs::write(&file, text).unwrap();
+    let out = folder.path().join("corrected.src");
+    let output = trupose(&[
+        "compensate",
+        "--calibration",
+        &calibration,
+        "--program",
+        file.to_str().unwrap(),
+        "--dialect",
+        "krl",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("line 4: left as it is: a Cartesian target"), "{message}");
+    // The second target has a straight wrist.
+    assert!(message.contains("line 5: near a singularity only the position is reached"), "{message}");
+    assert!(
+        message.contains("2 of 2 joint targets replaced (1 in position only), 0 not reached, 1 other places left"),
+        "{message}"
+    );
+    let corrected = fs::read(&out).unwrap();
+    let lines = |text: &[u8]| text.split(|byte| *byte == b'\n').map(<[u8]>::to_vec).collect::<Vec<_>>();
+    let (before, after) = (lines(text), lines(&corrected));
+    let changed: Vec<usize> = (0..before.len()).filter(|line| before[*line] != after[*line]).collect();
+    assert_eq!((before.len(), changed), (after.len(), vec![2, 4]));
+}

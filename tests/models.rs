@@ -1,0 +1,465 @@
+//! Models in and out: URDF to profile, profile to URDF, the identified arm in every format, each proven at random configurations.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure of a test is a panic")]
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::Isometry3;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use trupose::kinematics::{Convention, ForwardKinematics, KinematicChain, ParameterId};
+use trupose::model::proof::{self, configurations, prove};
+use trupose::model::{
+    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, export,
+    geometry_only, import, link_values, urdf_text,
+};
+use trupose::profile::{Level, Profile, builtin, builtin_names};
+use trupose::units::{to_deg, to_mm};
+
+const BOTH: [Convention; 2] = [Convention::Standard, Convention::Modified];
+
+fn profile(name: &str) -> Profile {
+    Profile::parse(builtin(name).unwrap(), name).unwrap_or_else(|errors| panic!("{errors}")).0
+}
+
+fn fixture(name: &str) -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/urdf").join(name)).unwrap()
+}
+
+/// The chain written as a profile and read again.
+fn through_text(arm: &ImportedArm) -> KinematicChain {
+    let heading = Heading { comments: &["a test".to_owned()], name: "Test Arm", title: "t", source: "s" };
+    let part = Arm { chain: &arm.chain, ranges: &arm.ranges, beta_joints: &arm.beta_joints };
+    let text = geometry_only(&heading, &part);
+    let (read, warnings) = Profile::parse(&text, "test.ron").unwrap_or_else(|errors| panic!("{errors}\n{text}"));
+    // What a URDF cannot know, and nothing else: a beta that is not needed would be warned about too.
+    for warning in &warnings {
+        let warning = warning.to_string();
+        assert!(warning.contains("no target is given") || warning.contains("has no limits"), "{warning}\n{text}");
+    }
+    assert_eq!(read.beta_joints(), arm.beta_joints);
+    read.chain().clone()
+}
+
+fn limits(profile: &Profile) -> Vec<Option<(f64, f64)>> {
+    profile.joints().iter().map(|range| range.limits).collect()
+}
+
+fn differs(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+    (a.translation.vector - b.translation.vector).norm().max(a.rotation.angle_to(&b.rotation))
+}
+
+/// Deviations as they are expected of this robot, three times over.
+fn deviated(profile: &Profile, seed: u64) -> KinematicChain {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let free = profile.free_parameters(Level::Geometric);
+    let links = free.iter().filter(|free| matches!(free.id, ParameterId::Link { .. }));
+    let deviations: Vec<_> =
+        links.map(|free| (free.id, 3.0 * free.expected * random.random_range(-1.0..1.0))).collect();
+    profile.chain().with_deviations(deviations).unwrap()
+}
+
+fn calibrated(profile: &Profile) -> CalibratedArm {
+    CalibratedArm {
+        identified: deviated(profile, 7),
+        targets: profile.targets().to_vec(),
+        other_effects: Vec::new(),
+        about: vec!["Identified geometry of a test".to_owned()],
+        profile: profile.clone(),
+    }
+}
+
+#[test]
+fn shipped_profiles_survive_the_way_through_urdf() {
+    for name in builtin_names() {
+        let profile = profile(name);
+        // The nominal arm, and one that no axis of which is exactly parallel to another.
+        for chain in [profile.chain().clone(), deviated(&profile, 3)] {
+            let text = urdf_text(name, &[], &chain, profile.joints()).unwrap();
+            let urdf = Urdf::parse(&text).unwrap();
+            let way = urdf.chain("base", "flange").unwrap();
+            for convention in BOTH {
+                let imported =
+                    import(&way, convention).unwrap_or_else(|error| panic!("{name} {convention:?}: {error}"));
+                let read = through_text(&imported);
+                let arm = ForwardKinematics::new(&read);
+                // Joint values of a URDF turn one link against the one before: a coupled arm is uncoupled by it.
+                let written = |q: &[f64]| arm.base_from_flange(&link_values(&chain, q));
+                prove(&chain, &limits(&profile), proof::IMPORT, written)
+                    .unwrap_or_else(|error| panic!("{name}: {error}"));
+                for (joint, own) in read.joints().iter().zip(chain.joints()) {
+                    assert_eq!((&joint.name, joint.joint_type), (&own.name, own.joint_type));
+                    let worst = joint.link.a.abs().max(joint.link.d.abs());
+                    assert!(worst < 2.0, "{name} {convention:?}: {} is {worst} m", joint.name);
+                }
+            }
+        }
+    }
+}
+
+/// Link constants in mm and degrees, for messages.
+fn table(chain: &KinematicChain) -> String {
+    let row = |joint: &trupose::kinematics::Joint| {
+        let link = joint.link;
+        let [alpha, theta, beta] = [link.alpha, link.theta, link.beta].map(to_deg);
+        let (a, d) = (to_mm(link.a), to_mm(link.d));
+        format!("{}: alpha {alpha:.4} a {a:.4} d {d:.4} theta {theta:.4} beta {beta:.4}\n", joint.name)
+    };
+    chain.joints().iter().map(row).collect()
+}
+
+fn imported(file: &str, base: &str, tip: &str, convention: Convention) -> ImportedArm {
+    let urdf = Urdf::parse(&fixture(file)).unwrap();
+    let way = urdf.chain(base, tip).unwrap();
+    let arm = import(&way, convention).unwrap();
+    let read = through_text(&arm);
+    let fk = ForwardKinematics::new(&read);
+    let limits: Vec<_> = arm.ranges.iter().map(|range| range.limits).collect();
+    for q in configurations(&arm.chain, &limits, 1000) {
+        let apart = differs(&fk.base_from_flange(&q), &way.base_from_tip(&q));
+        assert!(apart < 1e-9, "{file} {base} {tip}: {apart}");
+    }
+    arm
+}
+
+#[test]
+fn a_factory_calibrated_ur_comes_out_sane() {
+    for (convention, beta_joints) in [(Convention::Standard, vec![1, 2]), (Convention::Modified, vec![2, 3])] {
+        for (base, tip) in [("base", "tool0"), ("world", "camera"), ("base_link_inertia", "wrist_3_link")] {
+            let arm = imported("ur5_calibrated.urdf", base, tip, convention);
+            assert_eq!(arm.beta_joints, beta_joints);
+            for joint in arm.chain.joints() {
+                assert!(joint.link.a.abs() < 0.5 && joint.link.d.abs() < 0.2, "{}", table(&arm.chain));
+            }
+            assert!(arm.notes.is_empty(), "{:?}", arm.notes);
+        }
+    }
+    // Close to the maker's constants: a2 = -425 mm, a3 = -392.25 mm, d5 = 94.65 mm.
+    let arm = imported("ur5_calibrated.urdf", "base", "tool0", Convention::Standard);
+    let links: Vec<_> = arm.chain.joints().iter().map(|joint| joint.link).collect();
+    assert!((links[1].a + 0.42531).abs() < 2e-4 && (links[2].a + 0.39206).abs() < 1e-3, "{}", table(&arm.chain));
+    assert!((links[4].d - 0.09472).abs() < 2e-4 && links[1].theta.abs() < 1e-3, "{}", table(&arm.chain));
+    let speed = arm.ranges[0].max_speed.unwrap();
+    assert!((to_deg(speed) - 180.0).abs() < 1e-9 && arm.ranges[2].limits.unwrap().0 < -3.14);
+}
+
+#[test]
+fn a_panda_is_craigs_table_again() {
+    let arm = imported("panda.urdf", "panda_link0", "panda_link8", Convention::Modified);
+    assert_eq!(*arm.chain.base(), Isometry3::identity());
+    let shipped = profile("franka_panda");
+    for (joint, known) in arm.chain.joints().iter().zip(shipped.chain().joints()) {
+        let (link, known) = (joint.link, known.link);
+        let same = (link.alpha - known.alpha).abs() < 1e-9
+            && (link.a - known.a).abs() < 1e-9
+            && (link.d - known.d).abs() < 1e-9
+            && (link.theta - known.theta).abs() < 1e-9;
+        assert!(same, "{}", table(&arm.chain));
+    }
+    let arm = imported("panda.urdf", "panda_link0", "panda_leftfinger", Convention::Standard);
+    assert_eq!(arm.chain.dof(), 8);
+}
+
+#[test]
+fn a_scara_with_a_sliding_joint_keeps_its_arm_lengths() {
+    let arm = imported("scara.urdf", "table", "tool", Convention::Standard);
+    let links: Vec<_> = arm.chain.joints().iter().map(|joint| joint.link).collect();
+    assert!(
+        (links[0].a.abs() - 0.225).abs() < 1e-3 && (links[1].a.abs() - 0.175).abs() < 1e-3,
+        "{}",
+        table(&arm.chain)
+    );
+    assert_eq!(arm.beta_joints, [0, 1, 2]);
+    assert_eq!(arm.notes, ["joint 'J4' is continuous: it has no limits; poses are planned only within limits"]);
+    imported("scara.urdf", "pedestal", "shaft", Convention::Modified);
+}
+
+#[test]
+fn what_is_no_serial_chain_is_refused_with_its_place() {
+    let panda = fixture("panda.urdf");
+    let urdf = Urdf::parse(&panda).unwrap();
+    let refused = |base: &str, tip: &str| urdf.chain(base, tip).unwrap_err().to_string();
+    let message = refused("panda_link0", "panda_rightfinger");
+    assert!(
+        message.starts_with("line 45: joint 'panda_finger_joint2': it follows joint 'panda_finger_joint1'"),
+        "{message}"
+    );
+    let message = refused("panda_link3", "panda_link0");
+    assert!(
+        message.contains("joint 'panda_joint3'") && message.contains("leads up over this revolute joint"),
+        "{message}"
+    );
+    let message = refused("panda_link7", "panda_link8");
+    assert!(message.contains("no joint moves between"), "{message}");
+    let message = refused("panda_linkO", "panda_link8");
+    assert!(message.contains("there is no link 'panda_linkO'; links: panda_link0,"), "{message}");
+
+    let joint = |inside: &str| {
+        format!(
+            "<robot name='r'><link name='a'/><link name='b'/>\n<joint name='j' type='revolute'>\n<parent link='a'/><child link='b'/>{inside}</joint></robot>"
+        )
+    };
+    for (text, expected) in [
+        ("<robot><link", "line 1, column"),
+        ("<sdf/>", "line 1: <sdf>: a URDF begins with <robot>"),
+        ("<robot><link name='a'/>\n<link name='a'/></robot>", "line 2: link 'a': the link of line 1 has the same name"),
+        ("<robot name='r'><link/></robot>", "line 1: <link>: has no attribute 'name'"),
+        (
+            "<robot xmlns:xacro='http://www.ros.org/wiki/xacro'>\n<xacro:arm/></robot>",
+            "line 2: <xacro:arm>: this is xacro, not URDF; expand it first",
+        ),
+        (
+            "<robot>\n<joint name='j' type='fixed'><parent link='x'/><child link='b'/></joint></robot>",
+            "line 2: <parent> of joint 'j': there is no link 'x'",
+        ),
+        (
+            &joint("\n<origin xyz='0 1'/>"),
+            "line 4: <origin> of joint 'j': attribute 'xyz' needs three numbers, it has 2",
+        ),
+        (
+            &joint("\n<origin rpy='0 1 x'/>"),
+            "line 4: <origin> of joint 'j': attribute 'rpy' has 'x', which is no number",
+        ),
+        (&joint("<axis xyz='0 0 0'/>"), "line 2: <axis> of joint 'j': it has no direction"),
+        (&joint("\n<limit lower='1' upper='-1'/>"), "line 4: <limit> of joint 'j': lower 1 is above upper -1"),
+        (&joint("\n<origin/>\n<origin/>"), "line 5: <origin> of joint 'j': the joint has two of them"),
+    ] {
+        let message = Urdf::parse(text).unwrap_err().to_string();
+        assert!(message.starts_with(expected), "{message}\nexpected {expected}");
+    }
+    let floating = joint("").replace("revolute", "floating");
+    let message = Urdf::parse(&floating).unwrap().chain("a", "b").unwrap_err().to_string();
+    assert!(message.starts_with("line 2: joint 'j': type 'floating' is not part of a serial arm"), "{message}");
+    let ring = "<robot><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>\
+        <joint name='k' type='fixed'><parent link='b'/><child link='a'/></joint></robot>";
+    assert!(Urdf::parse(ring).unwrap().chain("a", "b").unwrap_err().to_string().contains("part of a ring"));
+    let two = "<robot><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>\n\
+        <joint name='k' type='fixed'><parent link='a'/><child link='b'/></joint></robot>";
+    let message = Urdf::parse(two).unwrap_err().to_string();
+    assert!(message.starts_with("line 2: joint 'k': link 'b' already hangs on joint 'j' (line 1)"), "{message}");
+}
+
+#[test]
+fn a_joint_without_limits_and_a_gimbal_locked_origin_are_exact() {
+    let text = "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><link name='d'/>\
+        <joint name='j1' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0.1 0.2 0.3' rpy='0.4 1.5707963267948966 0.3'/><axis xyz='1 2 -2'/></joint>\
+        <joint name='j2' type='prismatic'><parent link='b'/><child link='c'/><origin xyz='0 0 1' rpy='0.1 -1.5707963267948966 2'/></joint>\
+        <joint name='j3' type='revolute'><parent link='c'/><child link='d'/><origin xyz='1 0 0' rpy='0 -1.5707963267948966 0'/><axis xyz='0 3 0'/><limit lower='0' upper='0' velocity='0'/></joint></robot>";
+    let urdf = Urdf::parse(text).unwrap();
+    let way = urdf.chain("a", "d").unwrap();
+    for convention in BOTH {
+        let arm = import(&way, convention).unwrap();
+        assert_eq!(arm.notes.len(), 3, "{:?}", arm.notes);
+        let read = through_text(&arm);
+        let fk = ForwardKinematics::new(&read);
+        for q in configurations(&read, &[], 200) {
+            assert!(differs(&fk.base_from_flange(&q), &way.base_from_tip(&q)) < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn every_format_carries_every_arm_or_says_why_not() {
+    for name in builtin_names() {
+        let profile = profile(name);
+        let arm = calibrated(&profile);
+        for format in Format::ALL {
+            let is_ur = name.starts_with("ur");
+            match export(&arm, format, &ExportOptions { with_tool_offset: true, ..ExportOptions::default() }) {
+                Ok(done) => {
+                    assert!(done.agreement.position < 1e-9 && done.agreement.angle < 1e-9, "{name} {format:?}");
+                    let is_off = proof::configurations(profile.chain(), &limits(&profile), 1).iter().any(|q| {
+                        let (nominal, identified) = (profile.chain(), &arm.identified);
+                        let pose = |chain| ForwardKinematics::new(chain).base_from_flange(q);
+                        differs(&pose(nominal), &pose(identified)) > 1e-4
+                    });
+                    assert!(is_off, "{name}: the proof would not tell identified from nominal");
+                }
+                Err(ModelError::Unsuitable(reason)) => {
+                    assert!(format == Format::UrKinematics && !is_ur, "{name} {format:?}: {reason}");
+                }
+                Err(error) => panic!("{name} {format:?}: {error}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_corrected_profile_differs_from_the_nominal_one_in_geometry_and_targets_only() {
+    for name in builtin_names() {
+        let profile = profile(name);
+        let text = export(&calibrated(&profile), Format::CorrectedProfile, &ExportOptions::default()).unwrap().text;
+        let (read, _) = Profile::parse(&text, "corrected.ron").unwrap();
+        assert_eq!(read.fixed_parameters(), profile.fixed_parameters());
+        assert_eq!(read.beta_joints(), profile.beta_joints());
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        for (a, b) in read.joints().iter().zip(profile.joints()) {
+            for (a, b) in [(a.limits, b.limits), (a.planning_limits, b.planning_limits)] {
+                assert!(close(a.unwrap().0, b.unwrap().0) && close(a.unwrap().1, b.unwrap().1));
+            }
+            assert!(close(a.max_speed.unwrap(), b.max_speed.unwrap()));
+        }
+        let free = |profile: &Profile| profile.free_parameters(Level::Geometric);
+        assert!(free(&read).iter().zip(free(&profile)).all(|(a, b)| a.id == b.id && close(a.expected, b.expected)));
+        assert_eq!(read.bodies().len(), profile.bodies().len());
+        assert_eq!(read.instrument().map(|i| &i.name), profile.instrument().map(|i| &i.name));
+        assert_eq!(read.floor().is_some(), profile.floor().is_some());
+        assert_eq!(read.acceptance().position_rms.is_some(), profile.acceptance().position_rms.is_some());
+    }
+}
+
+#[test]
+fn other_effects_are_named_and_nothing_is_written_that_differs() {
+    let profile = profile("soochow");
+    let mut arm = calibrated(&profile);
+    arm.other_effects = vec!["stiffness2".to_owned()];
+    for format in [Format::Json, Format::Urdf] {
+        let remarks = export(&arm, format, &ExportOptions::default()).unwrap().remarks;
+        assert!(remarks.iter().any(|remark| remark.contains("stiffness2")), "{remarks:?}");
+    }
+    let arm = ForwardKinematics::new(profile.chain());
+    let tilted = deviated(&profile, 1);
+    let error = prove(&tilted, &limits(&profile), proof::EXPORT, |q| arm.base_from_flange(q)).unwrap_err();
+    assert!(matches!(error, ModelError::Differs { position_mm, .. } if position_mm > 0.01), "{error}");
+    let error = prove(&tilted, &[], proof::EXPORT, |_| Isometry3::translation(f64::NAN, 0.0, 0.0)).unwrap_err();
+    assert!(matches!(error, ModelError::Differs { .. }), "{error}");
+}
+
+/// A text without the elements `<origin …>`, and how many there were.
+fn without_origins(text: &str) -> (String, usize) {
+    let mut parts = text.split("<origin");
+    let mut rest = parts.next().unwrap().to_owned();
+    let mut count = 0;
+    for part in parts {
+        let (_, after) = part.split_once('>').unwrap();
+        rest.push_str(after.strip_prefix("</origin>").unwrap_or(after));
+        count += 1;
+    }
+    (rest, count)
+}
+
+#[test]
+fn a_given_urdf_changes_in_the_origins_of_its_chain_only() {
+    let (given, profile) = (fixture("ur5.urdf"), profile("ur5"));
+    let arm = calibrated(&profile);
+    for (base, tip, changed) in [("base", "tool0", 7), ("base", "flange", 7)] {
+        let options = ExportOptions { into: Some(GivenUrdf { text: &given, base, tip }), ..ExportOptions::default() };
+        let done = export(&arm, Format::Urdf, &options).unwrap();
+        assert!(done.agreement.position < 1e-9);
+        assert_eq!(without_origins(&done.text), without_origins(&given), "something else changed");
+        let lines = done.text.lines().zip(given.lines()).filter(|(new, old)| new != old).count();
+        assert!(lines >= changed, "{lines}");
+        assert!(
+            done.text.contains("<joint name=\"elbow_joint\"><origin xyz=\"9 9 9\"/>"),
+            "a transmission is no joint"
+        );
+        // Meshes stay on their links: every link frame moves by the size of the deviations only.
+        let (old, new) = (Urdf::parse(&given).unwrap(), Urdf::parse(&done.text).unwrap());
+        for joint in &old.joints {
+            let other = new.joints.iter().find(|other| other.name == joint.name).unwrap();
+            assert!(differs(&joint.origin, &other.origin) < 0.06, "{}", joint.name);
+            assert_eq!((joint.limits, joint.axis), (other.limits, other.axis));
+        }
+    }
+    // From the wrong base, without a fixed joint behind the last axis, and of another robot: refused.
+    let refused = |base: &str, tip: &str, arm: &CalibratedArm| {
+        let options = ExportOptions { into: Some(GivenUrdf { text: &given, base, tip }), ..ExportOptions::default() };
+        export(arm, Format::Urdf, &options).unwrap_err().to_string()
+    };
+    assert!(refused("base_link", "tool0", &arm).contains("not the nominal arm of the profile"));
+    assert!(refused("base", "wrist_3_link", &arm).contains("no fixed joint behind it"));
+    assert!(
+        refused("base", "tool0", &calibrated(&self::profile("ur10"))).contains("not the nominal arm of the profile")
+    );
+    assert!(refused("base", "tool0", &calibrated(&self::profile("franka_panda"))).contains("has 6 moving joints"));
+}
+
+#[test]
+fn urdfs_with_their_own_frames_are_patched_too() {
+    // Every frame of the given URDF is turned about its axis and moved along it, axes point anywhere, some count backwards.
+    for name in ["soochow", "kuka_kr6_r900", "fanuc_lrmate200id", "epson_ls3_b401s", "franka_panda"] {
+        let profile = profile(name);
+        let fresh = urdf_text(name, &[], profile.chain(), profile.joints()).unwrap();
+        let urdf = Urdf::parse(&fresh).unwrap();
+        let way = urdf.chain("base", "flange").unwrap();
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut given = fresh.clone();
+        let mut before = Isometry3::identity();
+        let places: Vec<usize> = fresh.match_indices("<origin").map(|(place, _)| place).collect();
+        let mut edits = Vec::new();
+        for (joint, place) in way.joints.iter().zip(places) {
+            let is_fixed = joint.type_name == "fixed";
+            let z = if is_fixed { 0.0 } else { random.random_range(-0.1..0.1) };
+            let turn = nalgebra::UnitQuaternion::from_euler_angles(
+                random.random_range(-1.0..1.0),
+                random.random_range(-1.0..1.0),
+                random.random_range(-1.0..1.0),
+            );
+            let own = if is_fixed {
+                Isometry3::identity()
+            } else {
+                Isometry3::from_parts(nalgebra::Translation3::new(0.0, 0.0, z), turn)
+            };
+            let origin = before.inverse() * joint.origin * own;
+            let axis = own.rotation.inverse() * joint.axis.into_inner();
+            let [roll, pitch, yaw] = trupose::model::roll_pitch_yaw(&origin.rotation);
+            let p = origin.translation.vector;
+            edits.push((
+                place,
+                format!("<origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>", p.x, p.y, p.z),
+                axis,
+            ));
+            before = own;
+        }
+        for (place, origin, axis) in edits.into_iter().rev() {
+            let end = place + given.get(place..).unwrap().find('>').unwrap() + 1;
+            given.replace_range(place..end, &origin);
+            let after = place + origin.len();
+            let Some(start) = given.get(after..).unwrap().find("<axis") else { continue };
+            let start = after + start;
+            let end = start + given.get(start..).unwrap().find('>').unwrap() + 1;
+            if !given.get(after..start).unwrap().contains("</joint>") {
+                given.replace_range(start..end, &format!("<axis xyz=\"{} {} {}\"/>", axis.x, axis.y, axis.z));
+            }
+        }
+        let options = ExportOptions {
+            into: Some(GivenUrdf { text: &given, base: "base", tip: "flange" }),
+            ..ExportOptions::default()
+        };
+        let done =
+            export(&calibrated(&profile), Format::Urdf, &options).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(without_origins(&done.text), without_origins(&given), "{name}");
+    }
+}
+
+#[test]
+fn the_ur_file_is_the_one_of_the_ros_description() {
+    let profile = profile("ur5");
+    let mut arm = calibrated(&profile);
+    let error = export(&arm, Format::UrKinematics, &ExportOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("alpha6, a6") && error.contains("--with-tool-offset"), "{error}");
+    let options = ExportOptions { with_tool_offset: true, ..ExportOptions::default() };
+    let remarks = export(&arm, Format::UrKinematics, &options).unwrap().remarks;
+    assert!(remarks.iter().any(|remark| remark.contains("in front of every tool")), "{remarks:?}");
+    arm.identified = profile.chain().clone();
+    let text = export(&arm, Format::UrKinematics, &ExportOptions::default()).unwrap().text;
+    let numbers = |name: &str| -> Vec<f64> {
+        let lines = text.lines().skip_while(|line| *line != format!("  {name}:")).skip(1).take(6);
+        lines.map(|line| line.split_once(": ").unwrap().1.parse().unwrap()).collect()
+    };
+    // Numbers of the public description of this robot.
+    let half = std::f64::consts::FRAC_PI_2;
+    for (name, expected) in [
+        ("shoulder", [0.0, 0.0, 0.089_159, 0.0, 0.0, 0.0]),
+        ("upper_arm", [0.0, 0.0, 0.0, half, 0.0, 0.0]),
+        ("forearm", [-0.425, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ("wrist_1", [-0.392_25, 0.0, 0.109_15, 0.0, 0.0, 0.0]),
+        ("wrist_2", [0.0, -0.094_65, 0.0, half, 0.0, 0.0]),
+        ("wrist_3", [0.0, 0.0823, 0.0, -half, 0.0, 0.0]),
+    ] {
+        for (found, expected) in numbers(name).iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-9, "{name}: {found} {expected}\n{text}");
+        }
+    }
+}
