@@ -170,6 +170,7 @@ fn page(view: &ViewModel, has_all: bool) -> Vec<String> {
     parts.extend(header.instrument.clone());
     lines.push(parts.join(", "));
     lines.push(view.purpose.to_owned());
+    lines.extend(view.live.as_ref().and_then(values::live).map(|text| format!("now: {text}")));
     lines.extend(values::lines(&view.content, has_all));
     lines.extend(view.notice.iter().flat_map(notice));
     lines.push("You can type:".to_owned());

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::wizard::view::Content;
+use crate::wizard::view::{Content, LiveView};
 
 /// Longest list that is written on one line, and entries of longer ones that are shown.
 const SHORT_LIST: usize = 8;
@@ -70,4 +70,17 @@ fn short(value: &Value) -> String {
                 .join(", ")
         }
     }
+}
+
+/// What the instrument sees, in a line.
+pub fn live(live: &LiveView) -> Option<String> {
+    if live.down.is_some() {
+        return Some("the link is down".to_owned());
+    }
+    live.point_mm?;
+    let mut parts = Vec::new();
+    parts.extend(live.rest_s.map(|seconds| format!("SMR rests {seconds:.1} s")));
+    parts.extend(live.scatter_mm.map(|scatter| format!("scatter {scatter:.3} mm")));
+    parts.extend(live.from_predicted_mm.map(|distance| format!("{distance:.1} mm from predicted")));
+    Some(parts.join(", "))
 }

@@ -13,8 +13,9 @@ use crate::session::measurements;
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::SearchStepSummary;
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, RecordedSet, Step, TargetChoice};
-use crate::session::simulation::{Fault, Simulation, Truth};
+use crate::session::simulation::{Fault, SimulatedWire, Simulation, Truth};
 use crate::session::summary::VerificationMode;
+use crate::session::wire::WireProtocol;
 
 /// Texts that a line-based format could stumble over.
 const TRICKY: &str = "a\nb\r\n\"c\", (\"d\") \\ \u{0} \u{85} \u{2028} \u{7} ä 机 #\"# )";

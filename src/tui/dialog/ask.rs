@@ -5,6 +5,7 @@ use crate::session::filter::Filter;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
+use crate::session::wire::{LinkChoice, WireAddress};
 use crate::tui::form::{Check, TextField};
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Intent, reading};
@@ -69,6 +70,48 @@ fn known(values: &[String]) -> Result<Intent, String> {
     }
     let xyz_mm = (number("x", x)?, number("y", y)?, number("z", z)?);
     Ok(Intent::ChooseTarget(TargetChoice::Known { xyz_mm, sigma_mm }))
+}
+
+/// An instrument on a wire.
+pub fn linked() -> Dialog {
+    Dialog::Form(
+        Form::new("An instrument on the network or a serial port", link)
+            .text(
+                "instrument",
+                "",
+                "emscon:HOST, geocom:serial:/dev/ttyUSB0:9600, ndi:HOST, ascii:tcp:HOST:PORT, ascii:listen:0.0.0.0:5000",
+            )
+            .text(
+                "options",
+                "",
+                "Empty: the usual ones. For ascii a preset such as xyz or bridge; else as (measure_ms: 2000).",
+            )
+            .text("robot", "", "rtde:HOST, if the robot's controller tells its joint angles. Empty: it does not.")
+            .pick(
+                "measure by itself",
+                &["no", "yes"],
+                0,
+                "Left/Right. yes: as soon as the SMR rests for 2 s near the predicted place.",
+            ),
+    )
+}
+
+fn link(values: &[String]) -> Result<Intent, String> {
+    let [address, options, robot, automatic] = values else { return Err("four values are needed".to_owned()) };
+    let parsed: WireAddress = address.parse()?;
+    if parsed.protocol.is_robot() {
+        return Err(format!("{} is a robot: give it below", parsed.protocol));
+    }
+    let some = |text: &String| (!text.trim().is_empty()).then(|| text.trim().to_owned());
+    let robot = some(robot);
+    if let Some(robot) = &robot
+        && !robot.parse::<WireAddress>()?.protocol.is_robot()
+    {
+        return Err(format!("'{robot}' is no robot; rtde:HOST is one"));
+    }
+    let is_automatic = automatic == "yes";
+    let choice = LinkChoice { address: parsed.to_string(), options: some(options), robot, is_automatic };
+    Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice)))
 }
 
 /// A cell that exists in the program only.
@@ -179,6 +222,26 @@ mod tests {
         assert_eq!(known(&values(&["1,5", "-2", "70", "0"])), Ok(Intent::ChooseTarget(target)));
         assert_eq!(known(&values(&["1", "x", "70", "0"])), Err("y: 'x' is not a number".to_owned()));
         assert_eq!(known(&values(&["1", "2", "70", "-1"])), Err("sigma cannot be negative".to_owned()));
+    }
+
+    #[test]
+    fn addresses_are_checked_where_they_are_typed() {
+        let choice = LinkChoice {
+            address: "emscon:tcp:192.168.0.2:700".to_owned(),
+            options: Some("(measure_ms: 2000)".to_owned()),
+            robot: Some("rtde:10.0.0.1".to_owned()),
+            is_automatic: true,
+        };
+        let typed = values(&["emscon:192.168.0.2", " (measure_ms: 2000) ", "rtde:10.0.0.1", "yes"]);
+        assert_eq!(link(&typed), Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice))));
+        for (texts, part) in [
+            (["192.168.0.2", "", "", "no"], "is no address"),
+            (["rtde:10.0.0.1", "", "", "no"], "is a robot"),
+            (["emscon:a", "", "emscon:b", "no"], "is no robot"),
+        ] {
+            let error = link(&values(&texts)).unwrap_err();
+            assert!(error.contains(part), "{error}");
+        }
     }
 
     #[test]

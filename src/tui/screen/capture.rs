@@ -4,12 +4,14 @@
 //! Go to       configuration in large digits; or the sample in question with what can be done
 //! Poses       all poses with what became of them; Enter goes to one
 //! Prediction  how good the result would be, and whether the rest is worth its time
+//! Live        what the instrument sees now, over the last seconds
 //! Notes       remarks, and measurements that gave no sample
 //! Picture     the arm, where it is not beside the other views anyway
 //! ```
 
 mod go_to;
 mod joints;
+mod live;
 mod notes;
 mod poses;
 mod prediction;
@@ -47,13 +49,14 @@ enum Tab {
     GoTo,
     Poses,
     Prediction,
+    Live,
     Notes,
     Picture,
 }
 
 impl Tab {
-    const ALL: [Self; 5] = [Self::GoTo, Self::Poses, Self::Prediction, Self::Notes, Self::Picture];
-    const NAMES: [&'static str; 5] = ["Go to", "Poses", "Prediction", "Notes", "Picture"];
+    const ALL: [Self; 6] = [Self::GoTo, Self::Poses, Self::Prediction, Self::Live, Self::Notes, Self::Picture];
+    const NAMES: [&'static str; 6] = ["Go to", "Poses", "Prediction", "Live", "Notes", "Picture"];
 
     fn index(self) -> usize {
         Self::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
@@ -146,7 +149,7 @@ impl Screen for Capture {
                 items.push(Item::new("Up/Down", "choose", 1));
             }
             Tab::Notes => items.push(Item::new("Up/Down", "scroll", 7)),
-            Tab::GoTo | Tab::Prediction | Tab::Picture => {}
+            Tab::GoTo | Tab::Prediction | Tab::Live | Tab::Picture => {}
         }
         if takes_typing(cx.view) && self.tab != Tab::Picture {
             items.push(Item::new("0-9, paste", "coordinates", 3));
@@ -169,7 +172,7 @@ impl Screen for Capture {
                 return match self.tab {
                     Tab::Poses => self.on_list_key(code, content),
                     Tab::Notes => self.on_notes_key(code, content),
-                    Tab::GoTo | Tab::Prediction | Tab::Picture => Reply::Ignored,
+                    Tab::GoTo | Tab::Prediction | Tab::Live | Tab::Picture => Reply::Ignored,
                 };
             }
         }
@@ -198,6 +201,7 @@ impl Screen for Capture {
             Tab::GoTo => go_to::draw(cx, content, body, buf),
             Tab::Poses => poses::draw(cx.theme, content, self.selected(content), body, buf),
             Tab::Prediction => prediction::draw(cx.theme, content, body, buf),
+            Tab::Live => live::draw(cx, content, body, buf),
             Tab::Notes => notes::draw(cx.theme, content, self.scroll, body, buf),
             Tab::Picture => {}
         }

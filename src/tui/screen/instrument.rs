@@ -11,16 +11,18 @@ use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::tui::dialog::ask;
 use crate::tui::keymap::{Item, Key};
 use crate::tui::theme::Role;
+use crate::tui::values;
 use crate::wizard::Intent;
 use crate::wizard::view::{Content, InstrumentView};
 
 /// Columns of the text beside the picture.
 const TEXT: u16 = 62;
 /// The ways, with what each means.
-const WAYS: [(&str, &str); 5] = [
+const WAYS: [(&str, &str); 6] = [
     ("by hand, in mm", "you read x y z off the instrument and type or paste them"),
     ("by hand, in m", "the same, the instrument counts in metres"),
     ("by hand, in inch", "the same, the instrument counts in inches"),
+    ("over a wire ...", "a tracker or another instrument on the network or a serial port"),
     ("simulated cell ...", "an arm with hidden errors: rehearse the whole procedure"),
     ("recorded measurements ...", "tables of earlier days, played as if captured now"),
 ];
@@ -56,7 +58,8 @@ impl InstrumentScreen {
         let at = self.menu.at.take().unwrap_or(0);
         match UNITS.get(at) {
             Some(unit) => Reply::Intend(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
-            None if at == UNITS.len() => {
+            None if at == UNITS.len() => Reply::Ask(Box::new(ask::linked())),
+            None if at == UNITS.len() + 1 => {
                 let is_paper = cx.view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper"));
                 Reply::Ask(Box::new(ask::simulated(is_paper)))
             }
@@ -94,6 +97,14 @@ fn state(content: &InstrumentView, cx: &ScreenCx<'_>, page: &mut Page) {
         (Some(identity), _) => page.pair_as("answers", identity, Role::Ok),
         (None, Some(_)) => page.pair("answers", "connecting ..."),
         (None, None) => page.pair_as("answers", "NO ANSWER: press r to try again, or choose another", Role::Warn),
+    }
+    if let Some(live) = &cx.view.live {
+        let seen =
+            live.point_mm.map_or_else(|| "no SMR".to_owned(), |[x, y, z]| format!("x {x:.3}  y {y:.3}  z {z:.3} mm"));
+        page.pair("sees", &seen);
+        if let Some(text) = values::live(live) {
+            page.pair("", &text);
+        }
     }
     if content.recorded_poses > 0 {
         page.pair("recorded", &counted(content.recorded_poses, "pose"));

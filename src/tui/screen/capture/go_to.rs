@@ -10,6 +10,7 @@ use crate::tui::keymap;
 use crate::tui::paint;
 use crate::tui::screen::ScreenCx;
 use crate::tui::theme::{Role, Theme};
+use crate::tui::values;
 use crate::wizard::Intent;
 use crate::wizard::view::{CaptureView, FindingView, PairView};
 
@@ -33,7 +34,7 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     lines.extend(joined(&count(content, is_tall), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
     lines.extend(panel(cx, content, room));
     // While something is in question, that and the configuration are what matters.
-    let status = if content.finding.is_some() && !is_tall { Vec::new() } else { status(content, is_tall) };
+    let status = if content.finding.is_some() && !is_tall { Vec::new() } else { status(cx, content, is_tall) };
     let status: Vec<(String, Role)> = status
         .into_iter()
         .flat_map(|(text, role)| {
@@ -224,8 +225,11 @@ fn choice(cx: &ScreenCx<'_>, label: &str, accepts: impl Fn(&Intent) -> bool) -> 
 }
 
 /// Last reading, prediction and drift in a line each.
-fn status(content: &CaptureView, is_tall: bool) -> Vec<(String, Role)> {
+fn status(cx: &ScreenCx<'_>, content: &CaptureView, is_tall: bool) -> Vec<(String, Role)> {
     let mut lines = Vec::new();
+    if let Some(live) = &cx.view.live {
+        lines.extend(values::live(live).map(|text| (format!("now: {text}"), Role::Hint)));
+    }
     if let Some(last) = &content.last {
         let scatter = last.scatter_mm.map_or_else(String::new, |scatter| format!(", scatter {scatter:.3} mm"));
         let [x, y, z] = last.xyz_mm;
