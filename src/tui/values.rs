@@ -73,7 +73,7 @@ fn short(value: &Value) -> String {
 }
 
 /// What the instrument sees, in a line.
-pub fn live(live: &LiveView) -> Option<String> {
+pub(super) fn live(live: &LiveView) -> Option<String> {
     if live.down.is_some() {
         return Some("the link is down".to_owned());
     }

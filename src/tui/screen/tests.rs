@@ -504,7 +504,7 @@ fn keys_become_intents() {
     is(&instrument(None, None), &[Down, Down, Enter], by_hand(CoordinateUnit::Inch));
     is(&instrument(Some("x"), Some("y")), &[Enter], Intent::Next);
     is(&instrument(Some("x"), None), &[Char('r')], Intent::Retry);
-    let simulated = pressed(&instrument(None, None), &[Down, Down, Down, Enter, Enter]);
+    let simulated = pressed(&instrument(None, None), &[Down, Down, Down, Down, Enter, Enter]);
     assert!(
         matches!(simulated, Wish::Intend(Intent::ChooseInstrument(InstrumentChoice::Simulated(_)))),
         "{simulated:?}"

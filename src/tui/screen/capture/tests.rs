@@ -6,7 +6,7 @@ use crate::session::set_up::Step;
 use crate::tui::dialog::Answer;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
-    DriftView, FindingView, JointShown, PairView, PredictionView, RowState, RowView, SampleView,
+    DriftView, FindingView, JointShown, LivePoint, LiveView, PairView, PredictionView, RowState, RowView, SampleView,
 };
 use crate::wizard::{IntentInfo, Notice};
 
@@ -197,6 +197,41 @@ fn other_views() {
     insta::assert_snapshot!("large", shown(&drawn(&on(Tab::GoTo), &of(normal()), unicode, (120, 40))));
     insta::assert_snapshot!("large_question", shown(&drawn(&on(Tab::GoTo), &in_question(), unicode, (120, 40))));
     insta::assert_snapshot!("at_100x24", shown(&drawn(&on(Tab::GoTo), &of(normal()), unicode, (100, 24))));
+}
+
+/// The tracker sees the SMR, which has come to rest; the robot stands a little off.
+fn live() -> ViewModel {
+    let track = (0..50).map(|index| {
+        let seconds = f64::from(index) / 10.0 - 4.9;
+        LivePoint { seconds, offset_mm: if seconds < -2.5 { 0.4 * (-2.5 - seconds) } else { 0.004 } }
+    });
+    let seen = LiveView {
+        point_mm: Some([1234.567, -345.678, 987.654]),
+        rest_s: Some(2.5),
+        scatter_mm: Some(0.004),
+        from_predicted_mm: Some(7.25),
+        joints: Some(vec![0.0; 6]),
+        joint_difference: Some((3, 0.062)),
+        is_still: Some(true),
+        down: None,
+        track: track.collect(),
+    };
+    ViewModel { live: Some(seen), ..of(normal()) }
+}
+
+#[test]
+fn what_the_instrument_sees_is_shown() {
+    let [unicode, ascii] = themes();
+    insta::assert_snapshot!("live", shown(&drawn(&on(Tab::Live), &live(), unicode, (80, 24))));
+    insta::assert_snapshot!("live_ascii", shown(&drawn(&on(Tab::Live), &live(), ascii, (60, 20))));
+    insta::assert_snapshot!("live_go_to", shown(&drawn(&on(Tab::GoTo), &live(), unicode, (80, 24))));
+    let mut lost = live();
+    if let Some(live) = &mut lost.live {
+        (live.point_mm, live.down) = (None, Some("the other end has closed the connection".to_owned()));
+        live.track.clear();
+    }
+    insta::assert_snapshot!("live_lost", shown(&drawn(&on(Tab::Live), &lost, unicode, (80, 24))));
+    insta::assert_snapshot!("live_none", shown(&drawn(&on(Tab::Live), &of(normal()), unicode, (80, 24))));
 }
 
 #[test]
