@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use rerun::{
-    Arrows3D, AsComponents, Boxes3D, Capsules3D, CoordinateFrame, FillMode, LineStrips3D, Radius, ViewCoordinates,
+    Arrows3D, AsComponents, Boxes3D, Capsules3D, Color, CoordinateFrame, FillMode, LineStrips3D, Points3D, Radius,
+    ViewCoordinates,
 };
 
 use super::{Posture, reach};
@@ -22,10 +23,38 @@ pub(super) fn draw(canvas: &Canvas, profile: &Profile) {
     floor(canvas, profile);
     tracker(canvas, profile);
     keep_out(canvas, profile);
-    arm(canvas, profile);
-    pose(canvas, profile, &rest(profile), Moment { pose: Some(0), ..Moment::default() });
+    styles(canvas, profile);
+    castings(canvas, profile, Arm::Nominal);
+    pose(canvas, profile, &rest(profile), Moment::pose(0));
     // The timelines of the computations show the arm too.
     pose(canvas, profile, &rest(profile), Moment::search(0));
+}
+
+/// Looks that never change are said once: every row is smaller without them.
+fn styles(canvas: &Canvas, profile: &Profile) {
+    let beam =
+        LineStrips3D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
+    canvas.fix(names::BEAM, &beam);
+    let points = |size: f32, color| {
+        Points3D::update_fields().with_radii([Radius::new_ui_points(size)]).with_colors([color])
+    };
+    canvas.fix(names::MEASURED, &Points3D::update_fields().with_radii([Radius::new_ui_points(4.0)]));
+    canvas.fix(names::NEXT, &points(7.0, layout::ATTENTION));
+    canvas.fix(names::UNUSED, &points(5.0, layout::OUT));
+    if profile.bodies().is_empty() {
+        canvas.fix(names::NOMINAL_SKELETON, &skeleton_style(profile, layout::NOMINAL));
+    }
+}
+
+/// How the line through the joints of an arm without castings looks.
+pub(super) fn skeleton_style(profile: &Profile, color: Color) -> LineStrips3D {
+    let radius = layout::single(0.02 * reach(profile));
+    LineStrips3D::update_fields().with_radii([radius]).with_colors([color])
+}
+
+/// The line through the joints of an arm without castings.
+pub(super) fn skeleton(posture: &Posture) -> LineStrips3D {
+    LineStrips3D::update_fields().with_strips([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
 }
 
 /// The middle of each range ((rad) or (m)).
@@ -42,16 +71,13 @@ pub(super) fn pose(canvas: &Canvas, profile: &Profile, q: &[f64], moment: Moment
     for (index, frame) in posture.frames.iter().enumerate() {
         canvas.draw(moment, names::NOMINAL_FRAMES, &layout::frame(frame, &names::frame("nominal", index)));
     }
+    // The timeline of clock times shows the arm and the points: more would make every file larger.
+    let lines = Moment { time: None, ..moment };
     if profile.bodies().is_empty() {
-        let radius = layout::single(0.02 * reach(profile));
-        let line = LineStrips3D::new([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
-            .with_radii([radius])
-            .with_colors([layout::NOMINAL]);
-        canvas.draw(moment, names::NOMINAL_SKELETON, &line);
+        canvas.draw(lines, names::NOMINAL_SKELETON, &skeleton(&posture));
     }
     let beam = [layout::at(&profile.tracker().position_in_base), layout::at(&posture.reflector)];
-    let beam = LineStrips3D::new([beam]).with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
-    canvas.draw(moment, names::BEAM, &beam);
+    canvas.draw(lines, names::BEAM, &LineStrips3D::update_fields().with_strips([beam]));
 }
 
 fn floor(canvas: &Canvas, profile: &Profile) {
@@ -106,13 +132,28 @@ fn keep_out(canvas: &Canvas, profile: &Profile) {
     canvas.fix(names::KEEP_OUT, &drawn);
 }
 
-/// Castings and joint axes, fixed to the frames: one entity per frame.
-fn arm(canvas: &Canvas, profile: &Profile) {
+/// An arm in the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arm {
+    /// Solid, with the axes of its joints.
+    Nominal,
+    /// With enlarged deviations: glassy, so that the nominal arm is seen in it.
+    Enlarged,
+}
+
+/// Castings and joint axes of an arm, fixed to its frames: one entity per frame.
+pub(super) fn castings(canvas: &Canvas, profile: &Profile, arm: Arm) {
+    let (frames, links, color, fill) = match arm {
+        Arm::Nominal => ("nominal", names::NOMINAL_LINKS, layout::NOMINAL, FillMode::Solid),
+        Arm::Enlarged => {
+            ("enlarged", names::ENLARGED_LINKS, layout::IDENTIFIED, FillMode::TransparentFillMajorWireframe)
+        }
+    };
     // A joint turns about or slides along the z axis of the frame before it, or of its own.
     let before = usize::from(profile.chain().convention() == Convention::Modified);
     let half = 0.13 * reach(profile);
     for frame in 0..=profile.chain().dof() + 1 {
-        let name = CoordinateFrame::new(names::frame("nominal", frame));
+        let name = CoordinateFrame::new(names::frame(frames, frame));
         let bodies: Vec<(&Capsule, (f64, UnitQuaternion<f64>))> =
             profile.bodies().iter().filter(|body| body.link == frame).map(|body| (body, along(body))).collect();
         let castings = Capsules3D::from_lengths_and_radii(
@@ -121,9 +162,11 @@ fn arm(canvas: &Canvas, profile: &Profile) {
         )
         .with_translations(bodies.iter().map(|(body, _)| layout::at(&body.from)))
         .with_quaternions(bodies.iter().map(|(_, (_, turned))| layout::quaternion(turned)))
-        .with_colors([layout::NOMINAL])
-        .with_fill_mode(FillMode::Solid);
-        let joint = frame.checked_sub(before).and_then(|index| profile.chain().joints().get(index));
+        .with_colors([color])
+        .with_line_radii([Radius::new_ui_points(0.7)])
+        .with_fill_mode(fill);
+        let joint = (arm == Arm::Nominal).then_some(frame).and_then(|frame| frame.checked_sub(before))
+            .and_then(|index| profile.chain().joints().get(index));
         let axis = joint.map(|joint| {
             Arrows3D::from_vectors([layout::vector(&Vector3::new(0.0, 0.0, 2.0 * half))])
                 .with_origins([layout::vector(&Vector3::new(0.0, 0.0, -half))])
@@ -140,7 +183,7 @@ fn arm(canvas: &Canvas, profile: &Profile) {
             parts.push(axis);
         }
         if parts.len() > 1 {
-            canvas.fix(&format!("{}/{frame}", names::NOMINAL_LINKS), &parts);
+            canvas.fix(&format!("{links}/{frame}"), &parts);
         }
     }
 }
