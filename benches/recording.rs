@@ -24,6 +24,8 @@ fn demo(poses: usize) -> Vec<Line> {
     let folder = tempfile::tempdir().unwrap();
     let script = include_str!("../sessions/demo.script.ron")
         .replace("poses: 56", &format!("poses: {poses}"))
+        // Which poses they are does not matter here.
+        .replace("candidates: 1500", "candidates: 400")
         .replace("Is(\"56\")", &format!("Is(\"{poses}\")"));
     fs::write(folder.path().join("demo.script.ron"), script).unwrap();
     let status = Command::new(env!("CARGO_BIN_EXE_trupose"))
@@ -57,20 +59,28 @@ fn size(folder: &Path) -> u64 {
 
 /// A recorder that has written these lines, batch by batch, as a session that is measured does.
 fn recorded<'a>(folder: &TempDir, batches: impl Iterator<Item = &'a [Line]>) -> Recorder {
-    let mut recorder = Recorder::start(folder.path(), Vec::new(), None, |event| panicked(&event)).unwrap();
-    for batch in batches {
-        let before = size(folder.path());
-        recorder.take(batch).unwrap();
-        // The next pose is measured seconds later.
-        while size(folder.path()) == before {
-            std::thread::yield_now();
-        }
-    }
+    let mut recorder = Recorder::start(folder.path(), Vec::new(), None, |event| println!("{event:?}")).unwrap();
+    batches.for_each(|batch| take_and_wait(&mut recorder, folder, batch));
     recorder
 }
 
-fn panicked(event: &recording::RecordingEvent) {
-    println!("{event:?}");
+/// Waits until it is written: the next pose is measured seconds later.
+fn take_and_wait(recorder: &mut Recorder, folder: &TempDir, batch: &[Line]) {
+    let before = size(folder.path());
+    recorder.take(batch).unwrap();
+    while size(folder.path()) == before {
+        std::thread::yield_now();
+    }
+    // All messages of a batch are written before the next can be taken; this one may still be at it.
+    let mut settled = size(folder.path());
+    loop {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let now = size(folder.path());
+        if now == settled {
+            return;
+        }
+        settled = now;
+    }
 }
 
 /// Sizes per pose, printed: they are not times.
@@ -83,11 +93,7 @@ fn sizes() {
         let mut recorder = recorded(&folder, std::iter::once(&lines[..first]));
         let before = size(folder.path());
         for line in lines[first..=last].chunks(1) {
-            let so_far = size(folder.path());
-            recorder.take(line).unwrap();
-            while size(folder.path()) == so_far {
-                std::thread::yield_now();
-            }
+            take_and_wait(&mut recorder, &folder, line);
         }
         let growth = size(folder.path()) - before;
         recorder.take(&lines[last + 1..]).unwrap();

@@ -438,9 +438,11 @@ fn predicted_position_errors_are_those_of_many_calibrations() {
         let case = PaperCase::simulated(&truth, 30, NOISE, &mut rng);
         let found = run(&case, &settings());
         let real = ArmModel::with_deviations(&case.problem(), &truth);
-        let pairs: Vec<_> = places.iter().map(|at| (1.0, found.model.point_in_base(at), real.point_in_base(at))).collect();
+        let pairs: Vec<_> =
+            places.iter().map(|at| (1.0, found.model.point_in_base(at), real.point_in_base(at))).collect();
         let registered = register(pairs.iter().copied()).unwrap().to_from_from;
-        for (place, (covariance, (_, from, to))) in position_covariances(&found, &places).iter().zip(&pairs).enumerate() {
+        for (place, (covariance, (_, from, to))) in position_covariances(&found, &places).iter().zip(&pairs).enumerate()
+        {
             stated[place] += covariance.trace();
             seen[place] += (registered * from - to).norm_squared();
         }
@@ -468,7 +470,12 @@ fn the_path_of_the_solver_ends_at_the_result() {
         for (value, estimate) in last.iter().zip(&found.estimates) {
             // What no data tell may be moved along its blind direction in the end.
             if estimate.identifiable {
-                assert!((value - estimate.deviation).abs() < 1e-12, "{}: {value} or {}", estimate.id, estimate.deviation);
+                assert!(
+                    (value - estimate.deviation).abs() < 1e-12,
+                    "{}: {value} or {}",
+                    estimate.id,
+                    estimate.deviation
+                );
             }
         }
         assert!(found.path.len() > 1);

@@ -374,7 +374,8 @@ fn many_processes_at_once_work_on_a_session_one_after_the_other() {
     let place = Place::new();
     place.pause(&["Capture(2, Fail)"]).until_measured(2).kill();
     let script = place.write_script("rest.script.ron", &["Capture(1, Fail)".to_owned()]);
-    let run = || Paused::start(place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"]));
+    let run =
+        || Paused::start(place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"]));
     let running: Vec<Paused> = (0..8).map(|_| run()).collect();
     let mut done = 0;
     for program in running {
@@ -394,7 +395,8 @@ fn many_processes_at_once_work_on_a_session_one_after_the_other() {
 fn many_new_sessions_of_one_name_get_a_folder_each() {
     let place = Place::new();
     let script = place.write_script("run.script.ron", &whole()[..3]);
-    let running: Vec<Paused> = (0..6).map(|_| Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]))).collect();
+    let running: Vec<Paused> =
+        (0..6).map(|_| Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]))).collect();
     for program in running {
         let output = program.end();
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));

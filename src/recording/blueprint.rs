@@ -136,10 +136,13 @@ const STEP: f64 = 0.8567;
 /// Where the camera stands and what it looks at: across the line from robot to tracker, as near as all of the arm's room allows.
 fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
     let postures = (1..=POSTURES).flat_map(|number| {
-        let q: Vec<f64> = (1..).zip(profile.joints()).map(|(power, joint)| {
-            let (low, high) = joint.planning_limits.or(joint.limits).unwrap_or((-1.0, 1.0));
-            low + (high - low) * (f64::from(number) * STEP.powi(power)).fract()
-        }).collect();
+        let q: Vec<f64> = (1..)
+            .zip(profile.joints())
+            .map(|(power, joint)| {
+                let (low, high) = joint.planning_limits.or(joint.limits).unwrap_or((-1.0, 1.0));
+                low + (high - low) * (f64::from(number) * STEP.powi(power)).fract()
+            })
+            .collect();
         Posture::nominal(profile, &q).line
     });
     let places: Vec<Point3<f64>> = postures.collect();
@@ -231,6 +234,10 @@ fn with_extras(
     extras: &[Extra],
 ) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
     let failed = |error: rerun::RecordingStreamError| RecordingError::library("making the layout", error);
+    if !rerun::decide_logging_enabled(true) {
+        // The library's builder then makes nothing, and panics about it. Everything else is recorded all the same.
+        return Err(RecordingError::library("making the layout", "the environment variable RERUN forbids it"));
+    }
     let (carrier, sent) = RecordingStreamBuilder::new(names::APPLICATION).enabled(true).memory().map_err(failed)?;
     let activation = BlueprintActivation { make_active: true, make_default: true };
     blueprint.send(&carrier, activation).map_err(failed)?;

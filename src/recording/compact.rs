@@ -26,7 +26,8 @@ pub(super) fn store(messages: impl Iterator<Item = LogMsg>, path: &Path) -> Resu
     let write = |source| RecordingError::file("cannot write the recording", path, source);
     let mut file = temporary().tempfile_in(folder).map_err(write)?;
     let mut compacted = Vec::new();
-    optimize(whole.as_slice(), &mut compacted, &OptimizationProfile::LIVE)
+    read::guarded(|| optimize(whole.as_slice(), &mut compacted, &OptimizationProfile::LIVE))
+        .ok_or_else(|| failed(&"the data are damaged"))?
         .map_err(|error| failed(&format!("{error:#}")))?;
     file.write_all(&compacted).and_then(|()| file.as_file().sync_all()).map_err(write)?;
     file.persist(path).map_err(|error| write(error.error))?;
@@ -64,7 +65,10 @@ pub(super) fn messages<'a>(
     let files: Vec<_> = paths
         .map(|path| File::open(path).map_err(|source| RecordingError::file("cannot open the recording", path, source)))
         .collect::<Result<_, _>>()?;
-    Ok(files.into_iter().flat_map(|file| DecoderApp::decode_lazy(BufReader::new(file)).filter_map(Result::ok)))
+    Ok(files.into_iter().flat_map(|file| {
+        let mut messages = DecoderApp::decode_lazy(BufReader::new(file));
+        std::iter::from_fn(move || read::guarded(|| messages.next()).flatten()).filter_map(Result::ok)
+    }))
 }
 
 /// Makes one file compact, in place.

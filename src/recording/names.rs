@@ -33,12 +33,8 @@ pub(super) const NOMINAL_LINKS: &str = "world/nominal/link";
 pub(super) const NOMINAL_SKELETON: &str = "world/nominal/skeleton";
 /// Frames of the identified arm at the pose, as they are.
 pub(super) const IDENTIFIED_FRAMES: &str = "world/identified/frames";
-/// Frames of the identified arm with its deviations enlarged.
-pub(super) const ENLARGED_FRAMES: &str = "world/enlarged/frames";
-/// Its castings, one entity per frame.
-pub(super) const ENLARGED_LINKS: &str = "world/enlarged/link";
-/// Line through its joints, of an arm without castings.
-pub(super) const ENLARGED_SKELETON: &str = "world/enlarged/skeleton";
+/// Castings of the identified arm with its deviations enlarged; a line through its joints if it has none.
+pub(super) const ENLARGED: &str = "world/identified/enlarged";
 /// Floor of the cell.
 pub(super) const FLOOR: &str = "world/cell/floor";
 /// Base of the robot.

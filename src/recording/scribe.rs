@@ -83,7 +83,14 @@ impl Scribe {
                 measured::sample(&self.canvas, &self.session, noted, line.time);
                 plan::points(&self.canvas, &self.session, false);
             }
-            Entry::Decision { .. } | Entry::Correction(_) | Entry::Row(_) | Entry::Skipped { .. } => self.points(),
+            Entry::Correction(_) => {
+                // It may have changed where the robot stood, or the unit, at any of them.
+                for sample in &self.session.samples {
+                    measured::sample(&self.canvas, &self.session, &sample.noted, sample.time);
+                }
+                self.points();
+            }
+            Entry::Decision { .. } | Entry::Row(_) | Entry::Skipped { .. } => self.points(),
             Entry::Identified(identified) => {
                 result::draw(&self.canvas, &self.session, identified, self.runs, line.time);
             }

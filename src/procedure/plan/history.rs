@@ -57,8 +57,14 @@ mod tests {
 
     fn sweep(start: usize, is_objective: bool, sweep: usize, value: f64) -> Progress {
         let stage = if is_objective { Stage::Objective { limit: 1.0 } } else { Stage::Prediction };
-        let found =
-            planning::Progress { start, stage, sweep, condition_number: 100.0 * value, o1: 1e-3, predicted_error: value };
+        let found = planning::Progress {
+            start,
+            stage,
+            sweep,
+            condition_number: 100.0 * value,
+            o1: 1e-3,
+            predicted_error: value,
+        };
         Progress::Sweep { found, sweeps: 3, starts: 2 }
     }
 

@@ -1,6 +1,6 @@
 //! What does not move: floor, base, tracker, boxes, and the castings and axes that move with the frames of the arm.
 
-use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rerun::{
     Arrows3D, AsComponents, Boxes3D, Capsules3D, Color, CoordinateFrame, FillMode, LineStrips3D, Points3D, Radius,
     ViewCoordinates,
@@ -24,7 +24,7 @@ pub(super) fn draw(canvas: &Canvas, profile: &Profile) {
     tracker(canvas, profile);
     keep_out(canvas, profile);
     styles(canvas, profile);
-    castings(canvas, profile, Arm::Nominal);
+    arm(canvas, profile);
     pose(canvas, profile, &rest(profile), Moment::pose(0));
     // The timelines of the computations show the arm too.
     pose(canvas, profile, &rest(profile), Moment::search(0));
@@ -32,12 +32,10 @@ pub(super) fn draw(canvas: &Canvas, profile: &Profile) {
 
 /// Looks that never change are said once: every row is smaller without them.
 fn styles(canvas: &Canvas, profile: &Profile) {
-    let beam =
-        LineStrips3D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
+    let beam = LineStrips3D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
     canvas.fix(names::BEAM, &beam);
-    let points = |size: f32, color| {
-        Points3D::update_fields().with_radii([Radius::new_ui_points(size)]).with_colors([color])
-    };
+    let points =
+        |size: f32, color| Points3D::update_fields().with_radii([Radius::new_ui_points(size)]).with_colors([color]);
     canvas.fix(names::MEASURED, &Points3D::update_fields().with_radii([Radius::new_ui_points(4.0)]));
     canvas.fix(names::NEXT, &points(7.0, layout::ATTENTION));
     canvas.fix(names::UNUSED, &points(5.0, layout::OUT));
@@ -132,48 +130,25 @@ fn keep_out(canvas: &Canvas, profile: &Profile) {
     canvas.fix(names::KEEP_OUT, &drawn);
 }
 
-/// An arm in the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Arm {
-    /// Solid, with the axes of its joints.
-    Nominal,
-    /// With enlarged deviations: glassy, so that the nominal arm is seen in it.
-    Enlarged,
-}
-
-/// Castings and joint axes of an arm, fixed to its frames: one entity per frame.
-pub(super) fn castings(canvas: &Canvas, profile: &Profile, arm: Arm) {
-    let (frames, links, color, fill) = match arm {
-        Arm::Nominal => ("nominal", names::NOMINAL_LINKS, layout::NOMINAL, FillMode::Solid),
-        Arm::Enlarged => {
-            ("enlarged", names::ENLARGED_LINKS, layout::IDENTIFIED, FillMode::TransparentFillMajorWireframe)
-        }
-    };
+/// Castings and joint axes of the nominal arm, fixed to its frames: one entity per frame.
+fn arm(canvas: &Canvas, profile: &Profile) {
     // A joint turns about or slides along the z axis of the frame before it, or of its own.
     let before = usize::from(profile.chain().convention() == Convention::Modified);
     let half = 0.13 * reach(profile);
     for frame in 0..=profile.chain().dof() + 1 {
-        let name = CoordinateFrame::new(names::frame(frames, frame));
-        let bodies: Vec<(&Capsule, (f64, UnitQuaternion<f64>))> =
-            profile.bodies().iter().filter(|body| body.link == frame).map(|body| (body, along(body))).collect();
-        let castings = Capsules3D::from_lengths_and_radii(
-            bodies.iter().map(|(_, (length, _))| layout::single(*length)),
-            bodies.iter().map(|(body, _)| layout::single(body.radius)),
-        )
-        .with_translations(bodies.iter().map(|(body, _)| layout::at(&body.from)))
-        .with_quaternions(bodies.iter().map(|(_, (_, turned))| layout::quaternion(turned)))
-        .with_colors([color])
-        .with_line_radii([Radius::new_ui_points(0.7)])
-        .with_fill_mode(fill);
-        let joint = (arm == Arm::Nominal).then_some(frame).and_then(|frame| frame.checked_sub(before))
-            .and_then(|index| profile.chain().joints().get(index));
+        let name = CoordinateFrame::new(names::frame("nominal", frame));
+        let bodies: Vec<&Capsule> = profile.bodies().iter().filter(|body| body.link == frame).collect();
+        let castings = capsules(&bodies, layout::NOMINAL)
+            .with_translations(bodies.iter().map(|body| layout::at(&body.from)))
+            .with_quaternions(bodies.iter().map(|body| layout::quaternion(&along(body).1)))
+            .with_fill_mode(FillMode::Solid);
+        let joint = frame.checked_sub(before).and_then(|index| profile.chain().joints().get(index));
         let axis = joint.map(|joint| {
             Arrows3D::from_vectors([layout::vector(&Vector3::new(0.0, 0.0, 2.0 * half))])
                 .with_origins([layout::vector(&Vector3::new(0.0, 0.0, -half))])
                 .with_radii([Radius::new_ui_points(1.0)])
                 .with_colors([layout::AXIS])
                 .with_labels([crate::recording::read::plain(&joint.name)])
-                .with_show_labels(true)
         });
         let mut parts: Vec<&dyn AsComponents> = vec![&name];
         if !bodies.is_empty() {
@@ -183,9 +158,50 @@ pub(super) fn castings(canvas: &Canvas, profile: &Profile, arm: Arm) {
             parts.push(axis);
         }
         if parts.len() > 1 {
-            canvas.fix(&format!("{links}/{frame}"), &parts);
+            canvas.fix(&format!("{}/{frame}", names::NOMINAL_LINKS), &parts);
         }
     }
+}
+
+/// Sizes and colour of castings.
+fn capsules(bodies: &[&Capsule], color: Color) -> Capsules3D {
+    Capsules3D::from_lengths_and_radii(
+        bodies.iter().map(|body| layout::single(along(body).0)),
+        bodies.iter().map(|body| layout::single(body.radius)),
+    )
+    .with_colors([color])
+}
+
+/// How the identified arm with its enlarged deviations looks: glassy, so that the nominal arm is seen in it.
+pub(super) fn enlarged_style(canvas: &Canvas, profile: &Profile) {
+    if profile.bodies().is_empty() {
+        canvas.fix(names::ENLARGED, &skeleton_style(profile, layout::IDENTIFIED));
+    } else {
+        let bodies: Vec<&Capsule> = profile.bodies().iter().collect();
+        let castings = capsules(&bodies, layout::IDENTIFIED).with_fill_mode(FillMode::TransparentFillMajorWireframe);
+        canvas.fix(names::ENLARGED, &castings);
+    }
+}
+
+/// The identified arm with its enlarged deviations at a pose. All castings are one entity, placed in the base: that takes a
+/// third of the room that frames would.
+pub(super) fn enlarged(canvas: &Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
+    if profile.bodies().is_empty() {
+        canvas.draw(moment, names::ENLARGED, &skeleton(posture));
+        return;
+    }
+    let placed: Vec<Isometry3<f64>> = profile
+        .bodies()
+        .iter()
+        .map(|body| {
+            let frame = posture.frames.get(body.link).copied().unwrap_or_else(Isometry3::identity);
+            frame * Isometry3::from_parts(body.from.coords.into(), along(body).1)
+        })
+        .collect();
+    let castings = Capsules3D::update_fields()
+        .with_translations(placed.iter().map(|place| layout::vector(&place.translation.vector)))
+        .with_quaternions(placed.iter().map(|place| layout::quaternion(&place.rotation)));
+    canvas.draw(moment, names::ENLARGED, &castings);
 }
 
 /// Length of the line of a capsule (m), and the rotation from +z onto it.

@@ -4,13 +4,12 @@ use std::iter;
 
 use jiff::Timestamp;
 use nalgebra::{Matrix3, Point3, Vector3};
-use rerun::components::MarkerShape;
 use rerun::{
     Arrows3D, BarChart, Color, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Radius, Scalars, SeriesLines,
     SeriesPoints, Tensor, TensorData,
 };
 
-use super::{Posture, cell, document, pose_moment, reach};
+use super::{Posture, cell, document, reach};
 use crate::geometry::{enlargement, register};
 use crate::profile::Profile;
 use crate::recording::canvas::{Canvas, Moment};
@@ -163,16 +162,12 @@ fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Cal
     else {
         return;
     };
-    if profile.bodies().is_empty() {
-        canvas.fix(names::ENLARGED_SKELETON, &cell::skeleton_style(profile, layout::IDENTIFIED));
-    } else {
-        cell::castings(canvas, profile, cell::Arm::Enlarged);
-    }
+    cell::enlarged_style(canvas, profile);
     if let Some(target) = bent_targets.first() {
-        // Castings without a frame would be an error in the picture.
+        // Before the first pose, and while the search goes on.
         let posture = Posture::new(&bent, target, &cell::rest(profile));
-        enlarged_pose(canvas, profile, &posture, Moment::pose(0));
-        enlarged_pose(canvas, profile, &posture, Moment::search(0));
+        cell::enlarged(canvas, profile, &posture, Moment::pose(0));
+        cell::enlarged(canvas, profile, &posture, Moment::search(0));
     }
     for sample in &session.samples {
         let target = sample.noted.target;
@@ -183,19 +178,7 @@ fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Cal
         for (index, frame) in posture.frames.iter().enumerate() {
             canvas.draw(moment, names::IDENTIFIED_FRAMES, &layout::frame(frame, &names::frame("identified", index)));
         }
-        enlarged_pose(canvas, profile, &Posture::new(&bent, bent_at, &q), pose_moment(sample.noted.number, sample.time));
-    }
-}
-
-/// The identified arm, enlarged, at a pose.
-fn enlarged_pose(canvas: &Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
-    if profile.bodies().is_empty() {
-        let moment = Moment { time: None, ..moment };
-        canvas.draw(moment, names::ENLARGED_SKELETON, &cell::skeleton(posture));
-        return;
-    }
-    for (index, frame) in posture.frames.iter().enumerate() {
-        canvas.draw(moment, names::ENLARGED_FRAMES, &layout::frame(frame, &names::frame("enlarged", index)));
+        cell::enlarged(canvas, profile, &Posture::new(&bent, bent_at, &q), moment);
     }
 }
 
@@ -218,11 +201,10 @@ fn series(canvas: &Canvas, session: &Session, judged: &[Judged<'_>], run: usize)
                     let style = SeriesPoints::new()
                         .with_names([name])
                         .with_colors([layout::VERIFICATION])
-                        .with_markers([MarkerShape::Circle])
                         .with_marker_sizes([3.0]);
                     canvas.fix(&path, &style);
                 } else {
-                    let style = SeriesLines::new().with_names([name]).with_colors([color]).with_widths([1.5]);
+                    let style = SeriesLines::new().with_names([name]).with_colors([color]);
                     canvas.fix(&path, &style);
                 }
             }
@@ -355,7 +337,7 @@ fn solver(
         let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * scales.arm).collect();
         let Some((bent, bent_targets)) = calibration.arm_with(profile, &larger) else { continue };
         if let Some(target) = bent_targets.first() {
-            enlarged_pose(canvas, profile, &Posture::new(&bent, target, &rest), moment);
+            cell::enlarged(canvas, profile, &Posture::new(&bent, target, &rest), moment);
         }
         let Some((chain, targets)) = calibration.arm_with(profile, deviations) else { continue };
         let predicted: Vec<Point3<f64>> = judged
