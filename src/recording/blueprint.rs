@@ -159,7 +159,7 @@ fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
     let towards = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
     let aside = Vector3::new(towards.y, -towards.x, 0.0);
     // A tracker far away is not worth an arm of a few pixels.
-    let behind = (distance - radius).clamp(0.0, 1.5 * radius);
+    let behind = (distance - radius).clamp(0.0, 0.8 * radius);
     let target = centre + towards * (0.4 * behind) - Vector3::z() * (0.1 * radius);
     let from = (aside * 0.8 - towards * 0.75 + Vector3::z() * 0.45).normalize();
     (target + from * (2.0 * radius + 0.6 * behind), target)
@@ -175,7 +175,7 @@ fn plots(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike, ContainerLik
         };
         ContainerLike::from(Vertical::new([of("nominal"), of("identified")]).with_name(name))
     };
-    let positions = both("position", "Position error", "Position errors");
+    let positions = both("position", "Position error", "Position errors, once identified");
     let distances = both("distance", "Mean distance error to all others", "Distance errors");
     let solver = Vertical::new([
         plot("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"]),

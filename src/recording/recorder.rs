@@ -310,6 +310,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut recorder = Recorder::start(folder.path(), Vec::new(), None, |_event| ()).unwrap();
         recorder.take(&opened()).unwrap();
+        let begun = std::time::Instant::now();
+        while segments::files(folder.path()).is_empty() {
+            assert!(begun.elapsed() < Duration::from_secs(5));
+            thread::yield_now();
+        }
         // In the way of the one file.
         std::fs::create_dir(folder.path().join(segments::FILE_NAME)).unwrap();
         let cause = recorder.finish().unwrap_err();

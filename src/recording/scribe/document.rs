@@ -28,7 +28,7 @@ Drag the time cursor along **pose**: the arm goes from measurement to measuremen
 | brown points | skipped, or left out |
 | violet | tracker and beam |
 
-How much is enlarged stands below the robot. Errors are measured less predicted, in the robot base, after the tracker was
+How much is enlarged stands above the robot. Errors are measured less predicted, in the robot base, after the tracker was
 registered to each arm.
 
 Choose the timeline **solver_iteration** to see the arm bend from nominal to identified while the errors shrink, and

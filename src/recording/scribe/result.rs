@@ -375,13 +375,14 @@ const fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }
 
-/// What the enlargements are, beside the robot.
+/// What the enlargements are, above the robot.
 fn note(canvas: &Canvas, profile: &Profile, scales: &Scales) {
     let text = format!(
         "drawn larger: red errors (nominal) {} x, green errors (identified) {} x, green arm's deviations {} x",
         scales.nominal, scales.identified, scales.arm
     );
-    let at = Point3::new(0.0, 0.0, profile.floor().unwrap_or(0.0) - 0.12 * reach(profile));
+    // Above the arm: points are rarely there.
+    let at = Point3::new(0.0, 0.0, 0.85 * reach(profile));
     let note = Points3D::new([layout::at(&at)])
         .with_radii([layout::single(0.1 * MILLIMETRE)])
         .with_colors([layout::NOMINAL])
