@@ -32,7 +32,7 @@ use thiserror::Error;
 pub use compact::{Check, check, compact_file};
 pub use read::{Recording, read};
 pub use recorder::{Live, Recorder, RecordingEvent};
-pub use segments::{FILE_NAME, files, merge, rebuild, write};
+pub use segments::{FILE_NAME, compact_folder, files, rebuild, write};
 
 /// Why a recording cannot be written or read. The session goes on without it.
 #[derive(Debug, Error)]

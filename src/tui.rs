@@ -117,12 +117,13 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
     }
     drop(guard);
     at_end(engine.deeds());
+    let remarks = engine.end_recording().into_iter().chain(terminal::take_remarks()).collect();
     let wizard = engine.wizard();
     Ok(Exit {
         cause: wizard.ended().unwrap_or("ended").to_owned(),
         signal: received.signal(),
         folder: wizard.folder().map(str::to_owned),
-        remarks: terminal::take_remarks(),
+        remarks,
     })
 }
 

@@ -7,6 +7,8 @@ mod support;
 use nalgebra::{DMatrix, DVector, Point3};
 use rand::RngExt as _;
 use support::{PaperCase, measure, normal, paper_deviations, paper_parameters, random_configurations, seeded};
+use trupose::geometry::register;
+use trupose::identification::predicted::position_covariances;
 use trupose::identification::verification::{DirectErrors, ModelErrors};
 use trupose::identification::{
     ArmModel, Estimator, Identification, IdentificationError, Length, LengthEnd, Observations, PointSample, Rejected,
@@ -417,4 +419,65 @@ fn a_sigma_in_the_wrong_unit_does_not_drown_the_expected_deviations() {
         assert!((estimate.sigma / estimate.expected - 1.0).abs() < 0.01, "{estimate:?}");
     }
     assert!(found.sigma.excess() > 10.0);
+}
+
+#[test]
+fn predicted_position_errors_are_those_of_many_calibrations() {
+    const TRIALS: u64 = 150;
+    const PLACES: usize = 12;
+    let parameters = paper_parameters();
+    let places: Vec<TargetAt> = random_configurations(PLACES, &mut seeded(77))
+        .into_iter()
+        .map(|configuration| TargetAt { configuration, target: 0 })
+        .collect();
+    let places: Vec<&TargetAt> = places.iter().collect();
+    let (mut stated, mut seen) = ([0.0; PLACES], [0.0; PLACES]);
+    for trial in 0..TRIALS {
+        let mut rng = seeded(5000 + trial);
+        let truth = drawn_deviations(&parameters, &mut rng);
+        let case = PaperCase::simulated(&truth, 30, NOISE, &mut rng);
+        let found = run(&case, &settings());
+        let real = ArmModel::with_deviations(&case.problem(), &truth);
+        let pairs: Vec<_> =
+            places.iter().map(|at| (1.0, found.model.point_in_base(at), real.point_in_base(at))).collect();
+        let registered = register(pairs.iter().copied()).unwrap().to_from_from;
+        for (place, (covariance, (_, from, to))) in position_covariances(&found, &places).iter().zip(&pairs).enumerate()
+        {
+            stated[place] += covariance.trace();
+            seen[place] += (registered * from - to).norm_squared();
+        }
+    }
+    let (all_stated, all_seen): (f64, f64) = (stated.iter().sum(), seen.iter().sum());
+    let ratio = (all_seen / all_stated).sqrt();
+    assert!((ratio - 1.0).abs() < 0.07, "errors are {ratio} times what was stated");
+    for (place, (stated, seen)) in stated.iter().zip(&seen).enumerate() {
+        let ratio = (seen / stated).sqrt();
+        assert!((ratio - 1.0).abs() < 0.25, "place {place}: errors are {ratio} times what was stated");
+    }
+}
+
+#[test]
+fn the_path_of_the_solver_ends_at_the_result() {
+    let outlying = {
+        let mut case = PaperCase::simulated(&paper_deviations(), 56, NOISE, &mut seeded(4));
+        case.observations.points[7].point.x += 5.0 * MILLIMETRE;
+        case
+    };
+    for case in [PaperCase::simulated(&paper_deviations(), 56, NOISE, &mut seeded(3)), outlying] {
+        let found = run(&case, &settings());
+        assert_eq!(found.path.len(), found.iterations.len());
+        let last = found.path.last().unwrap();
+        for (value, estimate) in last.iter().zip(&found.estimates) {
+            // What no data tell may be moved along its blind direction in the end.
+            if estimate.identifiable {
+                assert!(
+                    (value - estimate.deviation).abs() < 1e-12,
+                    "{}: {value} or {}",
+                    estimate.id,
+                    estimate.deviation
+                );
+            }
+        }
+        assert!(found.path.len() > 1);
+    }
 }

@@ -108,13 +108,13 @@ impl Place {
     /// Runs a script to its end.
     fn script(&self, steps: &[String]) -> Output {
         let script = self.write_script("run.script.ron", steps);
-        self.run(&["--script", &script, "--json"])
+        self.run(&["--script", &script, "--json", "--no-recording"])
     }
 
     /// Goes on with a session by a script.
     fn resume(&self, folder: &str, steps: &[String]) -> Output {
         let script = self.write_script("rest.script.ron", steps);
-        self.run(&["resume", folder, "--script", &script, "--json"])
+        self.run(&["resume", folder, "--script", &script, "--json", "--no-recording"])
     }
 
     /// Goes on with a session from where it is, to its end.
@@ -133,7 +133,7 @@ impl Place {
     fn pause(&self, before: &[&str]) -> Paused {
         let say = long_say();
         let script = self.write_script("run.script.ron", &paused(&[before, &[&say]].concat()));
-        Paused::start(self.command(&["--script", &script, "--json"]))
+        Paused::start(self.command(&["--script", &script, "--json", "--no-recording"]))
     }
 }
 
@@ -258,12 +258,12 @@ fn kill_at_random(seed: u64, kills: usize, expected: &str) -> (usize, BTreeSet<u
             let before = journal.as_ref().map_or(0, |journal| journal.lines.len());
             let command = if journal.is_some() {
                 let script = place.write_script("rest.script.ron", &from_step(step));
-                place.command(&["resume", "sessions/s", "--script", &script, "--json"])
+                place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"])
             } else {
                 // Killed before anything was saved: there is nothing to go on with.
                 drop(fs::remove_dir_all(place.session()));
                 let script = place.write_script("run.script.ron", &whole());
-                place.command(&["--script", &script, "--json"])
+                place.command(&["--script", &script, "--json", "--no-recording"])
             };
             let mut running = Paused::start(command);
             let lines = random.random_range(0..60_usize.saturating_sub(before).max(6));
@@ -374,7 +374,8 @@ fn many_processes_at_once_work_on_a_session_one_after_the_other() {
     let place = Place::new();
     place.pause(&["Capture(2, Fail)"]).until_measured(2).kill();
     let script = place.write_script("rest.script.ron", &["Capture(1, Fail)".to_owned()]);
-    let run = || Paused::start(place.command(&["resume", "sessions/s", "--script", &script, "--json"]));
+    let run =
+        || Paused::start(place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"]));
     let running: Vec<Paused> = (0..8).map(|_| run()).collect();
     let mut done = 0;
     for program in running {
@@ -394,7 +395,8 @@ fn many_processes_at_once_work_on_a_session_one_after_the_other() {
 fn many_new_sessions_of_one_name_get_a_folder_each() {
     let place = Place::new();
     let script = place.write_script("run.script.ron", &whole()[..3]);
-    let running: Vec<Paused> = (0..6).map(|_| Paused::start(place.command(&["--script", &script, "--json"]))).collect();
+    let running: Vec<Paused> =
+        (0..6).map(|_| Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]))).collect();
     for program in running {
         let output = program.end();
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
@@ -440,7 +442,7 @@ fn a_signal_at_any_moment_leaves_a_session_that_goes_on() {
     for (index, (name, number, _)) in (0..24).zip(SIGNALS.into_iter().cycle()) {
         let place = Place::new();
         let script = place.write_script("run.script.ron", &whole());
-        let mut running = Paused::start(place.command(&["--script", &script, "--json"]));
+        let mut running = Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]));
         // The first line comes when signals are watched.
         running.read_lines(1 + index * 2);
         running.signal(name);
@@ -516,7 +518,7 @@ fn a_reader_that_goes_away_costs_nothing_that_was_saved() {
     for lines in [1, 12, 20, 30] {
         let place = Place::new();
         let script = place.write_script("run.script.ron", &whole());
-        let mut running = Paused::start(place.command(&["--script", &script, "--json"]));
+        let mut running = Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]));
         assert!(running.read_lines(lines));
         let Paused { mut child, out, seen, .. } = running;
         drop(out);

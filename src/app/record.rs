@@ -50,12 +50,14 @@ pub(super) fn run<O: Write, E: Write>(
 fn compact<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let before;
     let file = if path.is_dir() {
-        let (_held, _journal) = SessionFolder::open(path).map_err(|error| session_failure(&error))?;
+        let (_held, journal) = SessionFolder::open(path).map_err(|error| session_failure(&error))?;
         before = None;
-        recording::merge(path).map_err(|error| failure(&error))?.ok_or_else(|| {
-            Failure::new(ExitStatus::Usage, format!("there is no recording in '{}'", path.display()))
-                .hint("'trupose record rebuild DIR' makes one from the journal")
-        })?
+        if recording::files(path).is_empty() {
+            let message = format!("there is no recording in '{}'", path.display());
+            return Err(Failure::new(ExitStatus::Usage, message)
+                .hint("'trupose record rebuild DIR' makes one from the journal"));
+        }
+        recording::compact_folder(path, &journal.lines).map_err(|error| failure(&error))?
     } else {
         before = Some(check(path)?.bytes);
         recording::compact_file(path).map_err(|error| failure(&error))?;

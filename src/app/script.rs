@@ -83,6 +83,7 @@ pub(super) fn live<O: Write, E: Write>(
     let live = Live::on(port).map_err(|error| {
         Failure::from_error(ExitStatus::Usage, &error).hint("another program listens there; give '--live' another port")
     })?;
+    let port = live.port();
     console.remark(&format!(
         "live view: 'rerun --connect {}', through 'ssh -L {port}:127.0.0.1:{port}' from elsewhere",
         live.url()

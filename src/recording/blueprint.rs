@@ -3,7 +3,7 @@
 //! The library's layout builder lacks cameras, legends and trails; they are entities of the same store, written beside what
 //! the builder writes.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rerun::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind, PanelState, PlayState};
 use rerun::blueprint::{
     BarChartView, Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel,
@@ -18,6 +18,7 @@ use rerun::log::LogMsg;
 use rerun::{AsComponents, Color, RecordingStream, RecordingStreamBuilder};
 
 use super::canvas::Canvas;
+use super::scribe::Posture;
 use super::{RecordingError, layout, names};
 use crate::profile::Profile;
 
@@ -48,19 +49,19 @@ fn messages(profile: &Profile, purpose: Purpose) -> Result<(Vec<LogMsg>, Bluepri
     let mut extras = Vec::new();
     let picture = picture(profile, &mut extras);
     let plots = plots(&mut extras);
-    let (poses, solver, search) = plots;
+    let (positions, distances, solver, search) = plots;
     let texts = |first: ContainerLike, second: ContainerLike| {
         Tabs::new([first, second, view(TextLogView::new("Log").with_origin(names::LOG))])
     };
     let report = view(TextDocumentView::new("Report").with_origin(names::REPORT));
-    let guide = view(TextDocumentView::new("How to read this").with_origin(names::GUIDE));
+    let guide = view(TextDocumentView::new("How to read this picture").with_origin(names::GUIDE));
     let bars = Tabs::new([
-        view(BarChartView::new("Deviations / sigma").with_origin(names::SIGNIFICANCE)),
+        view(BarChartView::new("Deviations in sigma (bar numbers: see report)").with_origin(names::SIGNIFICANCE)),
         view(TensorView::new("All pairs, nominal (um)").with_origin(names::MAP_NOMINAL)),
         view(TensorView::new("All pairs, identified (um)").with_origin(names::MAP_IDENTIFIED)),
     ]);
     let (plots, timeline) = match purpose {
-        Purpose::Session => (Tabs::new([poses, capture(&mut extras), solver, search]), names::POSE),
+        Purpose::Session => (Tabs::new([positions, distances, capture(&mut extras), solver, search]), names::POSE),
         Purpose::Plan => (Tabs::new([search]), names::PLAN_ITERATION),
     };
     let right = match purpose {
@@ -118,36 +119,64 @@ fn picture(profile: &Profile, extras: &mut Vec<Extra>) -> ContainerLike {
 
 /// All rows up to the time cursor.
 fn trail() -> VisibleTimeRanges {
-    VisibleTimeRanges::new([datatypes::VisibleTimeRange {
-        timeline: names::POSE.into(),
+    VisibleTimeRanges::new([names::POSE, names::TIME].map(|timeline| datatypes::VisibleTimeRange {
+        timeline: timeline.into(),
         range: datatypes::TimeRange {
             start: datatypes::TimeRangeBoundary::Infinite,
             end: datatypes::TimeRangeBoundary::CursorRelative(datatypes::TimeInt(0)),
         },
-    }])
+    }))
 }
 
-/// Where the camera stands and what it looks at: across the line from robot to tracker, so that both are seen.
+/// Postures that tell how much room an arm takes.
+const POSTURES: u32 = 64;
+/// Every joint goes through its range in steps of a power of this part of it: no two postures are alike.
+const STEP: f64 = 0.8567;
+
+/// Where the camera stands and what it looks at: across the line from robot to tracker, as near as all of the arm's room allows.
 fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
+    let postures = (1..=POSTURES).flat_map(|number| {
+        let q: Vec<f64> = (1..)
+            .zip(profile.joints())
+            .map(|(power, joint)| {
+                let (low, high) = joint.planning_limits.or(joint.limits).unwrap_or((-1.0, 1.0));
+                low + (high - low) * (f64::from(number) * STEP.powi(power)).fract()
+            })
+            .collect();
+        Posture::nominal(profile, &q).line
+    });
+    let places: Vec<Point3<f64>> = postures.collect();
+    let (mut low, mut high) = (Point3::origin(), Point3::origin());
+    for place in &places {
+        low = low.inf(place);
+        high = high.sup(place);
+    }
+    let centre = nalgebra::center(&low, &high);
+    let radius = places.iter().map(|place| (place - centre).norm()).fold(0.1, f64::max);
     let tracker = profile.tracker().position_in_base;
-    let reach: f64 = profile.chain().joints().iter().map(|joint| joint.link.a.abs() + joint.link.d.abs()).sum();
-    let floor = profile.floor().unwrap_or(0.0);
-    let towards = nalgebra::Vector3::new(tracker.x, tracker.y, 0.0);
-    let towards = towards.try_normalize(1e-9).unwrap_or_else(nalgebra::Vector3::x);
-    let aside = nalgebra::Vector3::new(towards.y, -towards.x, 0.0);
-    let target = Point3::from(towards * (0.35 * reach)) + nalgebra::Vector3::z() * (0.45 * reach + 0.2 * floor);
-    let eye = target + aside * (1.25 * reach) - towards * (1.35 * reach) + nalgebra::Vector3::z() * (0.7 * reach);
-    (eye, target)
+    let towards = Vector3::new(tracker.x - centre.x, tracker.y - centre.y, 0.0);
+    let distance = towards.norm();
+    let towards = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
+    let aside = Vector3::new(towards.y, -towards.x, 0.0);
+    // A tracker far away is not worth an arm of a few pixels.
+    let behind = (distance - radius).clamp(0.0, 0.8 * radius);
+    let target = centre + towards * (0.4 * behind) - Vector3::z() * (0.1 * radius);
+    let from = (aside * 0.8 - towards * 0.75 + Vector3::z() * 0.45).normalize();
+    (target + from * (2.0 * radius + 0.6 * behind), target)
 }
 
-/// Plots: errors at the poses, the solver, the search.
-fn plots(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike, ContainerLike) {
+/// Plots: errors of positions and of distances at the poses, the solver, the search.
+fn plots(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike, ContainerLike, ContainerLike) {
     let mut plot = |name: &str, contents: &[&str]| series(name, contents, extras);
-    let poses = Vertical::new([
-        plot("Position error (mm)", &["+ /errors_mm/position/**"]),
-        plot("Mean distance error to all others (mm)", &["+ /errors_mm/distance/**"]),
-    ])
-    .with_name("Errors per pose");
+    // Each arm has a plot of its own: beside the nominal errors the identified ones would not be seen.
+    let mut both = |quantity: &str, title: &str, name: &str| {
+        let mut of = |arm: &str| {
+            plot(&format!("{title}, {arm} arm (mm)"), &[&format!("+ /{}/**", names::all_errors(quantity, arm))])
+        };
+        ContainerLike::from(Vertical::new([of("nominal"), of("identified")]).with_name(name))
+    };
+    let positions = both("position", "Position error", "Position errors, once identified");
+    let distances = both("distance", "Mean distance error to all others", "Distance errors");
     let solver = Vertical::new([
         plot("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"]),
         plot("Cost and largest step (log10), per solver step", &["+ /solver/cost_and_step_log10"]),
@@ -161,7 +190,7 @@ fn plots(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike, ContainerLik
         ),
     ])
     .with_name("Search");
-    (poses.into(), solver.into(), search.into())
+    (positions, distances, solver.into(), search.into())
 }
 
 /// Plots of the capture.
@@ -205,6 +234,10 @@ fn with_extras(
     extras: &[Extra],
 ) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
     let failed = |error: rerun::RecordingStreamError| RecordingError::library("making the layout", error);
+    if !rerun::decide_logging_enabled(true) {
+        // The library's builder then makes nothing, and panics about it. Everything else is recorded all the same.
+        return Err(RecordingError::library("making the layout", "the environment variable RERUN forbids it"));
+    }
     let (carrier, sent) = RecordingStreamBuilder::new(names::APPLICATION).enabled(true).memory().map_err(failed)?;
     let activation = BlueprintActivation { make_active: true, make_default: true };
     blueprint.send(&carrier, activation).map_err(failed)?;

@@ -24,12 +24,35 @@ pub(super) fn store(messages: impl Iterator<Item = LogMsg>, path: &Path) -> Resu
     let whole = encoder.into_inner().map_err(|error| failed(&error))?;
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let write = |source| RecordingError::file("cannot write the recording", path, source);
-    let mut file = tempfile::Builder::new().prefix(".recording-").suffix(".tmp").tempfile_in(folder).map_err(write)?;
+    let mut file = temporary().tempfile_in(folder).map_err(write)?;
     let mut compacted = Vec::new();
-    optimize(whole.as_slice(), &mut compacted, &OptimizationProfile::LIVE)
+    read::guarded(|| optimize(whole.as_slice(), &mut compacted, &OptimizationProfile::LIVE))
+        .ok_or_else(|| failed(&"the data are damaged"))?
         .map_err(|error| failed(&format!("{error:#}")))?;
     file.write_all(&compacted).and_then(|()| file.as_file().sync_all()).map_err(write)?;
-    file.persist(path).map(drop).map_err(|error| write(error.error))
+    file.persist(path).map_err(|error| write(error.error))?;
+    // The rename itself must survive a power cut.
+    File::open(folder).and_then(|folder| folder.sync_all()).map_err(write)
+}
+
+/// How the names of files begin and end that will be recordings.
+const TEMPORARY: (&str, &str) = (".recording-", ".tmp");
+
+/// Files for everybody who may read the folder, as far as the process allows it.
+fn temporary() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        builder.permissions(std::fs::Permissions::from_mode(0o644));
+    }
+    builder
+}
+
+/// Whether a name is that of a file that a program did not finish.
+pub(super) fn is_temporary(name: &str) -> bool {
+    name.starts_with(TEMPORARY.0) && name.ends_with(TEMPORARY.1)
 }
 
 /// All messages of files that can be read, in order; what is damaged or torn is passed over.
@@ -42,7 +65,10 @@ pub(super) fn messages<'a>(
     let files: Vec<_> = paths
         .map(|path| File::open(path).map_err(|source| RecordingError::file("cannot open the recording", path, source)))
         .collect::<Result<_, _>>()?;
-    Ok(files.into_iter().flat_map(|file| DecoderApp::decode_lazy(BufReader::new(file)).filter_map(Result::ok)))
+    Ok(files.into_iter().flat_map(|file| {
+        let mut messages = DecoderApp::decode_lazy(BufReader::new(file));
+        std::iter::from_fn(move || read::guarded(|| messages.next()).flatten()).filter_map(Result::ok)
+    }))
 }
 
 /// Makes one file compact, in place.
@@ -101,7 +127,7 @@ pub fn check(path: &Path) -> Result<Check, RecordingError> {
 }
 
 /// Whether the file ends with the place of an index.
-fn has_index(path: &Path) -> Result<bool, RecordingError> {
+pub(super) fn has_index(path: &Path) -> Result<bool, RecordingError> {
     let failed = |source| RecordingError::file("cannot read the recording", path, source);
     let mut file = File::open(path).map_err(failed)?;
     let size = i64::try_from(StreamFooter::ENCODED_SIZE_BYTES).unwrap_or(i64::MAX);

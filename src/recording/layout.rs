@@ -10,14 +10,12 @@ pub(super) const fn rgb(red: u8, green: u8, blue: u8) -> Color {
 
 /// Castings of the nominal arm.
 pub(super) const NOMINAL: Color = rgb(176, 190, 205);
-/// The identified arm.
-pub(super) const IDENTIFIED: Color = rgb(255, 152, 0);
 /// Errors of the nominal arm.
 pub(super) const NOMINAL_ERROR: Color = rgb(239, 83, 80);
-/// Errors of the identified arm.
-pub(super) const IDENTIFIED_ERROR: Color = rgb(76, 195, 105);
+/// The identified arm and its errors.
+pub(super) const IDENTIFIED: Color = rgb(76, 205, 110);
 /// Measured points.
-pub(super) const DONE: Color = rgb(76, 195, 105);
+pub(super) const DONE: Color = rgb(238, 240, 242);
 /// Verification samples.
 pub(super) const VERIFICATION: Color = rgb(66, 165, 245);
 /// Samples in doubt, and the pose to go to.
@@ -25,9 +23,9 @@ pub(super) const ATTENTION: Color = rgb(255, 202, 40);
 /// Poses that wait.
 pub(super) const LEFT: Color = rgb(120, 144, 156);
 /// What is not used.
-pub(super) const OUT: Color = rgb(141, 110, 99);
+pub(super) const OUT: Color = rgb(188, 120, 90);
 /// Axes of the joints.
-pub(super) const AXIS: Color = rgb(38, 166, 154);
+pub(super) const AXIS: Color = rgb(160, 172, 180);
 /// Tracker and beam.
 pub(super) const TRACKER: Color = rgb(186, 104, 200);
 /// Floor and base.

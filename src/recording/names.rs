@@ -33,10 +33,8 @@ pub(super) const NOMINAL_LINKS: &str = "world/nominal/link";
 pub(super) const NOMINAL_SKELETON: &str = "world/nominal/skeleton";
 /// Frames of the identified arm at the pose, as they are.
 pub(super) const IDENTIFIED_FRAMES: &str = "world/identified/frames";
-/// Line through the joints of the identified arm, as it is.
-pub(super) const IDENTIFIED_SKELETON: &str = "world/identified/skeleton";
-/// The same with its deviations enlarged.
-pub(super) const IDENTIFIED_ENLARGED: &str = "world/identified/enlarged";
+/// Castings of the identified arm with its deviations enlarged; a line through its joints if it has none.
+pub(super) const ENLARGED: &str = "world/identified/enlarged";
 /// Floor of the cell.
 pub(super) const FLOOR: &str = "world/cell/floor";
 /// Base of the robot.
@@ -47,8 +45,12 @@ pub(super) const KEEP_OUT: &str = "world/cell/keep_out";
 pub(super) const TRACKER: &str = "world/tracker/body";
 /// From the tracker to the reflector.
 pub(super) const BEAM: &str = "world/tracker/beam";
-/// Poses that wait, are next, or are not used.
-pub(super) const PLAN: &str = "world/plan";
+/// Poses of the plan that are not skipped.
+pub(super) const PLAN: &str = "world/plan/poses";
+/// The pose to go to.
+pub(super) const NEXT: &str = "world/plan/next";
+/// What is not used: poses that are skipped, samples that are left out.
+pub(super) const UNUSED: &str = "world/plan/unused";
 /// Measured points, each at its pose.
 pub(super) const MEASURED: &str = "world/measured";
 /// Errors of the nominal arm, enlarged.
@@ -94,10 +96,15 @@ pub(super) const FIT: &str = "solver/mean_error_mm";
 /// Deviations in units of their standard deviation, one bar per parameter.
 pub(super) const SIGNIFICANCE: &str = "parameters/deviation_in_sigma";
 
-/// Errors at each pose of the result number `run`, of the nominal and the identified arm: `quantity` is `position` or `distance`,
+/// Errors at each pose of the result number `run`: `quantity` is `position` or `distance`, `arm` is `nominal` or `identified`,
 /// `samples` is `fit` or `verification`.
-pub(super) fn errors(run: usize, quantity: &str, samples: &str) -> String {
-    format!("errors_mm/{quantity}/{samples}_{run}")
+pub(super) fn errors(run: usize, quantity: &str, arm: &str, samples: &str) -> String {
+    format!("{}/{samples}_{run}", all_errors(quantity, arm))
+}
+
+/// What holds the errors of all results.
+pub(super) fn all_errors(quantity: &str, arm: &str) -> String {
+    format!("errors_mm/{quantity}_{arm}")
 }
 
 /// Frame `index` of an arm.

@@ -1,9 +1,12 @@
 //! Reads recordings, also those that a crash left half-written.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
+use std::sync::Once;
 
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
@@ -81,7 +84,14 @@ fn journal_lines(path: &Path) -> Result<(BTreeMap<i64, String>, usize), Recordin
 pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize, RecordingError> {
     let file = File::open(path).map_err(|source| RecordingError::file("cannot open the recording", path, source))?;
     let (mut damaged, mut known) = (0, false);
-    for message in DecoderApp::decode_lazy(BufReader::new(file)) {
+    let mut messages = DecoderApp::decode_lazy(BufReader::new(file));
+    loop {
+        let Some(next) = guarded(|| messages.next()) else {
+            // Nothing behind it can be told from garbage.
+            damaged += 1;
+            break;
+        };
+        let Some(message) = next else { break };
         match message {
             Ok(LogMsg::SetStoreInfo(info)) => {
                 let application = info.info.store_id.application_id().to_string();
@@ -91,10 +101,11 @@ pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize,
                 }
                 known = true;
             }
-            Ok(LogMsg::ArrowMsg(store, arrow)) if store.is_recording() => match Chunk::from_arrow_msg(&arrow) {
-                Ok(chunk) => take(&chunk),
-                Err(_error) => damaged += 1,
-            },
+            Ok(LogMsg::ArrowMsg(store, arrow)) if store.is_recording() => {
+                // Damaged data may fit together and still break what looks at them.
+                let taken = guarded(|| Chunk::from_arrow_msg(&arrow).map(|chunk| take(&chunk)).is_ok());
+                damaged += usize::from(taken != Some(true));
+            }
             Ok(_) => {}
             Err(error) if !known => {
                 let message = plain(&error.to_string());
@@ -108,6 +119,28 @@ pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize,
     } else {
         Err(RecordingError::Foreign { path: path.to_owned(), message: "there is nothing in it".to_owned() })
     }
+}
+
+thread_local! {
+    /// Whether panics of this thread are expected and caught.
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does something with data that may be damaged: the library panics about some kinds of damage. `None` then.
+pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let usual = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !GUARDED.get() {
+                usual(info);
+            }
+        }));
+    });
+    GUARDED.set(true);
+    let done = panic::catch_unwind(AssertUnwindSafe(work));
+    GUARDED.set(false);
+    done.ok()
 }
 
 /// A text in plain Latin letters: some viewers cannot draw others.

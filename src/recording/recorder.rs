@@ -19,8 +19,8 @@ use crate::session::journal::Line;
 const WAITING: usize = 1024;
 /// Longest time for a batch to reach the disk.
 const FLUSH: Duration = Duration::from_secs(5);
-/// Longest time to wait at the end for the parts to become one file.
-const FINISH: Duration = Duration::from_secs(30);
+/// Longest time to wait at the end for the parts to become one file: a hundred times what a long session takes.
+const FINISH: Duration = Duration::from_secs(20);
 
 /// What the recorder has to say.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,6 +54,11 @@ impl Live {
         Ok(Self { port })
     }
 
+    /// The port.
+    pub const fn port(&self) -> u16 {
+        self.port
+    }
+
     /// What a viewer connects to.
     pub fn url(&self) -> String {
         format!("rerun+http://127.0.0.1:{}/proxy", self.port)
@@ -79,9 +84,7 @@ impl Live {
 #[derive(Debug)]
 pub struct Recorder {
     lines: Option<SyncSender<Vec<Line>>>,
-    finished: Receiver<()>,
-    /// Lines were dropped: the recording has a gap.
-    has_lost: bool,
+    finished: Receiver<Result<(), String>>,
 }
 
 impl Recorder {
@@ -99,7 +102,7 @@ impl Recorder {
         let (done, finished) = sync_channel(1);
         let folder = folder.to_owned();
         thread::Builder::new().name("recorder".to_owned()).spawn(move || {
-            let mut work = Work { folder, live, tell, file: None, view: None, has_failed: false };
+            let mut work = Work { folder, live, tell, file: None, path: None, view: None, has_failed: false };
             if !before.is_empty() {
                 work.begin(&before);
             }
@@ -108,33 +111,47 @@ impl Recorder {
                 lines.extend(received.try_iter().flatten());
                 work.take(&lines);
             }
-            work.end();
             // Nobody may be waiting any more.
-            let _nobody = done.send(());
+            let _nobody = done.send(work.end());
         })?;
-        Ok(Self { lines: Some(lines), finished, has_lost: false })
+        Ok(Self { lines: Some(lines), finished })
     }
 
-    /// Takes lines that are on disk. Never waits; `false` once the recording has a gap.
-    pub fn take(&mut self, lines: &[Line]) -> bool {
-        if let (Some(sender), false) = (&self.lines, self.has_lost) {
-            self.has_lost = matches!(sender.try_send(lines.to_vec()), Err(TrySendError::Full(_)));
-        }
-        !self.has_lost
+    /// Takes lines that are on disk. Never waits.
+    ///
+    /// # Errors
+    /// The recorder cannot take them, and nothing after them.
+    pub fn take(&mut self, lines: &[Line]) -> Result<(), &'static str> {
+        let Some(sender) = &self.lines else { return Ok(()) };
+        let refused = match sender.try_send(lines.to_vec()) {
+            Ok(()) => return Ok(()),
+            Err(TrySendError::Full(_)) => "the disk is too slow for it",
+            Err(TrySendError::Disconnected(_)) => "an internal error ended it",
+        };
+        self.lines = None;
+        Err(refused)
     }
 
-    /// Makes one file of the parts. Waits for it, but not for ever; `false` if it was not done in time.
-    pub fn finish(&mut self) -> bool {
+    /// Makes one file of the parts. Waits for it, but not for ever.
+    ///
+    /// # Errors
+    /// It was not done; the parts are still there.
+    pub fn finish(&mut self) -> Result<(), String> {
         if self.lines.take().is_none() {
-            return true;
+            return Ok(());
         }
-        !matches!(self.finished.recv_timeout(FINISH), Err(RecvTimeoutError::Timeout))
+        match self.finished.recv_timeout(FINISH) {
+            Ok(result) => result,
+            Err(RecvTimeoutError::Timeout) => Err("the disk is too slow to make one file of it".to_owned()),
+            Err(RecvTimeoutError::Disconnected) => Err("an internal error ended it".to_owned()),
+        }
     }
 }
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        self.finish();
+        // Whoever wants to know has asked before.
+        drop(self.finish());
     }
 }
 
@@ -143,6 +160,8 @@ struct Work<T: Fn(RecordingEvent)> {
     live: Option<Live>,
     tell: T,
     file: Option<Scribe>,
+    /// Where it writes.
+    path: Option<PathBuf>,
     view: Option<Scribe>,
     has_failed: bool,
 }
@@ -169,16 +188,22 @@ impl<T: Fn(RecordingEvent)> Work<T> {
         self.flush();
     }
 
-    /// A part that goes on where the files of the folder end.
-    fn part(&self, identity: &Identity, before: &[Line]) -> Result<Scribe, RecordingError> {
-        let recorded = segments::recorded_lines(&self.folder).filter(|count| *count <= before.len());
-        if recorded.is_none() {
-            segments::remove(&self.folder)?;
-        }
-        let (drawn, missing) = before.split_at(recorded.unwrap_or(0));
-        let stream = identity.file(&segments::next_part(&self.folder))?;
+    /// A part that goes on where the files of the folder end. What a crash left is drawn anew, and removed once that is on disk.
+    fn part(&mut self, identity: &Identity, before: &[Line]) -> Result<Scribe, RecordingError> {
+        segments::clean(&self.folder);
+        let earlier = segments::earlier(&self.folder, before.len());
+        let (drawn, missing) = before.split_at(earlier.lines.min(before.len()));
+        let path = segments::next_part(&self.folder);
+        let stream = identity.file(self.path.insert(path))?;
         let mut scribe = Scribe::new(stream, Purpose::Session, drawn);
         missing.iter().for_each(|line| scribe.take(line));
+        if !earlier.void.is_empty() {
+            scribe
+                .stream()
+                .flush_with_timeout(FLUSH)
+                .map_err(|error| RecordingError::library("writing the recording", error))?;
+            segments::remove(&earlier.void)?;
+        }
         Ok(scribe)
     }
 
@@ -207,19 +232,26 @@ impl<T: Fn(RecordingEvent)> Work<T> {
     fn fail(&mut self, message: String) {
         self.has_failed = true;
         self.file = None;
+        if let Some(path) = self.path.take() {
+            // It has a gap, and the journal may need the room.
+            drop(std::fs::remove_file(path));
+        }
         (self.tell)(RecordingEvent::Failed(message));
     }
 
     /// Ends the part and makes one file of all.
-    fn end(&mut self) {
+    fn end(&mut self) -> Result<(), String> {
         if let Some(view) = self.view.take() {
             // It may wait for a viewer that does not answer.
             drop(thread::Builder::new().name("live-end".to_owned()).spawn(move || drop(view)));
         }
-        if self.file.take().is_some()
-            && let Err(error) = segments::merge(&self.folder)
-        {
-            self.fail(text(&error));
+        match self.file.take() {
+            // It failed, and that was told; the next program goes on from its parts.
+            None => Ok(()),
+            Some(file) => {
+                drop(file);
+                segments::merge(&self.folder).map(drop).map_err(|error| text(&error))
+            }
         }
     }
 }
@@ -228,4 +260,65 @@ impl<T: Fn(RecordingEvent)> Work<T> {
 fn text(error: &RecordingError) -> String {
     let cause = std::error::Error::source(error).map(|cause| format!(": {cause}")).unwrap_or_default();
     format!("{error}{cause}")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+    use crate::session::journal::{Entry, SCHEMA};
+
+    fn opened() -> Vec<Line> {
+        let entry = Entry::Opened { schema: SCHEMA, program: "test".to_owned(), name: "s".to_owned() };
+        vec![Line { number: 1, time: jiff::Timestamp::UNIX_EPOCH, entry }]
+    }
+
+    #[test]
+    fn a_folder_that_is_gone_is_told_within_a_second_and_nobody_waits() {
+        let folder = tempfile::tempdir().unwrap();
+        let gone = folder.path().join("gone");
+        let (told, heard) = channel();
+        let mut recorder = Recorder::start(&gone, Vec::new(), None, move |event| drop(told.send(event))).unwrap();
+        recorder.take(&opened()).unwrap();
+        let event = heard.recv_timeout(Duration::from_secs(1)).unwrap();
+        assert!(matches!(&event, RecordingEvent::Failed(cause) if cause.contains("No such file")), "{event:?}");
+        // What comes later is taken and dropped.
+        for _ in 0..2 * WAITING {
+            if recorder.take(&opened()).is_err() {
+                break;
+            }
+        }
+        recorder.finish().unwrap();
+        assert!(heard.recv_timeout(Duration::from_secs(1)).is_err(), "it is told once");
+    }
+
+    #[test]
+    fn a_recorder_that_has_died_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let tell = |_event| std::panic::resume_unwind(Box::new("a defect"));
+        let mut recorder = Recorder::start(&folder.path().join("gone"), Vec::new(), None, tell).unwrap();
+        recorder.take(&opened()).unwrap();
+        let died = recorder.finished.recv_timeout(Duration::from_secs(5));
+        assert_eq!(died, Err(RecvTimeoutError::Disconnected));
+        assert_eq!(recorder.take(&opened()), Err("an internal error ended it"));
+        recorder.finish().unwrap();
+    }
+
+    #[test]
+    fn what_cannot_be_joined_stays_in_parts_and_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut recorder = Recorder::start(folder.path(), Vec::new(), None, |_event| ()).unwrap();
+        recorder.take(&opened()).unwrap();
+        let begun = std::time::Instant::now();
+        while segments::files(folder.path()).is_empty() {
+            assert!(begun.elapsed() < Duration::from_secs(5));
+            thread::yield_now();
+        }
+        // In the way of the one file.
+        std::fs::create_dir(folder.path().join(segments::FILE_NAME)).unwrap();
+        let cause = recorder.finish().unwrap_err();
+        assert!(cause.contains(segments::FILE_NAME), "{cause}");
+        assert!(segments::files(folder.path()).len() > 1);
+    }
 }

@@ -58,7 +58,9 @@ impl Scribe {
         let before = self.sum.clone();
         let follows = self.follow(line);
         if let Ok((text, _)) = encode(line, &before) {
-            self.canvas.draw(entry_moment(line), names::JOURNAL, &TextDocument::new(text));
+            let number = i64::try_from(line.number).unwrap_or(i64::MAX);
+            let moment = Moment { entry: Some(number), ..Moment::default() };
+            self.canvas.draw(moment, names::JOURNAL, &TextDocument::new(text));
         }
         self.log(line);
         if !follows {
@@ -75,15 +77,20 @@ impl Scribe {
             Entry::Target(_) => self.cell(),
             Entry::Plan(plan) | Entry::PlanExtended(plan) => {
                 plan::search(&self.canvas, &plan.search);
-                self.points(line.time);
+                self.points();
             }
             Entry::Sample(noted) => {
                 measured::sample(&self.canvas, &self.session, noted, line.time);
-                self.points(line.time);
+                plan::points(&self.canvas, &self.session, false);
             }
-            Entry::Decision { .. } | Entry::Correction(_) | Entry::Row(_) | Entry::Skipped { .. } => {
-                self.points(line.time);
+            Entry::Correction(_) => {
+                // It may have changed where the robot stood, or the unit, at any of them.
+                for sample in &self.session.samples {
+                    measured::sample(&self.canvas, &self.session, &sample.noted, sample.time);
+                }
+                self.points();
             }
+            Entry::Decision { .. } | Entry::Row(_) | Entry::Skipped { .. } => self.points(),
             Entry::Identified(identified) => {
                 result::draw(&self.canvas, &self.session, identified, self.runs, line.time);
             }
@@ -110,8 +117,9 @@ impl Scribe {
         }
     }
 
-    fn points(&self, time: Timestamp) {
-        plan::points(&self.canvas, &self.session, time);
+    fn points(&self) {
+        plan::poses(&self.canvas, &self.session);
+        plan::points(&self.canvas, &self.session, true);
     }
 
     /// What happened in words.
@@ -124,13 +132,8 @@ impl Scribe {
         };
         let text = TextLog::new(super::read::plain(&line.entry.describe())).with_level(level);
         let pose = i64::try_from(self.session.measurements).unwrap_or(i64::MAX);
-        self.canvas.draw(Moment { pose: Some(pose), ..entry_moment(line) }, names::LOG, &text);
+        self.canvas.draw(Moment { pose: Some(pose), time: Some(line.time), ..Moment::default() }, names::LOG, &text);
     }
-}
-
-/// When a line was written.
-fn entry_moment(line: &Line) -> Moment {
-    Moment { entry: Some(i64::try_from(line.number).unwrap_or(i64::MAX)), time: Some(line.time), ..Moment::default() }
 }
 
 /// When a measurement was made.
@@ -139,9 +142,9 @@ fn pose_moment(number: u64, time: Timestamp) -> Moment {
 }
 
 /// An arm at a configuration: its frames and the points that a line through it visits, the reflector last.
-struct Posture {
+pub(super) struct Posture {
     frames: Vec<Isometry3<f64>>,
-    line: Vec<Point3<f64>>,
+    pub(super) line: Vec<Point3<f64>>,
     reflector: Point3<f64>,
 }
 
@@ -161,7 +164,7 @@ impl Posture {
     }
 
     /// The nominal arm of `profile` with its first target.
-    fn nominal(profile: &Profile, q: &[f64]) -> Self {
+    pub(super) fn nominal(profile: &Profile, q: &[f64]) -> Self {
         let target = profile.targets().first().map_or(Point3::origin(), |target| target.position_in_flange);
         Self::new(profile.chain(), &target, q)
     }

@@ -51,6 +51,11 @@ impl Identity {
         let create = |source| RecordingError::file("cannot create the recording", path, source);
         let file = File::options().write(true).create_new(true).open(path).map_err(create)?;
         let sink = DurableSink::new(file).map_err(|message| create(std::io::Error::other(message)))?;
+        self.stream(sink)
+    }
+
+    /// A stream into `sink`.
+    pub(super) fn stream(&self, sink: DurableSink) -> Result<RecordingStream, RecordingError> {
         self.builder()
             .set_sinks(vec![Box::new(sink) as Box<dyn LogSink>])
             .map_err(|error| RecordingError::library("beginning the recording", error))
@@ -84,40 +89,71 @@ pub(super) fn next_part(folder: &Path) -> PathBuf {
     folder.join(format!("{}{number:03}{}", PART.0, PART.1))
 }
 
-/// How many lines of a journal the files in `folder` have already. `None`: they have gaps or cannot be read, and are best made
-/// anew.
-pub(super) fn recorded_lines(folder: &Path) -> Option<usize> {
-    let mut seen = 0_usize;
-    let mut lines = std::collections::BTreeSet::new();
-    for file in files(folder) {
-        let found = read::line_numbers(&file).ok()?;
-        if found.1 > 0 {
-            return None;
-        }
-        lines.extend(found.0);
-    }
-    for number in &lines {
-        if usize::try_from(*number) != Ok(seen + 1) {
-            return None;
-        }
-        seen += 1;
-    }
-    Some(seen)
+/// What the files of a folder are good for.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct Earlier {
+    /// So many lines of the journal are drawn in files that were ended in good order.
+    pub(super) lines: usize,
+    /// Files that are to be replaced: a crash ended them and may have torn the last picture, or they cannot be read.
+    pub(super) void: Vec<PathBuf>,
 }
 
-/// Removes all files of the recording in `folder`.
-pub(super) fn remove(folder: &Path) -> Result<(), RecordingError> {
+/// Looks through the files in `folder`, whose journal has `count` lines.
+pub(super) fn earlier(folder: &Path, count: usize) -> Earlier {
+    let mut earlier = Earlier::default();
     for file in files(folder) {
-        fs::remove_file(&file).map_err(|source| RecordingError::file("cannot remove", &file, source))?;
+        let first = i64::try_from(earlier.lines + 1).unwrap_or(i64::MAX);
+        let found = match read::line_numbers(&file) {
+            Ok((numbers, 0)) if compact::has_index(&file).unwrap_or(false) => numbers,
+            _ => Vec::new(),
+        };
+        // One that goes on where the others end, and has nothing that the journal has not.
+        let follows = !found.is_empty() && found.iter().copied().eq((first..).take(found.len()));
+        if follows && earlier.void.is_empty() && earlier.lines + found.len() <= count {
+            earlier.lines += found.len();
+        } else {
+            earlier.void.push(file);
+        }
+    }
+    earlier
+}
+
+/// Removes files.
+pub(super) fn remove(files: &[PathBuf]) -> Result<(), RecordingError> {
+    for file in files {
+        fs::remove_file(file).map_err(|source| RecordingError::file("cannot remove", file, source))?;
     }
     Ok(())
 }
 
-/// Makes one compact file of all parts in `folder`; the parts go when it is on disk. Returns its path, if there is anything.
+/// Removes what a program left that was ended while it made one file of all. The folder must be held.
+pub(super) fn clean(folder: &Path) {
+    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let left = entries.filter(|entry| entry.file_name().to_str().is_some_and(compact::is_temporary));
+    // What cannot be removed does no harm.
+    left.for_each(|entry| drop(fs::remove_file(entry.path())));
+}
+
+/// Makes the recording in `folder`, whose journal has these lines, one compact file, and returns its path. Where a crash has
+/// left gaps or torn the last picture it is drawn anew.
 ///
 /// # Errors
 /// A file cannot be read or written; nothing is lost then.
-pub fn merge(folder: &Path) -> Result<Option<PathBuf>, RecordingError> {
+pub fn compact_folder(folder: &Path, lines: &[Line]) -> Result<PathBuf, RecordingError> {
+    let found = earlier(folder, lines.len());
+    if found.void.is_empty()
+        && found.lines == lines.len()
+        && let Some(path) = merge(folder)?
+    {
+        compact::compact_file(&path)?;
+        return Ok(path);
+    }
+    rebuild(folder, lines)
+}
+
+/// Makes one compact file of all parts in `folder`; the parts go when it is on disk. Returns its path, if there is anything.
+pub(super) fn merge(folder: &Path) -> Result<Option<PathBuf>, RecordingError> {
+    clean(folder);
     let whole = folder.join(FILE_NAME);
     let parts = parts(folder);
     if parts.is_empty() {
@@ -137,6 +173,7 @@ pub fn merge(folder: &Path) -> Result<Option<PathBuf>, RecordingError> {
 /// # Errors
 /// It cannot be written; the old one stays then.
 pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<PathBuf, RecordingError> {
+    clean(folder);
     let whole = folder.join(FILE_NAME);
     write_for(&whole, lines, Purpose::Session)?;
     for (_, part) in parts(folder) {

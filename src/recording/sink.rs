@@ -118,3 +118,85 @@ impl Drop for DurableSink {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Instant;
+
+    use rerun::external::re_log_encoding::DecoderApp;
+    use rerun::{RecordingStreamBuilder, TextDocument};
+
+    use super::*;
+
+    /// A disk with little room.
+    struct Small {
+        held: Arc<Mutex<Vec<u8>>>,
+        room: usize,
+        synced: Arc<AtomicUsize>,
+    }
+
+    impl Write for Small {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let mut held = locked(&self.held);
+            let count = bytes.len().min(self.room - held.len());
+            if count == 0 && !bytes.is_empty() {
+                return Err(io::Error::from(io::ErrorKind::StorageFull));
+            }
+            held.extend_from_slice(&bytes[..count]);
+            Ok(count)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Medium for Small {
+        fn sync(&mut self) -> io::Result<()> {
+            self.synced.fetch_add(1, Ordering::Relaxed);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_full_disk_is_told_at_once_with_its_cause_and_keeps_what_was_written() {
+        let (held, synced) = (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicUsize::new(0)));
+        let medium = Small { held: Arc::clone(&held), room: 40_000, synced: Arc::clone(&synced) };
+        let sink = DurableSink::new(medium).unwrap();
+        let stream = RecordingStreamBuilder::new("test")
+            .enabled(true)
+            .set_sinks(vec![Box::new(sink) as Box<dyn LogSink>])
+            .unwrap();
+        let mut flushed = 0;
+        let error = loop {
+            assert!(flushed < 1000, "the disk never got full");
+            stream.set_time_sequence("pose", flushed);
+            // Texts that cannot be compressed away.
+            let text = crate::session::sha256(flushed.to_string().as_bytes());
+            stream.log("text", &TextDocument::new(text)).unwrap();
+            let begun = Instant::now();
+            let result = stream.flush_with_timeout(Duration::from_secs(5));
+            assert!(begun.elapsed() < Duration::from_secs(1));
+            match result {
+                Ok(()) => flushed += 1,
+                Err(error) => break error.to_string(),
+            }
+        };
+        assert!(flushed > 3);
+        assert!(error.contains("no storage space"), "{error}");
+        assert!(synced.load(Ordering::Relaxed) >= usize::try_from(flushed).unwrap());
+        // It stays so, and ends in good time.
+        assert!(stream.flush_with_timeout(Duration::from_secs(5)).is_err());
+        let begun = Instant::now();
+        drop(stream);
+        assert!(begun.elapsed() < Duration::from_secs(5));
+        let bytes = locked(&held).clone();
+        let rows = DecoderApp::decode_lazy(bytes.as_slice())
+            .filter_map(Result::ok)
+            .filter(|message| matches!(message, LogMsg::ArrowMsg(store, _) if store.is_recording()))
+            .count();
+        assert!(rows >= usize::try_from(flushed).unwrap(), "{rows} messages of {flushed} flushed rows");
+    }
+}

@@ -238,11 +238,16 @@ impl Engine {
 
     /// Gives the session's folder back, with everything written that was asked for.
     pub fn release(&mut self) {
-        if let Some(recorder) = &mut self.recording.recorder {
-            // What is not done in time stays in parts, which the next program joins.
-            recorder.finish();
-        }
+        drop(self.end_recording());
         self.store.finish();
+    }
+
+    /// Makes one file of the recording while the session's folder is still held. Says what the operator should know if that
+    /// fails; the parts stay then, and the next program joins them.
+    pub fn end_recording(&mut self) -> Option<String> {
+        let mut recorder = self.recording.recorder.take()?;
+        let cause = recorder.finish().err()?;
+        Some(format!("the 3D recording is not complete: {cause}; 'trupose record compact' or 'rebuild' mends it"))
     }
 
     /// What has happened since it was asked last.
@@ -267,10 +272,9 @@ impl Engine {
     /// Lines that are on disk go on to the recording.
     fn record_lines(&mut self, lines: &[Line]) {
         let Some(recorder) = &mut self.recording.recorder else { return };
-        if !recorder.take(lines) {
+        if let Err(cause) = recorder.take(lines) {
             self.recording.recorder = None;
-            let message = "the disk is too slow for it".to_owned();
-            self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(message))));
+            self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(cause.to_owned()))));
         }
     }
 
@@ -371,6 +375,8 @@ impl Drop for Engine {
         }
         // Room for threads that still want to answer.
         while self.events.try_recv().is_ok() {}
+        // The folder is given back when nobody writes into it any more.
+        self.release();
     }
 }
 

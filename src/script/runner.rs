@@ -107,6 +107,9 @@ impl<'a, W: Write> Runner<'a, W> {
         let outcome = self.steps(script);
         self.end();
         self.report()?;
+        if let Some(remark) = self.engine.end_recording() {
+            self.transcript.event("recording", &remark)?;
+        }
         outcome
     }
 

@@ -55,12 +55,13 @@ pub fn run(
     }
     while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
     at_end(engine.deeds());
+    let remarks = engine.end_recording().into_iter().collect();
     let wizard = engine.wizard();
     Ok(Exit {
         cause: wizard.ended().unwrap_or("ended").to_owned(),
         signal: received.signal(),
         folder: wizard.folder().map(str::to_owned),
-        remarks: Vec::new(),
+        remarks,
     })
 }
 

@@ -50,3 +50,57 @@ impl History {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sweep(start: usize, is_objective: bool, sweep: usize, value: f64) -> Progress {
+        let stage = if is_objective { Stage::Objective { limit: 1.0 } } else { Stage::Prediction };
+        let found = planning::Progress {
+            start,
+            stage,
+            sweep,
+            condition_number: 100.0 * value,
+            o1: 1e-3,
+            predicted_error: value,
+        };
+        Progress::Sweep { found, sweeps: 3, starts: 2 }
+    }
+
+    #[test]
+    fn threads_may_tell_in_any_order() {
+        let told = [
+            sweep(0, false, 1, 0.9),
+            sweep(1, false, 1, 0.8),
+            sweep(0, false, 2, 0.7),
+            sweep(1, false, 2, 0.75),
+            sweep(0, true, 1, 0.72),
+            sweep(1, true, 1, 0.71),
+        ];
+        let steps = |order: &[usize]| {
+            let history = History::default();
+            order.iter().for_each(|index| history.take(&told[*index]));
+            history.steps()
+        };
+        let found = steps(&[0, 1, 2, 3, 4, 5]);
+        assert_eq!(found, steps(&[5, 3, 1, 4, 2, 0]));
+        // The best start of every sweep, one stage after the other.
+        let errors: Vec<f64> = found.iter().map(|step| step.predicted_error_sigma).collect();
+        assert_eq!(errors, [0.8, 0.7, 0.71]);
+    }
+
+    #[test]
+    fn another_search_begins_anew() {
+        let history = History::default();
+        history.take(&sweep(0, false, 1, 0.9));
+        history.take(&Progress::Unreachable { poses: 2 });
+        history.take(&Progress::Searching);
+        history.take(&sweep(0, false, 1, 0.5));
+        history.take(&sweep(0, false, 2, f64::INFINITY));
+        let steps = history.steps();
+        // A set that determines nothing is no point of a plot.
+        assert_eq!(steps.len(), 1);
+        assert!((steps[0].predicted_error_sigma - 0.5).abs() < 1e-12);
+    }
+}

@@ -1,8 +1,9 @@
 //! What does not move: floor, base, tracker, boxes, and the castings and axes that move with the frames of the arm.
 
-use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rerun::{
-    Arrows3D, AsComponents, Boxes3D, Capsules3D, CoordinateFrame, FillMode, LineStrips3D, Radius, ViewCoordinates,
+    Arrows3D, AsComponents, Boxes3D, Capsules3D, Color, CoordinateFrame, FillMode, LineStrips3D, Points3D, Radius,
+    ViewCoordinates,
 };
 
 use super::{Posture, reach};
@@ -22,10 +23,36 @@ pub(super) fn draw(canvas: &Canvas, profile: &Profile) {
     floor(canvas, profile);
     tracker(canvas, profile);
     keep_out(canvas, profile);
+    styles(canvas, profile);
     arm(canvas, profile);
-    pose(canvas, profile, &rest(profile), Moment { pose: Some(0), ..Moment::default() });
+    pose(canvas, profile, &rest(profile), Moment::pose(0));
     // The timelines of the computations show the arm too.
     pose(canvas, profile, &rest(profile), Moment::search(0));
+}
+
+/// Looks that never change are said once: every row is smaller without them.
+fn styles(canvas: &Canvas, profile: &Profile) {
+    let beam = LineStrips3D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
+    canvas.fix(names::BEAM, &beam);
+    let points =
+        |size: f32, color| Points3D::update_fields().with_radii([Radius::new_ui_points(size)]).with_colors([color]);
+    canvas.fix(names::MEASURED, &Points3D::update_fields().with_radii([Radius::new_ui_points(4.0)]));
+    canvas.fix(names::NEXT, &points(7.0, layout::ATTENTION));
+    canvas.fix(names::UNUSED, &points(5.0, layout::OUT));
+    if profile.bodies().is_empty() {
+        canvas.fix(names::NOMINAL_SKELETON, &skeleton_style(profile, layout::NOMINAL));
+    }
+}
+
+/// How the line through the joints of an arm without castings looks.
+pub(super) fn skeleton_style(profile: &Profile, color: Color) -> LineStrips3D {
+    let radius = layout::single(0.02 * reach(profile));
+    LineStrips3D::update_fields().with_radii([radius]).with_colors([color])
+}
+
+/// The line through the joints of an arm without castings.
+pub(super) fn skeleton(posture: &Posture) -> LineStrips3D {
+    LineStrips3D::update_fields().with_strips([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
 }
 
 /// The middle of each range ((rad) or (m)).
@@ -42,16 +69,13 @@ pub(super) fn pose(canvas: &Canvas, profile: &Profile, q: &[f64], moment: Moment
     for (index, frame) in posture.frames.iter().enumerate() {
         canvas.draw(moment, names::NOMINAL_FRAMES, &layout::frame(frame, &names::frame("nominal", index)));
     }
+    // The timeline of clock times shows the arm and the points: more would make every file larger.
+    let lines = Moment { time: None, ..moment };
     if profile.bodies().is_empty() {
-        let radius = layout::single(0.02 * reach(profile));
-        let line = LineStrips3D::new([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
-            .with_radii([radius])
-            .with_colors([layout::NOMINAL]);
-        canvas.draw(moment, names::NOMINAL_SKELETON, &line);
+        canvas.draw(lines, names::NOMINAL_SKELETON, &skeleton(&posture));
     }
     let beam = [layout::at(&profile.tracker().position_in_base), layout::at(&posture.reflector)];
-    let beam = LineStrips3D::new([beam]).with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
-    canvas.draw(moment, names::BEAM, &beam);
+    canvas.draw(lines, names::BEAM, &LineStrips3D::update_fields().with_strips([beam]));
 }
 
 fn floor(canvas: &Canvas, profile: &Profile) {
@@ -106,23 +130,18 @@ fn keep_out(canvas: &Canvas, profile: &Profile) {
     canvas.fix(names::KEEP_OUT, &drawn);
 }
 
-/// Castings and joint axes, fixed to the frames: one entity per frame.
+/// Castings and joint axes of the nominal arm, fixed to its frames: one entity per frame.
 fn arm(canvas: &Canvas, profile: &Profile) {
     // A joint turns about or slides along the z axis of the frame before it, or of its own.
     let before = usize::from(profile.chain().convention() == Convention::Modified);
     let half = 0.13 * reach(profile);
     for frame in 0..=profile.chain().dof() + 1 {
         let name = CoordinateFrame::new(names::frame("nominal", frame));
-        let bodies: Vec<(&Capsule, (f64, UnitQuaternion<f64>))> =
-            profile.bodies().iter().filter(|body| body.link == frame).map(|body| (body, along(body))).collect();
-        let castings = Capsules3D::from_lengths_and_radii(
-            bodies.iter().map(|(_, (length, _))| layout::single(*length)),
-            bodies.iter().map(|(body, _)| layout::single(body.radius)),
-        )
-        .with_translations(bodies.iter().map(|(body, _)| layout::at(&body.from)))
-        .with_quaternions(bodies.iter().map(|(_, (_, turned))| layout::quaternion(turned)))
-        .with_colors([layout::NOMINAL])
-        .with_fill_mode(FillMode::Solid);
+        let bodies: Vec<&Capsule> = profile.bodies().iter().filter(|body| body.link == frame).collect();
+        let castings = capsules(&bodies, layout::NOMINAL)
+            .with_translations(bodies.iter().map(|body| layout::at(&body.from)))
+            .with_quaternions(bodies.iter().map(|body| layout::quaternion(&along(body).1)))
+            .with_fill_mode(FillMode::Solid);
         let joint = frame.checked_sub(before).and_then(|index| profile.chain().joints().get(index));
         let axis = joint.map(|joint| {
             Arrows3D::from_vectors([layout::vector(&Vector3::new(0.0, 0.0, 2.0 * half))])
@@ -130,7 +149,6 @@ fn arm(canvas: &Canvas, profile: &Profile) {
                 .with_radii([Radius::new_ui_points(1.0)])
                 .with_colors([layout::AXIS])
                 .with_labels([crate::recording::read::plain(&joint.name)])
-                .with_show_labels(true)
         });
         let mut parts: Vec<&dyn AsComponents> = vec![&name];
         if !bodies.is_empty() {
@@ -143,6 +161,47 @@ fn arm(canvas: &Canvas, profile: &Profile) {
             canvas.fix(&format!("{}/{frame}", names::NOMINAL_LINKS), &parts);
         }
     }
+}
+
+/// Sizes and colour of castings.
+fn capsules(bodies: &[&Capsule], color: Color) -> Capsules3D {
+    Capsules3D::from_lengths_and_radii(
+        bodies.iter().map(|body| layout::single(along(body).0)),
+        bodies.iter().map(|body| layout::single(body.radius)),
+    )
+    .with_colors([color])
+}
+
+/// How the identified arm with its enlarged deviations looks: glassy, so that the nominal arm is seen in it.
+pub(super) fn enlarged_style(canvas: &Canvas, profile: &Profile) {
+    if profile.bodies().is_empty() {
+        canvas.fix(names::ENLARGED, &skeleton_style(profile, layout::IDENTIFIED));
+    } else {
+        let bodies: Vec<&Capsule> = profile.bodies().iter().collect();
+        let castings = capsules(&bodies, layout::IDENTIFIED).with_fill_mode(FillMode::TransparentFillMajorWireframe);
+        canvas.fix(names::ENLARGED, &castings);
+    }
+}
+
+/// The identified arm with its enlarged deviations at a pose. All castings are one entity, placed in the base: that takes a
+/// third of the room that frames would.
+pub(super) fn enlarged(canvas: &Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
+    if profile.bodies().is_empty() {
+        canvas.draw(moment, names::ENLARGED, &skeleton(posture));
+        return;
+    }
+    let placed: Vec<Isometry3<f64>> = profile
+        .bodies()
+        .iter()
+        .map(|body| {
+            let frame = posture.frames.get(body.link).copied().unwrap_or_else(Isometry3::identity);
+            frame * Isometry3::from_parts(body.from.coords.into(), along(body).1)
+        })
+        .collect();
+    let castings = Capsules3D::update_fields()
+        .with_translations(placed.iter().map(|place| layout::vector(&place.translation.vector)))
+        .with_quaternions(placed.iter().map(|place| layout::quaternion(&place.rotation)));
+    canvas.draw(moment, names::ENLARGED, &castings);
 }
 
 /// Length of the line of a capsule (m), and the rotation from +z onto it.

@@ -19,21 +19,23 @@ Drag the time cursor along **pose**: the arm goes from measurement to measuremen
 | in the picture | what it is |
 |---|---|
 | grey arm | nominal arm, as the maker describes it |
-| thin orange line | identified arm, true to scale |
-| thick orange line | identified arm with its deviations enlarged |
-| green, blue points | measured for identification, for verification |
-| yellow points | next pose, or a sample in doubt |
-| small grey points | poses that wait |
+| green glassy arm | identified arm, its deviations enlarged |
 | red arrows | errors of the nominal arm, enlarged |
 | green arrows | errors of the identified arm, enlarged much more |
+| white, blue points | measured for identification, for verification |
+| yellow points | next pose, or a sample in doubt |
+| small grey points | poses of the plan that wait |
+| brown points | skipped, or left out |
 | violet | tracker and beam |
 
-The enlargements stand below the robot. Errors are measured less predicted, in the robot base, after the tracker was
+How much is enlarged stands above the robot. Errors are measured less predicted, in the robot base, after the tracker was
 registered to each arm.
 
 Choose the timeline **solver_iteration** to see the arm bend from nominal to identified while the errors shrink, and
-**plan_iteration** to see the search for poses. Layers such as the worst pairs and the uncertainty are switched on in the
-list of entities on the left (open it with the button at the top right).
+**plan_iteration** to see the search for poses; **time** is the clock. The worst pairs and the uncertainty of positions are
+switched on in the list of entities on the left (open it with the button at the top right).
+
+The maps of all pairs show the size of every distance error: row and column are samples, the brighter the larger.
 
 *fit* marks samples that the identification has used: their errors are residuals, not accuracy. Accuracy is what
 *verification* shows.
@@ -104,13 +106,13 @@ fn markdown(session: &Session, identified: &IdentifiedText, time: Timestamp) -> 
         line("\nNothing was verified: there is no figure of accuracy.".to_owned());
     }
     line("\n## Parameters\n".to_owned());
-    line("| | nominal | deviation | sigma | unit | |".to_owned());
-    line("|---|---|---|---|---|---|".to_owned());
-    for parameter in &summary.parameters {
+    line("| bar | | nominal | deviation | sigma | unit | |".to_owned());
+    line("|---|---|---|---|---|---|---|".to_owned());
+    for (bar, parameter) in summary.parameters.iter().enumerate() {
         let sigma = parameter.sigma.map_or_else(|| "-".to_owned(), |sigma| format!("{sigma:.4}"));
         let note = if parameter.identifiable { "" } else { "only with others" };
         line(format!(
-            "| {} | {:.3} | {:+.4} | {sigma} | {} | {note} |",
+            "| {bar} | {} | {:.3} | {:+.4} | {sigma} | {} | {note} |",
             parameter.name, parameter.nominal, parameter.deviation, parameter.unit
         ));
     }

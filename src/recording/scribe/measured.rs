@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 use nalgebra::Point3;
-use rerun::{Points3D, Radius, Scalars};
+use rerun::{Points3D, Scalars};
 
 use super::{Posture, cell, pose_moment};
 use crate::geometry::register;
@@ -28,9 +28,8 @@ pub(super) fn sample(canvas: &Canvas, session: &Session, noted: &MeasuredText, t
         PoseKind::Verification => layout::VERIFICATION,
         _ => layout::DONE,
     };
-    let dot = Points3D::new([layout::at(&place(session, &profile, sample))])
-        .with_radii([Radius::new_ui_points(4.0)])
-        .with_colors([color]);
+    let dot =
+        Points3D::update_fields().with_positions([layout::at(&place(session, &profile, sample))]).with_colors([color]);
     canvas.draw(moment, names::MEASURED, &dot);
     let (x, y, z) = noted.xyz_mm;
     canvas.draw(moment, names::READING, &Scalars::new([x, y, z]));

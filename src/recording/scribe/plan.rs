@@ -1,10 +1,9 @@
 //! Poses that wait, are next or are not used, and how the search for them went on.
 
-use jiff::Timestamp;
 use nalgebra::Point3;
-use rerun::{Color, Points3D, Radius, Scalars};
+use rerun::{Points3D, Radius, Scalars};
 
-use super::{Posture, pose_moment};
+use super::Posture;
 use crate::recording::canvas::{Canvas, Moment};
 use crate::recording::{layout, names};
 use crate::session::plan_summary::SearchStepSummary;
@@ -21,46 +20,37 @@ pub(super) fn search(canvas: &Canvas, steps: &[SearchStepSummary]) {
     }
 }
 
-/// The points of the plan as they are now.
-pub(super) fn points(canvas: &Canvas, session: &Session, time: Timestamp) {
+/// Where the poses of the plan are. Those that are measured are covered by their points.
+pub(super) fn poses(canvas: &Canvas, session: &Session) {
+    let Some(profile) = session.mounted_profile() else { return };
+    let planned = session.rows.iter().filter(|row| !row.skipped);
+    let places = planned.map(|row| Posture::nominal(&profile, &row.planned.configuration).reflector);
+    let points = Points3D::new(places.map(|place| layout::at(&place)))
+        .with_radii([Radius::new_ui_points(2.5)])
+        .with_colors([layout::LEFT]);
+    canvas.fix(names::PLAN, &points);
+}
+
+/// Which pose is next, and what is not used. `is_new`: something may be used again.
+pub(super) fn points(canvas: &Canvas, session: &Session, is_new: bool) {
     let Some(profile) = session.mounted_profile() else { return };
     let at = |q: &[f64]| Posture::nominal(&profile, q).reflector;
-    let moment = pose_moment(session.measurements, time);
+    let moment = Moment::pose(session.measurements);
     let open: Vec<usize> = session.open_rows().collect();
     let shown = session.shown.and_then(|shown| open.iter().find(|row| **row >= shown)).or_else(|| open.first());
-    let mut marks: Vec<Mark> = Vec::new();
-    for index in &open {
-        let Some(row) = session.rows.get(*index) else { continue };
-        let is_next = Some(index) == shown;
-        marks.push(Mark {
-            at: at(&row.planned.configuration),
-            color: if is_next { layout::ATTENTION } else { layout::LEFT },
-            size: if is_next { 6.0 } else { 3.0 },
-            label: if is_next { format!("next: {}", row.planned.pose) } else { String::new() },
-        });
-    }
+    let next = shown.and_then(|row| session.rows.get(*row)).map(|row| &row.planned);
+    let point = Points3D::update_fields()
+        .with_positions(next.map(|next| layout::at(&at(&next.configuration))))
+        .with_labels(next.map(|next| crate::recording::read::plain(&format!("next: {}", next.pose))));
+    canvas.draw(moment, names::NEXT, &point);
     let skipped = session.rows.iter().filter(|row| row.skipped).map(|row| row.planned.configuration.clone());
-    let unused = session
+    let out = session
         .samples
         .iter()
         .filter(|sample| matches!(sample.state, SampleState::LeftOut | SampleState::Undone))
         .map(|sample| session.configuration_of(sample));
-    let out = |q: Vec<f64>| Mark { at: at(&q), color: layout::OUT, size: 5.0, label: String::new() };
-    marks.extend(skipped.chain(unused).map(out));
-    let points = Points3D::new(marks.iter().map(|mark| layout::at(&mark.at)))
-        .with_colors(marks.iter().map(|mark| mark.color))
-        .with_radii(marks.iter().map(|mark| Radius::new_ui_points(mark.size)))
-        .with_labels(marks.iter().map(|mark| crate::recording::read::plain(&mark.label)));
-    canvas.draw(moment, names::PLAN, &points);
-    if session.samples.is_empty() {
-        canvas.draw(Moment::search(0), names::PLAN, &points);
+    let unused: Vec<Point3<f64>> = skipped.chain(out).map(|q| at(&q)).collect();
+    if is_new || !unused.is_empty() {
+        canvas.draw(moment, names::UNUSED, &Points3D::update_fields().with_positions(unused.iter().map(layout::at)));
     }
-}
-
-/// A point of the plan.
-struct Mark {
-    at: Point3<f64>,
-    color: Color,
-    size: f32,
-    label: String,
 }

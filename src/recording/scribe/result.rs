@@ -5,8 +5,8 @@ use std::iter;
 use jiff::Timestamp;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rerun::{
-    Arrows3D, BarChart, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Radius, Scalars, SeriesLines, Tensor,
-    TensorData,
+    Arrows3D, BarChart, Color, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Radius, Scalars, SeriesLines,
+    SeriesPoints, Tensor, TensorData,
 };
 
 use super::{Posture, cell, document, reach};
@@ -58,7 +58,7 @@ pub(super) fn draw(canvas: &Canvas, session: &Session, identified: &IdentifiedTe
         arm: arm_scale(&profile, calibration, &judged),
         ellipsoid: ellipsoid_scale(&profile, &judged),
     };
-    vectors(canvas, &judged, &scales);
+    vectors(canvas, &judged, &scales, time);
     arms(canvas, session, &profile, calibration, scales.arm);
     series(canvas, session, &judged, run);
     pairs(canvas, &judged);
@@ -120,8 +120,7 @@ fn arm_scale(profile: &Profile, calibration: &Calibration, judged: &[Judged<'_>]
         let (nominal, found) = (Posture::new(profile.chain(), &target, &one.q), Posture::new(&chain, &target, &one.q));
         (found.reflector - nominal.reflector).norm()
     };
-    // Enlarged angles bend the arm: half the usual size keeps its shape.
-    enlargement(judged.iter().map(difference).fold(0.0, f64::max), 0.5 * SHOWN * reach(profile))
+    enlargement(judged.iter().map(difference).fold(0.0, f64::max), SHOWN * reach(profile))
 }
 
 fn ellipsoid_scale(profile: &Profile, judged: &[Judged<'_>]) -> f64 {
@@ -129,16 +128,29 @@ fn ellipsoid_scale(profile: &Profile, judged: &[Judged<'_>]) -> f64 {
     enlargement(axes.fold(0.0, f64::max), SHOWN_ELLIPSOID * reach(profile))
 }
 
-/// Errors as arrows from where the identified arm has the point.
-fn vectors(canvas: &Canvas, judged: &[Judged<'_>], scales: &Scales) {
-    let arrows = |scale: f64, color: rerun::Color, pick: fn(&Judged<'_>) -> Vector3<f64>| {
-        Arrows3D::from_vectors(judged.iter().map(|one| layout::vector(&(pick(one) * scale))).collect::<Vec<_>>())
-            .with_origins(judged.iter().map(|one| layout::at(&one.identified_at)).collect::<Vec<_>>())
-            .with_radii([Radius::new_ui_points(1.5)])
-            .with_colors([color])
+/// Errors as arrows from where the identified arm has the point. Not on the timeline of the solver, which has its own.
+fn vectors(canvas: &Canvas, judged: &[Judged<'_>], scales: &Scales, time: Timestamp) {
+    let moment = Moment { time: Some(time), ..Moment::pose(0) };
+    let arrows = |scale: f64, pick: fn(&Judged<'_>) -> Vector3<f64>| {
+        Arrows3D::update_fields()
+            .with_vectors(judged.iter().map(|one| layout::vector(&(pick(one) * scale))))
+            .with_origins(judged.iter().map(|one| layout::at(&one.identified_at)))
     };
-    canvas.fix(names::ERRORS_NOMINAL, &arrows(scales.nominal, layout::NOMINAL_ERROR, |one| one.nominal));
-    canvas.fix(names::ERRORS_IDENTIFIED, &arrows(scales.identified, layout::IDENTIFIED_ERROR, |one| one.identified));
+    let nominal = arrows(scales.nominal, |one| one.nominal);
+    let identified = arrows(scales.identified, |one| one.identified);
+    let all = [
+        (names::ERRORS_NOMINAL, nominal, layout::NOMINAL_ERROR),
+        (names::ERRORS_IDENTIFIED, identified, layout::IDENTIFIED),
+    ];
+    for (path, drawn, color) in all {
+        canvas.fix(path, &arrow_style(color));
+        canvas.draw(moment, path, &drawn);
+    }
+}
+
+/// How arrows look.
+fn arrow_style(color: Color) -> Arrows3D {
+    Arrows3D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_colors([color])
 }
 
 /// The identified arm at every pose, as it is and enlarged.
@@ -150,6 +162,13 @@ fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Cal
     else {
         return;
     };
+    cell::enlarged_style(canvas, profile);
+    if let Some(target) = bent_targets.first() {
+        // Before the first pose, and while the search goes on.
+        let posture = Posture::new(&bent, target, &cell::rest(profile));
+        cell::enlarged(canvas, profile, &posture, Moment::pose(0));
+        cell::enlarged(canvas, profile, &posture, Moment::search(0));
+    }
     for sample in &session.samples {
         let target = sample.noted.target;
         let (Some(at), Some(bent_at)) = (targets.get(target), bent_targets.get(target)) else { continue };
@@ -159,15 +178,8 @@ fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Cal
         for (index, frame) in posture.frames.iter().enumerate() {
             canvas.draw(moment, names::IDENTIFIED_FRAMES, &layout::frame(frame, &names::frame("identified", index)));
         }
-        canvas.draw(moment, names::IDENTIFIED_SKELETON, &skeleton(&posture, 2.5));
-        canvas.draw(moment, names::IDENTIFIED_ENLARGED, &skeleton(&Posture::new(&bent, bent_at, &q), 5.0));
+        cell::enlarged(canvas, profile, &Posture::new(&bent, bent_at, &q), moment);
     }
-}
-
-fn skeleton(posture: &Posture, points: f32) -> LineStrips3D {
-    LineStrips3D::new([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
-        .with_radii([Radius::new_ui_points(points)])
-        .with_colors([layout::IDENTIFIED])
 }
 
 /// Errors at each pose. What the identification has seen is a residual, and is named so.
@@ -176,29 +188,38 @@ fn series(canvas: &Canvas, session: &Session, judged: &[Judged<'_>], run: usize)
         judged.iter().filter(move |one| (session.kind_of(one.sample) == PoseKind::Verification) == is_verification)
     };
     let again = if run > 1 { format!(" (result {run})") } else { String::new() };
-    let kinds = [
-        (false, "fit", [layout::NOMINAL_ERROR, layout::IDENTIFIED_ERROR]),
-        (true, "verification", [layout::ATTENTION, layout::VERIFICATION]),
-    ];
-    for (is_verification, suffix, colors) in kinds {
+    for (is_verification, suffix) in [(false, "fit"), (true, "verification")] {
         let group: Vec<&Judged<'_>> = by_kind(is_verification).collect();
         if group.is_empty() {
             continue;
         }
         for quantity in ["position", "distance"] {
-            let style = SeriesLines::new()
-                .with_names([format!("nominal, {suffix}{again}"), format!("identified, {suffix}{again}")])
-                .with_colors(colors)
-                .with_widths([1.5]);
-            canvas.fix(&names::errors(run, quantity, suffix), &style);
+            for (arm, color) in [("nominal", layout::NOMINAL_ERROR), ("identified", layout::IDENTIFIED)] {
+                let (path, name) = (names::errors(run, quantity, arm, suffix), format!("{arm}, {suffix}{again}"));
+                if is_verification {
+                    // They are far apart: a line would invent what is between them.
+                    let style = SeriesPoints::new()
+                        .with_names([name])
+                        .with_colors([layout::VERIFICATION])
+                        .with_marker_sizes([3.0]);
+                    canvas.fix(&path, &style);
+                } else {
+                    let style = SeriesLines::new().with_names([name]).with_colors([color]);
+                    canvas.fix(&path, &style);
+                }
+            }
         }
         for one in &group {
             let moment = Moment::pose(one.sample.noted.number);
-            let position = Scalars::new([to_mm(one.nominal.norm()), to_mm(one.identified.norm())]);
-            canvas.draw(moment, &names::errors(run, "position", suffix), &position);
-            let Some((nominal, identified)) = distance_errors(one, &group) else { continue };
-            let distance = Scalars::new([to_mm(nominal), to_mm(identified)]);
-            canvas.draw(moment, &names::errors(run, "distance", suffix), &distance);
+            let plot = |quantity: &str, arm: &str, error: f64| {
+                canvas.draw(moment, &names::errors(run, quantity, arm, suffix), &Scalars::new([to_mm(error)]));
+            };
+            plot("position", "nominal", one.nominal.norm());
+            plot("position", "identified", one.identified.norm());
+            if let Some((nominal, identified)) = distance_errors(one, &group) {
+                plot("distance", "nominal", nominal);
+                plot("distance", "identified", identified);
+            }
         }
     }
 }
@@ -232,9 +253,10 @@ fn pairs(canvas: &Canvas, judged: &[Judged<'_>]) {
     for (i, one) in shown.iter().enumerate() {
         for (j, other) in shown.iter().enumerate().filter(|(j, _)| *j != i) {
             let errors = pair(one, other);
-            maps.0[i * count + j] = micrometres(errors.0);
-            maps.1[i * count + j] = micrometres(errors.1);
+            // The other half would be the same.
             if j > i {
+                maps.0[i * count + j] = micrometres(errors.0);
+                maps.1[i * count + j] = micrometres(errors.1);
                 all.push((errors, one, other));
             }
         }
@@ -301,10 +323,11 @@ fn solver(
 ) {
     let rest = cell::rest(profile);
     let nothing = vec![0.0; calibration.parameters.len()];
+    cell::pose(canvas, profile, &rest, Moment::solver(0));
+    canvas.fix(names::ERRORS_SOLVING, &arrow_style(layout::NOMINAL_ERROR));
     let steps = identified.summary.iterations.iter().map(|step| (Some(step), &step.deviations));
     for (index, (step, deviations)) in iter::once((None, &nothing)).chain(steps).enumerate() {
         let moment = Moment::solver(index);
-        cell::pose(canvas, profile, &rest, moment);
         if let Some(step) = step {
             let (cost, largest) = (step.cost.log10(), step.step.log10());
             if cost.is_finite() && largest.is_finite() {
@@ -314,7 +337,7 @@ fn solver(
         let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * scales.arm).collect();
         let Some((bent, bent_targets)) = calibration.arm_with(profile, &larger) else { continue };
         if let Some(target) = bent_targets.first() {
-            canvas.draw(moment, names::IDENTIFIED_ENLARGED, &skeleton(&Posture::new(&bent, target, &rest), 5.0));
+            cell::enlarged(canvas, profile, &Posture::new(&bent, target, &rest), moment);
         }
         let Some((chain, targets)) = calibration.arm_with(profile, deviations) else { continue };
         let predicted: Vec<Point3<f64>> = judged
@@ -327,10 +350,9 @@ fn solver(
         let Some(found) = register(weighed.collect::<Vec<_>>().iter().copied()) else { continue };
         let errors: Vec<Vector3<f64>> =
             pairs.map(|(measured, predicted)| found.to_from_from * measured - predicted).collect();
-        let arrows = Arrows3D::from_vectors(errors.iter().map(|error| layout::vector(&(error * scales.nominal))))
-            .with_origins(predicted.iter().map(layout::at))
-            .with_radii([Radius::new_ui_points(1.5)])
-            .with_colors([layout::NOMINAL_ERROR]);
+        let arrows = Arrows3D::update_fields()
+            .with_vectors(errors.iter().map(|error| layout::vector(&(error * scales.nominal))))
+            .with_origins(predicted.iter().map(layout::at));
         canvas.draw(moment, names::ERRORS_SOLVING, &arrows);
         let mean = errors.iter().map(nalgebra::Matrix::norm).sum::<f64>() / errors.len().max(1) as f64;
         canvas.draw(moment, names::FIT, &Scalars::new([to_mm(mean)]));
@@ -353,13 +375,14 @@ const fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }
 
-/// What the enlargements are, beside the robot.
+/// What the enlargements are, above the robot.
 fn note(canvas: &Canvas, profile: &Profile, scales: &Scales) {
     let text = format!(
-        "drawn larger: nominal errors {} x, identified errors {} x, difference of the arms {} x, uncertainty {} x",
-        scales.nominal, scales.identified, scales.arm, scales.ellipsoid
+        "drawn larger: red errors (nominal) {} x, green errors (identified) {} x, green arm's deviations {} x",
+        scales.nominal, scales.identified, scales.arm
     );
-    let at = Point3::new(0.0, 0.0, profile.floor().unwrap_or(0.0) - 0.12 * reach(profile));
+    // Above the arm: points are rarely there.
+    let at = Point3::new(0.0, 0.0, 0.85 * reach(profile));
     let note = Points3D::new([layout::at(&at)])
         .with_radii([layout::single(0.1 * MILLIMETRE)])
         .with_colors([layout::NOMINAL])
