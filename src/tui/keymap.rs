@@ -106,7 +106,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 }
 
 /// The table. Of several with one key the first whose intent is possible is meant.
-const BINDINGS: [Binding; 40] = [
+const BINDINGS: [Binding; 41] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Does::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Does::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Does::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -144,6 +144,7 @@ const BINDINGS: [Binding; 40] = [
     offer('e', 7, |intent| matches!(intent, Intent::SuggestPoses(_))),
     offer('i', 3, |intent| matches!(intent, Intent::Identify)),
     offer('d', 3, |intent| matches!(intent, Intent::Deliver)),
+    offer('a', 5, |intent| matches!(intent, Intent::About(_))),
     bind(Key::plain_code(KeyCode::F(1)), 9, Does::Local(Local::Help, "help")),
     bind(Key::ctrl('z'), 9, Does::Local(Local::Suspend, "to the shell, back with 'fg'")),
     bind(Key::ctrl('l'), 9, Does::Local(Local::Redraw, "draw the screen anew")),

@@ -44,6 +44,7 @@ fn about(file: &str) -> &'static str {
         "report.json" => "all numbers of this session, for other programs",
         "report.html" => "all numbers of this session, to read and print",
         "corrected.urdf" => "the identified arm for robot software",
+        "drift.csv" => "the pose that was measured again and again",
         "recording.rrd" => "the session as a 3D recording",
         _ => "",
     }
@@ -63,6 +64,17 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         Some(verdict) => verify::status(verdict, &mut page),
         None => page.paragraph("There is no result yet: go back and identify.", Role::Warn),
     }
+    let of = &content.about;
+    let said = |text: &str| if text.is_empty() { "-".to_owned() } else { crate::session::printable(text) };
+    page.paragraph(
+        &format!(
+            "Report for: serial number {}, operator {}, place {}",
+            said(&of.serial),
+            said(&of.operator),
+            said(&of.site)
+        ),
+        Role::Plain,
+    );
     let folder = cx.view.header.folder.as_deref().unwrap_or(".");
     let path = |file: &str| {
         if file.starts_with('/') { file.to_owned() } else { format!("{}/{file}", folder.trim_end_matches('/')) }
@@ -71,7 +83,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         page.title("Nothing is written yet. Enter writes the results into:");
         page.paragraph(folder, Role::Plain);
         page.gap();
-        page.paragraph("calibration.ron is the identified arm; report.json has all numbers; plan.csv and measurements.csv are the data.", Role::Plain);
+        page.paragraph("calibration.ron is the identified arm; report.html is to read and print, report.json has the same numbers; plan.csv and measurements.csv are the data.", Role::Plain);
     } else {
         page.title("Written");
         for file in &content.files {
