@@ -9,6 +9,8 @@ const LEFT: f64 = 42.0;
 const RIGHT: f64 = 8.0;
 const TOP: f64 = 18.0;
 const BOTTOM: f64 = 32.0;
+/// Room for an entry of a legend.
+const SLOT: f64 = 68.0;
 /// A logarithmic axis does not go further down than this below its largest value (decades).
 const MOST_DECADES: f64 = 7.0;
 
@@ -196,14 +198,13 @@ impl Plot {
             .push_str(&format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>\n", escape(text)));
     }
 
-    /// What the marks mean, from the right end of the top line.
+    /// What the marks mean, at the right of the top line.
     pub(super) fn legend(&mut self, entries: &[(Mark, &str)]) {
-        let mut right = self.width - RIGHT;
-        for (mark, text) in entries.iter().rev() {
-            self.text((right, 9.0), "end", text);
-            right -= 6.2 * text.chars().count() as f64 + 8.0;
-            self.mark(*mark, (right + 2.0, 5.6));
-            right -= 12.0;
+        let first = SLOT.mul_add(-(entries.len() as f64), self.width);
+        for (index, (mark, text)) in entries.iter().enumerate() {
+            let left = SLOT.mul_add(index as f64, first);
+            self.mark(*mark, (left, 5.6));
+            self.text((left + 7.0, 9.0), "start", text);
         }
     }
 

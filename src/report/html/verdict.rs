@@ -201,7 +201,7 @@ pub(super) fn drawings(document: &Document) -> String {
         html.push_str(&per_pose(
             &judged,
             "Identification poses: residual of the fit",
-            "<strong>not an accuracy</strong>: the parameters were fitted to these poses",
+            "<strong>not an accuracy</strong>: fitted to these very poses",
         ));
     }
     let errors = |pick: fn(&PointPart) -> [f64; 3]| tested.iter().map(|point| norm(pick(point))).collect::<Vec<_>>();

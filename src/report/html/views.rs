@@ -97,7 +97,8 @@ fn size(report: &Details) -> f64 {
     let places = || report.points.iter().map(|point| point.at_mm).chain(report.arm_mm.iter().copied());
     let span = |axis: usize| {
         let values = places().filter_map(|place| place.get(axis).copied()).filter(|value| value.is_finite());
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
         (high - low).max(1.0)
     };
     (0..3).map(span).filter(|span| span.is_finite()).fold(1.0, f64::max)
