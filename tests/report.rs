@@ -169,6 +169,7 @@ fn text(html: &str) -> String {
                 .replace("</th><td", ": </th><td"),
         );
     }
+    let lines = lines.replace("</caption>", "</caption>\n").replace("<br>", "\n").replace("</b>", "</b> ");
     let mut shown = String::new();
     let mut inside = false;
     for c in lines.chars() {
@@ -327,7 +328,14 @@ fn what_happened_is_told_with_how_it_was_decided() {
 
 #[test]
 fn the_page_of_a_small_session_stays_as_it_is() {
-    insta::assert_snapshot!("small", text(&report(&calibrated()).1));
+    let shown = text(&report(&calibrated()).1);
+    // Sums of files stand and fall with the last digits of their numbers.
+    let is_sum = |word: &str| word.len() == 64 && word.chars().all(|c| c.is_ascii_hexdigit());
+    let words = shown.split_inclusive([' ', '\n']).map(|word| match word.trim_end() {
+        sum if is_sum(sum) => word.replace(sum, "<sha256>"),
+        _ => word.to_owned(),
+    });
+    insta::assert_snapshot!("small", words.collect::<String>());
 }
 
 #[test]

@@ -15,7 +15,7 @@ mod verdict;
 mod views;
 
 use crate::report::document::{Document, PointOrigin};
-use markup::{css_string, escape, shortened};
+use markup::{add, css_string, escape, shortened};
 
 /// The rules of the page.
 const STYLE: &str = include_str!("html/style.css");
@@ -28,10 +28,10 @@ pub fn report_html(document: &Document) -> String {
     let title = report.robot.as_ref().map_or("no robot chosen", |robot| robot.title.as_str());
     let mut html = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
     html.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-    html.push_str(&format!("<title>Calibration report: {} {}</title>\n", escape(title), escape(&report.session.name)));
-    html.push_str(&format!("<style>\n{STYLE}{}</style>\n</head>\n<body>\n", page_rules(document)));
+    add(&mut html, &format!("<title>Calibration report: {} {}</title>\n", escape(title), escape(&report.session.name)));
+    add(&mut html, &format!("<style>\n{STYLE}{}</style>\n</head>\n<body>\n", page_rules(document)));
     html.push_str(&identity::banners(document));
-    html.push_str(&format!("<h1>Calibration report</h1>\n<p class=\"lead\">{}</p>\n", escape(title)));
+    add(&mut html, &format!("<h1>Calibration report</h1>\n<p class=\"lead\">{}</p>\n", escape(title)));
     html.push_str(&verdict::section(document));
     html.push_str(&identity::section(document));
     html.push_str(&verdict::accuracy(document));

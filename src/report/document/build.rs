@@ -12,7 +12,7 @@ use crate::profile::Profile;
 use crate::report::text::found;
 use crate::session::journal::{correction_text, instrument_text, target_text};
 use crate::session::plan::PoseKind;
-use crate::session::set_up::InstrumentChoice;
+use crate::session::set_up::{InstrumentChoice, TargetChoice};
 use crate::session::sha256;
 use crate::session::state::{Robot, Sample, Session};
 use crate::session::summary::ParameterSummary;
@@ -39,7 +39,7 @@ impl Document {
             about: session.about.clone(),
             robot: session.robot.as_ref().map(robot_part),
             instrument: session.instrument.as_ref().map(instrument_text),
-            target: session.target.as_ref().map(target_text),
+            target: target(session),
             temperature: temperature(session),
             counts: counts(session),
             parameter_notes: parameters.iter().map(|parameter| note(parameter, session)).collect(),
@@ -127,6 +127,20 @@ fn robot_part(robot: &Robot) -> RobotPart {
             .instrument()
             .map(|instrument| format!("{}, {} per coordinate", instrument.name, instrument.sigma_text())),
     }
+}
+
+/// Where the SMR sits; the profile's place with its coordinates.
+fn target(session: &Session) -> Option<String> {
+    let first = session.robot.as_ref()?.profile.targets().first()?;
+    Some(match &session.target {
+        Some(choice) if *choice != TargetChoice::Profile => target_text(choice),
+        _ => {
+            let [x, y, z] = first.position_in_flange.coords.map(to_mm).into();
+            let known =
+                if first.is_free() { format!(", to {} mm", to_mm(first.uncertainty)) } else { ", exact".to_owned() };
+            format!("as the profile says: {} at ({x:.3}, {y:.3}, {z:.3}) mm in the flange{known}", first.name)
+        }
+    })
 }
 
 fn temperature(session: &Session) -> Option<TemperaturePart> {

@@ -1,6 +1,6 @@
 //! What the report is about: robot, instrument, people, time, conditions; and where its numbers come from.
 
-use super::markup::{NONE, counted, escape, facts, number, paragraph, time};
+use super::markup::{NONE, add, counted, escape, facts, number, paragraph, time};
 use crate::report::document::{Counts, Details, Document, PointOrigin, ResultState, TemperaturePart};
 
 /// What must be seen before anything else.
@@ -8,7 +8,7 @@ pub(super) fn banners(document: &Document) -> String {
     let report = &document.report;
     let mut html = String::new();
     let mut banner = |word: &str, text: &str| {
-        html.push_str(&format!("<div class=\"banner\" role=\"note\"><b>{word}</b> {text}</div>\n"));
+        add(&mut html, &format!("<div class=\"banner\" role=\"note\"><b>{word}</b> {text}</div>\n"));
     };
     match report.points_from {
         PointOrigin::Simulated => {
@@ -27,7 +27,7 @@ pub(super) fn banners(document: &Document) -> String {
     }
     match report.state {
         ResultState::None => {
-            banner("NO RESULT.", "Nothing has been identified yet. This report shows what was measured so far.")
+            banner("NO RESULT.", "Nothing has been identified yet. This report shows what was measured so far.");
         }
         ResultState::OutOfDate => banner(
             "OUT OF DATE.",

@@ -8,6 +8,11 @@ pub(super) const NONE: &str = "–";
 /// As wide as a digit.
 const FIGURE_SPACE: &str = "\u{2007}";
 
+/// Adds a part that was formatted.
+pub(super) fn add(html: &mut String, part: &str) {
+    html.push_str(part);
+}
+
 /// A text of others: control characters are replaced, marks of HTML are written so that they are only read. An address stays
 /// readable, but no double slash stands in the file.
 pub(super) fn escape(text: &str) -> String {
@@ -89,17 +94,17 @@ pub(super) fn table(caption: &str, columns: &[(&str, Column)], rows: &[Vec<Strin
     let mut html = String::from("<div class=\"scroll\"><table");
     html.push_str(if keeps { " class=\"keep\">" } else { ">" });
     if !caption.is_empty() {
-        html.push_str(&format!("<caption>{caption}</caption>"));
+        add(&mut html, &format!("<caption>{caption}</caption>"));
     }
     html.push_str("<thead><tr>");
     for (name, column) in columns {
-        html.push_str(&format!("<th scope=\"col\"{}>{name}</th>", column.class()));
+        add(&mut html, &format!("<th scope=\"col\"{}>{name}</th>", column.class()));
     }
     html.push_str("</tr></thead>\n<tbody>\n");
     for row in rows {
         html.push_str("<tr>");
         for (cell, (_, column)) in row.iter().zip(columns) {
-            html.push_str(&format!("<td{}>{cell}</td>", column.class()));
+            add(&mut html, &format!("<td{}>{cell}</td>", column.class()));
         }
         html.push_str("</tr>\n");
     }
@@ -111,7 +116,7 @@ pub(super) fn table(caption: &str, columns: &[(&str, Column)], rows: &[Vec<Strin
 pub(super) fn facts(rows: &[(&str, String)]) -> String {
     let mut html = String::from("<table class=\"kv\"><tbody>\n");
     for (name, value) in rows.iter().filter(|(_, value)| !value.is_empty()) {
-        html.push_str(&format!("<tr><th scope=\"row\">{name}</th><td>{value}</td></tr>\n"));
+        add(&mut html, &format!("<tr><th scope=\"row\">{name}</th><td>{value}</td></tr>\n"));
     }
     html.push_str("</tbody></table>\n");
     html
@@ -124,8 +129,8 @@ pub(super) fn paragraph(html: &str) -> String {
 
 /// Points in order, each HTML.
 pub(super) fn list(points: &[String]) -> String {
-    let points: String = points.iter().map(|point| format!("<li>{point}</li>\n")).collect();
-    format!("<ul>\n{points}</ul>\n")
+    let points: Vec<String> = points.iter().map(|point| format!("<li>{point}</li>\n")).collect();
+    format!("<ul>\n{}</ul>\n", points.concat())
 }
 
 /// A number of things with its noun.

@@ -1,7 +1,7 @@
 //! How it was planned, measured and fitted; what was left out and why; what was found and how it was decided.
 
 use super::charts::{drift, norm, prediction, search};
-use super::markup::{Column, counted, escape, facts, number, optional, paragraph, table, time};
+use super::markup::{Column, add, counted, escape, facts, number, optional, paragraph, table, time};
 use crate::report::document::{Details, Document, PlanPart};
 use crate::report::text::{gap, sigma_origin, termination};
 use crate::session::summary::{EstimatorName, IdentificationSummary};
@@ -11,7 +11,7 @@ pub(super) fn section(document: &Document) -> String {
     let report = &document.report;
     let mut html = String::new();
     if let Some(result) = &document.result {
-        html.push_str(&format!("<h2>The fit</h2>\n{}", facts(&fit(result))));
+        add(&mut html, &format!("<h2>The fit</h2>\n{}", facts(&fit(result))));
         html.push_str(&paragraph(
             "Residuals of the fit tell how well the model describes the poses it was fitted to. They are no accuracy.",
         ));
@@ -33,7 +33,7 @@ pub(super) fn section(document: &Document) -> String {
         drawings.push_str(&drift(&report.drift));
     }
     if !drawings.is_empty() {
-        html.push_str(&format!("<div class=\"grid\">\n{drawings}</div>\n"));
+        add(&mut html, &format!("<div class=\"grid\">\n{drawings}</div>\n"));
     }
     html.push_str(&drift_table(report));
     html

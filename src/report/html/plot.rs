@@ -1,6 +1,6 @@
 //! Axes, marks and frames of the drawings, as inline SVG. Places are rounded to 0.1; what is not finite is not drawn.
 
-use super::markup::{escape, number};
+use super::markup::{add, escape, number};
 
 /// Width of a drawing in its own units; about a column of the page, so that text comes out as large as it is meant.
 pub(super) const WIDTH: f64 = 360.0;
@@ -167,7 +167,7 @@ impl Plot {
     /// A line through places.
     pub(super) fn line(&mut self, class: &str, places: &[(f64, f64)]) {
         let places: Vec<String> = places.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-        self.body.push_str(&format!("<polyline class=\"{class}\" points=\"{}\"></polyline>\n", places.join(" ")));
+        add(&mut self.body, &format!("<polyline class=\"{class}\" points=\"{}\"></polyline>\n", places.join(" ")));
     }
 
     /// A line through values.
@@ -185,17 +185,22 @@ impl Plot {
     pub(super) fn bar(&mut self, class: &str, (from, to): (f64, f64), y: f64) {
         if let (Some((left, top)), Some((right, bottom))) = (self.at(from, y), self.at(to, 0.0)) {
             let (width, height) = ((right - left - 1.0).max(0.5), (bottom - top).max(0.0));
-            self.body.push_str(&format!(
-                "<rect class=\"{class}\" x=\"{:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"></rect>\n",
-                left + 0.5
-            ));
+            add(
+                &mut self.body,
+                &format!(
+                    "<rect class=\"{class}\" x=\"{:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"></rect>\n",
+                    left + 0.5
+                ),
+            );
         }
     }
 
     /// Plain text at a place.
     pub(super) fn text(&mut self, (x, y): (f64, f64), anchor: &str, text: &str) {
-        self.body
-            .push_str(&format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>\n", escape(text)));
+        add(
+            &mut self.body,
+            &format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>\n", escape(text)),
+        );
     }
 
     /// What the marks mean, at the right of the top line.

@@ -1,6 +1,6 @@
 //! How to apply the result, and what must not be done with it.
 
-use super::markup::{escape, list, paragraph};
+use super::markup::{add, escape, list, paragraph};
 use crate::report::document::{Document, PointOrigin, ResultState};
 use crate::session::summary::VerdictStatus;
 
@@ -36,7 +36,7 @@ pub(super) fn section(document: &Document) -> String {
         _ => None,
     };
     if let Some(stop) = stop {
-        html.push_str(&format!("<div class=\"warn\"><b>{stop}</b></div>\n"));
+        add(&mut html, &format!("<div class=\"warn\"><b>{stop}</b></div>\n"));
     }
     if matches!(report.state, ResultState::None | ResultState::Unusable) {
         return html;

@@ -1,7 +1,7 @@
 //! The verdict, and the accuracy on poses that the identification did not see.
 
 use super::charts::{against_joints, histogram, norm, of_kind, per_pose};
-use super::markup::{Column, NONE, counted, escape, list, number, optional, paragraph, table};
+use super::markup::{Column, NONE, add, counted, escape, list, number, optional, paragraph, table};
 use super::views::views;
 use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
 use crate::session::summary::{
@@ -73,7 +73,8 @@ fn quantity(name: &str) -> String {
 
 fn warning(warning: &Warning) -> String {
     let (class, word) = if warning.blocks_acceptance { ("warn", "Warning") } else { ("note", "Note") };
-    format!("<div class=\"{class}\"><b>{word}.</b> {}</div>\n", escape(&warning.message))
+    let (message, code) = (escape(&warning.message), escape(&warning.code));
+    format!("<div class=\"{class}\"><b>{word}.</b> {message} <span class=\"soft\">[{code}]</span></div>\n")
 }
 
 /// Tables III and IV of the method paper for this robot.
@@ -213,12 +214,12 @@ pub(super) fn drawings(document: &Document) -> String {
     if let Some(robot) = &report.robot {
         html.push_str("<h3>What is left, against each joint</h3>\n");
         html.push_str(&paragraph("Position error of the identified arm (mm) over the pendant value of each joint. Full dots are verification poses; open dots are residuals of the fit. A pattern means that something besides the link constants moves the points, such as flexure or a gear."));
-        html.push_str(&format!("<div class=\"grid three\">\n{}</div>\n", against_joints(robot, &report.points)));
+        add(&mut html, &format!("<div class=\"grid three\">\n{}</div>\n", against_joints(robot, &report.points)));
         html.push_str(&joints_named(document));
     }
     html.push_str("<h3>Poses in space</h3>\n");
     html.push_str(&paragraph("Measured places of the reflector in the robot base with their errors (measured less predicted, drawn longer), and the arm at its first pose. Full dots are verification poses."));
-    html.push_str(&format!("<div class=\"grid\">\n{}</div>\n", views(report)));
+    add(&mut html, &format!("<div class=\"grid\">\n{}</div>\n", views(report)));
     html.push_str(&poses(&tested));
     html
 }

@@ -1,7 +1,7 @@
 //! The poses in space: two projections, with the errors drawn larger than they are by a factor that is stated.
 
 use super::charts::norm;
-use super::markup::counted;
+use super::markup::{add, counted};
 use super::plot::{Mark, figure, nice_above};
 use crate::report::document::{Details, PointPart};
 
@@ -27,9 +27,12 @@ const VIEWS: [View; 2] = [
     View { name: "from above", axes: (0, 1), labels: ("x", "y") },
 ];
 
+/// Picks the error against one of the models.
+type Pick = fn(&PointPart) -> [f64; 3];
+
 /// Both models in both views.
 pub(super) fn views(report: &Details) -> String {
-    let errors: [(&str, bool, fn(&PointPart) -> [f64; 3]); 2] =
+    let errors: [(&str, bool, Pick); 2] =
         [("Nominal arm", false, |point| point.nominal_mm), ("Identified arm", true, |point| point.identified_mm)];
     let drawn = errors.iter().flat_map(|(name, is_identified, error)| {
         VIEWS.iter().map(move |view| draw(report, *view, name, *is_identified, *error))
@@ -37,7 +40,7 @@ pub(super) fn views(report: &Details) -> String {
     drawn.collect()
 }
 
-fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: fn(&PointPart) -> [f64; 3]) -> String {
+fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pick) -> String {
     let points: Vec<&PointPart> = report
         .points
         .iter()
@@ -76,7 +79,7 @@ fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: fn
     let joints: Vec<(f64, f64)> = arm.iter().copied().map(at).collect();
     body.push_str(&line("arm", &joints));
     for (x, y) in &joints {
-        body.push_str(&format!("<circle class=\"jnt\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.6\"></circle>\n"));
+        add(&mut body, &format!("<circle class=\"jnt\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.6\"></circle>\n"));
     }
     for point in &points {
         let from = pick(point.at_mm);
