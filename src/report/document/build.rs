@@ -86,6 +86,8 @@ impl Document {
         let mut document = Self::new(session, files);
         let program = std::mem::take(&mut document.report.session.program);
         document.report.session = SessionPart { program, ..SessionPart::default() };
+        // Tables do not say how many readings are behind a row.
+        (document.report.counts.fewest_shots, document.report.counts.most_shots) = (0, 0);
         document
     }
 }

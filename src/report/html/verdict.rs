@@ -102,9 +102,8 @@ fn procedure(result: &IdentificationSummary, verification: &VerificationSummary,
     let samples = counted(verification.samples, "verification pose", "verification poses");
     let pairs = verification.identified.distance_mm.map(|distance| counted(distance.count, "distance", "distances"));
     let visits = match (result.settings.verification, report.counts.repeats) {
-        (VerificationMode::Session | VerificationMode::File | VerificationMode::Rest, 0) => {
-            "each pose was visited once".to_owned()
-        }
+        (VerificationMode::File | VerificationMode::Rest, 0) => "no pose stands twice in the tables".to_owned(),
+        (VerificationMode::Session, 0) => "each pose was visited once".to_owned(),
         (VerificationMode::Session | VerificationMode::File | VerificationMode::Rest, repeats) => {
             format!("{} at a pose that was measured before", counted(repeats, "sample is", "samples are"))
         }
@@ -117,12 +116,19 @@ fn procedure(result: &IdentificationSummary, verification: &VerificationSummary,
         (fewest, most) if fewest == most => format!(", {fewest} readings averaged at each"),
         (fewest, most) => format!(", {fewest} to {most} readings averaged at each"),
     };
-    let pairs = pairs.map_or_else(String::new, |pairs| format!(" between all pairs: {pairs}"));
+    let distances = pairs.map_or_else(String::new, |pairs| {
+        format!(" Distance errors are measured less predicted length, over {pairs}.")
+    });
+    let positions = if verification.identified.position_mm.is_some() {
+        " Position errors are after the place of the instrument was fitted on the identification poses only, for each model by itself."
+    } else {
+        ""
+    };
     let basis = escape(&verification.basis);
     let basis = if basis.is_empty() { String::new() } else { format!(" ({basis})") };
     let visits = if visits.is_empty() { visits } else { format!("; {visits}{shots}") };
     format!(
-        "{samples}{basis}{visits}. Distance errors are measured less predicted length{pairs}. Position errors are after the place of the instrument was fitted on the identification poses only, for each model by itself. The test cycles of ISO 9283 (given poses, approached 30 times) were not run: these are not its distance and pose accuracy."
+        "{samples}{basis}{visits}.{distances}{positions} The test cycles of ISO 9283 (given poses, approached 30 times) were not run: these are not its distance and pose accuracy."
     )
 }
 

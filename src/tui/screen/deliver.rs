@@ -64,22 +64,22 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         Some(verdict) => verify::status(verdict, &mut page),
         None => page.paragraph("There is no result yet: go back and identify.", Role::Warn),
     }
-    let of = &content.about;
-    let said = |text: &str| if text.is_empty() { "-".to_owned() } else { crate::session::printable(text) };
-    page.paragraph(
-        &format!(
-            "Report for: serial number {}, operator {}, place {}",
-            said(&of.serial),
-            said(&of.operator),
-            said(&of.site)
-        ),
-        Role::Plain,
-    );
     let folder = cx.view.header.folder.as_deref().unwrap_or(".");
     let path = |file: &str| {
         if file.starts_with('/') { file.to_owned() } else { format!("{}/{file}", folder.trim_end_matches('/')) }
     };
     if content.files.is_empty() {
+        let of = &content.about;
+        let said = |text: &str| if text.is_empty() { "-".to_owned() } else { crate::session::printable(text) };
+        page.paragraph(
+            &format!(
+                "Report for: serial number {}, operator {}, place {}",
+                said(&of.serial),
+                said(&of.operator),
+                said(&of.site)
+            ),
+            Role::Plain,
+        );
         page.title("Nothing is written yet. Enter writes the results into:");
         page.paragraph(folder, Role::Plain);
         page.gap();
