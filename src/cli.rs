@@ -150,6 +150,15 @@ pub enum SessionCommand {
         #[arg(long, conflicts_with = "journal")]
         json: bool,
     },
+    /// Write the report of a session anew from its journal: report.html to read and print, report.json for programs
+    Report {
+        /// Folder of the session
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+        /// Name of the HTML file; the JSON file lies beside it [default: report.html in the session's folder]
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
     /// Write the tables of a session
     Export {
         /// Folder of the session
@@ -246,7 +255,7 @@ pub struct EstimationArgs {
     /// Expected deviation of every length and every angle instead of the profile's, such as '1mm,0.1deg'
     #[arg(long, value_name = "LENGTH,ANGLE")]
     pub expected_deviation: Option<ExpectedDeviation>,
-    /// Folder for the results (calibration.ron, report.json); made if it is missing
+    /// Folder for the results (calibration.ron, report.html, report.json); made if it is missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print one JSON object instead of tables

@@ -10,6 +10,7 @@ pub(crate) mod assess;
 pub(crate) mod cell;
 pub(crate) mod checks;
 pub mod circles;
+pub mod deliver;
 pub mod identify;
 pub mod plan;
 pub mod points;

@@ -1,11 +1,20 @@
-//! Results as text for people: at most 80 columns, every number with its unit and as many digits as it deserves.
+//! Results for people: as text of at most 80 columns, and as a page to print; every number with its unit and as many digits as it
+//! deserves.
 //!
-//! Knows the plain summaries of `session` and nothing of how they were made.
+//! Knows the plain summaries of `session` and nothing of how they were made. [`Document`] is everything a report says:
+//! `report.json` is that object, `report.html` ([`report_html`]) shows it.
 
+mod document;
+mod html;
 mod plan;
 mod tables;
 mod text;
 
+pub use document::{
+    Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, NotCounted, NotePart, ParameterNote, PlanPart,
+    PointOrigin, PointPart, PredictionPart, RefusedPart, ResultState, RobotPart, SessionPart, TemperaturePart,
+};
+pub use html::report_html;
 pub use plan::plan_text;
 pub use tables::fixed as number;
 pub use text::{identification_text, verification_text};

@@ -20,7 +20,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("search", &["planning"]),
     ("link", &["units", "geometry", "kinematics", "profile", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
-    ("report", &["units", "geometry", "profile", "session"]),
+    ("report", &["units", "geometry", "kinematics", "profile", "session"]),
     ("recording", &["units", "geometry", "kinematics", "profile", "session"]),
     ("error", &["session"]),
     (

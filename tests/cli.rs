@@ -456,7 +456,10 @@ fn a_calibration_is_read_back_to_the_same_numbers() {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let identified: Value = serde_json::from_slice(&output.stdout).unwrap();
     let saved: Value = serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
-    assert_eq!(saved, identified);
+    let names = identified.as_object().unwrap().keys();
+    for name in names {
+        assert_eq!(saved[name], identified[name], "{name}");
+    }
     let calibration = out.join("calibration.ron");
     let output = trupose(&[
         "verify",

@@ -540,7 +540,7 @@ impl SmallDisk {
     fn mount(path: PathBuf) -> Option<Self> {
         fs::create_dir(&path).unwrap();
         let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", "size=256k", "tmpfs"]).arg(&path);
+        mount.args(["-t", "tmpfs", "-o", "size=1024k", "tmpfs"]).arg(&path);
         mount.output().is_ok_and(|output| output.status.success()).then_some(Self(path))
     }
 }
@@ -563,7 +563,7 @@ fn a_full_disk_stops_the_run_and_goes_on_when_there_is_room() {
             return;
         };
         let ballast = disk.0.join("ballast");
-        fs::write(&ballast, vec![0; (256 - room) * 1024]).unwrap();
+        fs::write(&ballast, vec![0; (1024 - room) * 1024]).unwrap();
         let output = place.script(&whole());
         says_what_is_safe(&place, &output, "No space left on device");
         fs::remove_file(&ballast).unwrap();

@@ -20,7 +20,7 @@ use trupose::profile::{Profile, builtin};
 use trupose::session::journal::Line;
 use trupose::session::plan::{PlannedPose, PoseKind};
 use trupose::session::reading::{MeasureRequest, Reading};
-use trupose::session::set_up::{CoordinateUnit, InstrumentChoice, TargetChoice};
+use trupose::session::set_up::{About, CoordinateUnit, InstrumentChoice, TargetChoice};
 use trupose::session::simulation::Simulation;
 use trupose::session::state::Session;
 use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
@@ -187,6 +187,7 @@ impl Cell {
             Intent::GoToPose(_) if self.chance(80) => Intent::GoToPose(self.rng.random_range(0..40).to_string()),
             Intent::GoToPose(_) => Intent::GoToPose(self.text()),
             Intent::Note(_) => Intent::Note(self.text()),
+            Intent::About(_) => Intent::About(About { serial: self.text(), operator: self.text(), site: self.text() }),
             Intent::SuggestPoses(_) => Intent::SuggestPoses([0, 1, 3, usize::MAX][self.pick(4)]),
             other => other,
         }
@@ -417,10 +418,10 @@ impl Cell {
 /// One of each.
 fn every_intent() -> Vec<Intent> {
     use Intent::{
-        AcceptPlan, AcceptReading, ApplyRemedy, Back, Cancel, ChooseInstrument, ChooseProfile, ChooseTarget, Deliver,
-        DiscardCircles, Dismiss, GoToPose, Identify, Keep, LeaveOut, LoadPlan, MakePlan, Measure, MeasureAgain,
-        NameSession, Next, Note, PlanFromRecording, Quit, Retry, Skip, StartCircles, SuggestPoses, TypeReading, Undo,
-        UseCircles,
+        About, AcceptPlan, AcceptReading, ApplyRemedy, Back, Cancel, ChooseInstrument, ChooseProfile, ChooseTarget,
+        Deliver, DiscardCircles, Dismiss, GoToPose, Identify, Keep, LeaveOut, LoadPlan, MakePlan, Measure,
+        MeasureAgain, NameSession, Next, Note, PlanFromRecording, Quit, Retry, Skip, StartCircles, SuggestPoses,
+        TypeReading, Undo, UseCircles,
     };
     vec![
         Next,
@@ -453,6 +454,7 @@ fn every_intent() -> Vec<Intent> {
         Note(String::new()),
         SuggestPoses(1),
         Identify,
+        About(trupose::session::set_up::About::default()),
         Deliver,
     ]
 }

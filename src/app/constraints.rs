@@ -6,7 +6,7 @@ use std::io::Write;
 use super::identify::deliver;
 use super::load::{self, LoadedProfile};
 use super::progress::Progress;
-use super::{Console, estimation_settings};
+use super::{Console, estimation_settings, record};
 use crate::cli::ConstraintsArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{DirectErrors, FittedSetup, fit_setup};
@@ -136,7 +136,11 @@ pub(super) fn run<O: Write, E: Write>(
     let summary = finished.summary();
     let calibration =
         (!unusable).then(|| calibration(&summary, &loaded.text, &nominal, &problem, of_identification, None));
-    deliver(summary, calibration.as_ref(), estimation, console)
+    let session = estimation
+        .out
+        .as_deref()
+        .map(|folder| record::bare_session(folder, &estimation.profile, &loaded.text, &summary, calibration.as_ref()));
+    deliver(summary, calibration.as_ref(), session.transpose()?.as_ref(), estimation, console)
 }
 
 /// The settings that only this command has.

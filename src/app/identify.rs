@@ -10,12 +10,14 @@ use super::{Console, estimation_settings, load, record, to_json};
 use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::checks;
+use crate::procedure::deliver::{REPORT_HTML, REPORT_JSON};
 use crate::procedure::identify::{IdentifyRequest, NamedSample, SampleSet, identify};
 use crate::profile::Profile;
 use crate::report;
 use crate::session::TableProblem;
 use crate::session::calibration::Calibration;
 use crate::session::measurements::Row;
+use crate::session::state::Session;
 use crate::session::summary::{IdentificationSummary, VerdictStatus, VerificationMode};
 use crate::store;
 
@@ -72,7 +74,9 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     if let Some(path) = &args.record.record {
         record::identification(path, &estimation.profile, &request, &identified)?;
     }
-    deliver(identified.summary, identified.calibration.as_ref(), estimation, console)
+    let out = estimation.out.as_deref();
+    let session = out.map(|folder| record::identification_session(folder, &estimation.profile, &request, &identified));
+    deliver(identified.summary, identified.calibration.as_ref(), session.transpose()?.as_ref(), estimation, console)
 }
 
 /// The samples of rows with their names; `file` is named where there are several.
@@ -92,16 +96,17 @@ fn sample_set(
 }
 
 /// Writes the result files and prints the summary: also where writing fails, so that the numbers are not lost. Without a
-/// `calibration` there is no usable solution, and only the report is written.
+/// `calibration` there is no usable solution, and only the report is written. `session` is what the report shows.
 pub(super) fn deliver<O: Write, E: Write>(
     mut summary: IdentificationSummary,
     calibration: Option<&Calibration>,
+    session: Option<&Session>,
     args: &EstimationArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let mut failed = None;
-    if let Some(folder) = &args.out {
-        failed = save(&mut summary, calibration, folder).err();
+    if let (Some(folder), Some(session)) = (&args.out, session) {
+        failed = save(&mut summary, calibration, session, folder).err();
         if failed.is_some() {
             summary.written.clear();
         }
@@ -124,18 +129,28 @@ pub(super) fn deliver<O: Write, E: Write>(
 }
 
 /// Writes the result files into `folder` and lists them in the summary.
-fn save(summary: &mut IdentificationSummary, calibration: Option<&Calibration>, folder: &Path) -> Result<(), Failure> {
+fn save(
+    summary: &mut IdentificationSummary,
+    calibration: Option<&Calibration>,
+    session: &Session,
+    folder: &Path,
+) -> Result<(), Failure> {
     let store_failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
     store::create_folder(folder).map_err(store_failure)?;
+    let mut files = Vec::new();
     if let Some(calibration) = calibration {
         let text = calibration.to_text().map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
         let file = folder.join("calibration.ron");
         store::replace(&file, &text).map_err(store_failure)?;
         summary.written.push(file.display().to_string());
+        files.push(("calibration.ron".to_owned(), text));
     }
-    let file = folder.join("report.json");
-    summary.written.push(file.display().to_string());
-    store::replace(&file, &to_json(summary)?).map_err(store_failure)
+    let (json, html) = (folder.join(REPORT_JSON), folder.join(REPORT_HTML));
+    summary.written.extend([&json, &html].map(|file| file.display().to_string()));
+    let mut document = report::Document::of_tables(session, &files);
+    document.result = Some(summary.clone());
+    store::replace(&json, &to_json(&document)?).map_err(store_failure)?;
+    store::replace(&html, &report::report_html(&document)).map_err(store_failure)
 }
 
 /// 1 only where limits were checked and not met.

@@ -15,12 +15,15 @@ use crate::procedure::joint_types;
 use crate::procedure::points::point_errors;
 use crate::profile::Profile;
 use crate::recording::{self, Check, RecordingError};
+use crate::session::calibration::Calibration;
 use crate::session::journal::{
-    Entry, IdentifiedText, Line, MeasuredText, PlanText, PlannedText, SCHEMA, to_edge, to_xyz_mm,
+    Entry, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText, SCHEMA, to_edge, to_xyz_mm,
 };
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
 use crate::session::sha256;
+use crate::session::state::Session;
+use crate::session::summary::IdentificationSummary;
 use crate::store::session::{SessionFolder, read_journal};
 use crate::units::to_mm;
 
@@ -145,6 +148,44 @@ pub(super) fn identification(
     request: &IdentifyRequest,
     identified: &Identified,
 ) -> Result<(), Failure> {
+    let lines = identification_lines(path, source, request, identified);
+    recording::write(path, &lines, false).map_err(|error| failure(&error))
+}
+
+/// What an identification from tables would be as a session: for its report.
+pub(super) fn identification_session(
+    folder: &Path,
+    source: &str,
+    request: &IdentifyRequest,
+    identified: &Identified,
+) -> Result<Session, Failure> {
+    session(identification_lines(folder, source, request, identified))
+}
+
+/// What an identification without coordinates would be as a session: for its report.
+pub(super) fn bare_session(
+    folder: &Path,
+    source: &str,
+    profile_text: &str,
+    summary: &IdentificationSummary,
+    calibration: Option<&Calibration>,
+) -> Result<Session, Failure> {
+    let mut lines = Lines::new(folder, source, profile_text);
+    lines.push(Entry::Identified(Box::new(IdentifiedText {
+        samples: Vec::new(),
+        summary: summary.clone(),
+        calibration: calibration.cloned(),
+        points: Vec::new(),
+    })));
+    session(lines.lines)
+}
+
+fn session(lines: Vec<Line>) -> Result<Session, Failure> {
+    let journal = Journal { lines, ..Journal::default() };
+    Session::of(&journal).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))
+}
+
+fn identification_lines(path: &Path, source: &str, request: &IdentifyRequest, identified: &Identified) -> Vec<Line> {
     let types = joint_types(&request.profile);
     let mut lines = Lines::new(path, source, &request.profile_text);
     let named = |kind: PoseKind, samples: &[NamedSample]| -> Vec<(PoseKind, NamedSample)> {
@@ -177,7 +218,7 @@ pub(super) fn identification(
         calibration: identified.calibration.clone(),
         points: point_errors(identified, judged, tested),
     })));
-    recording::write(path, &lines.lines, false).map_err(|error| failure(&error))
+    lines.lines
 }
 
 fn measured(row: usize, kind: PoseKind, named: &NamedSample, types: &[JointType]) -> MeasuredText {

@@ -1,4 +1,4 @@
-//! `trupose session list | show | export`: sessions on disk, without holding them.
+//! `trupose session list | show | export | report`: sessions on disk, without holding them.
 
 use std::io::Write;
 use std::path::Path;
@@ -7,6 +7,7 @@ use super::script::session_failure;
 use super::{Console, to_json};
 use crate::cli::SessionCommand;
 use crate::error::{ExitStatus, Failure};
+use crate::procedure::deliver;
 use crate::session::export;
 use crate::session::journal::{Journal, instrument_text, target_text};
 use crate::session::plan::PoseKind;
@@ -22,6 +23,7 @@ pub(super) fn run<O: Write, E: Write>(
     match command {
         SessionCommand::List { sessions } => list(sessions, console),
         SessionCommand::Show { folder, journal, json } => show(folder, *journal, *json, console),
+        SessionCommand::Report { folder, out } => report(folder, out.as_deref(), console),
         SessionCommand::Export { folder, csv, out } => export_tables(folder, *csv, out.as_deref(), console),
     }
 }
@@ -149,6 +151,33 @@ fn show<O: Write, E: Write>(
         );
     }
     console.print(&(lines.join("\n") + "\n"))?;
+    Ok(ExitStatus::Accepted)
+}
+
+/// Writes the report of a session anew from its journal. Sessions of earlier versions get one so.
+fn report<O: Write, E: Write>(
+    folder: &Path,
+    out: Option<&Path>,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let (_, session) = load(folder)?;
+    let internal = |message: String| Failure::new(ExitStatus::Internal, message);
+    let files = deliver::data_files(&session).map_err(internal)?;
+    let failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
+    for (name, text) in deliver::reports(&session, &files).map_err(internal)? {
+        let place = folder.join(&name);
+        let file = match (out, place.extension()) {
+            (Some(out), Some(extension)) => out.with_extension(extension),
+            _ => place,
+        };
+        store::replace(&file, &text).map_err(failure)?;
+        console.print(&format!("written: {}\n", file.display()))?;
+    }
+    if session.identified.is_none() {
+        console.remark("nothing has been identified in this session yet; the report says so");
+    } else if !session.is_current() {
+        console.remark("samples have changed since the identification; the report says so");
+    }
     Ok(ExitStatus::Accepted)
 }
 

@@ -1,5 +1,6 @@
 //! The reports of `identify`, `constraints` and `verify` on a terminal.
 
+use super::document::Found;
 use super::tables::{decimals_for, fixed, paragraph, push_line};
 use crate::session::summary::{
     EstimatorName, IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, SigmaOrigin,
@@ -144,19 +145,13 @@ fn row(text: &mut String, name: &str, nominal: f64, identified: f64) {
 }
 
 /// The gap in the singular values. Beyond a million the rest is rounding noise, and its size means nothing.
-fn gap(ratio: f64) -> String {
+pub(super) fn gap(ratio: f64) -> String {
     if ratio > 1e6 { "gap over 1e6".to_owned() } else { format!("gap {ratio:.0e}") }
 }
 
 fn fit_lines(summary: &IdentificationSummary) -> String {
     let sigma = &summary.sigma;
-    let source = match sigma.source {
-        SigmaOrigin::Readings => "given with the readings",
-        SigmaOrigin::Option => "given on the command line",
-        SigmaOrigin::Instrument => "of the profile's instrument",
-        SigmaOrigin::Residuals => "estimated from the residuals",
-        SigmaOrigin::Assumed => "assumed, for want of data to estimate it",
-    };
+    let source = sigma_origin(sigma.source);
     let mut text = paragraph(
         "",
         &format!(
@@ -197,7 +192,19 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
     text
 }
 
-fn termination(reason: Termination) -> &'static str {
+/// Where the measurement σ comes from.
+pub(super) const fn sigma_origin(origin: SigmaOrigin) -> &'static str {
+    match origin {
+        SigmaOrigin::Readings => "given with the readings",
+        SigmaOrigin::Option => "given on the command line",
+        SigmaOrigin::Instrument => "of the profile's instrument",
+        SigmaOrigin::Residuals => "estimated from the residuals",
+        SigmaOrigin::Assumed => "assumed, for want of data to estimate it",
+    }
+}
+
+/// Why the solver stopped.
+pub(super) const fn termination(reason: Termination) -> &'static str {
     match reason {
         Termination::Converged => "converged",
         Termination::IterationLimit => "iteration limit",
@@ -217,13 +224,7 @@ fn parameter_table(parameters: &[ParameterSummary]) -> String {
     );
     for parameter in parameters {
         let decimals = parameter.sigma.map_or(4, decimals_for);
-        let found = if !parameter.identifiable {
-            "only combined"
-        } else if parameter.sigma.is_none_or(|sigma| sigma > WEAK * parameter.expected) {
-            "weakly"
-        } else {
-            "yes"
-        };
+        let found = found(parameter).words();
         push_line(
             &mut text,
             &format!(
@@ -239,6 +240,17 @@ fn parameter_table(parameters: &[ParameterSummary]) -> String {
     }
     text.push('\n');
     text
+}
+
+/// How well a parameter was found.
+pub(super) fn found(parameter: &ParameterSummary) -> Found {
+    if !parameter.identifiable {
+        Found::OnlyCombined
+    } else if parameter.sigma.is_none_or(|sigma| sigma > WEAK * parameter.expected) {
+        Found::Weakly
+    } else {
+        Found::Yes
+    }
 }
 
 fn blind_lines(summary: &IdentificationSummary) -> String {
@@ -283,6 +295,12 @@ fn rejected_lines(summary: &IdentificationSummary) -> String {
     text
 }
 
+/// Whether more of the error follows a joint than chance explains.
+pub(super) fn is_worth_naming(joint: &JointSummary) -> bool {
+    let count: usize = joint.bins.iter().map(|bin| bin.count).sum();
+    joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64)
+}
+
 /// Mean error over each joint's range, so that a pattern is seen, and the joints that the errors follow.
 fn joint_lines(joints: &[JointSummary]) -> String {
     let mut text = String::new();
@@ -305,12 +323,7 @@ fn joint_lines(joints: &[JointSummary]) -> String {
                 }
             })
             .collect();
-        let count: usize = joint.bins.iter().map(|bin| bin.count).sum();
-        let share = if joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64) {
-            format!("{:.0} %", 100.0 * joint.explained)
-        } else {
-            "-".to_owned()
-        };
+        let share = if is_worth_naming(joint) { format!("{:.0} %", 100.0 * joint.explained) } else { "-".to_owned() };
         push_line(&mut text, &format!("  {:<6}{range:<18}{bins}{share:>7}", joint.joint));
     }
     text.push('\n');

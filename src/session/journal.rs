@@ -22,7 +22,7 @@ use jiff::Timestamp;
 use sha2::{Digest as _, Sha256};
 use thiserror::Error;
 
-pub use describe::{instrument_text, target_text};
+pub use describe::{correction_text, instrument_text, target_text};
 pub use entry::{
     CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, MeasuredText, PairText, PlanText,
     PlannedText, PointErrorText, from_edge, from_xyz_mm, to_edge, to_length_mm, to_xyz_mm,

@@ -14,7 +14,7 @@ use super::journal::{
     PlannedText, from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
-use super::set_up::{InstrumentChoice, Step, TargetChoice};
+use super::set_up::{About, InstrumentChoice, Step, TargetChoice};
 use crate::kinematics::JointType;
 use crate::profile::Profile;
 use crate::units::from_mm;
@@ -61,8 +61,12 @@ pub struct Session {
     pub measurements: u64,
     /// From which measurement on noted coordinates have to be multiplied by what.
     pub scales: Vec<(u64, f64)>,
+    /// What was set right, oldest first.
+    pub corrections: Vec<Correction>,
     /// Remarks.
     pub notes: Vec<Note>,
+    /// Serial number, operator and place.
+    pub about: About,
     /// Where the wizard is.
     pub step: Step,
     /// The last result.
@@ -248,6 +252,7 @@ impl Session {
             }
             Entry::Correction(correction) => {
                 self.correct(correction).ok_or_else(|| misfit("a correction of an unknown sample"))?;
+                self.corrections.push(correction.clone());
             }
             Entry::Row(row) => {
                 self.rows.get(*row).ok_or_else(|| misfit("a row that is in no plan"))?;
@@ -259,6 +264,11 @@ impl Session {
             }
             Entry::Note { pose, text } => {
                 self.notes.push(Note { time: line.time, pose: pose.clone(), text: text.clone() });
+            }
+            Entry::About(about) => {
+                self.about = about.clone();
+                // The report on disk says something else.
+                self.delivered.clear();
             }
             Entry::Identified(result) => {
                 self.identified = Some(result.clone());

@@ -149,6 +149,7 @@ const BINDINGS: [Binding; 41] = [
     offer('e', 7, |intent| matches!(intent, Intent::SuggestPoses(_))),
     offer('i', 3, |intent| matches!(intent, Intent::Identify)),
     offer('d', 3, |intent| matches!(intent, Intent::Deliver)),
+    offer('a', 5, |intent| matches!(intent, Intent::About(_))),
     bind(Key::plain_code(KeyCode::F(1)), 9, Does::Local(Local::Help, "help")),
     bind(Key::ctrl('z'), 9, Does::Local(Local::Suspend, "to the shell, back with 'fg'")),
     bind(Key::ctrl('l'), 9, Does::Local(Local::Redraw, "draw the screen anew")),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::session::set_up::{InstrumentChoice, TargetChoice};
+use crate::session::set_up::{About, InstrumentChoice, TargetChoice};
 
 /// Something the operator wants done.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +71,8 @@ pub enum Intent {
 
     /// Identify the arm from what is measured.
     Identify,
+    /// Say serial number, operator and place for the report.
+    About(About),
     /// Write the result files.
     Deliver,
 }
@@ -109,6 +111,7 @@ impl Intent {
             Self::Note(_) => "Note",
             Self::SuggestPoses(_) => "SuggestPoses",
             Self::Identify => "Identify",
+            Self::About(_) => "About",
             Self::Deliver => "Deliver",
         }
     }

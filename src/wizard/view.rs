@@ -12,7 +12,7 @@ use crate::procedure::plan;
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
-use crate::session::set_up::Step;
+use crate::session::set_up::{About, Step};
 use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummary, Warning};
 use crate::units::to_mm;
 
@@ -505,6 +505,8 @@ pub struct DeliverView {
     pub verdict: Option<Box<Verdict>>,
     /// Whether the result rests on exactly the samples that count now.
     pub is_current: bool,
+    /// Serial number, operator and place, as the report will have them.
+    pub about: About,
 }
 
 /// The view of a wizard.

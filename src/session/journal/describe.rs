@@ -2,7 +2,7 @@
 
 use super::entry::{Correction, Decision, Entry, MeasuredText, PlanText};
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{InstrumentChoice, TargetChoice};
+use crate::session::set_up::{About, InstrumentChoice, TargetChoice};
 use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictStatus};
 use crate::session::wire::LinkChoice;
 
@@ -41,6 +41,7 @@ impl Entry {
             Self::Skipped { row, skipped: false } => format!("row {} of the plan is to be measured after all", row + 1),
             Self::Note { pose: Some(pose), text } => format!("note to pose {pose}: {text}"),
             Self::Note { pose: None, text } => format!("note: {text}"),
+            Self::About(about) => format!("for the report: {}", about_text(about)),
             Self::Identified(result) => result_text(&result.summary, result.calibration.is_some()),
             Self::Delivered { files } => format!("written: {}", files.join(", ")),
             Self::Resumed { program, torn_bytes: 0 } => format!("resumed by {program}"),
@@ -84,7 +85,8 @@ fn plan_text(plan: &PlanText) -> String {
     )
 }
 
-fn correction_text(correction: &Correction) -> String {
+/// What was set right, in one line.
+pub fn correction_text(correction: &Correction) -> String {
     match correction {
         Correction::Scale { since, factor } => {
             format!("corrected: coordinates from measurement {since} on times {factor}")
@@ -127,6 +129,13 @@ fn result_text(summary: &IdentificationSummary, is_usable: bool) -> String {
         VerdictStatus::NotEvaluated => "not evaluated",
     };
     format!("{text}{verified}; {verdict}")
+}
+
+fn about_text(about: &About) -> String {
+    let said = |name: &str, text: &str| (!text.is_empty()).then(|| format!("{name} {text}"));
+    let texts = [said("serial number", &about.serial), said("operator", &about.operator), said("at", &about.site)];
+    let texts: Vec<String> = texts.into_iter().flatten().collect();
+    if texts.is_empty() { "nothing given".to_owned() } else { texts.join(", ") }
 }
 
 /// An instrument in one line.

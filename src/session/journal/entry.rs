@@ -7,7 +7,7 @@ use crate::kinematics::JointType;
 use crate::session::calibration::Calibration;
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::SearchStepSummary;
-use crate::session::set_up::{InstrumentChoice, Step, TargetChoice};
+use crate::session::set_up::{About, InstrumentChoice, Step, TargetChoice};
 use crate::session::summary::IdentificationSummary;
 use crate::units::{from_mm, to_mm};
 
@@ -84,6 +84,8 @@ pub enum Entry {
         /// What he wrote.
         text: String,
     },
+    /// Serial number, operator and place, for the report.
+    About(About),
     /// A result.
     Identified(Box<IdentifiedText>),
     /// Files were written.

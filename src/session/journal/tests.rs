@@ -12,7 +12,7 @@ use crate::profile::{Profile, builtin};
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::SearchStepSummary;
-use crate::session::set_up::{CoordinateUnit, InstrumentChoice, RecordedSet, Step, TargetChoice};
+use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, Step, TargetChoice};
 use crate::session::simulation::{Fault, SimulatedWire, Simulation, Truth};
 use crate::session::summary::VerificationMode;
 use crate::session::wire::WireProtocol;
@@ -242,6 +242,7 @@ fn all_entries() -> Vec<Entry> {
         Entry::Closed { reason: TRICKY.to_owned() },
     ];
     entries.extend(Step::ALL.map(Entry::Step));
+    entries.push(Entry::About(About { serial: TRICKY.to_owned(), ..About::default() }));
     entries.extend(instruments.map(Entry::Instrument));
     entries.extend(targets.map(Entry::Target));
     entries.extend(corrections.map(Entry::Correction));
@@ -273,6 +274,7 @@ fn variant(entry: &Entry) -> usize {
         Entry::Resumed { .. } => 17,
         Entry::Closed { .. } => 18,
         Entry::Row(_) => 19,
+        Entry::About(_) => 20,
     }
 }
 
@@ -280,7 +282,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 20);
+    assert_eq!(variants.len(), 21);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

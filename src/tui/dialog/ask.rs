@@ -1,9 +1,10 @@
-//! The questions that screens ask: coordinates, a known target, a simulated cell, recorded measurements.
+//! The forms that screens ask with: coordinates, a known target, a simulated cell, recorded measurements, what the
+//! report is about.
 
 use super::{Dialog, Form};
 use crate::session::filter::Filter;
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
+use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::wire::{LinkChoice, WireAddress};
 use crate::tui::form::{Check, TextField};
@@ -202,6 +203,30 @@ fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
+/// What only people know.
+pub fn about(about: &About) -> Dialog {
+    Dialog::Form(
+        Form::new("For the report: what only you know. All of it may stay empty.", said)
+            .text(
+                "serial number",
+                &about.serial,
+                "Of the arm, from its type plate: the result belongs to this one arm.",
+            )
+            .text("operator", &about.operator, "Who measured.")
+            .text("place and conditions", &about.site, "Hall, cell, warm-up, payload: what a later reader must know."),
+    )
+}
+
+fn said(values: &[String]) -> Result<Intent, String> {
+    let [serial, operator, site] = values else { return Err("three texts are needed".to_owned()) };
+    let about = About { serial: serial.clone(), operator: operator.clone(), site: site.clone() };
+    if about.is_usable() {
+        Ok(Intent::About(about))
+    } else {
+        Err(format!("each text may have up to {} characters", About::LONGEST))
+    }
+}
+
 /// A number; a decimal comma is a point.
 fn number(name: &str, text: &str) -> Result<f64, String> {
     let value = text.replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite());
@@ -251,6 +276,16 @@ mod tests {
         assert_eq!((cell.seed, cell.truth, cell.noise_mm, cell.faults.len()), (7, Truth::Paper, None, 2));
         assert!(simulation(&values(&["7", "paper", "", "earthquake@3"])).is_err());
         assert!(simulation(&values(&["x", "paper", "", ""])).is_err());
+    }
+
+    #[test]
+    fn what_the_report_is_about_may_be_empty_but_not_endless() {
+        let given = About { serial: "R-17".to_owned(), ..About::default() };
+        assert_eq!(said(&values(&["R-17", "", ""])), Ok(Intent::About(given)));
+        assert_eq!(
+            said(&values(&["", "", &"x".repeat(201)])),
+            Err("each text may have up to 200 characters".to_owned())
+        );
     }
 
     #[test]

@@ -45,6 +45,7 @@ fn about(file: &str) -> &'static str {
         "report.json" => "all numbers of this session, for other programs",
         "report.html" => "all numbers of this session, to read and print",
         "corrected.urdf" => "the identified arm for robot software",
+        "drift.csv" => "the pose that was measured again and again",
         "recording.rrd" => "the session as a 3D recording",
         _ => "",
     }
@@ -69,12 +70,23 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         if file.starts_with('/') { file.to_owned() } else { format!("{}/{file}", folder.trim_end_matches('/')) }
     };
     if content.files.is_empty() {
+        let of = &content.about;
+        let said = |text: &str| if text.is_empty() { "-".to_owned() } else { crate::session::printable(text) };
+        page.paragraph(
+            &format!(
+                "Report for: serial number {}, operator {}, place {}",
+                said(&of.serial),
+                said(&of.operator),
+                said(&of.site)
+            ),
+            Role::Plain,
+        );
         let is_writing = cx.view.busy.is_some();
         let nothing = "Nothing is written yet. Enter writes the results into:";
         page.title(if is_writing { "The results are being written into:" } else { nothing });
         page.paragraph(folder, Role::Plain);
         page.gap();
-        page.paragraph("calibration.ron is the identified arm; report.json has all numbers; plan.csv and measurements.csv are the data.", Role::Plain);
+        page.paragraph("calibration.ron is the identified arm; report.html is to read and print, report.json has the same numbers; plan.csv and measurements.csv are the data.", Role::Plain);
     } else {
         page.title("Written");
         for file in &content.files {

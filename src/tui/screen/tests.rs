@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::profile::{Profile, builtin};
-use crate::session::set_up::{CoordinateUnit, InstrumentChoice, TargetChoice};
+use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, TargetChoice};
 use crate::session::state::Session;
 use crate::session::summary::Verdict;
 use crate::session::summary::{
@@ -332,6 +332,7 @@ fn deliver(files: &[&str]) -> ViewModel {
         files: files.iter().map(|file| (*file).to_owned()).collect(),
         verdict: Some(Box::new(verdict(VerdictStatus::Accepted))),
         is_current: true,
+        about: About { serial: "R-17".to_owned(), ..About::default() },
     });
     let deliver = IntentInfo::new(Intent::Deliver, "write the files");
     view(Step::Deliver, content, vec![if files.is_empty() { deliver.default_action() } else { deliver }])

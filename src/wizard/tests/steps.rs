@@ -260,11 +260,11 @@ fn identify_verify_and_deliver_end_in_files() {
     assert!(mean(&verification.identified) < 0.2 * mean(&verification.nominal));
     assert_eq!(offers(&bench.wizard), ["Next*", "Back", "Quit"]);
     bench.does(Intent::Next);
-    assert_eq!(offers(&bench.wizard), ["Deliver*", "Back", "Quit"]);
+    assert_eq!(offers(&bench.wizard), ["Deliver*", "About", "Back", "Quit"]);
     let effects = bench.intend(Intent::Deliver);
     assert_eq!(texts(&effects), ["start writing files"]);
     bench.settle(effects);
-    let files = ["plan.csv", "measurements.csv", "drift.csv", "calibration.ron", "report.json"];
+    let files = ["plan.csv", "measurements.csv", "drift.csv", "calibration.ron", "report.json", "report.html"];
     assert_eq!(bench.wizard.session().delivered, files);
     let Content::Deliver(view) = bench.wizard.view().content else { panic!() };
     assert_eq!(view.files, files);
@@ -280,7 +280,7 @@ fn files_that_cannot_be_written_can_be_written_again() {
     assert_eq!(bench.told(), "disk full");
     assert!(offers(&bench.wizard).contains(&text("Deliver*")));
     bench.does(Intent::Deliver);
-    assert_eq!(bench.wizard.session().delivered.len(), 5);
+    assert_eq!(bench.wizard.session().delivered.len(), 6);
 }
 
 #[test]

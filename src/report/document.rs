@@ -1,0 +1,320 @@
+//! Everything a report says, as plain data in mm and degree. `report.json` is this object; `report.html` shows it and nothing else,
+//! so the two cannot disagree.
+//!
+//! Field names are part of the interface of scripts: units are in the names, nothing is renamed or removed within a schema
+//! version. `docs/report-schema.md` describes them.
+
+mod build;
+mod decisions;
+
+use serde::Serialize;
+
+use crate::session::plan_summary::SearchStepSummary;
+use crate::session::set_up::About;
+use crate::session::summary::IdentificationSummary;
+
+/// Version of the layout of [`Details`].
+const SCHEMA: u32 = 1;
+
+/// A report.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Document {
+    /// The result, its fields at the top of the object; none before anything was identified.
+    #[serde(flatten)]
+    pub result: Option<IdentificationSummary>,
+    /// What else there is to say.
+    pub report: Details,
+}
+
+/// Whether a result can be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ResultState {
+    /// Nothing was identified.
+    None,
+    /// Samples have changed since.
+    OutOfDate,
+    /// There is no usable solution.
+    Unusable,
+    /// It rests on exactly the samples that count.
+    Current,
+}
+
+/// Where points come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PointOrigin {
+    /// Typed in at the cell.
+    Typed,
+    /// The simulated cell: nothing was measured.
+    Simulated,
+    /// Recorded on another day and played.
+    Recorded,
+    /// Read from tables, or not known.
+    Tables,
+}
+
+/// What a report says besides the result.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Details {
+    /// Version of this layout.
+    pub schema: u32,
+    /// Whether the result can be used.
+    pub state: ResultState,
+    /// Where the points come from.
+    pub points_from: PointOrigin,
+    /// The session.
+    pub session: SessionPart,
+    /// Serial number, operator and place; empty: not given.
+    pub about: About,
+    /// The robot; none before one was chosen.
+    pub robot: Option<RobotPart>,
+    /// What measured, in words.
+    pub instrument: Option<String>,
+    /// Where the SMR sits, in words.
+    pub target: Option<String>,
+    /// Temperature over the samples that count.
+    pub temperature: Option<TemperaturePart>,
+    /// How many samples, and of what kind.
+    pub counts: Counts,
+    /// What is known of each parameter in words, in the order of `parameters`.
+    pub parameter_notes: Vec<ParameterNote>,
+    /// Every sample of the result against both models.
+    pub points: Vec<PointPart>,
+    /// Links of the nominal arm at the pose that the views show, base to SMR, in the base (mm).
+    pub arm_mm: Vec<[f64; 3]>,
+    /// The plan; none before one was accepted.
+    pub plan: Option<PlanPart>,
+    /// Predicted error against the number of identification samples, as measured.
+    pub prediction: Vec<PredictionPart>,
+    /// The pose that was measured again and again.
+    pub drift: Vec<DriftPart>,
+    /// Samples that do not count, with the reason.
+    pub not_counted: Vec<NotCounted>,
+    /// Measurements that gave no sample.
+    pub refused: Vec<RefusedPart>,
+    /// What the checks found, and how it was decided.
+    pub findings: Vec<FindingPart>,
+    /// What was set right, in words, oldest first.
+    pub corrections: Vec<String>,
+    /// Remarks of the operator.
+    pub notes: Vec<NotePart>,
+    /// Files beside the report.
+    pub files: Vec<FilePart>,
+}
+
+/// The session; all but the program empty or zero for a result from tables.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct SessionPart {
+    /// Its name.
+    pub name: String,
+    /// Program and version that opened it.
+    pub program: String,
+    /// When it was opened (RFC 3339, UTC).
+    pub opened: Option<String>,
+    /// Time of the first sample that counts.
+    pub first_sample: Option<String>,
+    /// Time of the last one.
+    pub last_sample: Option<String>,
+    /// Time of work, breaks not counted.
+    pub worked_min: f64,
+    /// How often it was opened again.
+    pub resumed: usize,
+    /// Entries of the journal that this report stands on.
+    pub journal_entries: u64,
+}
+
+/// The robot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RobotPart {
+    /// Its title.
+    pub title: String,
+    /// Name of the profile.
+    pub profile: String,
+    /// Where the nominal numbers come from.
+    pub source: String,
+    /// SHA-256 of the profile's text.
+    pub profile_sha256: String,
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// Unit of each joint: `deg` or `mm`.
+    pub joint_units: Vec<&'static str>,
+    /// The instrument that the profile names, with the standard deviation that it states.
+    pub instrument: Option<String>,
+}
+
+/// Temperatures.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TemperaturePart {
+    /// Lowest.
+    pub lowest_degc: f64,
+    /// Highest.
+    pub highest_degc: f64,
+    /// Samples that have one.
+    pub samples: usize,
+}
+
+/// How many samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// That count for identification.
+    pub identification: usize,
+    /// That count for verification.
+    pub verification: usize,
+    /// Repetitions of the drift pose.
+    pub drift: usize,
+    /// Samples of identification and verification that count, taken at a pose where another one counts.
+    pub repeats: usize,
+    /// Fewest shots that were averaged for a sample.
+    pub fewest_shots: u32,
+    /// Most of them.
+    pub most_shots: u32,
+    /// Poses of the plan that were not measured.
+    pub open: usize,
+    /// Poses that were skipped.
+    pub skipped: usize,
+}
+
+/// How well a parameter was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Found {
+    /// Well.
+    Yes,
+    /// The data say less than half of what is expected anyway.
+    Weakly,
+    /// Only a combination with others.
+    OnlyCombined,
+}
+
+/// A parameter in words.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ParameterNote {
+    /// Its name.
+    pub name: String,
+    /// What it is.
+    pub meaning: String,
+    /// How well it was found.
+    pub found: Found,
+}
+
+/// A sample against the models, in the robot base of each model's own registration.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PointPart {
+    /// Number of the measurement.
+    pub number: u64,
+    /// Name of the pose.
+    pub pose: String,
+    /// Whether the identification did not see it. Only then its errors are an accuracy; else they are residuals of the fit.
+    pub verification: bool,
+    /// The identification left it out as an outlier.
+    pub rejected: bool,
+    /// Pendant joint values, in the joints' units.
+    pub joints: Vec<f64>,
+    /// Where the identified arm has the SMR.
+    pub at_mm: [f64; 3],
+    /// Measured − predicted by the nominal arm.
+    pub nominal_mm: [f64; 3],
+    /// Measured − predicted by the identified arm.
+    pub identified_mm: [f64; 3],
+}
+
+/// The plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlanPart {
+    /// Where it comes from, in words.
+    pub origin: String,
+    /// Condition number of its identification poses.
+    pub condition_number: Option<f64>,
+    /// Predicted RMS position error, per σ.
+    pub predicted_error_sigma: Option<f64>,
+    /// Time that it takes.
+    pub minutes: Option<f64>,
+    /// How the search went on, sweep by sweep.
+    pub search: Vec<SearchStepSummary>,
+}
+
+/// What so many samples promise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PredictionPart {
+    /// Number of identification samples that were there.
+    pub samples: usize,
+    /// Predicted RMS position error at fresh poses, per σ of the instrument.
+    pub predicted_error_sigma: f64,
+}
+
+/// A repetition of an earlier pose.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DriftPart {
+    /// Number of the measurement.
+    pub number: u64,
+    /// Name of the pose.
+    pub pose: String,
+    /// Number of the measurement that it is compared with.
+    pub since: u64,
+    /// Time since that one.
+    pub minutes: f64,
+    /// How far the point moved in the tracker frame.
+    pub moved_mm: [f64; 3],
+}
+
+/// A sample that does not count.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct NotCounted {
+    /// Number of the measurement.
+    pub number: u64,
+    /// Name of the pose.
+    pub pose: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// A measurement that gave no sample.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct RefusedPart {
+    /// Number of the measurement.
+    pub number: u64,
+    /// Name of the pose.
+    pub pose: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// What a check found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FindingPart {
+    /// Number of the measurement that raised it.
+    pub raised_at: u64,
+    /// Number of the measurement it is about.
+    pub about: u64,
+    /// Name of the pose of that one.
+    pub pose: String,
+    /// Short name of the cause.
+    pub cause: String,
+    /// How many standard deviations off.
+    pub ratio: f64,
+    /// In words.
+    pub message: String,
+    /// What became of the sample.
+    pub decision: String,
+}
+
+/// A remark.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct NotePart {
+    /// When (RFC 3339, UTC).
+    pub time: String,
+    /// Name of the pose it is about.
+    pub pose: Option<String>,
+    /// What it says.
+    pub text: String,
+}
+
+/// A file beside the report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FilePart {
+    /// Its name.
+    pub name: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+}

@@ -1,0 +1,282 @@
+//! The report of a session.
+
+use nalgebra::Point3;
+
+use super::decisions::{findings, not_counted};
+use super::{
+    Counts, Details, Document, DriftPart, FilePart, Found, NotePart, ParameterNote, PlanPart, PointOrigin, PointPart,
+    PredictionPart, RefusedPart, ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
+};
+use crate::kinematics::ForwardKinematics;
+use crate::profile::Profile;
+use crate::report::text::found;
+use crate::session::journal::{correction_text, instrument_text, target_text};
+use crate::session::plan::PoseKind;
+use crate::session::set_up::{InstrumentChoice, TargetChoice};
+use crate::session::sha256;
+use crate::session::state::{Robot, Sample, Session};
+use crate::session::summary::ParameterSummary;
+use crate::units::to_mm;
+
+/// Points of the drawn arm closer than this (mm) are one.
+const SAME_POINT: f64 = 0.001;
+
+impl Document {
+    /// The report of a session as it stands, with the hashes of the `files` (name and text) that lie beside it.
+    pub fn new(session: &Session, files: &[(String, String)]) -> Self {
+        let result = session.identified.as_deref().map(|result| result.summary.clone());
+        let parameters = result.as_ref().map_or(&[][..], |result| &result.parameters);
+        let report = Details {
+            schema: SCHEMA,
+            state: state(session),
+            points_from: match &session.instrument {
+                None => PointOrigin::Tables,
+                Some(InstrumentChoice::Manual { .. }) => PointOrigin::Typed,
+                Some(InstrumentChoice::Simulated(_)) => PointOrigin::Simulated,
+                Some(InstrumentChoice::Replay { .. }) => PointOrigin::Recorded,
+            },
+            session: session_part(session),
+            about: session.about.clone(),
+            robot: session.robot.as_ref().map(robot_part),
+            instrument: session.instrument.as_ref().map(instrument_text),
+            target: target(session),
+            temperature: temperature(session),
+            counts: counts(session),
+            parameter_notes: parameters.iter().map(|parameter| note(parameter, session)).collect(),
+            points: points(session),
+            arm_mm: arm(session),
+            plan: session.plan.as_ref().map(|plan| PlanPart {
+                origin: plan.origin.clone(),
+                condition_number: plan.condition_number,
+                predicted_error_sigma: plan.predicted_error_sigma,
+                minutes: plan.minutes,
+                search: plan.search.clone(),
+            }),
+            prediction: prediction(session),
+            drift: drift(session),
+            not_counted: not_counted(session),
+            refused: session
+                .refused
+                .iter()
+                .map(|refused| RefusedPart {
+                    number: refused.number,
+                    pose: refused.pose.clone(),
+                    reason: refused.reason.clone(),
+                })
+                .collect(),
+            findings: findings(session),
+            corrections: session.corrections.iter().map(correction_text).collect(),
+            notes: session
+                .notes
+                .iter()
+                .map(|note| NotePart { time: note.time.to_string(), pose: note.pose.clone(), text: note.text.clone() })
+                .collect(),
+            files: files
+                .iter()
+                .map(|(name, text)| FilePart { name: name.clone(), sha256: sha256(text.as_bytes()) })
+                .collect(),
+        };
+        Self { result, report }
+    }
+}
+
+impl Document {
+    /// The report of an identification from tables, which `session` stands for: there was no session, and no time of measuring.
+    pub fn of_tables(session: &Session, files: &[(String, String)]) -> Self {
+        let mut document = Self::new(session, files);
+        let program = std::mem::take(&mut document.report.session.program);
+        document.report.session = SessionPart { program, ..SessionPart::default() };
+        // Tables do not say how many readings are behind a row.
+        (document.report.counts.fewest_shots, document.report.counts.most_shots) = (0, 0);
+        document
+    }
+}
+
+fn state(session: &Session) -> ResultState {
+    match &session.identified {
+        None => ResultState::None,
+        Some(_) if !session.is_current() => ResultState::OutOfDate,
+        Some(result) if result.calibration.is_none() => ResultState::Unusable,
+        Some(_) => ResultState::Current,
+    }
+}
+
+fn session_part(session: &Session) -> SessionPart {
+    let times = || session.counted().map(|sample| sample.time);
+    SessionPart {
+        name: session.name.clone(),
+        program: session.program.clone(),
+        opened: session.opened.map(|time| time.to_string()),
+        first_sample: times().min().map(|time| time.to_string()),
+        last_sample: times().max().map(|time| time.to_string()),
+        worked_min: session.worked / 60.0,
+        resumed: session.resumed,
+        journal_entries: session.lines,
+    }
+}
+
+fn robot_part(robot: &Robot) -> RobotPart {
+    let profile = &robot.profile;
+    let joints = profile.chain().joints();
+    RobotPart {
+        title: profile.title().to_owned(),
+        profile: profile.name().to_owned(),
+        source: profile.source().to_owned(),
+        profile_sha256: robot.sha256.clone(),
+        joints: joints.iter().map(|joint| joint.name.clone()).collect(),
+        joint_units: joints.iter().map(|joint| joint.joint_type.quantity().unit()).collect(),
+        instrument: profile
+            .instrument()
+            .map(|instrument| format!("{}, {} per coordinate", instrument.name, instrument.sigma_text())),
+    }
+}
+
+/// Where the SMR sits; the profile's place with its coordinates.
+fn target(session: &Session) -> Option<String> {
+    let first = session.robot.as_ref()?.profile.targets().first()?;
+    Some(match &session.target {
+        Some(choice) if *choice != TargetChoice::Profile => target_text(choice),
+        _ => {
+            let [x, y, z] = first.position_in_flange.coords.map(to_mm).into();
+            let known =
+                if first.is_free() { format!(", to {} mm", to_mm(first.uncertainty)) } else { ", exact".to_owned() };
+            format!("as the profile says: {} at ({x:.3}, {y:.3}, {z:.3}) mm in the flange{known}", first.name)
+        }
+    })
+}
+
+fn temperature(session: &Session) -> Option<TemperaturePart> {
+    let measured = session.counted().filter_map(|sample| sample.noted.temperature_degc);
+    let measured: Vec<f64> = measured.filter(|value| value.is_finite()).collect();
+    let lowest_degc = measured.iter().copied().reduce(f64::min)?;
+    let highest_degc = measured.iter().copied().reduce(f64::max)?;
+    Some(TemperaturePart { lowest_degc, highest_degc, samples: measured.len() })
+}
+
+fn counts(session: &Session) -> Counts {
+    let count = |kind| session.counted_of(kind).count();
+    let judged: Vec<&Sample> = [PoseKind::Identification, PoseKind::Verification]
+        .into_iter()
+        .flat_map(|kind| session.counted_of(kind))
+        .collect();
+    let is_repeat = |(index, sample): (usize, &&Sample)| {
+        judged
+            .iter()
+            .take(index)
+            .any(|other| other.joints == sample.joints && other.noted.target == sample.noted.target)
+    };
+    let shots = || judged.iter().map(|sample| sample.noted.shots);
+    Counts {
+        identification: count(PoseKind::Identification),
+        verification: count(PoseKind::Verification),
+        drift: count(PoseKind::Drift),
+        repeats: judged.iter().enumerate().filter(|one| is_repeat(*one)).count(),
+        fewest_shots: shots().min().unwrap_or(0),
+        most_shots: shots().max().unwrap_or(0),
+        open: session.open_rows().count(),
+        skipped: session.rows.iter().filter(|row| row.active && row.skipped).count(),
+    }
+}
+
+fn note(parameter: &ParameterSummary, session: &Session) -> ParameterNote {
+    let profile = session.robot.as_ref().map(|robot| &robot.profile);
+    ParameterNote { name: parameter.name.clone(), meaning: meaning(&parameter.name, profile), found: found(parameter) }
+}
+
+/// What a parameter is, from its name: `alpha3` is the twist of link 3.
+fn meaning(name: &str, profile: Option<&Profile>) -> String {
+    let (target, axis) = name.strip_prefix("target").and_then(|rest| rest.split_once('.')).unwrap_or_default();
+    if !target.is_empty() {
+        return format!("SMR {target} on the flange, {axis}");
+    }
+    let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let number = name.strip_prefix(letters).unwrap_or_default();
+    let what = match letters {
+        "alpha" => "twist about x",
+        "a" => "length along x",
+        "d" => "offset along z",
+        "theta" => "angle about z",
+        "beta" => "turn about y",
+        _ => return String::new(),
+    };
+    let joint = number.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+    let joint = joint.zip(profile).and_then(|(index, profile)| profile.chain().joints().get(index));
+    joint.map_or_else(|| format!("link {number}: {what}"), |joint| format!("{}: {what}", joint.name))
+}
+
+fn points(session: &Session) -> Vec<PointPart> {
+    let Some(result) = session.identified.as_deref() else { return Vec::new() };
+    let part = |(number, point): (&u64, &crate::session::journal::PointErrorText)| {
+        let sample = session.sample(*number)?;
+        let array = |(x, y, z): (f64, f64, f64)| [x, y, z];
+        Some(PointPart {
+            number: *number,
+            pose: session.pose_of(sample).to_owned(),
+            verification: session.kind_of(sample) == PoseKind::Verification,
+            rejected: point.rejected,
+            joints: sample.joints.clone(),
+            at_mm: array(point.at_mm),
+            nominal_mm: array(point.nominal_mm),
+            identified_mm: array(point.identified_mm),
+        })
+    };
+    result.samples.iter().zip(&result.points).filter_map(part).collect()
+}
+
+/// The nominal arm at the first sample that counts, or in the middle of its ranges.
+fn arm(session: &Session) -> Vec<[f64; 3]> {
+    let Some(profile) = session.mounted_profile() else { return Vec::new() };
+    let middle = || {
+        let ranges = profile.joints().iter();
+        let middle = |(low, high)| f64::midpoint(low, high);
+        ranges.map(|range| range.planning_limits.or(range.limits).map_or(0.0, middle)).collect::<Vec<_>>()
+    };
+    let first = session.counted_of(PoseKind::Identification).next();
+    let q = first.map_or_else(middle, |sample| session.configuration_of(sample));
+    let forward = ForwardKinematics::new(profile.chain());
+    let mut line = vec![Point3::origin()];
+    line.extend(forward.base_from_links(&q).iter().map(|frame| Point3::from(frame.translation.vector)));
+    line.extend(profile.targets().first().map(|target| forward.point_in_base(&q, &target.position_in_flange)));
+    let mut line: Vec<[f64; 3]> = line.iter().map(|point| [to_mm(point.x), to_mm(point.y), to_mm(point.z)]).collect();
+    line.dedup_by(|one, other| one.iter().zip(other.iter()).all(|(a, b)| (a - b).abs() < SAME_POINT));
+    line
+}
+
+fn prediction(session: &Session) -> Vec<PredictionPart> {
+    let samples = session.counted_of(PoseKind::Identification).enumerate();
+    samples
+        .filter_map(|(index, sample)| {
+            let predicted_error_sigma = sample.noted.predicted_error_sigma.filter(|value| value.is_finite())?;
+            Some(PredictionPart { samples: index + 1, predicted_error_sigma })
+        })
+        .collect()
+}
+
+/// Repetitions against the first sample of the same pose.
+fn drift(session: &Session) -> Vec<DriftPart> {
+    let part = |sample: &Sample| {
+        let pose = session.pose_of(sample);
+        let first = session.counted().find(|other| session.pose_of(other) == pose)?;
+        let moved = (session.point_of(sample) - session.point_of(first)).map(to_mm);
+        let is_repeated = first.noted.number != sample.noted.number && moved.iter().all(|value| value.is_finite());
+        is_repeated.then(|| DriftPart {
+            number: sample.noted.number,
+            pose: pose.to_owned(),
+            since: first.noted.number,
+            minutes: sample.time.duration_since(first.time).as_secs_f64() / 60.0,
+            moved_mm: moved.into(),
+        })
+    };
+    session.counted_of(PoseKind::Drift).filter_map(part).collect()
+}
+
+impl Found {
+    /// As it stands in a table.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Yes => "yes",
+            Self::Weakly => "weakly",
+            Self::OnlyCombined => "only combined",
+        }
+    }
+}

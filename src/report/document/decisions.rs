@@ -1,0 +1,67 @@
+//! What became of the samples that do not count, and of what the checks found.
+
+use super::{FindingPart, NotCounted};
+use crate::session::state::{Sample, SampleState, Session};
+
+/// Samples that do not count. Outliers of the identification are not among them: they count, and the identification says why it
+/// left them out.
+pub(super) fn not_counted(session: &Session) -> Vec<NotCounted> {
+    let without = session.samples.iter().filter(|sample| sample.state != SampleState::Counts);
+    without
+        .map(|sample| NotCounted {
+            number: sample.noted.number,
+            pose: session.pose_of(sample).to_owned(),
+            reason: reason(session, sample),
+        })
+        .collect()
+}
+
+fn reason(session: &Session, sample: &Sample) -> String {
+    let number = sample.noted.number;
+    let about = session.samples.iter().flat_map(|holder| &holder.noted.findings).filter(|found| found.about == number);
+    let found: Vec<&str> = about.map(|found| found.message.as_str()).collect();
+    let found = if found.is_empty() { String::new() } else { format!(" ({})", found.join("; ")) };
+    match sample.state {
+        SampleState::Counts => String::new(),
+        SampleState::Superseded => {
+            let later = session.samples.iter().rfind(|other| other.row == sample.row && other.noted.number != number);
+            let later = later.map_or_else(String::new, |later| format!(" as measurement {}", later.noted.number));
+            format!("measured again{later}{found}")
+        }
+        SampleState::LeftOut => format!("left out by the operator{found}"),
+        SampleState::Undone => format!("taken back by the operator{found}"),
+    }
+}
+
+/// What the checks found while measuring.
+pub(super) fn findings(session: &Session) -> Vec<FindingPart> {
+    let findings = session.samples.iter().flat_map(|holder| {
+        let raised_at = holder.noted.number;
+        holder.noted.findings.iter().map(move |finding| (raised_at, finding))
+    });
+    findings
+        .map(|(raised_at, finding)| {
+            let about = session.sample(finding.about);
+            FindingPart {
+                raised_at,
+                about: finding.about,
+                pose: about.map_or_else(String::new, |about| session.pose_of(about).to_owned()),
+                cause: finding.cause.clone(),
+                ratio: finding.ratio,
+                message: finding.message.clone(),
+                decision: about.map_or("", |about| decision(about, raised_at)).to_owned(),
+            }
+        })
+        .collect()
+}
+
+const fn decision(about: &Sample, raised_at: u64) -> &'static str {
+    match about.state {
+        SampleState::Superseded => "measured again",
+        SampleState::LeftOut => "left out by the operator",
+        SampleState::Undone => "taken back by the operator",
+        SampleState::Counts if about.settled >= raised_at => "set right, see the corrections",
+        SampleState::Counts if about.kept => "kept by the operator",
+        SampleState::Counts => "not decided: the sample counts as it is",
+    }
+}

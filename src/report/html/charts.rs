@@ -1,0 +1,146 @@
+//! The drawings of a report: errors per pose, their spread, against each joint, the search, the prediction, the drift.
+
+use super::markup::{counted, number};
+use super::plot::{Mark, Plot, Scale, WIDTH};
+use crate::report::document::{Details, DriftPart, PointPart, PredictionPart, RobotPart};
+use crate::session::plan_summary::SearchStepSummary;
+
+/// Bars of a histogram.
+const BINS: usize = 12;
+/// Size of a drawing in one of three columns.
+const SMALL: (f64, f64) = (236.0, 150.0);
+
+/// Length of an error.
+pub(super) fn norm([x, y, z]: [f64; 3]) -> f64 {
+    x.hypot(y).hypot(z)
+}
+
+/// Position errors, pose by pose, of both models.
+pub(super) fn per_pose(points: &[&PointPart], title: &str, caption: &str) -> String {
+    let all = points.iter().flat_map(|point| [norm(point.nominal_mm), norm(point.identified_mm)]);
+    let x = Scale::linear(0.0, points.len() as f64 + 1.0);
+    let mut plot = Plot::new((WIDTH, 210.0), (x, "pose, in the order of measuring"), (Scale::log(all), "mm"));
+    for (index, point) in points.iter().enumerate() {
+        let x = (index + 1) as f64;
+        let (before, after) = (plot.at(x, norm(point.nominal_mm)), plot.at(x, norm(point.identified_mm)));
+        if let (Some(before), Some(after)) = (before, after) {
+            plot.line("gr", &[before, after]);
+            plot.mark(Mark::Nominal, before);
+            plot.mark(if point.rejected { Mark::Rejected } else { Mark::Identified }, after);
+        }
+    }
+    let mut legend = vec![(Mark::Nominal, "nominal"), (Mark::Identified, "identified")];
+    if points.iter().any(|point| point.rejected) {
+        legend.push((Mark::Rejected, "rejected"));
+    }
+    plot.legend(&legend);
+    plot.figure(title, caption)
+}
+
+/// How the errors of one model are spread.
+pub(super) fn histogram(errors: &[f64], is_identified: bool) -> String {
+    let finite: Vec<f64> = errors.iter().copied().filter(|error| error.is_finite()).collect();
+    let largest = finite.iter().copied().fold(0.0, f64::max);
+    let width = if largest > 0.0 { largest / BINS as f64 } else { 1.0 };
+    let mut bins = [0_u32; BINS];
+    for error in &finite {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small whole number, not negative"
+        )]
+        let index = ((error / width) as usize).min(BINS - 1);
+        if let Some(bin) = bins.get_mut(index) {
+            *bin += 1;
+        }
+    }
+    let x = Scale::linear(0.0, width * BINS as f64);
+    let y = Scale::from_zero(bins.iter().map(|count| f64::from(*count)));
+    let mut plot = Plot::new((WIDTH, 130.0), (x, "position error (mm)"), (y, "poses"));
+    for (index, count) in bins.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let from = width * index as f64;
+        plot.bar(if is_identified { "idn" } else { "nom" }, (from, from + width), f64::from(*count));
+    }
+    let title = if is_identified { "Spread, identified arm" } else { "Spread, nominal arm" };
+    let poses = counted(finite.len(), "verification pose", "verification poses");
+    plot.figure(title, &format!("{poses}; largest {} mm", number(largest, 3)))
+}
+
+/// Errors of the identified arm against every joint.
+pub(super) fn against_joints(robot: &RobotPart, points: &[PointPart]) -> String {
+    let used: Vec<&PointPart> = points.iter().filter(|point| !point.rejected).collect();
+    let largest = Scale::from_zero(used.iter().map(|point| norm(point.identified_mm)));
+    let joints = robot.joints.iter().zip(&robot.joint_units).enumerate();
+    joints
+        .map(|(index, (name, unit))| {
+            let value = |point: &PointPart| point.joints.get(index).copied().unwrap_or(f64::NAN);
+            let x = Scale::around(used.iter().map(|point| value(point)));
+            let mut plot = Plot::new(SMALL, (x, unit), (largest, "mm"));
+            // Verification in front.
+            for is_verification in [false, true] {
+                for point in used.iter().filter(|point| point.verification == is_verification) {
+                    let mark = if is_verification { Mark::Identified } else { Mark::Residual };
+                    if let Some(place) = plot.at(value(point), norm(point.identified_mm)) {
+                        plot.mark(mark, place);
+                    }
+                }
+            }
+            plot.figure(name, "")
+        })
+        .collect()
+}
+
+/// Condition number and predicted error over the sweeps of the search.
+pub(super) fn search(steps: &[SearchStepSummary]) -> String {
+    let drawn = |title: &str, label: &str, pick: fn(&SearchStepSummary) -> f64| {
+        let x = Scale::linear(0.0, steps.len().saturating_sub(1).max(1) as f64);
+        let y = Scale::around(steps.iter().map(pick));
+        let mut plot = Plot::new((WIDTH, 160.0), (x, "sweep of the search"), (y, label));
+        let values = || steps.iter().enumerate().map(|(index, step)| (index as f64, pick(step)));
+        plot.curve("il", values());
+        let places: Vec<_> = values().filter_map(|(x, y)| plot.at(x, y)).collect();
+        for place in places {
+            plot.mark(Mark::Identified, place);
+        }
+        let ends = steps.first().zip(steps.last()).map(|(first, last)| (pick(first), pick(last)));
+        let caption = ends.map_or_else(String::new, |(first, last)| {
+            format!("from {} at the start to {} in the end", number(first, 2), number(last, 2))
+        });
+        plot.figure(title, &caption)
+    };
+    drawn("Condition number over the search", "condition number", |step| step.condition_number)
+        + &drawn("Predicted error over the search", "× sigma", |step| step.predicted_error_sigma)
+}
+
+/// What more and more samples promise.
+pub(super) fn prediction(steps: &[PredictionPart]) -> String {
+    let x = Scale::around(steps.iter().map(|step| step.samples as f64));
+    let y = Scale::log(steps.iter().map(|step| step.predicted_error_sigma));
+    let mut plot = Plot::new((WIDTH, 160.0), (x, "identification samples"), (y, "× sigma"));
+    plot.curve("il", steps.iter().map(|step| (step.samples as f64, step.predicted_error_sigma)));
+    plot.figure(
+        "Predicted error against the number of poses",
+        "RMS position error to expect at fresh poses, per standard deviation of the instrument; computed while measuring",
+    )
+}
+
+/// How far the repeated pose moved.
+pub(super) fn drift(parts: &[DriftPart]) -> String {
+    let x = Scale::from_zero(parts.iter().map(|part| part.minutes));
+    let y = Scale::from_zero(parts.iter().map(|part| norm(part.moved_mm)));
+    let mut plot = Plot::new((WIDTH, 160.0), (x, "minutes since its first measurement"), (y, "mm"));
+    plot.curve("il", parts.iter().map(|part| (part.minutes, norm(part.moved_mm))));
+    let places: Vec<_> = parts.iter().filter_map(|part| plot.at(part.minutes, norm(part.moved_mm))).collect();
+    for place in places {
+        plot.mark(Mark::Identified, place);
+    }
+    plot.figure(
+        "Drift over time",
+        "distance of the repeated pose from its first measurement, in the frame of the instrument",
+    )
+}
+
+/// The points of one kind.
+pub(super) fn of_kind(report: &Details, is_verification: bool) -> Vec<&PointPart> {
+    report.points.iter().filter(|point| point.verification == is_verification).collect()
+}

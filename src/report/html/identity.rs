@@ -1,0 +1,138 @@
+//! What the report is about: robot, instrument, people, time, conditions; and where its numbers come from.
+
+use super::markup::{NONE, add, counted, escape, facts, number, paragraph, time};
+use crate::report::document::{Counts, Details, Document, PointOrigin, ResultState, TemperaturePart};
+
+/// What must be seen before anything else.
+pub(super) fn banners(document: &Document) -> String {
+    let report = &document.report;
+    let mut html = String::new();
+    let mut banner = |word: &str, text: &str| {
+        add(&mut html, &format!("<div class=\"banner\" role=\"note\"><b>{word}</b> {text}</div>\n"));
+    };
+    match report.points_from {
+        PointOrigin::Simulated => {
+            banner(
+                "SIMULATED.",
+                "The points come from a simulated cell. Nothing was measured; this says nothing about a real robot.",
+            );
+        }
+        PointOrigin::Recorded => {
+            banner(
+                "RECORDED.",
+                "The points were measured earlier and played from tables; this program did not measure them.",
+            );
+        }
+        PointOrigin::Typed | PointOrigin::Tables => {}
+    }
+    match report.state {
+        ResultState::None => {
+            banner("NO RESULT.", "Nothing has been identified yet. This report shows what was measured so far.");
+        }
+        ResultState::OutOfDate => banner(
+            "OUT OF DATE.",
+            "Samples have changed since the identification. The numbers below are those of the earlier samples; identify again.",
+        ),
+        ResultState::Unusable => banner(
+            "NOT USABLE.",
+            "The data gave no usable solution, and there is no calibration to apply. The warnings say why.",
+        ),
+        ResultState::Current => {}
+    }
+    html
+}
+
+/// Robot, instrument, people, time, conditions.
+pub(super) fn section(document: &Document) -> String {
+    let report = &document.report;
+    let given =
+        |text: &str| if text.is_empty() { "<span class=\"soft\">not given</span>".to_owned() } else { escape(text) };
+    let robot = report.robot.as_ref();
+    let instrument = match (&report.instrument, robot.and_then(|robot| robot.instrument.as_ref())) {
+        (Some(how), Some(name)) => format!("{}; {}", escape(name), escape(how)),
+        (Some(how), None) => escape(how),
+        (None, Some(name)) => format!("{} (as the profile says)", escape(name)),
+        (None, None) => NONE.to_owned(),
+    };
+    let result = document.result.as_ref();
+    let rows = [
+        ("Robot", robot.map_or_else(|| NONE.to_owned(), |robot| escape(&robot.title))),
+        ("Serial number", given(&report.about.serial)),
+        ("Operator", given(&report.about.operator)),
+        ("Place and conditions", given(&report.about.site)),
+        ("Instrument", instrument),
+        ("Reflector (SMR)", report.target.as_deref().map_or_else(|| "as the profile says".to_owned(), escape)),
+        ("Measured", measured(report)),
+        ("Identified", result.map_or_else(|| "not yet".to_owned(), |result| time(&result.provenance.created))),
+        ("Temperature", temperature(report.temperature)),
+        ("Samples that count", samples(&report.counts)),
+        ("Session", escape(&report.session.name)),
+        (
+            "Program",
+            result.map_or_else(|| escape(&report.session.program), |result| escape(&result.provenance.program)),
+        ),
+    ];
+    format!("<h2>Robot and conditions</h2>\n{}", facts(&rows))
+}
+
+fn measured(report: &Details) -> String {
+    let session = &report.session;
+    match (&session.first_sample, &session.last_sample) {
+        // Rows of a table carry no time.
+        _ if report.points_from == PointOrigin::Tables => "read from tables, which carry no time".to_owned(),
+        (Some(first), Some(last)) => {
+            let work = format!("{} min of work", number(session.worked_min, 0));
+            format!("{} to {} ({work})", time(first), time(last))
+        }
+        _ => "nothing yet".to_owned(),
+    }
+}
+
+fn temperature(range: Option<TemperaturePart>) -> String {
+    range.map_or_else(
+        || "not recorded".to_owned(),
+        |range| {
+            let (low, high) = (number(range.lowest_degc, 1), number(range.highest_degc, 1));
+            let span = number(range.highest_degc - range.lowest_degc, 1);
+            format!("{low} to {high} °C over {} (range {span} °C)", counted(range.samples, "sample", "samples"))
+        },
+    )
+}
+
+fn samples(counts: &Counts) -> String {
+    let Counts { identification, verification, drift, .. } = counts;
+    format!("{identification} for identification, {verification} for verification, {drift} drift")
+}
+
+/// Where the numbers come from, with hashes to check it.
+pub(super) fn origins(document: &Document) -> String {
+    let report = &document.report;
+    let mut rows = Vec::new();
+    let hash = |text: &str| format!("<code class=\"hash\">{}</code>", escape(text));
+    if let Some(robot) = &report.robot {
+        rows.push(("Profile".to_owned(), format!("{}<br>{}", escape(&robot.profile), hash(&robot.profile_sha256))));
+        rows.push(("Nominal numbers".to_owned(), escape(&robot.source)));
+    }
+    for input in document.result.iter().flat_map(|result| &result.provenance.inputs) {
+        rows.push((
+            format!("Read: {}", escape(&input.role)),
+            format!("{}<br>{}", escape(&input.file), hash(&input.sha256)),
+        ));
+    }
+    for file in &report.files {
+        rows.push((format!("Beside this: {}", escape(&file.name)), hash(&file.sha256)));
+    }
+    let session = &report.session;
+    let resumed = match session.resumed {
+        0 => String::new(),
+        times => format!(", opened again {}", counted(times, "time", "times")),
+    };
+    if session.journal_entries > 0 {
+        let text = format!("{} entries up to this report{resumed}", session.journal_entries);
+        rows.push(("Journal".to_owned(), text));
+    }
+    let rows: Vec<(&str, String)> = rows.iter().map(|(name, value)| (name.as_str(), value.clone())).collect();
+    let intro = "The codes are SHA-256 sums: <code>sha256sum FILE</code> shows the same for an unchanged file. All numbers of this report are in report.json as well, with all their digits.";
+    let signatures = "<div class=\"sign\"><div>Measured by: name, date, signature</div><div>Released by: name, date, signature</div></div>\n";
+    format!("<h2>Where the numbers come from</h2>\n{}{}{signatures}", paragraph(intro), facts(&rows))
+}

@@ -1,0 +1,204 @@
+//! How it was planned, measured and fitted; what was left out and why; what was found and how it was decided.
+
+use super::charts::{drift, norm, prediction, search};
+use super::markup::{Column, add, counted, escape, facts, number, optional, paragraph, table, time};
+use crate::report::document::{Details, Document, PlanPart};
+use crate::report::text::{gap, sigma_origin, termination};
+use crate::session::summary::{EstimatorName, IdentificationSummary};
+
+/// Plan, fit and drift.
+pub(super) fn section(document: &Document) -> String {
+    let report = &document.report;
+    let mut html = String::new();
+    if let Some(result) = &document.result {
+        add(&mut html, &format!("<h2>The fit</h2>\n{}", facts(&fit(result))));
+        html.push_str(&paragraph(
+            "Residuals of the fit tell how well the model describes the poses it was fitted to. They are no accuracy.",
+        ));
+    }
+    html.push_str("<h2>Poses and measuring</h2>\n");
+    match &report.plan {
+        Some(plan) => html.push_str(&facts(&plan_facts(plan, report))),
+        None => html.push_str(&paragraph("No plan was accepted.")),
+    }
+    let mut drawings = String::new();
+    let steps = report.plan.as_ref().map_or(&[][..], |plan| &plan.search);
+    if steps.len() > 1 {
+        drawings.push_str(&search(steps));
+    }
+    if report.prediction.len() > 1 {
+        drawings.push_str(&prediction(&report.prediction));
+    }
+    if !report.drift.is_empty() {
+        drawings.push_str(&drift(&report.drift));
+    }
+    if !drawings.is_empty() {
+        add(&mut html, &format!("<div class=\"grid\">\n{drawings}</div>\n"));
+    }
+    html.push_str(&drift_table(report));
+    html
+}
+
+fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
+    let settings = &result.settings;
+    let estimator = match settings.estimator {
+        EstimatorName::Robust => "robust: outliers are found, named and left out",
+        EstimatorName::LeastSquares => "least squares: every sample counts",
+    };
+    let residuals = result
+        .sigma
+        .from_residuals_mm
+        .map_or_else(String::new, |residual| format!("{} mm per coordinate (not an accuracy)", number(residual, 4)));
+    let rank = result.rank.map_or_else(
+        || "not clear".to_owned(),
+        |rank| format!("{rank} of {} parameters ({})", result.parameter_count, escape(&gap(result.singular_value_gap))),
+    );
+    let condition = result.condition_number.map_or_else(String::new, |scaled| {
+        let raw = optional(result.condition_number_mm_rad, 0);
+        format!("{} in expected deviations, {raw} in mm and rad", number(scaled, 1))
+    });
+    let steps = counted(result.iterations.len(), "solver step", "solver steps");
+    vec![
+        ("Identification samples", format!("{}, {} of them rejected", result.samples, result.rejected.len())),
+        (
+            "Standard deviation used",
+            format!("{} mm per coordinate, {}", number(result.sigma.used_mm, 4), sigma_origin(result.sigma.source)),
+        ),
+        ("Residuals of the fit", residuals),
+        ("Weighting, prior", format!("{}, {}", escape(&settings.weighting), escape(&settings.prior))),
+        ("Estimator", estimator.to_owned()),
+        ("Rank", rank),
+        ("Condition number", condition),
+        ("Solver", format!("{} after {steps}", termination(result.termination))),
+    ]
+}
+
+fn plan_facts(plan: &PlanPart, report: &Details) -> Vec<(&'static str, String)> {
+    let mut missing = Vec::new();
+    if report.counts.open > 0 {
+        missing.push(counted(report.counts.open, "pose was not measured", "poses were not measured"));
+    }
+    if report.counts.skipped > 0 {
+        missing.push(counted(report.counts.skipped, "pose was skipped", "poses were skipped"));
+    }
+    vec![
+        ("Plan", escape(&plan.origin)),
+        ("Condition number of the plan", plan.condition_number.map_or_else(String::new, |value| number(value, 1))),
+        (
+            "Predicted error of the plan",
+            plan.predicted_error_sigma.map_or_else(String::new, |value| {
+                format!("{} times the standard deviation of the instrument (RMS at fresh poses)", number(value, 3))
+            }),
+        ),
+        ("Planned time", plan.minutes.map_or_else(String::new, |minutes| format!("{} min", number(minutes, 0)))),
+        ("Left undone", missing.join(", ")),
+    ]
+}
+
+fn drift_table(report: &Details) -> String {
+    if report.drift.is_empty() {
+        return paragraph("No pose was measured again, so a drift of instrument or robot would not have been seen.");
+    }
+    let columns = [
+        ("No.", Column::Number),
+        ("pose", Column::Text),
+        ("minutes later", Column::Number),
+        ("moved (mm)", Column::Number),
+        ("x", Column::Number),
+        ("y", Column::Number),
+        ("z", Column::Number),
+    ];
+    let rows: Vec<Vec<String>> = report
+        .drift
+        .iter()
+        .map(|part| {
+            let moved = part.moved_mm.map(|value| number(value, 4));
+            let first =
+                [part.number.to_string(), escape(&part.pose), number(part.minutes, 0), number(norm(part.moved_mm), 4)];
+            first.into_iter().chain(moved).collect()
+        })
+        .collect();
+    table(
+        "Drift: a pose measured again, against its first measurement, in the frame of the instrument",
+        &columns,
+        &rows,
+        true,
+    )
+}
+
+/// Samples without use, findings, corrections, remarks.
+pub(super) fn samples(document: &Document) -> String {
+    let report = &document.report;
+    let mut html = String::from("<h2>Samples left out, findings, remarks</h2>\n");
+    html.push_str(&rejected(document));
+    let plain = |number: u64, pose: &str, reason: &str| vec![number.to_string(), escape(pose), escape(reason)];
+    let columns = [("No.", Column::Number), ("pose", Column::Text), ("why", Column::Text)];
+    if !report.not_counted.is_empty() {
+        let rows: Vec<_> = report.not_counted.iter().map(|one| plain(one.number, &one.pose, &one.reason)).collect();
+        html.push_str(&table("Measured, but not counted", &columns, &rows, false));
+    }
+    if !report.refused.is_empty() {
+        let rows: Vec<_> = report.refused.iter().map(|one| plain(one.number, &one.pose, &one.reason)).collect();
+        html.push_str(&table("Readings that were refused", &columns, &rows, false));
+    }
+    if !report.findings.is_empty() {
+        let columns = [
+            ("No.", Column::Number),
+            ("pose", Column::Text),
+            ("what was found", Column::Text),
+            ("what was decided", Column::Text),
+        ];
+        let rows: Vec<Vec<String>> = report
+            .findings
+            .iter()
+            .map(|finding| {
+                let found = format!("{} (at measurement {})", escape(&finding.message), finding.raised_at);
+                vec![finding.about.to_string(), escape(&finding.pose), found, escape(&finding.decision)]
+            })
+            .collect();
+        html.push_str(&table("What the checks found while measuring", &columns, &rows, false));
+    }
+    if !report.corrections.is_empty() {
+        let rows: Vec<Vec<String>> = report.corrections.iter().map(|text| vec![escape(text)]).collect();
+        html.push_str(&table("", &[("Corrections", Column::Text)], &rows, false));
+    }
+    let is_quiet = report.not_counted.is_empty() && report.refused.is_empty() && report.findings.is_empty();
+    if is_quiet {
+        html.push_str(&paragraph("Nothing was left out by the operator, no reading was refused, and the checks found nothing while measuring."));
+    }
+    if !report.notes.is_empty() {
+        let columns = [("time", Column::Word), ("pose", Column::Text), ("remark of the operator", Column::Text)];
+        let rows: Vec<Vec<String>> = report
+            .notes
+            .iter()
+            .map(|note| {
+                vec![time(&note.time), note.pose.as_deref().map_or_else(String::new, escape), escape(&note.text)]
+            })
+            .collect();
+        html.push_str(&table("", &columns, &rows, false));
+    }
+    html
+}
+
+fn rejected(document: &Document) -> String {
+    let Some(result) = &document.result else { return String::new() };
+    if result.settings.estimator != EstimatorName::Robust {
+        return paragraph("The fit did not look for outliers: every identification sample counts.");
+    }
+    if result.rejected.is_empty() {
+        return paragraph("The identification rejected no sample.");
+    }
+    let columns = [
+        ("pose", Column::Text),
+        ("off by (mm)", Column::Number),
+        ("times the scatter", Column::Number),
+        ("why", Column::Text),
+    ];
+    let rows: Vec<Vec<String>> = result
+        .rejected
+        .iter()
+        .map(|one| vec![escape(&one.pose), number(one.residual_mm, 3), number(one.ratio, 0), escape(&one.reason)])
+        .collect();
+    let caption = format!("Rejected by the identification: {} of {} samples", result.rejected.len(), result.samples);
+    table(&caption, &columns, &rows, false)
+}

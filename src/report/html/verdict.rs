@@ -1,0 +1,272 @@
+//! The verdict, and the accuracy on poses that the identification did not see.
+
+use super::charts::{against_joints, histogram, norm, of_kind, per_pose};
+use super::markup::{Column, NONE, add, counted, escape, list, number, optional, paragraph, table};
+use super::views::views;
+use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
+use crate::session::summary::{
+    IdentificationSummary, LimitCheck, ModelSummary, StatisticsSummary, VerdictStatus, VerificationMode,
+    VerificationSummary, Warning,
+};
+
+/// The verdict with every limit, and what must be known before the numbers.
+pub(super) fn section(document: &Document) -> String {
+    let Some(result) = &document.result else {
+        return "<div class=\"verdict open\"><div class=\"word\">– NOT EVALUATED</div>\n<div>Nothing has been identified yet.</div></div>\n"
+            .to_owned();
+    };
+    let state = document.report.state;
+    let status = if state == ResultState::OutOfDate { VerdictStatus::NotEvaluated } else { result.verdict.status };
+    let (class, word) = match status {
+        VerdictStatus::Accepted => ("", "✓ ACCEPTED"),
+        VerdictStatus::NotAccepted => (" bad", "✗ NOT ACCEPTED"),
+        VerdictStatus::NotEvaluated => (" open", "– NOT EVALUATED"),
+    };
+    let simulated = if document.report.points_from == PointOrigin::Simulated { " (simulated)" } else { "" };
+    let mut reasons: Vec<String> = result.verdict.reasons.iter().map(|reason| escape(reason)).collect();
+    if state == ResultState::OutOfDate {
+        reasons.insert(0, "samples have changed since the identification".to_owned());
+    }
+    let mut html = format!(
+        "<div class=\"verdict{class}\"><div class=\"word\">{word}{simulated}</div>\n<div>{}</div></div>\n",
+        reasons.join("; ")
+    );
+    html.push_str(&limits(&result.verdict.checks));
+    html.push_str(&result.warnings.iter().map(warning).collect::<String>());
+    html
+}
+
+fn limits(checks: &[LimitCheck]) -> String {
+    if checks.is_empty() {
+        return paragraph("The profile states no acceptance limits, so there is nothing to accept against.");
+    }
+    let rows: Vec<Vec<String>> = checks
+        .iter()
+        .map(|check| {
+            let met = match check.met {
+                Some(true) => "✓ met",
+                Some(false) => "✗ <b>not met</b>",
+                None => "– not evaluated",
+            };
+            vec![
+                escape(&quantity(&check.quantity)),
+                optional(check.value_mm, 4),
+                number(check.limit_mm, 4),
+                met.to_owned(),
+            ]
+        })
+        .collect();
+    let columns =
+        [("Limit", Column::Text), ("found (mm)", Column::Number), ("allowed (mm)", Column::Number), ("", Column::Word)];
+    table("", &columns, &rows, true)
+}
+
+/// `position_rms` as it is read.
+fn quantity(name: &str) -> String {
+    match name.split_once('_') {
+        Some((what @ ("position" | "distance"), "mean")) => format!("{what} error, mean"),
+        Some((what @ ("position" | "distance"), "rms")) => format!("{what} error, root mean square"),
+        Some((what @ ("position" | "distance"), "max")) => format!("{what} error, largest"),
+        _ => name.replace('_', " "),
+    }
+}
+
+fn warning(warning: &Warning) -> String {
+    let (class, word) = if warning.blocks_acceptance { ("warn", "Warning") } else { ("note", "Note") };
+    let (message, code) = (escape(&warning.message), escape(&warning.code));
+    format!("<div class=\"{class}\"><b>{word}.</b> {message} <span class=\"soft\">[{code}]</span></div>\n")
+}
+
+/// Tables III and IV of the method paper for this robot.
+pub(super) fn accuracy(document: &Document) -> String {
+    let title = "<h2>Accuracy on poses that the identification did not see</h2>\n";
+    let Some(result) = &document.result else { return String::new() };
+    let Some(verification) = &result.verification else {
+        let text = "No verification poses were measured, so nothing can be said about the accuracy. The residuals of the fit below are no accuracy: the parameters were chosen to make them small.";
+        return format!("<h2>Accuracy</h2>\n{}", paragraph(text));
+    };
+    let mut html = if verification.independent {
+        title.to_owned()
+    } else {
+        "<h2>Errors on verification poses</h2>\n<div class=\"warn\"><b>Not independent.</b> The identification saw these poses in part or all; the numbers may be too good.</div>\n".to_owned()
+    };
+    html.push_str(&paragraph(&procedure(result, verification, &document.report)));
+    let (before, after) = (&verification.nominal, &verification.identified);
+    html.push_str(&distances(before, after));
+    html.push_str(&positions(before, after));
+    html
+}
+
+/// What was done, in words, and what was not.
+fn procedure(result: &IdentificationSummary, verification: &VerificationSummary, report: &Details) -> String {
+    let samples = counted(verification.samples, "verification pose", "verification poses");
+    let pairs = verification.identified.distance_mm.map(|distance| counted(distance.count, "distance", "distances"));
+    let visits = match (result.settings.verification, report.counts.repeats) {
+        (VerificationMode::File | VerificationMode::Rest, 0) => "no pose stands twice in the tables".to_owned(),
+        (VerificationMode::Session, 0) => "each pose was visited once".to_owned(),
+        (VerificationMode::Session | VerificationMode::File | VerificationMode::Rest, repeats) => {
+            format!("{} at a pose that was measured before", counted(repeats, "sample is", "samples are"))
+        }
+        (VerificationMode::LeaveOneOut, _) => "each position of the plate was left out in turn".to_owned(),
+        (VerificationMode::None, _) => String::new(),
+    };
+    let shots = match (report.counts.fewest_shots, report.counts.most_shots) {
+        (0, _) => String::new(),
+        (1, 1) => ", one reading each".to_owned(),
+        (fewest, most) if fewest == most => format!(", {fewest} readings averaged at each"),
+        (fewest, most) => format!(", {fewest} to {most} readings averaged at each"),
+    };
+    let distances = pairs.map_or_else(String::new, |pairs| {
+        format!(" Distance errors are measured less predicted length, over {pairs}.")
+    });
+    let positions = if verification.identified.position_mm.is_some() {
+        " Position errors are after the place of the instrument was fitted on the identification poses only, for each model by itself."
+    } else {
+        ""
+    };
+    let basis = escape(&verification.basis);
+    let basis = if basis.is_empty() { String::new() } else { format!(" ({basis})") };
+    let visits = if visits.is_empty() { visits } else { format!("; {visits}{shots}") };
+    format!(
+        "{samples}{basis}{visits}.{distances}{positions} The test cycles of ISO 9283 (given poses, approached 30 times) were not run: these are not its distance and pose accuracy."
+    )
+}
+
+/// Picks one figure of some statistics.
+type Figure = (&'static str, fn(&StatisticsSummary) -> f64);
+const FIGURES: [Figure; 4] = [
+    ("largest", |statistics| statistics.max),
+    ("mean", |statistics| statistics.mean),
+    ("root mean square", |statistics| statistics.rms),
+    ("95 % are at most", |statistics| statistics.p95),
+];
+
+const COLUMNS: [(&str, Column); 3] =
+    [("mm", Column::Text), ("nominal (before)", Column::Number), ("identified (after)", Column::Number)];
+
+fn statistics(before: &StatisticsSummary, after: &StatisticsSummary) -> Vec<Vec<String>> {
+    let row = |(name, pick): &Figure| vec![(*name).to_owned(), number(pick(before), 4), number(pick(after), 4)];
+    FIGURES.iter().map(row).collect()
+}
+
+fn distances(before: &ModelSummary, after: &ModelSummary) -> String {
+    let mut html = String::new();
+    if let (Some(before), Some(after)) = (&before.distance_mm, &after.distance_mm) {
+        let caption = format!("Distance error of {} distances", after.count);
+        html.push_str(&table(&caption, &COLUMNS, &statistics(before, after), true));
+    }
+    if let (Some(before), Some(after)) = (&before.seat_mm, &after.seat_mm) {
+        let caption = format!("Distance from the shared point, {} samples", after.count);
+        html.push_str(&table(&caption, &COLUMNS, &statistics(before, after), true));
+    }
+    html
+}
+
+fn positions(before: &ModelSummary, after: &ModelSummary) -> String {
+    let mut html = String::new();
+    if let (Some(before), Some(after)) = (&before.axis_mm, &after.axis_mm) {
+        let columns = [
+            ("mm, in the robot base", Column::Text),
+            ("ΔX", Column::Number),
+            ("ΔY", Column::Number),
+            ("ΔZ", Column::Number),
+        ];
+        let row = |name: &str, values: &[f64; 3]| {
+            std::iter::once(name.to_owned()).chain(values.map(|value| number(value, 4))).collect::<Vec<_>>()
+        };
+        let rows = [
+            row("nominal (before), largest absolute value", &before.max),
+            row("nominal (before), mean absolute value", &before.mean),
+            row("identified (after), largest absolute value", &after.max),
+            row("identified (after), mean absolute value", &after.mean),
+        ];
+        html.push_str(&table("Position error per axis", &columns, &rows, true));
+    }
+    if let (Some(before), Some(after)) = (&before.position_mm, &after.position_mm) {
+        let caption = format!("Position error (length of the vector), {}", counted(after.count, "pose", "poses"));
+        html.push_str(&table(&caption, &COLUMNS, &statistics(before, after), true));
+    }
+    html
+}
+
+/// Errors as drawings.
+pub(super) fn drawings(document: &Document) -> String {
+    let report = &document.report;
+    if report.points.is_empty() {
+        return String::new();
+    }
+    let (tested, judged) = (of_kind(report, true), of_kind(report, false));
+    let mut html = String::from("<h2>Errors as drawings</h2>\n<div class=\"grid\">\n");
+    if !tested.is_empty() {
+        html.push_str(&per_pose(
+            &tested,
+            "Verification poses: position error",
+            "not seen by the identification; logarithmic scale",
+        ));
+    }
+    if !judged.is_empty() {
+        html.push_str(&per_pose(
+            &judged,
+            "Identification poses: residual of the fit",
+            "<strong>not an accuracy</strong>: fitted to these very poses",
+        ));
+    }
+    let errors = |pick: fn(&PointPart) -> [f64; 3]| tested.iter().map(|point| norm(pick(point))).collect::<Vec<_>>();
+    if !tested.is_empty() {
+        html.push_str(&histogram(&errors(|point| point.nominal_mm), false));
+        html.push_str(&histogram(&errors(|point| point.identified_mm), true));
+    }
+    html.push_str("</div>\n");
+    if let Some(robot) = &report.robot {
+        html.push_str("<h3>What is left, against each joint</h3>\n");
+        html.push_str(&paragraph("Position error of the identified arm (mm) over the pendant value of each joint. Full dots are verification poses; open dots are residuals of the fit. A pattern means that something besides the link constants moves the points, such as flexure or a gear."));
+        add(&mut html, &format!("<div class=\"grid three\">\n{}</div>\n", against_joints(robot, &report.points)));
+        html.push_str(&joints_named(document));
+    }
+    html.push_str("<h3>Poses in space</h3>\n");
+    html.push_str(&paragraph("Measured places of the reflector in the robot base with their errors (measured less predicted, drawn longer), and the arm at its first pose. Full dots are verification poses."));
+    add(&mut html, &format!("<div class=\"grid\">\n{}</div>\n", views(report)));
+    html.push_str(&poses(&tested));
+    html
+}
+
+/// How much of the error follows each joint, as far as the verification tells.
+fn joints_named(document: &Document) -> String {
+    let joints = document.result.iter().filter_map(|result| result.verification.as_ref());
+    let named: Vec<String> = joints
+        .flat_map(|verification| &verification.residual_by_joint)
+        .filter(|joint| crate::report::text::is_worth_naming(joint))
+        .map(|joint| format!("{}: {} %", escape(&joint.joint), number(100.0 * joint.explained, 0)))
+        .collect();
+    if named.is_empty() {
+        return paragraph("No joint stands out on the verification poses.");
+    }
+    let intro = paragraph("Share of the square error on the verification poses that follows a joint:");
+    intro + &list(&named)
+}
+
+/// The verification poses one by one.
+fn poses(points: &[&PointPart]) -> String {
+    if points.is_empty() {
+        return String::new();
+    }
+    let columns = [
+        ("No.", Column::Number),
+        ("pose", Column::Text),
+        ("nominal (mm)", Column::Number),
+        ("identified (mm)", Column::Number),
+        ("ΔX", Column::Number),
+        ("ΔY", Column::Number),
+        ("ΔZ", Column::Number),
+    ];
+    let rows: Vec<Vec<String>> = points
+        .iter()
+        .map(|point| {
+            let pose = if point.pose.is_empty() { NONE.to_owned() } else { escape(&point.pose) };
+            let lengths = [norm(point.nominal_mm), norm(point.identified_mm)].map(|value| number(value, 4));
+            let axes = point.identified_mm.map(|value| number(value, 4));
+            [point.number.to_string(), pose].into_iter().chain(lengths).chain(axes).collect()
+        })
+        .collect();
+    table("Verification poses one by one; Δ of the identified arm (mm)", &columns, &rows, false)
+}

@@ -1,0 +1,155 @@
+//! The poses in space: two projections, with the errors drawn larger than they are by a factor that is stated.
+
+use super::charts::norm;
+use super::markup::{add, counted};
+use super::plot::{Mark, figure, nice_above};
+use crate::report::document::{Details, PointPart};
+
+/// Size of a view.
+const WIDTH: f64 = 360.0;
+const HEIGHT: f64 = 300.0;
+/// Room at the edges.
+const EDGE: f64 = 26.0;
+/// The largest error is drawn at most this part of the arm's reach long.
+const LARGEST: f64 = 0.25;
+
+/// Looks along an axis of the base.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    name: &'static str,
+    /// Axes of the base to the right and up.
+    axes: (usize, usize),
+    labels: (&'static str, &'static str),
+}
+
+const VIEWS: [View; 2] = [
+    View { name: "from the side", axes: (0, 2), labels: ("x", "z") },
+    View { name: "from above", axes: (0, 1), labels: ("x", "y") },
+];
+
+/// Picks the error against one of the models.
+type Pick = fn(&PointPart) -> [f64; 3];
+
+/// Both models in both views.
+pub(super) fn views(report: &Details) -> String {
+    let errors: [(&str, bool, Pick); 2] =
+        [("Nominal arm", false, |point| point.nominal_mm), ("Identified arm", true, |point| point.identified_mm)];
+    let drawn = errors.iter().flat_map(|(name, is_identified, error)| {
+        VIEWS.iter().map(move |view| draw(report, *view, name, *is_identified, *error))
+    });
+    drawn.collect()
+}
+
+fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pick) -> String {
+    let points: Vec<&PointPart> = report
+        .points
+        .iter()
+        .filter(|point| !point.rejected && point.at_mm.iter().chain(&error(point)).all(|value| value.is_finite()))
+        .collect();
+    let pick = |place: [f64; 3]| (place[view.axes.0], place[view.axes.1]);
+    let arm: Vec<(f64, f64)> = report
+        .arm_mm
+        .iter()
+        .filter(|place| place.iter().all(|value| value.is_finite()))
+        .map(|place| pick(*place))
+        .collect();
+    let places = || arm.iter().copied().chain(points.iter().map(|point| pick(point.at_mm)));
+    let span = |axis: fn((f64, f64)) -> f64| {
+        places()
+            .map(axis)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let ((left, right), (bottom, top)) = (span(|place| place.0), span(|place| place.1));
+    let (wide, high) = ((right - left).max(1.0), (top - bottom).max(1.0));
+    if !(wide.is_finite() && high.is_finite()) {
+        return String::new();
+    }
+    let scale = ((WIDTH - 2.0 * EDGE) / wide).min((HEIGHT - 2.0 * EDGE) / high) * 0.94;
+    let middle = (f64::midpoint(left, right), f64::midpoint(bottom, top));
+    let at =
+        |(x, y): (f64, f64)| ((x - middle.0).mul_add(scale, WIDTH / 2.0), (y - middle.1).mul_add(-scale, HEIGHT / 2.0));
+    let longest = points.iter().map(|point| norm(error(point))).fold(0.0, f64::max);
+    let exaggeration = exaggeration(longest, size(report));
+
+    let mut body = String::new();
+    let line = |class: &str, places: &[(f64, f64)]| {
+        let places: Vec<String> = places.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+        format!("<polyline class=\"{class}\" points=\"{}\"></polyline>\n", places.join(" "))
+    };
+    let joints: Vec<(f64, f64)> = arm.iter().copied().map(at).collect();
+    body.push_str(&line("arm", &joints));
+    for (x, y) in &joints {
+        add(&mut body, &format!("<circle class=\"jnt\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.6\"></circle>\n"));
+    }
+    for point in &points {
+        let from = pick(point.at_mm);
+        let by = pick(error(point));
+        let to = (by.0.mul_add(exaggeration, from.0), by.1.mul_add(exaggeration, from.1));
+        body.push_str(&line(if is_identified { "il" } else { "nl" }, &[at(from), at(to)]));
+        body.push_str(&if point.verification { Mark::Identified } else { Mark::Residual }.svg(at(from)));
+    }
+    body.push_str(&bar(wide, scale));
+    body.push_str(&cross(view.labels));
+    let caption =
+        format!("{}: errors drawn {exaggeration:.0} times as long as they are", counted(points.len(), "pose", "poses"));
+    figure(&format!("{name}, {}", view.name), &caption, (WIDTH, HEIGHT), &body)
+}
+
+/// Size of all that is drawn (mm), the same for every view.
+fn size(report: &Details) -> f64 {
+    let places = || report.points.iter().map(|point| point.at_mm).chain(report.arm_mm.iter().copied());
+    let span = |axis: usize| {
+        let values = places().filter_map(|place| place.get(axis).copied()).filter(|value| value.is_finite());
+        let (low, high) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        (high - low).max(1.0)
+    };
+    (0..3).map(span).filter(|span| span.is_finite()).fold(1.0, f64::max)
+}
+
+/// A round factor with which the longest error (mm) is well seen beside something of this size (mm).
+fn exaggeration(longest: f64, width: f64) -> f64 {
+    if longest > 0.0 && longest.is_finite() {
+        // The next smaller round number.
+        (1.0 / nice_above(longest / (LARGEST * width))).max(1.0).round()
+    } else {
+        1.0
+    }
+}
+
+/// A bar of a round length.
+fn bar(wide: f64, scale: f64) -> String {
+    let length = nice_above(wide / 8.0);
+    let (left, y) = (6.0, HEIGHT - 8.0);
+    let right = length.mul_add(scale, left);
+    format!(
+        "<polyline class=\"ax\" points=\"{left},{y1} {left},{y} {right:.1},{y} {right:.1},{y1}\"></polyline>\n<text x=\"{:.1}\" y=\"{y}\">{length:.0} mm</text>\n",
+        right + 4.0,
+        y1 = y - 4.0
+    )
+}
+
+/// Which way the axes of the base point.
+fn cross((right, up): (&str, &str)) -> String {
+    let (x, y) = (WIDTH - 40.0, HEIGHT - 8.0);
+    format!(
+        "<polyline class=\"ax\" points=\"{x},{:.1} {x},{y} {:.1},{y}\"></polyline>\n<text x=\"{:.1}\" y=\"{:.1}\">{right}</text>\n<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{up}</text>\n",
+        y - 22.0,
+        x + 22.0,
+        x + 25.0,
+        y + 3.0,
+        x - 3.0,
+        y - 16.0
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exaggeration_is_round_and_never_below_one() {
+        let shown = [(10.0, 2000.0), (0.01, 2000.0), (5000.0, 2000.0), (0.0, 2000.0), (f64::NAN, 1.0)];
+        assert_eq!(shown.map(|(longest, width)| exaggeration(longest, width)), [50.0, 50_000.0, 1.0, 1.0, 1.0]);
+    }
+}

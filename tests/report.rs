@@ -1,0 +1,539 @@
+//! The report: its numbers are those of the journal, nothing foreign becomes markup, nothing refers to the outside, and every
+//! session has one, however little is in it.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    clippy::indexing_slicing,
+    clippy::string_slice,
+    reason = "a failure of a test is a panic; test files need no atomic writes"
+)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::LazyLock;
+
+use serde_json::Value;
+use trupose::procedure::deliver::{data_files, files, reports};
+use trupose::profile::builtin;
+use trupose::session::journal::{Entry, IdentifiedText, Journal, Line, PointErrorText};
+use trupose::session::set_up::About;
+use trupose::session::sha256;
+use trupose::session::state::Session;
+use trupose::session::summary::{StatisticsSummary, VerdictStatus};
+use trupose::store::session::read_journal;
+
+/// A short calibration in which something goes wrong and is decided about.
+const SCRIPT: &str = r#"(title: "test", clock: Some("2026-01-05T08:00:00Z"), steps: [
+    Do(NameSession("s")), Do(ChooseProfile("soochow")), Do(Next),
+    Do(ChooseInstrument(Simulated((seed: 1, truth: Paper, faults: ["wrong-pose@11", "beam-break@15"])))), Do(Next),
+    Do(ChooseTarget(Profile)), Do(Next), Do(LoadPlan("plan.csv")), Do(AcceptPlan),
+    Capture(3, Fail), Do(Note("door open <b>&")), CaptureAll(MeasureAgain), Do(Next),
+    Do(Identify), Do(Next), Do(Next),
+    Do(About((serial: " R-17 ", operator: "Zoë", site: "cell 4"))), Do(Deliver),
+])"#;
+
+/// A figure of some statistics.
+type Pick = fn(&StatisticsSummary) -> f64;
+
+struct Calibrated {
+    folder: tempfile::TempDir,
+    journal: Journal,
+}
+
+fn trupose(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_trupose")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+static CALIBRATED: LazyLock<Calibrated> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("plan.csv"), include_str!("sessions/plan.csv")).unwrap();
+    fs::write(folder.path().join("a.script.ron"), SCRIPT).unwrap();
+    let output = trupose(folder.path(), &["--script", "a.script.ron", "--no-recording"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let journal = read_journal(&folder.path().join("sessions/s")).unwrap();
+    Calibrated { folder, journal }
+});
+
+fn session_of(lines: &[Line]) -> Session {
+    Session::of(&Journal { lines: lines.to_vec(), ..Journal::default() }).unwrap()
+}
+
+fn calibrated() -> Session {
+    session_of(&CALIBRATED.journal.lines)
+}
+
+/// The session with its result changed.
+fn with_result(change: impl Fn(&mut IdentifiedText)) -> Session {
+    let mut session = calibrated();
+    change(session.identified.as_deref_mut().unwrap());
+    session
+}
+
+/// Both reports of a session, the page checked.
+fn report(session: &Session) -> (Value, String) {
+    let [(_, json), (_, html)] = reports(session, &data_files(session).unwrap()).unwrap().try_into().unwrap();
+    check_page(&html);
+    (serde_json::from_str(&json).unwrap(), html)
+}
+
+/// Marks of HTML in order: opening and closing names, attributes with them.
+fn marks(html: &str) -> Vec<&str> {
+    html.split('<').skip(1).map(|part| &part[..part.find('>').unwrap_or_else(|| panic!("no end: {part}"))]).collect()
+}
+
+/// Every mark is closed, known and refers to nothing outside; no number is none.
+fn check_page(html: &str) {
+    const EMPTY: [&str; 3] = ["!DOCTYPE", "meta", "br"];
+    const KNOWN: &[&str] = &[
+        "!DOCTYPE",
+        "html",
+        "head",
+        "meta",
+        "title",
+        "style",
+        "body",
+        "h1",
+        "h2",
+        "h3",
+        "p",
+        "b",
+        "i",
+        "strong",
+        "br",
+        "ul",
+        "li",
+        "code",
+        "div",
+        "span",
+        "table",
+        "caption",
+        "thead",
+        "tbody",
+        "tr",
+        "th",
+        "td",
+        "figure",
+        "figcaption",
+        "svg",
+        "polyline",
+        "circle",
+        "rect",
+        "path",
+        "text",
+    ];
+    let mut open = Vec::new();
+    for mark in marks(html) {
+        let name = mark.split([' ', '\n']).next().unwrap();
+        if let Some(name) = name.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name), "closed out of order: <{mark}>");
+            continue;
+        }
+        assert!(KNOWN.contains(&name), "unknown mark <{mark}>");
+        for attribute in mark.split(' ').skip(1).filter_map(|part| part.split_once('=')).map(|(name, _)| name) {
+            let harmful = ["src", "href", "xlink:href", "srcset", "style", "action", "data"];
+            assert!(!harmful.contains(&attribute) && !attribute.starts_with("on"), "<{mark}>");
+        }
+        if !EMPTY.contains(&name) {
+            open.push(name);
+        }
+    }
+    assert!(open.is_empty(), "not closed: {open:?}");
+    for outside in ["http:", "https:", "//", "url(", "@import", "<script", "<link", "<img", "<iframe", "javascript:"] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    assert!(html.chars().all(|c| !c.is_control() || c == '\n'));
+    let shown = text(html);
+    let words = shown.split(|c: char| !c.is_alphanumeric());
+    for word in words {
+        assert!(!["nan", "inf", "infinity"].contains(&word.to_lowercase().as_str()), "{word}");
+    }
+    for place in html.split("points=\"").skip(1).map(|rest| &rest[..rest.find('"').unwrap()]) {
+        for number in place.split([' ', ',']).filter(|number| !number.is_empty()) {
+            assert!(number.parse::<f64>().unwrap().is_finite(), "{place}");
+        }
+    }
+}
+
+/// What a reader sees, line by line: no drawings, no marks.
+fn text(html: &str) -> String {
+    let body = &html[html.find("<body>").unwrap()..];
+    let mut lines = String::new();
+    for (index, part) in body.split("<svg").enumerate() {
+        let part = if index == 0 { part } else { &part[part.find("</svg>").unwrap()..] };
+        lines.push_str(
+            &part
+                .replace("</td><td", " | </td><td")
+                .replace("</th><th", " | </th><th")
+                .replace("</th><td", ": </th><td"),
+        );
+    }
+    let lines = lines.replace("</caption>", "</caption>\n").replace("<br>", "\n").replace("</b>", "</b> ");
+    let mut shown = String::new();
+    let mut inside = false;
+    for c in lines.chars() {
+        match c {
+            '<' => inside = true,
+            '>' => inside = false,
+            c if !inside => shown.push(c),
+            _ => {}
+        }
+    }
+    let shown = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&#39;", "'"), ("&#47;", "/"), ("&amp;", "&")]
+        .into_iter()
+        .fold(shown, |shown, (from, to)| shown.replace(from, to));
+    let shown = shown.replace('\u{2007}', "").replace('−', "-");
+    shown.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("\n")
+}
+
+/// Cells of the row that begins with these.
+fn row(shown: &str, first: &str) -> Vec<String> {
+    let found = shown.lines().find(|line| line.starts_with(&format!("{first} | ")));
+    found.unwrap_or_else(|| panic!("no row '{first}' in\n{shown}")).split(" | ").skip(1).map(str::to_owned).collect()
+}
+
+/// The part of a text between two headings.
+fn between<'a>(shown: &'a str, from: &str, to: &str) -> &'a str {
+    let start = shown.find(from).unwrap_or_else(|| panic!("no '{from}'"));
+    let rest = &shown[start..];
+    &rest[..rest.find(to).unwrap_or_else(|| panic!("no '{to}'"))]
+}
+
+#[test]
+fn the_json_report_is_the_result_of_the_journal_with_all_digits() {
+    let session = calibrated();
+    let (json, _) = report(&session);
+    let result = session.identified.as_deref().unwrap();
+    // The reader of JSON rounds the last digit of some numbers: both go through it.
+    let expected = serde_json::to_string(&result.summary).unwrap();
+    let Value::Object(expected) = serde_json::from_str(&expected).unwrap() else { panic!() };
+    for (name, value) in expected.iter().filter(|(name, _)| *name != "written") {
+        assert_eq!(json[name], *value, "{name}");
+    }
+    let points = json["report"]["points"].as_array().unwrap();
+    assert_eq!(points.len(), result.points.len());
+    for ((point, number), expected) in points.iter().zip(&result.samples).zip(&result.points) {
+        let tuple = |(x, y, z): (f64, f64, f64)| serde_json::json!([x, y, z]);
+        assert_eq!(point["number"], serde_json::json!(number));
+        assert_eq!(point["nominal_mm"], tuple(expected.nominal_mm));
+        assert_eq!(point["identified_mm"], tuple(expected.identified_mm));
+        assert_eq!(point["joints"], serde_json::json!(session.sample(*number).unwrap().joints));
+    }
+    let about = &json["report"]["about"];
+    assert_eq!(*about, serde_json::json!({ "serial": "R-17", "operator": "Zoë", "site": "cell 4" }));
+    for file in json["report"]["files"].as_array().unwrap() {
+        let path = CALIBRATED.folder.path().join("sessions/s").join(file["name"].as_str().unwrap());
+        assert_eq!(file["sha256"], sha256(&fs::read(&path).unwrap()), "{}", path.display());
+    }
+}
+
+#[test]
+fn the_page_shows_the_numbers_of_the_journal() {
+    let session = calibrated();
+    let (_, html) = report(&session);
+    let shown = text(&html);
+    let summary = &session.identified.as_deref().unwrap().summary;
+    let verification = summary.verification.as_ref().unwrap();
+    let (before, after) = (&verification.nominal, &verification.identified);
+    let table = |from: &str, to: &str, before: StatisticsSummary, after: StatisticsSummary| {
+        let part = between(&shown, from, to);
+        let rows: [(&str, Pick); 4] = [
+            ("largest", |s| s.max),
+            ("mean", |s| s.mean),
+            ("root mean square", |s| s.rms),
+            ("95 % are at most", |s| s.p95),
+        ];
+        for (name, pick) in rows {
+            assert_eq!(
+                row(part, name),
+                [format!("{:.4}", pick(&before)), format!("{:.4}", pick(&after))],
+                "{from} {name}"
+            );
+        }
+    };
+    table("Distance error of ", "Position error per axis", before.distance_mm.unwrap(), after.distance_mm.unwrap());
+    table("Position error (length", "Errors as drawings", before.position_mm.unwrap(), after.position_mm.unwrap());
+    let axes = |values: [f64; 3]| values.map(|value| format!("{value:.4}"));
+    let (before, after) = (before.axis_mm.unwrap(), after.axis_mm.unwrap());
+    assert_eq!(row(&shown, "nominal (before), largest absolute value"), axes(before.max));
+    assert_eq!(row(&shown, "nominal (before), mean absolute value"), axes(before.mean));
+    assert_eq!(row(&shown, "identified (after), largest absolute value"), axes(after.max));
+    assert_eq!(row(&shown, "identified (after), mean absolute value"), axes(after.mean));
+
+    for parameter in &summary.parameters {
+        let cells = row(&shown, &parameter.name);
+        assert_eq!(cells[1], parameter.unit, "{}", parameter.name);
+        let shown = |cell: &str| cell.parse::<f64>().unwrap_or_else(|_| panic!("{}: {cell}", parameter.name));
+        let half = |cell: &str| 0.5001 * 0.1_f64.powi(i32::try_from(cell.len() - cell.find('.').unwrap() - 1).unwrap());
+        let values =
+            [parameter.nominal, parameter.deviation, parameter.sigma.unwrap(), parameter.nominal + parameter.deviation];
+        for (cell, value) in cells[2..6].iter().zip(values) {
+            assert!((shown(cell) - value).abs() <= half(cell), "{}: {cell} and {value}", parameter.name);
+        }
+        assert!(cells[6].starts_with("only combined") != parameter.identifiable, "{}: {cells:?}", parameter.name);
+    }
+    for check in &summary.verdict.checks {
+        let value = format!(" | {:.4} | {:.4} | ", check.value_mm.unwrap(), check.limit_mm);
+        assert!(shown.contains(&value), "{value}");
+    }
+}
+
+#[test]
+fn the_tables_are_those_of_the_points() {
+    let session = calibrated();
+    let result = session.identified.as_deref().unwrap();
+    let (json, _) = report(&session);
+    let tested: Vec<[f64; 3]> = json["report"]["points"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|point| point["verification"] == true)
+        .map(|point| serde_json::from_value(point["identified_mm"].clone()).unwrap())
+        .collect();
+    let expected = result.summary.verification.as_ref().unwrap().identified.axis_mm.unwrap();
+    for axis in 0..3 {
+        let absolute = tested.iter().map(|error| error[axis].abs());
+        let mean = absolute.clone().sum::<f64>() / tested.len() as f64;
+        assert!((absolute.fold(0.0, f64::max) - expected.max[axis]).abs() < 2e-6, "axis {axis}");
+        assert!((mean - expected.mean[axis]).abs() < 2e-6, "axis {axis}");
+    }
+}
+
+#[test]
+fn what_happened_is_told_with_how_it_was_decided() {
+    let (json, html) = report(&calibrated());
+    let shown = text(&html);
+    let part = &json["report"];
+    let findings = part["findings"].as_array().unwrap();
+    assert!(
+        findings.iter().any(|finding| finding["cause"] == "wrong_pose" && finding["decision"] == "measured again"),
+        "{findings:?}"
+    );
+    assert_eq!(part["not_counted"].as_array().unwrap().len(), 1, "{part}");
+    assert_eq!(part["refused"].as_array().unwrap().len(), 1, "{part}");
+    for words in [
+        "Measured, but not counted",
+        "Readings that were refused",
+        "door open <b>&",
+        "R-17",
+        "Zoë",
+        "SIMULATED.",
+        "were not run",
+    ] {
+        assert!(shown.contains(words), "no '{words}' in\n{shown}");
+    }
+    assert!(!html.contains("door open <b>"));
+}
+
+#[test]
+fn the_page_of_a_small_session_stays_as_it_is() {
+    let shown = text(&report(&calibrated()).1);
+    // Sums of files stand and fall with the last digits of their numbers.
+    let is_sum = |word: &str| word.len() == 64 && word.chars().all(|c| c.is_ascii_hexdigit());
+    let words = shown.split_inclusive([' ', '\n']).map(|word| match word.trim_end() {
+        sum if is_sum(sum) => word.replace(sum, "<sha256>"),
+        _ => word.to_owned(),
+    });
+    insta::assert_snapshot!("small", words.collect::<String>());
+}
+
+#[test]
+fn names_of_others_stay_text() {
+    let hostile = [
+        "</style></title><script>alert(1)</script>",
+        "\u{1b}[31mred\u{7}\u{202e}\u{0}",
+        "\"' onload=alert(1) x='",
+        "机器人 Ωмега العربية",
+        "see https://example.org//x and url(http://a) @import",
+    ];
+    let long = "x".repeat(5000);
+    for name in hostile.into_iter().chain([long.as_str()]) {
+        let mut session = calibrated();
+        name.clone_into(&mut session.name);
+        session.about = About { serial: name.to_owned(), operator: name.to_owned(), site: name.to_owned() };
+        for row in &mut session.rows {
+            name.clone_into(&mut row.planned.pose);
+        }
+        for note in &mut session.notes {
+            name.clone_into(&mut note.text);
+        }
+        for refused in &mut session.refused {
+            name.clone_into(&mut refused.reason);
+        }
+        for sample in &mut session.samples {
+            for finding in &mut sample.noted.findings {
+                name.clone_into(&mut finding.message);
+            }
+        }
+        let result = session.identified.as_deref_mut().unwrap();
+        for parameter in &mut result.summary.parameters {
+            name.clone_into(&mut parameter.name);
+            name.clone_into(&mut parameter.unit);
+        }
+        name.clone_into(&mut result.summary.provenance.program);
+        result.summary.verdict.reasons = vec![name.to_owned()];
+        for warning in &mut result.summary.warnings {
+            name.clone_into(&mut warning.message);
+        }
+        let [_, (_, html)] = reports(&session, &[(name.to_owned(), String::new())]).unwrap().try_into().unwrap();
+        // An address may be read, but nothing follows it.
+        check_page(
+            &html.replace("https:/&#47;", "").replace("http:/&#47;", "").replace("url(", "").replace("@import", ""),
+        );
+        let plain: String = name.chars().filter(|c| !c.is_control() && *c != '\u{202e}').collect();
+        let seen = text(&html).replace('\u{fffd}', "");
+        assert!(seen.contains(plain.trim()) || name.contains('-'), "{name:?}");
+    }
+}
+
+#[test]
+fn every_part_of_a_session_has_a_report() {
+    let lines = &CALIBRATED.journal.lines;
+    for count in 1..=lines.len() {
+        let session = session_of(&lines[..count]);
+        let (json, html) = report(&session);
+        let state = json["report"]["state"].as_str().unwrap();
+        match &session.identified {
+            None => {
+                assert_eq!((state, files(&session).is_err()), ("none", true));
+                assert!(html.contains("NOT EVALUATED") && html.contains("NO RESULT."), "after {count} entries");
+                assert!(json.get("verdict").is_none());
+            }
+            Some(_) => assert_eq!(state, "current"),
+        }
+    }
+}
+
+#[test]
+fn a_result_that_does_not_hold_is_not_shown_as_accepted() {
+    let mut session = with_result(|result| result.summary.verdict.status = VerdictStatus::Accepted);
+    assert!(report(&session).1.contains("✓ ACCEPTED"));
+    let last = session.samples.iter().rposition(|sample| session.kind_of(sample).is_measured()).unwrap();
+    session.samples[last].state = trupose::session::state::SampleState::LeftOut;
+    let (json, html) = report(&session);
+    assert_eq!(json["report"]["state"], "out_of_date");
+    assert!(html.contains("OUT OF DATE.") && html.contains("– NOT EVALUATED") && !html.contains("✓ ACCEPTED"));
+
+    let unusable = with_result(|result| result.calibration = None);
+    let (json, html) = report(&unusable);
+    assert_eq!(json["report"]["state"], "unusable");
+    assert!(html.contains("NOT USABLE.") && html.contains("There is nothing to apply"));
+}
+
+#[test]
+fn little_or_nothing_to_show_is_said() {
+    let unverified = with_result(|result| {
+        result.summary.verification = None;
+        result.summary.verdict.checks.clear();
+    });
+    let shown = text(&report(&unverified).1);
+    assert!(shown.contains("nothing can be said about the accuracy") && shown.contains("states no acceptance limits"));
+    assert!(!shown.contains("Accuracy on poses"));
+
+    let all_rejected = with_result(|result| {
+        for point in &mut result.points {
+            point.rejected = true;
+        }
+    });
+    report(&all_rejected);
+
+    let three = with_result(|result| {
+        result.samples.truncate(3);
+        result.points.truncate(3);
+        result.summary.samples = 3;
+        result.summary.rank = None;
+        result.summary.parameters.clear();
+        result.summary.blind_groups.clear();
+    });
+    assert!(text(&report(&three).1).contains("an unclear number"));
+
+    let bare = with_result(|result| {
+        result.samples.clear();
+        result.points.clear();
+    });
+    report(&bare);
+
+    for profile in ["epson_ls3_b401s", "ur5e"] {
+        let text = builtin(profile).unwrap().to_owned();
+        let entry = Entry::Profile { source: profile.to_owned(), sha256: sha256(text.as_bytes()), text };
+        let first = &CALIBRATED.journal.lines[0];
+        let session = session_of(&[first.clone(), Line { number: 2, time: first.time, entry }]);
+        let (json, html) = report(&session);
+        assert_eq!(json["report"]["robot"]["profile"], profile);
+        assert!(html.contains("No plan was accepted."));
+    }
+}
+
+#[test]
+fn numbers_that_are_none_reach_neither_file() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        let mut session = with_result(|result| {
+            let summary = &mut result.summary;
+            summary.sigma.used_mm = bad;
+            summary.condition_number = Some(bad);
+            summary.singular_value_gap = if bad.is_nan() { 0.0 } else { bad.abs().min(1e300) };
+            for parameter in &mut summary.parameters {
+                (parameter.nominal, parameter.deviation, parameter.sigma) = (bad, bad, Some(bad));
+            }
+            let verification = summary.verification.as_mut().unwrap();
+            for model in [&mut verification.nominal, &mut verification.identified] {
+                model.position_mm = Some(StatisticsSummary { count: 1, mean: bad, rms: bad, p95: bad, max: bad });
+            }
+            for (index, point) in result.points.iter_mut().enumerate() {
+                *point = PointErrorText {
+                    at_mm: if index == 0 { point.at_mm } else { (bad, 0.0, bad) },
+                    nominal_mm: (bad, bad, bad),
+                    identified_mm: if index % 2 == 0 { (bad, 0.0, 0.0) } else { point.identified_mm },
+                    ..*point
+                };
+            }
+        });
+        for sample in &mut session.samples {
+            sample.noted.temperature_degc = Some(bad);
+            sample.noted.predicted_error_sigma = Some(bad);
+        }
+        report(&session);
+    }
+}
+
+#[test]
+fn the_command_makes_the_same_report_anew() {
+    let place = CALIBRATED.folder.path();
+    let delivered = fs::read_to_string(place.join("sessions/s/report.json")).unwrap();
+    fs::create_dir_all(place.join("again")).unwrap();
+    let output = trupose(place, &["session", "report", "sessions/s", "--out", "again/mine.html"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(said, "written: again/mine.json\nwritten: again/mine.html\n");
+    let read = |text: &str| {
+        let mut value: Value = serde_json::from_str(text).unwrap();
+        for later in ["journal_entries", "worked_min"] {
+            value["report"]["session"][later] = Value::Null;
+        }
+        value
+    };
+    assert_eq!(read(&fs::read_to_string(place.join("again/mine.json")).unwrap()), read(&delivered));
+    check_page(&fs::read_to_string(place.join("again/mine.html")).unwrap());
+    let output = trupose(place, &["session", "report", "nowhere"]);
+    assert_ne!(output.status.code(), Some(0));
+}
+
+#[test]
+fn identify_writes_both_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let out = folder.path().join("r");
+    let arguments = ["identify", "--profile", "soochow", "--measurements", "sessions/soochow-example/measurements.csv"];
+    let verify = ["--verify", "sessions/soochow-example/verification.csv", "--out", out.to_str().unwrap()];
+    let output = trupose(root, &[&arguments[..], &verify].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let html = fs::read_to_string(out.join("report.html")).unwrap();
+    check_page(&html);
+    let json: Value = serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+    assert_eq!(json["report"]["points"].as_array().unwrap().len(), 76);
+    assert_eq!(json["report"]["points_from"], "tables");
+    assert!(text(&html).contains("read from tables, which carry no time"));
+    let calibration = sha256(&fs::read(out.join("calibration.ron")).unwrap());
+    assert_eq!(json["report"]["files"], serde_json::json!([{ "name": "calibration.ron", "sha256": calibration }]));
+}
