@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 
-use super::protocol::{Failure, Identity, Severity, Shot};
+use super::protocol::{Failure, Identity, JointState, Severity, Shot};
 use super::wire::{Latest, RawLog, Wire, WireEvent};
 use super::{Link, LinkError, LinkNews, build};
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
@@ -17,12 +17,18 @@ const SET_UP: Duration = Duration::from_secs(120);
 const SHOT: Duration = Duration::from_secs(120);
 /// A reading that was not steady is tried so often in all, with this pause between.
 const TRIES: (u32, Duration) = (3, Duration::from_secs(2));
+/// The same pause where the instrument is a simulated one.
+const SIMULATED_PAUSE: Duration = Duration::from_millis(100);
 /// The robot comes to rest within this.
 const REST: Duration = Duration::from_secs(20);
 /// What is older than this is not now.
 const FRESH: Duration = Duration::from_secs(1);
 /// A wait looks so often whether it is still wanted.
 const LOOK: Duration = Duration::from_millis(50);
+/// So often for the joints of the robot.
+const LOOK_AT_JOINTS: Duration = Duration::from_millis(5);
+/// Events taken at once: the rest waits for the next look.
+const AT_ONCE: usize = 1024;
 /// No instrument measures nearer or farther (m).
 const RANGE: (f64, f64) = (0.05, 100.0);
 
@@ -40,6 +46,8 @@ pub struct Wired {
     before: Option<Point3<f64>>,
     /// For a simulated instrument: told before every shot.
     before_shot: Option<BeforeShot>,
+    /// For a simulated robot: what it told before this is of the place before (s, its own clock).
+    robot_since: f64,
 }
 
 /// Told before a shot is asked for.
@@ -85,6 +93,7 @@ impl Wired {
             news: Vec::new(),
             before: None,
             before_shot: None,
+            robot_since: f64::NEG_INFINITY,
         })
     }
 
@@ -93,6 +102,11 @@ impl Wired {
     pub(super) fn simulated(mut self, before_shot: BeforeShot) -> Self {
         self.before_shot = Some(before_shot);
         self
+    }
+
+    /// A simulated robot stands elsewhere since then (s, its own clock).
+    pub(super) const fn robot_moved(&mut self, since: f64) {
+        self.robot_since = since;
     }
 
     /// Who answers, once it does.
@@ -119,8 +133,8 @@ impl Wired {
             }
         }
         let until = self.instrument.now() + wait;
-        loop {
-            // However much comes, the wait ends.
+        // However much comes, this ends.
+        for _ in 0..AT_ONCE {
             let left = until.saturating_sub(self.instrument.now());
             let event = match self.instrument.events.recv_timeout(left) {
                 Ok(event) => event,
@@ -154,6 +168,7 @@ impl Wired {
                 WireEvent::Status(_) => {}
             }
         }
+        None
     }
 
     /// Waits for `time`, or until it is not wanted any more.
@@ -177,11 +192,12 @@ impl Wired {
         }
         let until = self.instrument.now() + REST;
         loop {
-            // What happens meanwhile at the instrument is told later.
-            drop(self.drain(LOOK));
             let Some(robot) = &self.robot else { return Ok(None) };
             let (latest, now) = (robot.latest(), robot.now());
-            let fresh = latest.joints.filter(|(at, _)| now.saturating_sub(*at) <= FRESH);
+            let is_fresh = |(at, state): &(Duration, JointState)| {
+                now.saturating_sub(*at) <= FRESH && state.controller_time > self.robot_since
+            };
+            let fresh = latest.joints.filter(is_fresh);
             if let Some((_, state)) = &fresh {
                 if let Some(why) = &state.stopped {
                     return Err(LinkError::Robot(format!("it does not move on: {why}")));
@@ -201,15 +217,18 @@ impl Wired {
                 };
                 return Err(LinkError::Robot(why));
             }
+            // What happens meanwhile at the instrument is told later.
+            drop(self.drain(LOOK_AT_JOINTS));
         }
     }
 
     /// One shot that passes the gates; what is not steady is tried again.
     fn shot(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Shot, LinkError> {
+        let pause = if self.before_shot.is_some() { SIMULATED_PAUSE } else { TRIES.1 };
         for left in (0..TRIES.0).rev() {
             match self.one_shot(keep_going)? {
                 Ok(shot) => return Ok(shot),
-                Err(failure) if failure.is_transient() && left > 0 => self.pause(TRIES.1, keep_going)?,
+                Err(failure) if failure.is_transient() && left > 0 => self.pause(pause, keep_going)?,
                 Err(failure) => return Err(LinkError::Instrument(failure)),
             }
         }
@@ -289,26 +308,7 @@ impl Wired {
 
 impl Link for Wired {
     fn connect(&mut self) -> Result<String, LinkError> {
-        let until = self.instrument.now() + SET_UP;
-        while self.identity.is_none() {
-            if let Some(Err(failure)) = self.drain(LOOK) {
-                return Err(LinkError::Instrument(failure));
-            }
-            if self.instrument.now() > until {
-                let what = format!("'{}' was being set up", self.address);
-                return Err(LinkError::Instrument(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
-            }
-        }
-        if self.robot.is_some() {
-            self.standing_robot(until)?;
-        }
-        let identity = self.identity.clone().unwrap_or_default();
-        let reflector = identity.reflector.map_or_else(String::new, |reflector| {
-            format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
-        });
-        let warnings: String = identity.warnings.iter().map(|warning| format!("; {warning}")).collect();
-        let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
-        Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
+        self.connect_while(&|| true)
     }
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
@@ -333,6 +333,40 @@ impl Link for Wired {
         // An answer without a question is one that came too late.
         drop(self.drain(wait));
         Some((self.live(), std::mem::take(&mut self.news)))
+    }
+}
+
+impl Wired {
+    /// As [`Link::connect`], while it is wanted.
+    ///
+    /// # Errors
+    /// As there; [`LinkError::Cancelled`].
+    pub fn connect_while(&mut self, keep_going: &dyn Fn() -> bool) -> Result<String, LinkError> {
+        let until = self.instrument.now() + SET_UP;
+        while self.identity.is_none() {
+            if let Some(Err(failure)) = self.drain(LOOK) {
+                return Err(LinkError::Instrument(failure));
+            }
+            if !keep_going() {
+                return Err(LinkError::Cancelled);
+            }
+            if self.instrument.now() > until {
+                let what = format!("'{}' was being set up", self.address);
+                return Err(LinkError::Instrument(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
+            }
+        }
+        if self.robot.is_some() {
+            self.standing_robot(until)?;
+        }
+        // What was said on the way is in the line below.
+        self.news.clear();
+        let identity = self.identity.clone().unwrap_or_default();
+        let reflector = identity.reflector.map_or_else(String::new, |reflector| {
+            format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
+        });
+        let warnings: String = identity.warnings.iter().map(|warning| format!("; {warning}")).collect();
+        let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
+        Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
     }
 }
 
