@@ -14,6 +14,8 @@ mod replay;
 mod serve;
 mod simulated;
 pub mod simulator;
+#[cfg(test)]
+mod tests;
 mod transport;
 mod wire;
 mod wired;

@@ -18,8 +18,9 @@ use crate::units::{to_deg, to_mm};
 
 /// Between two lines of what is seen.
 const LINE: Duration = Duration::from_millis(500);
-/// Shots that scatter more are worth a word (mm).
+/// Shots that scatter more are worth a word (mm), unless the instrument states a standard deviation: then this many of it.
 const SCATTER_MM: f64 = 0.1;
+const SCATTER_SIGMAS: f64 = 4.0;
 
 pub(super) fn run<O: Write, E: Write>(
     command: &LinkCommand,
@@ -171,7 +172,8 @@ fn shoot<O: Write, E: Write>(
     if readings.len() > 1 {
         console.print(&format!("scatter of {count} shots: {scatter:.4} mm\n"))?;
     }
-    if readings.len() > 1 && scatter > SCATTER_MM {
+    let stated = readings.iter().filter_map(|reading| reading.sigma).fold(0.0, f64::max);
+    if readings.len() > 1 && scatter > SCATTER_MM.max(SCATTER_SIGMAS * to_mm(stated)) {
         return Err(Failure::new(ExitStatus::Instrument, format!("the shots scatter by {scatter:.3} mm"))
             .hint("is the reflector at rest? is something warm or shaking near the beam? does every shot see the same reflector?"));
     }

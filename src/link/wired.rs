@@ -21,6 +21,8 @@ const TRIES: (u32, Duration) = (3, Duration::from_secs(2));
 const SIMULATED_PAUSE: Duration = Duration::from_millis(100);
 /// The robot comes to rest within this.
 const REST: Duration = Duration::from_secs(20);
+/// A simulated one within this.
+const SIMULATED_REST: Duration = Duration::from_secs(2);
 /// What is older than this is not now.
 const FRESH: Duration = Duration::from_secs(1);
 /// A wait looks so often whether it is still wanted.
@@ -83,10 +85,16 @@ impl Wired {
                 .map_err(|error| LinkError::SetUp(format!("the link cannot be started: {error}")))
         };
         let shown = address.to_string();
-        Ok(Self {
-            instrument: start(address, choice.options.as_deref())?,
-            address: shown,
-            robot: robot.map(|robot| start(robot, None)).transpose()?,
+        let instrument = start(address, choice.options.as_deref())?;
+        Ok(Self::over(shown, instrument, robot.map(|robot| start(robot, None)).transpose()?))
+    }
+
+    /// An instrument on a wire that is there already.
+    pub(super) const fn over(address: String, instrument: Wire, robot: Option<Wire>) -> Self {
+        Self {
+            instrument,
+            address,
+            robot,
             identity: None,
             down: None,
             robot_down: None,
@@ -94,7 +102,7 @@ impl Wired {
             before: None,
             before_shot: None,
             robot_since: f64::NEG_INFINITY,
-        })
+        }
     }
 
     /// The same for a simulated instrument, where nothing has to settle and which is told of every shot.
@@ -185,17 +193,19 @@ impl Wired {
         Ok(())
     }
 
-    /// The joints of the robot once it stands, if it tells them.
+    /// The joints of the robot once it stands, if it tells them; as they arrived from now on.
     fn standing(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, LinkError> {
         if self.robot.is_none() {
             return Ok(None);
         }
-        let until = self.instrument.now() + REST;
+        let rest = if self.before_shot.is_some() { SIMULATED_REST } else { REST };
+        let until = self.instrument.now() + rest;
+        let since = self.robot.as_ref().map_or(Duration::ZERO, Wire::now);
         loop {
             let Some(robot) = &self.robot else { return Ok(None) };
             let (latest, now) = (robot.latest(), robot.now());
             let is_fresh = |(at, state): &(Duration, JointState)| {
-                now.saturating_sub(*at) <= FRESH && state.controller_time > self.robot_since
+                *at >= since && now.saturating_sub(*at) <= FRESH && state.controller_time > self.robot_since
             };
             let fresh = latest.joints.filter(is_fresh);
             if let Some((_, state)) = &fresh {
@@ -212,7 +222,7 @@ impl Wired {
             if self.instrument.now() > until {
                 let why = match (fresh, &self.robot_down) {
                     (_, Some(failure)) => failure.to_string(),
-                    (Some(_), None) => format!("it still moves after {} s", REST.as_secs()),
+                    (Some(_), None) => format!("it still moves after {} s", rest.as_secs()),
                     (None, None) => "it tells no joint angles".to_owned(),
                 };
                 return Err(LinkError::Robot(why));
