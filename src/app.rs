@@ -4,6 +4,7 @@ mod compensate;
 mod constraints;
 mod export;
 mod identify;
+mod link;
 mod load;
 mod plan;
 mod profile;
@@ -13,6 +14,7 @@ mod record;
 mod replay;
 mod script;
 mod session;
+mod simulate;
 mod verify;
 mod wizard;
 
@@ -80,6 +82,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
                 sessions: args.sessions,
                 json: false,
                 record_script: args.record_script,
+                raw_log: args.raw_log,
                 recording: args.recording,
             };
             wizard::run(args.profile.as_deref(), &place, args.terminal, console)
@@ -95,6 +98,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Compensate(args) => compensate::run(&args, console),
         Command::Export(args) => export::run(&args, console),
         Command::Profile(command) => profile::run(&command, console),
+        Command::Link(command) => link::run(&command, console),
+        Command::Simulate(args) => simulate::run(&args, console),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The command line: what was typed. The only reader of the environment is clap, but for what concerns the terminal.
 
+mod link;
 mod recording;
 mod terminal;
 
@@ -16,8 +17,10 @@ use crate::planning::{BoxInBase, Objective};
 use crate::profile::{ExpectedDeviation, Level};
 use crate::program::{DEFAULT_DWELL, Dialect, MAX_SPEED};
 use crate::session::measurements::Layout;
+use crate::session::simulation::SimulatedWire;
 use crate::units::from_mm;
 
+pub use link::{LinkCommand, LinkTestArgs, SimulateArgs};
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
 pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
 
@@ -53,6 +56,9 @@ pub struct WizardArgs {
     /// Write what was done as a script
     #[arg(long, value_name = "FILE")]
     pub record_script: Option<PathBuf>,
+    /// Write every byte of instruments on a wire to this file
+    #[arg(long, value_name = "FILE")]
+    pub raw_log: Option<PathBuf>,
     /// What is recorded.
     #[command(flatten)]
     pub recording: RecordingArgs,
@@ -76,6 +82,9 @@ pub struct ScriptArgs {
     /// Write what was done as a script
     #[arg(long, value_name = "FILE")]
     pub record_script: Option<PathBuf>,
+    /// Write every byte of instruments on a wire to this file
+    #[arg(long, value_name = "FILE")]
+    pub raw_log: Option<PathBuf>,
     /// What is recorded.
     #[command(flatten)]
     pub recording: RecordingArgs,
@@ -87,6 +96,9 @@ pub struct DemoArgs {
     /// Seed of the simulated cell: the same seed gives the same transcript
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Speak to the simulated cell over wires: 'emscon', 'ascii', 'geocom', 'ndi', each also as 'serial:…' where it is spoken on serial lines; with ',rtde' the robot tells its joints
+    #[arg(long, value_name = "PROTOCOL", value_parser = wires)]
+    pub over: Option<Wires>,
     /// How to run it.
     #[command(flatten)]
     pub script: ScriptArgs,
@@ -207,6 +219,11 @@ pub enum Command {
     /// List, show or check robot profiles
     #[command(subcommand)]
     Profile(ProfileCommand),
+    /// Test the link to an instrument
+    #[command(subcommand)]
+    Link(LinkCommand),
+    /// Simulate an instrument or a robot's controller on a wire
+    Simulate(SimulateArgs),
 }
 
 /// What to do with profiles.
@@ -551,6 +568,18 @@ fn name_and_value(text: &str) -> Result<(String, String), String> {
         Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.to_owned())),
         _ => Err(format!("'{text}' is not a value; write NAME=VALUE")),
     }
+}
+
+/// `--over`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wires(pub Vec<SimulatedWire>);
+
+fn wires(text: &str) -> Result<Wires, String> {
+    let wire = |text: &str| match text.trim().strip_prefix("serial:") {
+        Some(protocol) => protocol.parse().map(SimulatedWire::Serial),
+        None => text.trim().parse().map(SimulatedWire::Tcp),
+    };
+    text.split(',').map(wire).collect::<Result<_, _>>().map(Wires)
 }
 
 fn speed_percent(text: &str) -> Result<f64, String> {

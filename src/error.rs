@@ -15,6 +15,8 @@ pub enum ExitStatus {
     NotAccepted,
     /// The command line, a profile or an input file is not usable.
     Usage,
+    /// An instrument or robot does not answer, or not as it should.
+    Instrument,
     /// No usable solution.
     Numerical,
     /// Files of a result or session could not be read or written.
@@ -26,12 +28,13 @@ pub enum ExitStatus {
 }
 
 impl ExitStatus {
-    /// The exit code: 0, 1, 2, 4, 5 or 70 (3 is for instruments), 128 + number for a signal.
+    /// The exit code: 0, 1, 2, 3, 4, 5 or 70, 128 + number for a signal.
     pub const fn code(self) -> u8 {
         match self {
             Self::Accepted => 0,
             Self::NotAccepted => 1,
             Self::Usage => 2,
+            Self::Instrument => 3,
             Self::Numerical => 4,
             Self::Store => 5,
             Self::Internal => 70,

@@ -7,11 +7,15 @@
 #![warn(missing_docs)]
 
 mod build;
+mod cell_view;
 pub mod protocol;
 mod rehearsal;
 mod replay;
+mod serve;
 mod simulated;
 pub mod simulator;
+#[cfg(test)]
+mod tests;
 mod transport;
 mod wire;
 mod wired;
@@ -22,6 +26,7 @@ use thiserror::Error;
 
 pub use rehearsal::Rehearsal;
 pub use replay::{Replay, ReplayRow};
+pub use serve::Served;
 pub use simulated::{HiddenArm, SimulatedCell};
 pub use wire::RawLog;
 pub use wired::Wired;

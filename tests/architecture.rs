@@ -52,6 +52,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "geometry",
             "identification",
             "kinematics",
+            "link",
             "model",
             "planning",
             "procedure",

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use jiff::Timestamp;
 
-use super::{Console, load};
+use super::{Console, link, load};
 use crate::cli::{DemoArgs, RecordingArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::recording::Live;
@@ -29,7 +29,7 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
-    let engine = Engine::new(Options { live: live(args.recording, console)?, ..options(&script, args) })
+    let engine = Engine::new(Options { live: live(args.recording, console)?, ..options(&script, args)? })
         .map_err(|error| internal(&error))?;
     play(engine, &script, args, console)
 }
@@ -40,9 +40,14 @@ pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O,
     if let Some(seed) = args.seed {
         script_args.values.push(("seed".to_owned(), seed.to_string()));
     }
+    if let Some(wires) = &args.over {
+        let wires = ron::to_string(&wires.0).map_err(|error| internal(&error))?;
+        script_args.values.push(("wires".to_owned(), wires));
+    }
     let script = parse(DEMO, "demo", &script_args)?;
-    let engine = Engine::new(Options { live: live(args.script.recording, console)?, ..options(&script, &script_args) })
-        .map_err(|error| internal(&error))?;
+    let engine =
+        Engine::new(Options { live: live(args.script.recording, console)?, ..options(&script, &script_args)? })
+            .map_err(|error| internal(&error))?;
     play(engine, &script, &script_args, console)
 }
 
@@ -55,7 +60,7 @@ pub(super) fn resume<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
-    let engine = open(folder, Options { live: live(args.recording, console)?, ..options(&script, args) })?;
+    let engine = open(folder, Options { live: live(args.recording, console)?, ..options(&script, args)? })?;
     play(engine, &script, args, console)
 }
 
@@ -64,14 +69,15 @@ fn parse(text: &str, file: &str, args: &ScriptArgs) -> Result<Script, Failure> {
     Script::parse(text, &values).map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))
 }
 
-fn options(script: &Script, args: &ScriptArgs) -> Options {
+fn options(script: &Script, args: &ScriptArgs) -> Result<Options, Failure> {
     let start = script.clock.as_deref().and_then(|clock| clock.parse::<Timestamp>().ok());
-    Options {
+    Ok(Options {
         sessions: args.sessions.clone(),
         clock: start.map_or(Clock::System, Clock::starting_at),
         is_recorded: !args.recording.no_recording,
         live: None,
-    }
+        raw_log: link::raw_log(args.raw_log.as_deref())?,
+    })
 }
 
 /// The port for a live view, if one is asked for.
@@ -131,7 +137,9 @@ fn play<O: Write, E: Write>(
     let format = if args.json { Format::Json } else { Format::Text };
     let transcript = Transcript::new(&mut console.out, format, script.clock.is_some());
     let reopen = |folder: &str| {
-        let engine = open(Path::new(folder), options(script, args)).map_err(|failure| failure.message)?;
+        let engine = options(script, args)
+            .and_then(|options| open(Path::new(folder), options))
+            .map_err(|failure| failure.message)?;
         received.follow(engine.sender());
         Ok(engine)
     };

@@ -3,7 +3,7 @@
 use std::io::{IsTerminal as _, Write, stdin, stdout};
 use std::path::Path;
 
-use super::{Console, script};
+use super::{Console, link, script};
 use crate::cli::{ColorArg, ScriptArgs, TerminalArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
 use crate::runtime::{Clock, Deed, Engine, Options};
@@ -48,6 +48,7 @@ fn options<O: Write, E: Write>(args: &ScriptArgs, console: &mut Console<O, E>) -
         clock: Clock::System,
         is_recorded: !args.recording.no_recording,
         live: script::live(args.recording, console)?,
+        raw_log: link::raw_log(args.raw_log.as_deref())?,
     })
 }
 

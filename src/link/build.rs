@@ -1,17 +1,18 @@
 //! Protocols from their names and options.
 
 use super::protocol::Protocol;
-use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Checksum, Mode, Preset};
+use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Checksum, Column, Layout, Mode, Preset};
 use super::protocol::emscon::{Emscon, EmsconOptions};
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::{Rtde, RtdeOptions};
 use super::simulator::Simulator;
-use super::simulator::ascii::AsciiSimulator;
-use super::simulator::emscon::EmsconSimulator;
-use super::simulator::geocom::GeocomSimulator;
-use super::simulator::ndi::NdiSimulator;
-use super::simulator::rtde::RtdeSimulator;
+use super::simulator::ascii::{AsciiFault, AsciiSimulator};
+use super::simulator::emscon::{EmsconFault, EmsconSimulator};
+use super::simulator::fault::NamedFault as _;
+use super::simulator::geocom::{GeocomFault, GeocomSimulator};
+use super::simulator::ndi::{NdiFault, NdiSimulator};
+use super::simulator::rtde::{RtdeFault, RtdeSimulator};
 use crate::session::wire::{Route, WireAddress, WireProtocol};
 use std::str::FromStr;
 
@@ -124,10 +125,22 @@ where
     faults.iter().map(|fault| fault.parse().map_err(|error: F::Err| error.to_string())).collect()
 }
 
-/// How lines are written in a rehearsal: asked for one by one, with a check sum.
+/// Names of the faults of a simulator.
+pub(super) fn fault_names(protocol: WireProtocol) -> Vec<&'static str> {
+    match protocol {
+        WireProtocol::Emscon => EmsconFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Rtde => RtdeFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Ascii => AsciiFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Geocom => GeocomFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Ndi => NdiFault::ALL.iter().map(|fault| fault.name()).collect(),
+    }
+}
+
+/// How lines are written in a rehearsal: asked for one by one, each with its standard deviation and a check sum.
 fn rehearsal_ascii() -> AsciiOptions {
     AsciiOptions {
         mode: Mode::Polled { trigger: "M\\r".to_owned() },
+        layout: Layout::Columns(vec![Column::X, Column::Y, Column::Z, Column::Sigma]),
         checksum: Checksum::Crc16,
         ..AsciiOptions::default()
     }

@@ -12,7 +12,7 @@ use std::time::Duration;
 use super::protocol::rtde::Stillness;
 use super::protocol::{Failure, Identity, JointState, Protocol, ProtocolEvent, Shot, Status};
 use super::transport::{self, Stopwatch, Transport};
-use crate::session::wire::WireAddress;
+use crate::session::wire::{WireAddress, WireProtocol};
 
 /// A read waits this long at most, so that commands are seen.
 const READ: Duration = Duration::from_millis(20);
@@ -130,12 +130,12 @@ impl RawLog {
         Self(Arc::new(Mutex::new(file)))
     }
 
-    /// One line per piece: time since the start (s), direction, bytes in hexadecimal.
-    fn write(&self, now: Duration, direction: &str, bytes: &[u8]) {
+    /// One line per piece: time since the start of the wire (s), whose wire, direction, bytes in hexadecimal.
+    fn write(&self, now: Duration, wire: WireProtocol, direction: &str, bytes: &[u8]) {
         use std::fmt::Write as _;
         use std::io::Write as _;
 
-        let mut line = format!("{:.6} {direction} ", now.as_secs_f64());
+        let mut line = format!("{:.6} {wire} {direction} ", now.as_secs_f64());
         for byte in bytes {
             // Writing to a string cannot fail.
             let _infallible = write!(line, "{byte:02x}");
@@ -182,7 +182,7 @@ impl Worker {
                     }
                 },
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => return,
-                Err(error) => Failure::Disconnected(error.to_string()),
+                Err(error) => Failure::Unreachable(error.to_string()),
             };
             // What was last seen is not there any more.
             *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = Latest::default();
@@ -311,7 +311,7 @@ impl Worker {
 
     fn note(&self, direction: &str, bytes: &[u8]) {
         if let Some(log) = &self.log {
-            log.write(self.clock.now(), direction, bytes);
+            log.write(self.clock.now(), self.address.protocol, direction, bytes);
         }
     }
 }

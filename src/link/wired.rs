@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 
-use super::protocol::{Failure, Identity, Severity, Shot};
+use super::protocol::{Failure, Identity, JointState, Severity, Shot};
 use super::wire::{Latest, RawLog, Wire, WireEvent};
 use super::{Link, LinkError, LinkNews, build};
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
@@ -17,12 +17,20 @@ const SET_UP: Duration = Duration::from_secs(120);
 const SHOT: Duration = Duration::from_secs(120);
 /// A reading that was not steady is tried so often in all, with this pause between.
 const TRIES: (u32, Duration) = (3, Duration::from_secs(2));
+/// The same pause where the instrument is a simulated one.
+const SIMULATED_PAUSE: Duration = Duration::from_millis(100);
 /// The robot comes to rest within this.
 const REST: Duration = Duration::from_secs(20);
+/// A simulated one within this.
+const SIMULATED_REST: Duration = Duration::from_secs(2);
 /// What is older than this is not now.
 const FRESH: Duration = Duration::from_secs(1);
 /// A wait looks so often whether it is still wanted.
 const LOOK: Duration = Duration::from_millis(50);
+/// So often for the joints of the robot.
+const LOOK_AT_JOINTS: Duration = Duration::from_millis(5);
+/// Events taken at once: the rest waits for the next look.
+const AT_ONCE: usize = 1024;
 /// No instrument measures nearer or farther (m).
 const RANGE: (f64, f64) = (0.05, 100.0);
 
@@ -40,6 +48,8 @@ pub struct Wired {
     before: Option<Point3<f64>>,
     /// For a simulated instrument: told before every shot.
     before_shot: Option<BeforeShot>,
+    /// For a simulated robot: what it told before this is of the place before (s, its own clock).
+    robot_since: f64,
 }
 
 /// Told before a shot is asked for.
@@ -75,17 +85,24 @@ impl Wired {
                 .map_err(|error| LinkError::SetUp(format!("the link cannot be started: {error}")))
         };
         let shown = address.to_string();
-        Ok(Self {
-            instrument: start(address, choice.options.as_deref())?,
-            address: shown,
-            robot: robot.map(|robot| start(robot, None)).transpose()?,
+        let instrument = start(address, choice.options.as_deref())?;
+        Ok(Self::over(shown, instrument, robot.map(|robot| start(robot, None)).transpose()?))
+    }
+
+    /// An instrument on a wire that is there already.
+    pub(super) const fn over(address: String, instrument: Wire, robot: Option<Wire>) -> Self {
+        Self {
+            instrument,
+            address,
+            robot,
             identity: None,
             down: None,
             robot_down: None,
             news: Vec::new(),
             before: None,
             before_shot: None,
-        })
+            robot_since: f64::NEG_INFINITY,
+        }
     }
 
     /// The same for a simulated instrument, where nothing has to settle and which is told of every shot.
@@ -93,6 +110,11 @@ impl Wired {
     pub(super) fn simulated(mut self, before_shot: BeforeShot) -> Self {
         self.before_shot = Some(before_shot);
         self
+    }
+
+    /// A simulated robot stands elsewhere since then (s, its own clock).
+    pub(super) const fn robot_moved(&mut self, since: f64) {
+        self.robot_since = since;
     }
 
     /// Who answers, once it does.
@@ -119,8 +141,8 @@ impl Wired {
             }
         }
         let until = self.instrument.now() + wait;
-        loop {
-            // However much comes, the wait ends.
+        // However much comes, this ends.
+        for _ in 0..AT_ONCE {
             let left = until.saturating_sub(self.instrument.now());
             let event = match self.instrument.events.recv_timeout(left) {
                 Ok(event) => event,
@@ -154,6 +176,7 @@ impl Wired {
                 WireEvent::Status(_) => {}
             }
         }
+        None
     }
 
     /// Waits for `time`, or until it is not wanted any more.
@@ -170,18 +193,21 @@ impl Wired {
         Ok(())
     }
 
-    /// The joints of the robot once it stands, if it tells them.
+    /// The joints of the robot once it stands, if it tells them; as they arrived from now on.
     fn standing(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, LinkError> {
         if self.robot.is_none() {
             return Ok(None);
         }
-        let until = self.instrument.now() + REST;
+        let rest = if self.before_shot.is_some() { SIMULATED_REST } else { REST };
+        let until = self.instrument.now() + rest;
+        let since = self.robot.as_ref().map_or(Duration::ZERO, Wire::now);
         loop {
-            // What happens meanwhile at the instrument is told later.
-            drop(self.drain(LOOK));
             let Some(robot) = &self.robot else { return Ok(None) };
             let (latest, now) = (robot.latest(), robot.now());
-            let fresh = latest.joints.filter(|(at, _)| now.saturating_sub(*at) <= FRESH);
+            let is_fresh = |(at, state): &(Duration, JointState)| {
+                *at >= since && now.saturating_sub(*at) <= FRESH && state.controller_time > self.robot_since
+            };
+            let fresh = latest.joints.filter(is_fresh);
             if let Some((_, state)) = &fresh {
                 if let Some(why) = &state.stopped {
                     return Err(LinkError::Robot(format!("it does not move on: {why}")));
@@ -196,20 +222,23 @@ impl Wired {
             if self.instrument.now() > until {
                 let why = match (fresh, &self.robot_down) {
                     (_, Some(failure)) => failure.to_string(),
-                    (Some(_), None) => format!("it still moves after {} s", REST.as_secs()),
+                    (Some(_), None) => format!("it still moves after {} s", rest.as_secs()),
                     (None, None) => "it tells no joint angles".to_owned(),
                 };
                 return Err(LinkError::Robot(why));
             }
+            // What happens meanwhile at the instrument is told later.
+            drop(self.drain(LOOK_AT_JOINTS));
         }
     }
 
     /// One shot that passes the gates; what is not steady is tried again.
     fn shot(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Shot, LinkError> {
+        let pause = if self.before_shot.is_some() { SIMULATED_PAUSE } else { TRIES.1 };
         for left in (0..TRIES.0).rev() {
             match self.one_shot(keep_going)? {
                 Ok(shot) => return Ok(shot),
-                Err(failure) if failure.is_transient() && left > 0 => self.pause(TRIES.1, keep_going)?,
+                Err(failure) if failure.is_transient() && left > 0 => self.pause(pause, keep_going)?,
                 Err(failure) => return Err(LinkError::Instrument(failure)),
             }
         }
@@ -289,26 +318,7 @@ impl Wired {
 
 impl Link for Wired {
     fn connect(&mut self) -> Result<String, LinkError> {
-        let until = self.instrument.now() + SET_UP;
-        while self.identity.is_none() {
-            if let Some(Err(failure)) = self.drain(LOOK) {
-                return Err(LinkError::Instrument(failure));
-            }
-            if self.instrument.now() > until {
-                let what = format!("'{}' was being set up", self.address);
-                return Err(LinkError::Instrument(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
-            }
-        }
-        if self.robot.is_some() {
-            self.standing_robot(until)?;
-        }
-        let identity = self.identity.clone().unwrap_or_default();
-        let reflector = identity.reflector.map_or_else(String::new, |reflector| {
-            format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
-        });
-        let warnings: String = identity.warnings.iter().map(|warning| format!("; {warning}")).collect();
-        let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
-        Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
+        self.connect_while(&|| true)
     }
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
@@ -333,6 +343,40 @@ impl Link for Wired {
         // An answer without a question is one that came too late.
         drop(self.drain(wait));
         Some((self.live(), std::mem::take(&mut self.news)))
+    }
+}
+
+impl Wired {
+    /// As [`Link::connect`], while it is wanted.
+    ///
+    /// # Errors
+    /// As there; [`LinkError::Cancelled`].
+    pub fn connect_while(&mut self, keep_going: &dyn Fn() -> bool) -> Result<String, LinkError> {
+        let until = self.instrument.now() + SET_UP;
+        while self.identity.is_none() {
+            if let Some(Err(failure)) = self.drain(LOOK) {
+                return Err(LinkError::Instrument(failure));
+            }
+            if !keep_going() {
+                return Err(LinkError::Cancelled);
+            }
+            if self.instrument.now() > until {
+                let what = format!("'{}' was being set up", self.address);
+                return Err(LinkError::Instrument(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
+            }
+        }
+        if self.robot.is_some() {
+            self.standing_robot(until)?;
+        }
+        // What was said on the way is in the line below.
+        self.news.clear();
+        let identity = self.identity.clone().unwrap_or_default();
+        let reflector = identity.reflector.map_or_else(String::new, |reflector| {
+            format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
+        });
+        let warnings: String = identity.warnings.iter().map(|warning| format!("; {warning}")).collect();
+        let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
+        Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
     }
 }
 

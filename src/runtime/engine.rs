@@ -12,6 +12,7 @@ use super::clock::Clock;
 use super::jobs;
 use super::links::LinkThread;
 use super::store_thread::{Command, StoreThread};
+use crate::link::RawLog;
 use crate::recording::{Live, Recorder, RecordingEvent};
 use crate::session::journal::{Journal, Line};
 use crate::session::state::Session;
@@ -32,12 +33,14 @@ pub struct Options {
     pub is_recorded: bool,
     /// Where a viewer may look on.
     pub live: Option<Live>,
+    /// What takes every byte of instruments on a wire.
+    pub raw_log: Option<RawLog>,
 }
 
 impl Options {
     /// Sessions in this folder, without a recording.
     pub const fn unrecorded(sessions: PathBuf, clock: Clock) -> Self {
-        Self { sessions, clock, is_recorded: false, live: None }
+        Self { sessions, clock, is_recorded: false, live: None, raw_log: None }
     }
 }
 
@@ -158,7 +161,7 @@ impl Engine {
             wizard,
             clock: options.clock,
             store: StoreThread::start(options.sessions, folder, sender.clone())?,
-            link: LinkThread::start(sender.clone())?,
+            link: LinkThread::start(sender.clone(), options.raw_log)?,
             recording: Recording { is_wanted: options.is_recorded, live: options.live, recorder: None },
             sender,
             events,

@@ -5,12 +5,12 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
 use super::engine::Events;
-use crate::link::{Link, LinkError, LinkNews, Rehearsal, Replay, SimulatedCell, Wired};
+use crate::link::{Link, LinkError, LinkNews, RawLog, Rehearsal, Replay, SimulatedCell, Wired};
 use crate::profile::Profile;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, read_bytes_as};
@@ -38,9 +38,10 @@ pub(super) struct LinkThread {
 }
 
 impl LinkThread {
-    pub(super) fn start(events: Events) -> io::Result<Self> {
+    /// `log` takes every byte of instruments on a wire.
+    pub(super) fn start(events: Events, log: Option<RawLog>) -> io::Result<Self> {
         let (commands, received) = sync_channel(WAITING);
-        thread::Builder::new().name("link".to_owned()).spawn(move || work(&received, &events))?;
+        thread::Builder::new().name("link".to_owned()).spawn(move || work(&received, &events, log.as_ref()))?;
         Ok(Self { commands })
     }
 
@@ -53,13 +54,13 @@ impl LinkThread {
     }
 }
 
-fn work(commands: &Receiver<Command>, events: &Events) {
+fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
     let mut link: Option<Box<dyn Link>> = None;
     while let Some(command) = next(commands, link.as_deref_mut(), events) {
         let (id, answer) = match command {
             Command::Connect { id, instrument, profile } => {
                 link = None;
-                match connect(&instrument, &profile) {
+                match connect(&instrument, &profile, log) {
                     Ok((connected, identity, recorded)) => {
                         link = connected;
                         (id, Answer::Connected { identity, recorded })
@@ -89,16 +90,17 @@ fn work(commands: &Receiver<Command>, events: &Events) {
 fn next(commands: &Receiver<Command>, link: Option<&mut (dyn Link + 'static)>, events: &Events) -> Option<Command> {
     let Some(link) = link else { return commands.recv().ok() };
     loop {
-        match commands.try_recv() {
-            Ok(command) => return Some(command),
-            Err(TryRecvError::Disconnected) => return None,
-            Err(TryRecvError::Empty) => {}
-        }
-        let Some((live, news)) = link.watch(WATCH) else { return commands.recv().ok() };
+        let Some((live, news)) = link.watch(Duration::ZERO) else { return commands.recv().ok() };
         // The next look says more than one that nobody has room for.
         events.offer(Event::Live(live));
         for one in news {
             events.offer(Event::Remark(remark(one)));
+        }
+        // A command does not wait for the next look.
+        match commands.recv_timeout(WATCH) {
+            Ok(command) => return Some(command),
+            Err(RecvTimeoutError::Disconnected) => return None,
+            Err(RecvTimeoutError::Timeout) => {}
         }
     }
 }
@@ -129,7 +131,7 @@ fn failed(error: &LinkError) -> Answer {
 
 type Connected = (Option<Box<dyn Link>>, String, Vec<PlannedPose>);
 
-fn connect(instrument: &InstrumentChoice, profile: &Profile) -> Result<Connected, LinkError> {
+fn connect(instrument: &InstrumentChoice, profile: &Profile, log: Option<&RawLog>) -> Result<Connected, LinkError> {
     match instrument {
         InstrumentChoice::Manual { unit } => {
             Ok((None, format!("coordinates typed in, in {}", unit.sign()), Vec::new()))
@@ -140,7 +142,7 @@ fn connect(instrument: &InstrumentChoice, profile: &Profile) -> Result<Connected
             Ok((Some(Box::new(rehearsal)), identity, Vec::new()))
         }
         InstrumentChoice::Linked(choice) => {
-            let mut wired = Wired::new(choice, None)?;
+            let mut wired = Wired::new(choice, log.cloned())?;
             let identity = wired.connect()?;
             Ok((Some(Box::new(wired)), identity, Vec::new()))
         }

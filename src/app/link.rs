@@ -1,0 +1,191 @@
+//! `trupose link test`: is the instrument there, is it set as it should be, does it measure, and if not, why.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::Console;
+use crate::cli::{LinkCommand, LinkTestArgs};
+use crate::error::{ExitStatus, Failure};
+use crate::link::{Link as _, LinkError, LinkNews, RawLog, Wired};
+use crate::runtime::signals;
+use crate::session::reading::{LiveReading, MeasureRequest, Reading};
+use crate::session::wire::LinkChoice;
+use crate::units::{to_deg, to_mm};
+
+/// Between two lines of what is seen.
+const LINE: Duration = Duration::from_millis(500);
+/// Shots that scatter more are worth a word (mm), unless the instrument states a standard deviation: then this many of it.
+const SCATTER_MM: f64 = 0.1;
+const SCATTER_SIGMAS: f64 = 4.0;
+
+pub(super) fn run<O: Write, E: Write>(
+    command: &LinkCommand,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let LinkCommand::Test(args) = command;
+    test(args, console)
+}
+
+/// A raw log in a new file.
+pub(super) fn raw_log(path: Option<&Path>) -> Result<Option<RawLog>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let file = File::options().create(true).append(true).open(path).map_err(|error| {
+        Failure::new(ExitStatus::Usage, format!("cannot write the raw log '{}': {error}", path.display()))
+    })?;
+    Ok(Some(RawLog::new(file)))
+}
+
+fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let told = Arc::clone(&ended);
+    signals::each(move |_signal| told.store(true, Ordering::Relaxed))
+        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    let keep_going = || !ended.load(Ordering::Relaxed);
+    let choice = LinkChoice {
+        address: args.address.clone(),
+        options: args.options.clone(),
+        robot: args.robot.clone(),
+        is_automatic: false,
+    };
+    let mut wired = Wired::new(&choice, raw_log(args.raw_log.as_deref())?)
+        .map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
+    console.print(&format!("connecting to {}\n", args.address))?;
+    let peer = wired.connect_while(&keep_going).map_err(|error| problem(&error, "it does not connect"))?;
+    console.print(&format!("connected: {peer}\n"))?;
+    let identity = wired.identity().cloned().unwrap_or_default();
+    for item in &identity.checked {
+        console.print(&format!("checked: {item}\n"))?;
+    }
+    if let Some(reflector) = &identity.reflector {
+        console.print(&format!(
+            "reflector: {} (number {}), surface offset {:.3} mm: is it the one on the robot?\n",
+            reflector.name,
+            reflector.id,
+            to_mm(reflector.offset)
+        ))?;
+    }
+    for warning in &identity.warnings {
+        console.print(&format!("WARNING: {warning}\n"))?;
+    }
+    watch(args, &mut wired, console, &keep_going)?;
+    if args.shots > 0 {
+        shoot(args.shots, &mut wired, console, &keep_going)?;
+    }
+    if !keep_going() {
+        return Err(Failure::new(ExitStatus::Instrument, "the test was ended before it was complete"));
+    }
+    if identity.warnings.is_empty() {
+        console.print("the link works\n")?;
+        Ok(ExitStatus::Accepted)
+    } else {
+        Err(Failure::new(ExitStatus::Instrument, "the link works, but not as it should: see the warnings above")
+            .hint(identity.warnings.join("; ")))
+    }
+}
+
+/// What is seen while nothing is measured.
+fn watch<O: Write, E: Write>(
+    args: &LinkTestArgs,
+    wired: &mut Wired,
+    console: &mut Console<O, E>,
+    keep_going: &dyn Fn() -> bool,
+) -> Result<(), Failure> {
+    let until = Instant::now() + Duration::try_from_secs_f64(args.seconds).unwrap_or_default();
+    while Instant::now() < until && keep_going() {
+        let Some((live, news)) = wired.watch(LINE.min(until.saturating_duration_since(Instant::now()))) else {
+            return Ok(());
+        };
+        for one in news {
+            console.print(&format!("{}\n", news_text(&one)))?;
+        }
+        console.print(&format!("sees: {}\n", live_text(&live)))?;
+        if let Some(cause) = live.down {
+            return Err(Failure::new(ExitStatus::Instrument, format!("the link is down: {cause}"))
+                .hint("check cable, address and whether the instrument is on; then test again"));
+        }
+    }
+    Ok(())
+}
+
+fn news_text(news: &LinkNews) -> String {
+    match news {
+        LinkNews::Up(identity) => format!("connected again: {identity}"),
+        LinkNews::Down(cause) => format!("lost: {cause}"),
+        LinkNews::Status(text) => format!("told: {text}"),
+    }
+}
+
+fn live_text(live: &LiveReading) -> String {
+    let mut parts = vec![live.point.map_or_else(
+        || "no position between measurements".to_owned(),
+        |point| format!("x {:.3}  y {:.3}  z {:.3} mm", to_mm(point.x), to_mm(point.y), to_mm(point.z)),
+    )];
+    if let Some(joints) = &live.joints {
+        let joints: Vec<String> = joints.iter().map(|joint| format!("{:.3}", to_deg(*joint))).collect();
+        let rests = if live.is_still == Some(true) { "at rest" } else { "moving" };
+        parts.push(format!("robot {rests} at {} deg", joints.join(" ")));
+    }
+    parts.join("; ")
+}
+
+/// Single shots, and how they scatter.
+fn shoot<O: Write, E: Write>(
+    count: u32,
+    wired: &mut Wired,
+    console: &mut Console<O, E>,
+    keep_going: &dyn Fn() -> bool,
+) -> Result<(), Failure> {
+    let mut readings: Vec<Reading> = Vec::new();
+    for number in 1..=count {
+        let request = MeasureRequest {
+            number: u64::from(number),
+            pose: "test".to_owned(),
+            target: 0,
+            configuration: Vec::new(),
+            following: None,
+            settle: 0.0,
+            shots: 1,
+        };
+        let reading = wired
+            .measure(&request, keep_going)
+            .map_err(|error| problem(&error, &format!("shot {number} of {count} gave no point")))?;
+        let point = reading.point;
+        let sigma = reading.sigma.map_or_else(String::new, |sigma| format!(", stated sigma {:.4} mm", to_mm(sigma)));
+        console.print(&format!(
+            "shot {number}: x {:.4}  y {:.4}  z {:.4} mm, {:.3} m away, {:.1} s{sigma}\n",
+            to_mm(point.x),
+            to_mm(point.y),
+            to_mm(point.z),
+            point.coords.norm(),
+            reading.seconds
+        ))?;
+        readings.push(reading);
+    }
+    let shots = readings.len() as f64;
+    let mean = readings.iter().map(|reading| reading.point.coords).sum::<nalgebra::Vector3<f64>>() / shots;
+    let square = readings.iter().map(|reading| (reading.point.coords - mean).norm_squared()).sum::<f64>() / shots;
+    let scatter = to_mm(square.sqrt());
+    if readings.len() > 1 {
+        console.print(&format!("scatter of {count} shots: {scatter:.4} mm\n"))?;
+    }
+    let stated = readings.iter().filter_map(|reading| reading.sigma).fold(0.0, f64::max);
+    if readings.len() > 1 && scatter > SCATTER_MM.max(SCATTER_SIGMAS * to_mm(stated)) {
+        return Err(Failure::new(ExitStatus::Instrument, format!("the shots scatter by {scatter:.3} mm"))
+            .hint("is the reflector at rest? is something warm or shaking near the beam? does every shot see the same reflector?"));
+    }
+    Ok(())
+}
+
+/// What an error of a link means, with what to do.
+fn problem(error: &LinkError, what: &str) -> Failure {
+    let failure = Failure::new(ExitStatus::Instrument, format!("{what}: {error}"));
+    match error {
+        LinkError::Instrument(instrument) => failure.hint(instrument.hint()),
+        LinkError::Robot(_) => failure.hint("bring the robot to rest and look at its pendant; then test again"),
+        _ => failure,
+    }
+}

@@ -1,0 +1,163 @@
+//! `trupose simulate`: an instrument or a robot's controller that is not there, for rehearsals and for whoever writes a driver.
+
+use std::io::{BufRead as _, Write, stdin};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::Duration;
+
+use super::{Console, load};
+use crate::cli::SimulateArgs;
+use crate::error::{ExitStatus, Failure};
+use crate::link::{LinkError, Served};
+use crate::procedure::joint_types;
+use crate::profile::Profile;
+use crate::runtime::signals;
+use crate::session::plan::{self, PlannedPose, PoseKind};
+use crate::session::simulation::Simulation;
+use crate::store;
+
+/// How often it is looked whether the robot goes on.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// What may happen.
+enum Order {
+    /// A line was typed.
+    Line(String),
+    /// A signal.
+    End,
+}
+
+/// Where the robot goes.
+struct Route {
+    poses: Vec<PlannedPose>,
+    at: usize,
+}
+
+impl Route {
+    fn here(&self) -> Option<&PlannedPose> {
+        self.poses.get(self.at)
+    }
+
+    fn go(&self, served: &mut Served) -> Result<(), LinkError> {
+        let Some(pose) = self.here() else { return Ok(()) };
+        let following = self.poses.get(self.at + 1).map(|pose| pose.configuration.as_slice());
+        served.go(&pose.pose, &pose.configuration, following)
+    }
+
+    /// `pose 7 (3 of 56)`.
+    fn text(&self) -> String {
+        let pose = self.here().map_or("", |pose| &pose.pose);
+        format!("pose {pose} ({} of {})", self.at + 1, self.poses.len())
+    }
+}
+
+pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let loaded = load::profile(&args.profile)?;
+    let profile = &loaded.profile;
+    let mut route = Route { poses: poses(args, profile)?, at: 0 };
+    let simulation = Simulation { seed: args.seed, ..Simulation::default() };
+    let usage = |error: &LinkError| Failure::new(ExitStatus::Usage, error.to_string());
+    let mut served =
+        Served::new(profile, &simulation, args.protocol, args.listen.as_deref(), &args.faults).map_err(|error| {
+            let names = Served::fault_names(args.protocol).join(", ");
+            usage(&error).hint(format!("faults of {}: {names}", args.protocol))
+        })?;
+    route.go(&mut served).map_err(|error| usage(&error))?;
+    console.print(&format!("listening: {}\n", served.address()))?;
+    if let Some(options) = served.options() {
+        console.print(&format!("options: {options}\n"))?;
+    }
+    if let Some(listen) = &args.robot {
+        let address = served.listen_for_robot(profile, listen).map_err(|error| usage(&error))?;
+        console.print(&format!("robot: {address}\n"))?;
+    }
+    console.remark(served.title());
+    console.remark(&format!("the robot stands at {}", route.text()));
+    console.remark("'next', 'goto POSE', 'where', 'quit' or Ctrl-C");
+    let (sender, orders) = channel();
+    let signalled = sender.clone();
+    // Nobody listens any more once this ends.
+    signals::each(move |_signal| drop(signalled.send(Order::End)))
+        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    read_lines(sender)?;
+    loop {
+        match orders.recv_timeout(LOOK) {
+            Ok(Order::End) => return Ok(ExitStatus::Accepted),
+            Ok(Order::Line(line)) => match obey(line.trim(), &mut route, &mut served) {
+                Some(said) => console.remark(&said),
+                None => return Ok(ExitStatus::Accepted),
+            },
+            Err(RecvTimeoutError::Timeout) => {
+                let is_done = args.shots > 0 && served.taken() >= args.shots && route.at + 1 < route.poses.len();
+                if is_done && let Some(said) = obey("next", &mut route, &mut served) {
+                    console.remark(&said);
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => return Ok(ExitStatus::Accepted),
+        }
+    }
+}
+
+/// What is said to a line; none: it ends the program.
+fn obey(line: &str, route: &mut Route, served: &mut Served) -> Option<String> {
+    let target = match line.split_once(char::is_whitespace) {
+        _ if line == "quit" => return None,
+        _ if line.is_empty() || line == "where" => {
+            return Some(format!("at {}, {} shots taken", route.text(), served.taken()));
+        }
+        None if line == "next" && route.at + 1 < route.poses.len() => route.at + 1,
+        None if line == "next" => return Some("that was the last pose".to_owned()),
+        Some(("goto", pose)) => match route.poses.iter().position(|one| one.pose == pose.trim()) {
+            Some(found) => found,
+            None => return Some(format!("there is no pose '{}'", pose.trim())),
+        },
+        _ => return Some(format!("'{line}' is no order; there are next, goto POSE, where and quit")),
+    };
+    let before = std::mem::replace(&mut route.at, target);
+    match route.go(served) {
+        Ok(()) => Some(format!("the robot goes to {}", route.text())),
+        Err(error) => {
+            route.at = before;
+            Some(error.to_string())
+        }
+    }
+}
+
+/// Has the lines of standard input told. Its end ends nothing: a simulator may run without a terminal.
+fn read_lines(sender: Sender<Order>) -> Result<(), Failure> {
+    let read = move || {
+        for line in stdin().lock().lines() {
+            let Ok(line) = line else { return };
+            if sender.send(Order::Line(line)).is_err() {
+                return;
+            }
+        }
+    };
+    thread::Builder::new()
+        .name("simulate-orders".to_owned())
+        .spawn(read)
+        .map(drop)
+        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))
+}
+
+/// The measured rows of the plan, or one pose in the middle.
+fn poses(args: &SimulateArgs, profile: &Profile) -> Result<Vec<PlannedPose>, Failure> {
+    let Some(path) = &args.plan else {
+        let middle = |range: &crate::profile::JointRange| {
+            range.planning_limits.or(range.limits).map_or(0.0, |(low, high)| f64::midpoint(low, high))
+        };
+        let configuration = profile.joints().iter().map(middle).collect();
+        let pose = "middle".to_owned();
+        let kind = PoseKind::Identification;
+        return Ok(vec![PlannedPose { pose, kind, configuration, point_in_base: None }]);
+    };
+    let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    let file = path.display().to_string();
+    let mut listed = plan::read_bytes(&bytes, &file, &joint_types(profile))
+        .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
+    listed.rows.retain(|row| row.kind.is_measured());
+    if listed.rows.is_empty() {
+        return Err(Failure::new(ExitStatus::Usage, format!("'{file}' has no pose that is measured")));
+    }
+    Ok(listed.rows)
+}

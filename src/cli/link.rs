@@ -1,0 +1,78 @@
+//! `trupose link` and `trupose simulate`: what was typed.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Subcommand};
+
+use crate::session::wire::WireProtocol;
+
+/// What to do with a link.
+#[derive(Debug, Subcommand)]
+pub enum LinkCommand {
+    /// Connect to an instrument: identity, settings, what it sees, a few shots; says what is wrong
+    Test(LinkTestArgs),
+}
+
+/// Arguments of `link test`.
+#[derive(Args, Clone, Debug)]
+pub struct LinkTestArgs {
+    /// Address of the instrument, such as 'emscon:192.168.0.2', 'geocom:serial:/dev/ttyUSB0:9600' or 'ascii:listen:0.0.0.0:5000'
+    #[arg(value_name = "ADDRESS")]
+    pub address: String,
+    /// Options of the protocol: the name of a preset, or what differs from the usual, such as '(measure_ms: 2000)'
+    #[arg(long, value_name = "TEXT")]
+    pub options: Option<String>,
+    /// Address of the robot's controller, such as 'rtde:192.168.0.10'
+    #[arg(long, value_name = "ADDRESS")]
+    pub robot: Option<String>,
+    /// Shots to take; 0: none
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub shots: u32,
+    /// How long to watch before the shots (s)
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
+    pub seconds: f64,
+    /// File for every byte that comes and goes
+    #[arg(long, value_name = "FILE")]
+    pub raw_log: Option<PathBuf>,
+}
+
+/// Arguments of `simulate`.
+#[derive(Args, Clone, Debug)]
+pub struct SimulateArgs {
+    /// What to speak
+    #[arg(value_name = "emscon|ascii|geocom|ndi|rtde", value_parser = WireProtocol::from_str)]
+    pub protocol: WireProtocol,
+    /// TCP address to listen on, such as '127.0.0.1:7000'; port 0: any free one
+    #[arg(long, value_name = "HOST:PORT", required_unless_present = "pty", conflicts_with = "pty")]
+    pub listen: Option<String>,
+    /// Listen behind a pseudo-terminal, as on a serial line
+    #[arg(long)]
+    pub pty: bool,
+    /// The controller of the same robot tells its joints by RTDE at this TCP address
+    #[arg(long, value_name = "HOST:PORT")]
+    pub robot: Option<String>,
+    /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
+    #[arg(long, value_name = "NAME|FILE", default_value = "soochow")]
+    pub profile: String,
+    /// Seed of the hidden deviations and of the noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Fault of the instrument, such as 'cut-20@3' for the third occasion or 'drip@1x5'; may be repeated
+    #[arg(long = "fault", value_name = "NAME")]
+    pub faults: Vec<String>,
+    /// Poses that the robot visits; without a plan it stands in the middle of its joint ranges
+    #[arg(long, value_name = "CSV")]
+    pub plan: Option<PathBuf>,
+    /// Go on to the next pose after so many shots; 0: only when told
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub shots: usize,
+}
+
+/// A time from 0 on.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),
+        _ => Err(format!("'{text}' is not a time from 0 to 86400 s")),
+    }
+}

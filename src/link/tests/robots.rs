@@ -1,0 +1,77 @@
+//! Robots that do not stand as they should while the instrument measures.
+
+use super::*;
+
+fn bench(faults: &[&str]) -> Bench {
+    let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(faults), None);
+    bench.wired.connect().unwrap();
+    bench
+}
+
+#[test]
+fn the_joints_of_the_robot_come_with_the_point() {
+    let mut bench = bench(&[]);
+    let reading = bench.measure().unwrap();
+    let told = reading.configuration.unwrap();
+    let differences = told.iter().zip(&bench.stage.lock().joints.positions).map(|(a, b)| (a - b).abs());
+    assert!(differences.fold(0.0, f64::max) < 1e-12, "{told:?}");
+    let end = Instant::now() + DEADLINE;
+    loop {
+        let (live, _) = bench.wired.watch(Duration::from_millis(20)).unwrap();
+        if live.is_still == Some(true) && live.joints.is_some() {
+            return;
+        }
+        assert!(Instant::now() < end, "{live:?}");
+    }
+}
+
+#[test]
+fn a_robot_that_moves_is_waited_for_and_then_refused() {
+    let mut bench = bench(&["moving@1x*"]);
+    let before = bench.stage.shots();
+    let error = bench.measure().unwrap_err();
+    assert!(matches!(&error, LinkError::Robot(why) if why.contains("still moves")), "{error:?}");
+    assert_eq!(bench.stage.shots(), before, "nothing is measured while it moves");
+}
+
+#[test]
+fn a_robot_that_moves_while_it_is_measured_spoils_the_point() {
+    let mut bench = bench(&[]);
+    bench.measure().unwrap();
+    bench.stage.lock().turns = 0.01;
+    let error = bench.measure().unwrap_err();
+    assert!(matches!(&error, LinkError::Robot(why) if why.contains("moved while")), "{error:?}");
+    bench.stage.lock().turns = 0.0;
+    bench.measure().unwrap();
+}
+
+#[test]
+fn a_protective_stop_is_said_at_once_and_nothing_is_measured() {
+    let mut bench = bench(&[]);
+    bench.measure().unwrap();
+    let before = bench.stage.shots();
+    bench.stage.lock().joints.stopped = Some("protective stop".to_owned());
+    let error = bench.measure().unwrap_err();
+    assert!(matches!(&error, LinkError::Robot(why) if why.contains("does not move on")), "{error:?}");
+    assert_eq!(bench.stage.shots(), before);
+    bench.stage.lock().joints.stopped = None;
+    bench.measure().unwrap();
+}
+
+#[test]
+fn every_fault_of_the_controller_is_survived_or_said() {
+    for name in build::fault_names(WireProtocol::Rtde) {
+        let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(&[&format!("{name}@2x1")]), None);
+        bench.wired.connect().unwrap_or_else(|error| panic!("{name}: {error}"));
+        let said = bench.recover();
+        assert!(said.iter().all(|message| message.starts_with("the robot: ")), "{name}: {said:?}");
+    }
+}
+
+#[test]
+fn a_controller_that_goes_away_is_told_and_comes_back() {
+    let mut bench = bench(&["cut@20"]);
+    bench.until(|news| matches!(news, LinkNews::Down(cause) if cause.starts_with("robot: ")));
+    bench.until(|news| matches!(news, LinkNews::Up(name) if name.starts_with("robot: ")));
+    bench.measure().unwrap();
+}

@@ -1,0 +1,270 @@
+//! Instruments whose connection or lines are not as they should be.
+
+use std::io::{Read as _, Seek as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::thread;
+
+use super::*;
+use crate::link::protocol::Failure;
+use crate::session::wire::LinkChoice;
+
+/// Every fault of a protocol over a real socket at its second occasion, with a good shot before it: whatever comes out is a shot that
+/// was taken for it, and in the end the link measures again.
+fn every_fault(protocol: WireProtocol, left_out: &[&str]) {
+    for name in build::fault_names(protocol).into_iter().filter(|name| !left_out.contains(name)) {
+        let mut bench = Bench::tcp(protocol, &[&format!("{name}@2x1")]);
+        bench.wired.connect().unwrap_or_else(|error| panic!("{protocol} {name}: {error}"));
+        for _ in 0..3 {
+            drop(bench.measure());
+        }
+        let said = bench.recover();
+        assert!(said.iter().all(|message| !message.is_empty()), "{protocol} {name}: {said:?}");
+    }
+}
+
+#[test]
+fn every_fault_of_emscon_gives_no_wrong_point_and_the_link_measures_again() {
+    // Two take half a minute of real time, as commands may: they are tested with virtual time. Three begin with the connection.
+    every_fault(WireProtocol::Emscon, &["mute", "warming-up", "in-use", "metres", "try-stuck"]);
+}
+
+#[test]
+fn every_fault_of_lines_gives_no_wrong_point_and_the_link_measures_again() {
+    every_fault(WireProtocol::Ascii, &[]);
+}
+
+#[test]
+fn every_fault_of_geocom_gives_no_wrong_point_and_the_link_measures_again() {
+    // Three take a quarter of a minute of real time, as requests may: they are tested with virtual time.
+    every_fault(WireProtocol::Geocom, &["silent", "late-reply", "dead", "wrong-transaction"]);
+}
+
+#[test]
+fn every_fault_of_ndi_gives_no_wrong_point_and_the_link_measures_again() {
+    every_fault(WireProtocol::Ndi, &[]);
+}
+
+#[test]
+fn what_comes_byte_by_byte_or_joined_or_in_halves_is_the_same() {
+    for (protocol, fault) in [
+        (WireProtocol::Emscon, "drip@1x*"),
+        (WireProtocol::Emscon, "joined@1x*"),
+        (WireProtocol::Ascii, "halves@1x9"),
+        (WireProtocol::Geocom, "half-line@1x9"),
+        (WireProtocol::Ndi, "halves@1x9"),
+    ] {
+        let mut bench = Bench::tcp(protocol, &[fault]);
+        bench.wired.connect().unwrap_or_else(|error| panic!("{protocol} {fault}: {error}"));
+        for _ in 0..3 {
+            bench.measure().unwrap_or_else(|error| panic!("{protocol} {fault}: {error}"));
+        }
+    }
+}
+
+#[test]
+fn a_serial_line_carries_the_same_points() {
+    for protocol in [WireProtocol::Ascii, WireProtocol::Geocom, WireProtocol::Ndi] {
+        let mut bench = Bench::with(protocol, &Place::PseudoTerminal, &[], None, None);
+        bench.wired.connect().unwrap();
+        let reading = bench.measure().unwrap();
+        assert_eq!(reading.shots, 1);
+    }
+}
+
+#[test]
+fn a_link_that_dies_in_mid_packet_fails_the_shot_comes_back_and_measures_nothing_by_itself() {
+    for (protocol, fault) in [
+        (WireProtocol::Emscon, "cut-20@2"),
+        (WireProtocol::Ascii, "disconnect-mid-line@2"),
+        (WireProtocol::Geocom, "disconnect-mid-line@2"),
+    ] {
+        let mut bench = Bench::tcp(protocol, &[fault]);
+        bench.wired.connect().unwrap();
+        bench.measure().unwrap();
+        let error = bench.measure().unwrap_err();
+        let LinkError::Instrument(failure @ Failure::Disconnected(_)) = &error else { panic!("{protocol}: {error:?}") };
+        assert!(failure.to_string().starts_with("the connection is lost"), "{failure}");
+        assert!(failure.hint().contains("connects again by itself"), "{}", failure.hint());
+        let taken = bench.stage.shots();
+        bench.until(|news| matches!(news, LinkNews::Up(_)));
+        assert_eq!(bench.stage.shots(), taken, "{protocol}: nobody has asked for a shot");
+        bench.measure().unwrap();
+    }
+}
+
+#[test]
+fn settings_that_lie_are_found_in_the_set_up_and_said() {
+    for (fault, part) in [
+        ("metres@1x*", "the instrument is set differently"),
+        ("try-stuck@1x*", "the instrument is set differently"),
+        ("in-use@1x*", "in use by another program"),
+        ("warming-up@1x*", "not ready"),
+    ] {
+        let mut bench = Bench::tcp(WireProtocol::Emscon, &[fault]);
+        // A tracker that warms up is waited for; here nobody has so much time.
+        let error = if fault.starts_with("warming") {
+            let end = Instant::now() + Duration::from_millis(1500);
+            bench.wired.connect_while(&|| Instant::now() < end).unwrap_err()
+        } else {
+            bench.wired.connect().unwrap_err()
+        };
+        let is_said = error.to_string().contains(part) || (fault.starts_with("warming") && error == LinkError::Cancelled);
+        assert!(is_said, "{fault}: {error}");
+    }
+}
+
+#[test]
+fn points_in_another_unit_are_refused() {
+    for (protocol, fault) in [(WireProtocol::Emscon, "silent-metres@1"), (WireProtocol::Ascii, "wrong-unit@1")] {
+        let mut bench = Bench::tcp(protocol, &[fault]);
+        bench.wired.connect().unwrap();
+        let error = bench.measure().unwrap_err();
+        assert!(matches!(error, LinkError::Instrument(Failure::Unusable(_))), "{protocol}: {error:?}");
+        bench.measure().unwrap();
+    }
+}
+
+fn choice(address: &str) -> LinkChoice {
+    LinkChoice { address: address.to_owned(), ..LinkChoice::default() }
+}
+
+#[test]
+fn a_port_where_nobody_listens_is_said_with_what_to_look_at() {
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let mut wired = Wired::new(&choice(&format!("emscon:127.0.0.1:{port}")), None).unwrap();
+    let error = wired.connect().unwrap_err();
+    assert!(matches!(error, LinkError::Instrument(Failure::Unreachable(_))), "{error:?}");
+    assert!(error.to_string().contains("nothing listens there"), "{error}");
+}
+
+#[test]
+fn a_serial_port_that_is_in_use_or_missing_is_said() {
+    let (_master, slave) = serialport::TTYPort::pair().unwrap();
+    let device = serialport::SerialPort::name(&slave).unwrap();
+    let held = serialport::new(&device, 9600).open().unwrap();
+    let refused = |address: &str| Wired::new(&choice(address), None).unwrap().connect().unwrap_err().to_string();
+    let error = refused(&format!("geocom:serial:{device}"));
+    assert!(error.contains("another program may use it"), "{error}");
+    drop(held);
+    let error = refused("geocom:serial:/dev/there-is-no-such-port");
+    assert!(error.contains("is the adapter plugged in?"), "{error}");
+}
+
+#[test]
+fn addresses_of_the_wrong_kind_are_refused_before_anything_is_opened() {
+    let refused = |choice: &LinkChoice| Wired::new(choice, None).unwrap_err().to_string();
+    assert!(refused(&choice("rtde:127.0.0.1")).contains("not where the SMR is"));
+    let with_robot = LinkChoice { robot: Some("emscon:127.0.0.1".to_owned()), ..choice("emscon:127.0.0.1") };
+    assert!(refused(&with_robot).contains("is no robot"));
+    let with_options = LinkChoice { options: Some("(speed: 3)".to_owned()), ..choice("emscon:127.0.0.1") };
+    assert!(refused(&with_options).contains("speed"));
+}
+
+/// A peer that prints numbered lines as fast as they are taken.
+fn flood() -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    thread::spawn(move || {
+        let Ok((mut stream, _)) = listener.accept() else { return };
+        let mut number = 0_u32;
+        loop {
+            let mut lines = String::new();
+            for _ in 0..1000 {
+                number += 1;
+                writeln!(lines, "{:.4},-678.25,90.125", 1000.0 + 1e-4 * f64::from(number)).unwrap();
+            }
+            // Ends with the other side.
+            if stream.write_all(lines.as_bytes()).is_err() {
+                return;
+            }
+        }
+    });
+    port
+}
+
+#[test]
+fn a_flood_of_lines_keeps_nobody_waiting_and_gives_lines_that_came_after_the_question() {
+    let mut wired = Wired::new(&choice(&format!("ascii:127.0.0.1:{}", flood())), None).unwrap();
+    wired.connect().unwrap();
+    let mut before = 0.0;
+    for _ in 0..5 {
+        let reading = wired.measure(&request(1), &|| true).unwrap();
+        assert!(reading.point.x > before && (reading.point.y + 0.67825).abs() < 1e-9, "{:?}", reading.point);
+        before = reading.point.x;
+    }
+    // Whoever asks waits as long as asked, and not until the flood ends.
+    let start = Instant::now();
+    for _ in 0..20 {
+        drop(wired.watch(Duration::from_millis(1)));
+    }
+    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+}
+
+#[test]
+fn a_peer_that_says_nothing_is_said_to_be_silent() {
+    let mut bench = Bench::tcp(WireProtocol::Ascii, &["silent@2"]);
+    bench.wired.connect().unwrap();
+    bench.measure().unwrap();
+    let error = bench.measure().unwrap_err();
+    assert!(matches!(error, LinkError::Instrument(Failure::Silent { .. })), "{error:?}");
+    bench.measure().unwrap();
+}
+
+#[test]
+fn a_measurement_can_be_given_up() {
+    let mut bench = Bench::tcp(WireProtocol::Emscon, &["silence@1x*"]);
+    bench.wired.connect().unwrap();
+    assert_eq!(bench.wired.measure(&request(1), &|| false), Err(LinkError::Cancelled));
+}
+
+#[test]
+fn somebody_may_connect_to_this_program() {
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let mut wired = Wired::new(&choice(&format!("ascii:listen:127.0.0.1:{port}")), None).unwrap();
+    let end = Instant::now() + DEADLINE;
+    let mut stream = loop {
+        match TcpStream::connect(("127.0.0.1", port)) {
+            Ok(stream) => break stream,
+            Err(error) => assert!(Instant::now() < end, "{error}"),
+        }
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let ended = Arc::clone(&stop);
+    let printer = thread::spawn(move || {
+        let mut number = 0_u32;
+        while !ended.load(Ordering::Relaxed) {
+            number += 1;
+            if stream.write_all(format!("{:.4},-678.25,90.125\n", 1234.0 + f64::from(number)).as_bytes()).is_err() {
+                return;
+            }
+            thread::yield_now();
+        }
+    });
+    wired.connect().unwrap();
+    let reading = wired.measure(&request(1), &|| true).unwrap();
+    assert!((reading.point.y + 0.67825).abs() < 1e-9);
+    stop.store(true, Ordering::Relaxed);
+    printer.join().unwrap();
+}
+
+#[test]
+fn the_raw_log_holds_what_came_and_went() {
+    let mut file = tempfile::tempfile().unwrap();
+    let log = RawLog::new(file.try_clone().unwrap());
+    let mut bench = Bench::with(WireProtocol::Ascii, &Place::Loopback, &[], None, Some(log));
+    bench.wired.connect().unwrap();
+    let reading = bench.measure().unwrap();
+    let mut text = String::new();
+    file.rewind().unwrap();
+    file.read_to_string(&mut text).unwrap();
+    let bytes = |direction: &str| -> String {
+        text.lines().filter_map(|line| line.split_once(&format!(" ascii {direction} "))).map(|(_, hex)| hex).collect()
+    };
+    assert_eq!(bytes("out"), "4d0d");
+    let x = format!("{:.4}", reading.point.x * 1e3);
+    let hex: String = x.bytes().fold(String::new(), |mut hex, byte| {
+        write!(hex, "{byte:02x}").unwrap();
+        hex
+    });
+    assert!(bytes("in").contains(&hex), "{text}");
+}
