@@ -5,6 +5,7 @@ mod constraints;
 mod export;
 mod identify;
 mod load;
+mod manual;
 mod plan;
 mod profile;
 mod program;
@@ -95,6 +96,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Compensate(args) => compensate::run(&args, console),
         Command::Export(args) => export::run(&args, console),
         Command::Profile(command) => profile::run(&command, console),
+        Command::Completions(args) => manual::completions(&args, console),
+        Command::Man(args) => manual::man(&args, console),
     }
 }
 

@@ -11,6 +11,7 @@ pub(crate) mod cell;
 pub(crate) mod checks;
 pub mod circles;
 pub mod identify;
+pub mod models;
 pub mod plan;
 pub mod points;
 mod provenance;

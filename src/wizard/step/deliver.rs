@@ -1,6 +1,7 @@
 //! Deliver: the results as files in the session's folder.
 
 use super::{Action, Cx, StepMachine};
+use crate::procedure::models::{Models, ModelsRequest};
 use crate::session::export;
 use crate::session::journal::Entry;
 use crate::wizard::effect::{Answer, Request};
@@ -12,8 +13,22 @@ use crate::wizard::view::{Content, DeliverView};
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct DeliverStep;
 
+/// The request for the models of the identified arm; none without a usable result.
+fn models_request(cx: &Cx<'_>) -> Option<ModelsRequest> {
+    let calibration = cx.session.identified.as_deref()?.calibration.clone()?;
+    Some(ModelsRequest { calibration, profile: cx.robot()?.profile.clone() })
+}
+
+/// Asks for all files to be written.
+fn deliver(cx: &Cx<'_>, models: Models) -> Action {
+    match files(cx, models.files) {
+        Ok(files) => Action::Ask(Request::Deliver { files, left_out: models.left_out }),
+        Err(message) => Action::Say(Notice::error(message)),
+    }
+}
+
 /// The files of a session with their names.
-fn files(cx: &Cx<'_>) -> Result<Vec<(String, String)>, String> {
+fn files(cx: &Cx<'_>, models: Vec<(String, String)>) -> Result<Vec<(String, String)>, String> {
     let session = cx.session;
     let robot = session.robot.as_ref().ok_or("there is no robot")?;
     let result = session.identified.as_deref().ok_or("there is no result")?;
@@ -25,6 +40,7 @@ fn files(cx: &Cx<'_>) -> Result<Vec<(String, String)>, String> {
     if let Some(calibration) = &result.calibration {
         files.push(("calibration.ron".to_owned(), calibration.to_text().map_err(|error| error.to_string())?));
     }
+    files.extend(models);
     let mut summary = result.summary.clone();
     summary.written = files.iter().map(|(name, _)| name.clone()).collect();
     summary.written.push("report.json".to_owned());
@@ -44,15 +60,26 @@ impl StepMachine for DeliverStep {
         if intent != Intent::Deliver {
             return Vec::new();
         }
-        match files(cx) {
-            Ok(files) => vec![Action::Ask(Request::Deliver { files })],
-            Err(message) => vec![Action::Say(Notice::error(message))],
+        match models_request(cx) {
+            Some(request) => vec![Action::Ask(Request::Model(Box::new(request)))],
+            None => vec![deliver(cx, Models::default())],
         }
     }
 
-    fn on_answer(&mut self, answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
-        let Answer::Delivered(files) = answer else { return Vec::new() };
-        vec![Action::Write(vec![Entry::Delivered { files }])]
+    fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
+        match answer {
+            // The step may have been left meanwhile, and entered again with other samples.
+            Answer::Modelled(models) if cx.session.is_current() => vec![deliver(cx, *models)],
+            Answer::Delivered { files, left_out } => {
+                let notice = (!left_out.is_empty()).then(|| {
+                    let hint = "all other files are written; 'trupose export --help' shows what can be done";
+                    Action::Say(Notice::info(format!("left out: {}", left_out.join("; "))).hint(hint))
+                });
+                let write = Action::Write(vec![Entry::Delivered { files, left_out }]);
+                std::iter::once(write).chain(notice).collect()
+            }
+            _ => Vec::new(),
+        }
     }
 
     fn on_failure(&mut self, problem: Problem, _cx: &Cx<'_>) -> Vec<Action> {
@@ -66,6 +93,7 @@ impl StepMachine for DeliverStep {
         let result = cx.session.identified.as_deref();
         Content::Deliver(DeliverView {
             files: cx.session.delivered.clone(),
+            left_out: cx.session.left_out.clone(),
             verdict: result.map(|result| Box::new(result.summary.verdict.clone())),
             is_current: cx.session.is_current(),
         })
