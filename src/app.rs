@@ -6,6 +6,7 @@ mod export;
 mod identify;
 mod link;
 mod load;
+mod manual;
 mod plan;
 mod profile;
 mod program;
@@ -100,6 +101,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Profile(command) => profile::run(&command, console),
         Command::Link(command) => link::run(&command, console),
         Command::Simulate(args) => simulate::run(&args, console),
+        Command::Completions(args) => manual::completions(&args, console),
+        Command::Man(args) => manual::man(&args, console),
     }
 }
 

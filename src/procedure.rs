@@ -12,6 +12,7 @@ pub(crate) mod checks;
 pub mod circles;
 pub mod deliver;
 pub mod identify;
+pub mod models;
 pub mod plan;
 pub mod points;
 mod provenance;

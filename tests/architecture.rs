@@ -34,6 +34,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "profile",
             "session",
             "search",
+            "model",
             "report",
             "error",
         ],

@@ -396,7 +396,7 @@ fn every_part_of_a_session_has_a_report() {
         let state = json["report"]["state"].as_str().unwrap();
         match &session.identified {
             None => {
-                assert_eq!((state, files(&session).is_err()), ("none", true));
+                assert_eq!((state, files(&session, Vec::new()).is_err()), ("none", true));
                 assert!(html.contains("NOT EVALUATED") && html.contains("NO RESULT."), "after {count} entries");
                 assert!(json.get("verdict").is_none());
             }

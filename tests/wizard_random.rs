@@ -16,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 
 use trupose::kinematics::ForwardKinematics;
 use trupose::procedure::identify::identify;
+use trupose::procedure::models::models;
 use trupose::profile::{Profile, builtin};
 use trupose::session::journal::Line;
 use trupose::session::plan::{PlannedPose, PoseKind};
@@ -255,7 +256,11 @@ impl Cell {
                 Ok(identified) => Answer::Identified(Box::new(identified)),
                 Err(error) => Answer::Failed(Problem { message: error.message, hints: error.hints }),
             },
-            Request::Deliver { files } => Answer::Delivered(files.iter().map(|(name, _)| name.clone()).collect()),
+            Request::Model(request) => Answer::Modelled(Box::new(models(request))),
+            Request::Deliver { files, left_out } => {
+                let files = files.iter().map(|(name, _)| name.clone()).collect();
+                Answer::Delivered { files, left_out: left_out.clone() }
+            }
         }
     }
 

@@ -231,7 +231,9 @@ impl Failure {
             Self::Unusable(_) => "measure again; if it stays, check the beam and the settings of the instrument",
             Self::Garbled(_) => "check baud rate, line ending and the kind of instrument that was chosen",
             Self::InUse(_) => "close the other program; then connect again",
-            Self::Unreachable(_) => "check address, cable and network, and whether the instrument is on; then connect again",
+            Self::Unreachable(_) => {
+                "check address, cable and network, and whether the instrument is on; then connect again"
+            }
             Self::Disconnected(_) => "check the cable or network; the link connects again by itself",
             Self::TooEarly(_) => "wait for the reading under way",
         }

@@ -49,7 +49,7 @@ impl Format {
             Self::CorrectedProfile => "corrected.ron",
             Self::Urdf => "corrected.urdf",
             Self::UrKinematics => "default_kinematics.yaml",
-            Self::DhCsv => "corrected-dh.csv",
+            Self::DhCsv => "dh.csv",
             Self::Json => "corrected.json",
         }
     }

@@ -9,11 +9,11 @@ pub const REPORT_HTML: &str = "report.html";
 /// Name of the report for other programs.
 pub const REPORT_JSON: &str = "report.json";
 
-/// The files of a session that has a result, with their names: tables, calibration, report.
+/// The files of a session that has a result, with their names: tables, calibration, the corrected `models`, report.
 ///
 /// # Errors
 /// There is no robot or no result; or the serialiser refuses, which is a defect.
-pub fn files(session: &Session) -> Result<Vec<(String, String)>, String> {
+pub fn files(session: &Session, models: Vec<(String, String)>) -> Result<Vec<(String, String)>, String> {
     if session.robot.is_none() {
         return Err("there is no robot".to_owned());
     }
@@ -21,6 +21,7 @@ pub fn files(session: &Session) -> Result<Vec<(String, String)>, String> {
         return Err("there is no result".to_owned());
     }
     let mut files = data_files(session)?;
+    files.extend(models);
     files.extend(reports(session, &files)?);
     Ok(files)
 }

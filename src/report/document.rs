@@ -46,6 +46,8 @@ pub enum ResultState {
 pub enum PointOrigin {
     /// Typed in at the cell.
     Typed,
+    /// Told by an instrument over a wire.
+    Instrument,
     /// The simulated cell: nothing was measured.
     Simulated,
     /// Recorded on another day and played.

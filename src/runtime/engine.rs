@@ -344,7 +344,7 @@ impl Engine {
         let is_started = match request {
             Request::Connect { instrument, profile } => self.link.connect(id, instrument, profile),
             Request::Measure(request) => self.link.measure(id, request, flag),
-            Request::Deliver { files } => self.store.ask(Command::Replace { id, files }),
+            Request::Deliver { files, left_out } => self.store.ask(Command::Replace { id, files, left_out }),
             request => jobs::start(id, request, flag, self.sender.clone()),
         };
         if !is_started {

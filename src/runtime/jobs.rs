@@ -20,6 +20,7 @@ pub(super) fn start(id: RequestId, request: Request, cancelled: Arc<AtomicBool>,
     let name = match &request {
         Request::Plan { .. } => "plan",
         Request::Identify(_) => "identify",
+        Request::Model(_) => "model",
         _ => "read",
     };
     let work = move || {
@@ -55,6 +56,7 @@ impl Job {
             Request::LoadPlan { file, profile } => load_plan(&file, &profile),
             Request::PlanCircles { profile } => circles(&profile),
             Request::Identify(request) => self.identify(&request),
+            Request::Model(request) => Ok(Answer::Modelled(Box::new(procedure::models::models(&request)))),
             // These have threads of their own.
             Request::Connect { .. } | Request::Measure(_) | Request::Deliver { .. } => Ok(Answer::Cancelled),
         };

@@ -18,7 +18,7 @@ const WAITING: usize = 4;
 pub(super) enum Command {
     Create { id: RequestId, name: String },
     Append { id: RequestId, lines: Vec<Line> },
-    Replace { id: RequestId, files: Vec<(String, String)> },
+    Replace { id: RequestId, files: Vec<(String, String)>, left_out: Vec<String> },
 }
 
 /// The thread with its channel.
@@ -77,7 +77,9 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
                 Some(Err(error)) => StoreEvent::Failed { id, message: chain(&SessionError::from(error)) },
                 None => StoreEvent::Failed { id, message: "the session has no folder".to_owned() },
             }),
-            Command::Replace { id, files } => Event::Answer { id, answer: replace(held.as_ref(), &files) },
+            Command::Replace { id, files, left_out } => {
+                Event::Answer { id, answer: replace(held.as_ref(), &files, left_out) }
+            }
         };
         if !events.send(event) {
             break;
@@ -85,7 +87,7 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
     }
 }
 
-fn replace(held: Option<&SessionFolder>, files: &[(String, String)]) -> Answer {
+fn replace(held: Option<&SessionFolder>, files: &[(String, String)], left_out: Vec<String>) -> Answer {
     let Some(folder) = held else {
         return Answer::Failed(Problem { message: "the session has no folder".to_owned(), hints: Vec::new() });
     };
@@ -94,7 +96,7 @@ fn replace(held: Option<&SessionFolder>, files: &[(String, String)]) -> Answer {
             return Answer::Failed(Problem { message: chain(&error), hints: Vec::new() });
         }
     }
-    Answer::Delivered(files.iter().map(|(name, _)| name.clone()).collect())
+    Answer::Delivered { files: files.iter().map(|(name, _)| name.clone()).collect(), left_out }
 }
 
 /// An error with its causes.

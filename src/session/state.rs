@@ -73,6 +73,8 @@ pub struct Session {
     pub identified: Option<Box<IdentifiedText>>,
     /// Files that were written.
     pub delivered: Vec<String>,
+    /// Models that were left out of them, with the reason.
+    pub left_out: Vec<String>,
     /// How often it was opened again.
     pub resumed: usize,
     /// Whether it ended in good order.
@@ -274,8 +276,12 @@ impl Session {
                 self.identified = Some(result.clone());
                 // Files of an earlier result are not those of this one.
                 self.delivered.clear();
+                self.left_out.clear();
             }
-            Entry::Delivered { files } => self.delivered.clone_from(files),
+            Entry::Delivered { files, left_out } => {
+                self.delivered.clone_from(files);
+                self.left_out.clone_from(left_out);
+            }
             Entry::Resumed { .. } => {
                 self.resumed += 1;
                 self.closed = false;

@@ -111,7 +111,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 pub const BELL: Key = Key::ctrl('b');
 
 /// The table. Of several with one key the first whose intent is possible is meant.
-const BINDINGS: [Binding; 41] = [
+const BINDINGS: [Binding; 42] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Does::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Does::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Does::Offer(|intent| matches!(intent, Intent::Dismiss))),

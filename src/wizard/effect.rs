@@ -7,6 +7,7 @@ use super::notice::{Notice, Problem};
 use crate::identification::Iteration;
 use crate::procedure;
 use crate::procedure::identify::{Identified, IdentifyRequest};
+use crate::procedure::models::{Models, ModelsRequest};
 use crate::procedure::plan::PlanRequest;
 use crate::profile::Profile;
 use crate::session::journal::Line;
@@ -111,8 +112,15 @@ pub enum Answer {
     CirclesPlanned(Vec<CircleConfigurations>),
     /// A result.
     Identified(Box<Identified>),
+    /// The models are written and proven, in memory.
+    Modelled(Box<Models>),
     /// Files were written.
-    Delivered(Vec<String>),
+    Delivered {
+        /// Their names.
+        files: Vec<String>,
+        /// Models that were left out, with the reason.
+        left_out: Vec<String>,
+    },
     /// It could not be done.
     Failed(Problem),
     /// It was cancelled.
@@ -207,10 +215,14 @@ pub enum Request {
     },
     /// Identify, and verify where there are verification samples.
     Identify(Box<IdentifyRequest>),
+    /// Write the identified arm in the formats of others, and prove each.
+    Model(Box<ModelsRequest>),
     /// Replace result files in the session's folder.
     Deliver {
         /// Name and text of each.
         files: Vec<(String, String)>,
+        /// Models that were left out, with the reason.
+        left_out: Vec<String>,
     },
 }
 
@@ -225,6 +237,7 @@ impl Request {
             Self::LoadPlan { .. } => "reading the plan",
             Self::PlanCircles { .. } => "choosing circles",
             Self::Identify(_) => "identifying",
+            Self::Model(_) => "writing and checking the models",
             Self::Deliver { .. } => "writing files",
         }
     }

@@ -501,6 +501,8 @@ pub struct VerifyView {
 pub struct DeliverView {
     /// Files that were written.
     pub files: Vec<String>,
+    /// Models that this arm does not fit into, with the reason.
+    pub left_out: Vec<String>,
     /// Against the acceptance limits.
     pub verdict: Option<Box<Verdict>>,
     /// Whether the result rests on exactly the samples that count now.

@@ -108,7 +108,8 @@ fn settings_that_lie_are_found_in_the_set_up_and_said() {
         } else {
             bench.wired.connect().unwrap_err()
         };
-        let is_said = error.to_string().contains(part) || (fault.starts_with("warming") && error == LinkError::Cancelled);
+        let is_said =
+            error.to_string().contains(part) || (fault.starts_with("warming") && error == LinkError::Cancelled);
         assert!(is_said, "{fault}: {error}");
     }
 }

@@ -33,6 +33,7 @@ impl Document {
                 None => PointOrigin::Tables,
                 Some(InstrumentChoice::Manual { .. }) => PointOrigin::Typed,
                 Some(InstrumentChoice::Simulated(_)) => PointOrigin::Simulated,
+                Some(InstrumentChoice::Linked(_)) => PointOrigin::Instrument,
                 Some(InstrumentChoice::Replay { .. }) => PointOrigin::Recorded,
             },
             session: session_part(session),

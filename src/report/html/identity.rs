@@ -23,7 +23,7 @@ pub(super) fn banners(document: &Document) -> String {
                 "The points were measured earlier and played from tables; this program did not measure them.",
             );
         }
-        PointOrigin::Typed | PointOrigin::Tables => {}
+        PointOrigin::Typed | PointOrigin::Instrument | PointOrigin::Tables => {}
     }
     match report.state {
         ResultState::None => {

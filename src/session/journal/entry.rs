@@ -92,6 +92,9 @@ pub enum Entry {
     Delivered {
         /// Their names in the session's folder.
         files: Vec<String>,
+        /// Models that this arm does not fit into, with the reason.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        left_out: Vec<String>,
     },
     /// The session was opened again.
     Resumed {

@@ -237,7 +237,8 @@ fn all_entries() -> Vec<Entry> {
         note(""),
         Entry::Identified(Box::new(identified())),
         Entry::Identified(Box::new(no_solution)),
-        Entry::Delivered { files: vec!["a.csv".to_owned(), TRICKY.to_owned()] },
+        Entry::Delivered { files: vec!["a.csv".to_owned(), TRICKY.to_owned()], left_out: Vec::new() },
+        Entry::Delivered { files: vec!["a.csv".to_owned()], left_out: vec![TRICKY.to_owned()] },
         Entry::Resumed { program: "trupose 9".to_owned(), torn_bytes: usize::MAX },
         Entry::Closed { reason: TRICKY.to_owned() },
     ];

@@ -44,8 +44,11 @@ fn about(file: &str) -> &'static str {
         "calibration.ron" => "the identified arm: the result to apply",
         "report.json" => "all numbers of this session, for other programs",
         "report.html" => "all numbers of this session, to read and print",
-        "corrected.urdf" => "the identified arm for robot software",
         "drift.csv" => "the pose that was measured again and again",
+        "corrected.ron" => "a profile with the identified constants, for this program",
+        "corrected.urdf" => "the identified arm for robot software, such as ROS",
+        "dh.csv" => "the identified link constants, for a controller or a spreadsheet",
+        "default_kinematics.yaml" => "the identified arm for the ROS driver of Universal Robots",
         "recording.rrd" => "the session as a 3D recording",
         _ => "",
     }
@@ -86,7 +89,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         page.title(if is_writing { "The results are being written into:" } else { nothing });
         page.paragraph(folder, Role::Plain);
         page.gap();
-        page.paragraph("calibration.ron is the identified arm; report.html is to read and print, report.json has the same numbers; plan.csv and measurements.csv are the data.", Role::Plain);
+        page.paragraph("calibration.ron is the identified arm, corrected.* and dh.csv are the same arm for other programs; report.html is to read and print, report.json has the same numbers; plan.csv and measurements.csv are the data.", Role::Plain);
     } else {
         page.title("Written");
         for file in &content.files {
@@ -94,6 +97,9 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             if rows >= EXPLAINED && !about(file).is_empty() {
                 page.marked(("    ", Role::Dim), about(file), Role::Dim);
             }
+        }
+        for reason in &content.left_out {
+            page.marked(("Left out: ", Role::Warn), reason, Role::Plain);
         }
         page.title("What to do next");
         let is_accepted = content.verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);

@@ -330,6 +330,7 @@ fn verify(verdict: Option<Verdict>) -> ViewModel {
 fn deliver(files: &[&str]) -> ViewModel {
     let content = Content::Deliver(DeliverView {
         files: files.iter().map(|file| (*file).to_owned()).collect(),
+        left_out: Vec::new(),
         verdict: Some(Box::new(verdict(VerdictStatus::Accepted))),
         is_current: true,
         about: About { serial: "R-17".to_owned(), ..About::default() },

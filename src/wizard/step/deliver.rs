@@ -2,6 +2,7 @@
 
 use super::{Action, Cx, StepMachine};
 use crate::procedure::deliver;
+use crate::procedure::models::{Models, ModelsRequest};
 use crate::session::journal::Entry;
 use crate::session::set_up::About;
 use crate::wizard::effect::{Answer, Request};
@@ -12,6 +13,20 @@ use crate::wizard::view::{Content, DeliverView};
 /// The deliver step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct DeliverStep;
+
+/// The request for the models of the identified arm; none without a usable result.
+fn models_request(cx: &Cx<'_>) -> Option<ModelsRequest> {
+    let calibration = cx.session.identified.as_deref()?.calibration.clone()?;
+    Some(ModelsRequest { calibration, profile: cx.robot()?.profile.clone() })
+}
+
+/// Asks for all files to be written.
+fn write_files(cx: &Cx<'_>, models: Models) -> Action {
+    match deliver::files(cx.session, models.files) {
+        Ok(files) => Action::Ask(Request::Deliver { files, left_out: models.left_out }),
+        Err(message) => Action::Say(Notice::error(message)),
+    }
+}
 
 impl StepMachine for DeliverStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
@@ -33,15 +48,26 @@ impl StepMachine for DeliverStep {
         if intent != Intent::Deliver {
             return Vec::new();
         }
-        match deliver::files(cx.session) {
-            Ok(files) => vec![Action::Ask(Request::Deliver { files })],
-            Err(message) => vec![Action::Say(Notice::error(message))],
+        match models_request(cx) {
+            Some(request) => vec![Action::Ask(Request::Model(Box::new(request)))],
+            None => vec![write_files(cx, Models::default())],
         }
     }
 
-    fn on_answer(&mut self, answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
-        let Answer::Delivered(files) = answer else { return Vec::new() };
-        vec![Action::Write(vec![Entry::Delivered { files }])]
+    fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
+        match answer {
+            // The step may have been left meanwhile, and entered again with other samples.
+            Answer::Modelled(models) if cx.session.is_current() => vec![write_files(cx, *models)],
+            Answer::Delivered { files, left_out } => {
+                let notice = (!left_out.is_empty()).then(|| {
+                    let hint = "all other files are written; 'trupose export --help' shows what can be done";
+                    Action::Say(Notice::info(format!("left out: {}", left_out.join("; "))).hint(hint))
+                });
+                let write = Action::Write(vec![Entry::Delivered { files, left_out }]);
+                std::iter::once(write).chain(notice).collect()
+            }
+            _ => Vec::new(),
+        }
     }
 
     fn on_failure(&mut self, problem: Problem, _cx: &Cx<'_>) -> Vec<Action> {
@@ -55,6 +81,7 @@ impl StepMachine for DeliverStep {
         let result = cx.session.identified.as_deref();
         Content::Deliver(DeliverView {
             files: cx.session.delivered.clone(),
+            left_out: cx.session.left_out.clone(),
             verdict: result.map(|result| Box::new(result.summary.verdict.clone())),
             is_current: cx.session.is_current(),
             about: cx.session.about.clone(),

@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::kinematics::{ForwardKinematics, KinematicChain, LinkParameter, ParameterId};
 use crate::procedure::identify::identify;
+use crate::procedure::models::models;
 use crate::profile::{Profile, builtin};
 use crate::session::journal::{Entry, Journal, Line};
 use crate::session::plan::{PlannedPose, PoseKind};
@@ -148,7 +149,11 @@ pub(super) fn answer(request: &Request) -> Answer {
             Ok(identified) => Answer::Identified(Box::new(identified)),
             Err(error) => failure(&error.message),
         },
-        Request::Deliver { files } => Answer::Delivered(files.iter().map(|(name, _)| name.clone()).collect()),
+        Request::Model(request) => Answer::Modelled(Box::new(models(request))),
+        Request::Deliver { files, left_out } => {
+            let files = files.iter().map(|(name, _)| name.clone()).collect();
+            Answer::Delivered { files, left_out: left_out.clone() }
+        }
     }
 }
 

@@ -1,11 +1,12 @@
 //! Every step: what it offers, what it does, what it shows.
 
 use super::bench::{Bench, FOLDER, IDENTIFICATION, MANUAL, MEASURED, VERIFICATION, blocked, offers, started, texts};
+use crate::procedure::models::Models;
 use crate::session::journal::Entry;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, RecordedSet, Step, TargetChoice};
 use crate::wizard::view::Content;
-use crate::wizard::{Intent, PlanSettings, Request, Severity};
+use crate::wizard::{Answer, Intent, PlanSettings, Request, Severity};
 
 fn text(name: &str) -> String {
     name.to_owned()
@@ -262,9 +263,15 @@ fn identify_verify_and_deliver_end_in_files() {
     bench.does(Intent::Next);
     assert_eq!(offers(&bench.wizard), ["Deliver*", "About", "Back", "Quit"]);
     let effects = bench.intend(Intent::Deliver);
-    assert_eq!(texts(&effects), ["start writing files"]);
+    assert_eq!(texts(&effects), ["start writing and checking the models"]);
     bench.settle(effects);
-    let files = ["plan.csv", "measurements.csv", "drift.csv", "calibration.ron", "report.json", "report.html"];
+    let models = ["corrected.ron", "corrected.urdf", "dh.csv"];
+    let files = [
+        &["plan.csv", "measurements.csv", "drift.csv", "calibration.ron"],
+        &models[..],
+        &["report.json", "report.html"],
+    ]
+    .concat();
     assert_eq!(bench.wizard.session().delivered, files);
     let Content::Deliver(view) = bench.wizard.view().content else { panic!() };
     assert_eq!(view.files, files);
@@ -275,12 +282,31 @@ fn identify_verify_and_deliver_end_in_files() {
 fn files_that_cannot_be_written_can_be_written_again() {
     let mut bench = Bench::at(Step::Deliver);
     let effects = bench.intend(Intent::Deliver);
+    let (id, request) = started(&effects);
+    let effects = bench.answer(id, super::bench::answer(&request));
+    assert_eq!(texts(&effects), ["start writing files"]);
     let (id, _) = started(&effects);
     assert!(bench.answer(id, super::bench::failure("disk full")).is_empty());
     assert_eq!(bench.told(), "disk full");
     assert!(offers(&bench.wizard).contains(&text("Deliver*")));
     bench.does(Intent::Deliver);
-    assert_eq!(bench.wizard.session().delivered.len(), 6);
+    assert_eq!(bench.wizard.session().delivered.len(), 9);
+    assert!(bench.wizard.session().left_out.is_empty());
+}
+
+#[test]
+fn a_model_that_cannot_be_written_is_left_out_and_said() {
+    let mut bench = Bench::at(Step::Deliver);
+    let effects = bench.intend(Intent::Deliver);
+    let (id, _) = started(&effects);
+    let left_out = vec!["dh.csv: it does not fit".to_owned()];
+    let files = vec![("corrected.ron".to_owned(), "x".to_owned())];
+    let effects = bench.answer(id, Answer::Modelled(Box::new(Models { files, left_out: left_out.clone() })));
+    bench.settle(effects);
+    assert_eq!(bench.told(), "left out: dh.csv: it does not fit");
+    let Content::Deliver(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.left_out, left_out);
+    assert!(view.files.iter().any(|file| file == "corrected.ron") && !view.files.iter().any(|file| file == "dh.csv"));
 }
 
 #[test]

@@ -1,0 +1,240 @@
+//! Every command that README.md and docs/*.md show is run, in a folder that has what a reader would have: the profiles, the sessions
+//! of the repository, a robot, a table of points, a program.
+//!
+//! In blocks ```` ```sh ```` every line that begins with `trupose` is a command; `\` at its end joins lines. It must end with exit code 0, or with
+//! that of a remark `# exit code N` behind it. `# not run: REASON` behind it, or on the line before, leaves it out; so does a command that needs a
+//! terminal. What is not run must at least be a command line that the program understands. Each document has a folder of its own, its commands run in order.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::string_slice,
+    clippy::disallowed_methods,
+    reason = "a failure of a test is a panic; what is tested is real files and a real program"
+)]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+
+use clap::Parser as _;
+use trupose::cli::{Cli, Command as Told};
+
+/// A command of a document.
+#[derive(Debug, PartialEq)]
+struct Shown {
+    line: usize,
+    words: Vec<String>,
+    exit_code: i32,
+    is_run: bool,
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Words of a line as a shell splits it, and the remark behind it. Nothing else of a shell is understood.
+fn split(line: &str) -> (Vec<String>, &str) {
+    let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None);
+    for (at, c) in line.char_indices() {
+        match (quote, c) {
+            (Some(open), _) if c == open => quote = None,
+            (None, '\'' | '"') => {
+                quote = Some(c);
+                word.get_or_insert_default();
+            }
+            (None, ' ') => words.extend(word.take()),
+            (None, '#') if word.is_none() => return (words, &line[at..]),
+            (None, '|' | '>' | '<' | '&' | ';' | '$' | '`') => panic!("no simple command: {line}"),
+            _ => word.get_or_insert_default().push(c),
+        }
+    }
+    assert!(quote.is_none(), "open quote: {line}");
+    words.extend(word);
+    (words, "")
+}
+
+/// The commands of a document.
+fn commands(text: &str) -> Vec<Shown> {
+    let mut shown = Vec::new();
+    let (mut is_inside, mut before, mut joined) = (false, String::new(), String::new());
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.starts_with("```") {
+            is_inside = !is_inside && line == "```sh";
+            before.clear();
+            continue;
+        }
+        if !is_inside {
+            continue;
+        }
+        joined.push_str(line);
+        if joined.ends_with('\\') {
+            joined.pop();
+            continue;
+        }
+        let whole = std::mem::take(&mut joined);
+        if whole.starts_with("trupose ") || whole == "trupose" {
+            let (words, remark) = split(&whole);
+            let exit_code = remark.split_once("exit code ").map_or(0, |(_, code)| {
+                code.chars().take_while(char::is_ascii_digit).collect::<String>().parse().unwrap()
+            });
+            let is_run = ![remark, &before].iter().any(|remark| remark.contains("# not run:"));
+            shown.push(Shown { line: index + 1, words, exit_code, is_run });
+        }
+        before = whole;
+    }
+    shown
+}
+
+/// Whether a command needs a terminal, another program or hardware.
+fn needs_somebody(cli: &Cli) -> bool {
+    match &cli.command {
+        None => cli.script.is_none(),
+        Some(Told::Wizard(_)) => true,
+        Some(Told::Resume(args)) => args.script.is_none(),
+        Some(Told::Replay(args)) => !args.print && !args.csv,
+        Some(_) => false,
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    if from.is_dir() {
+        fs::create_dir_all(to).unwrap();
+        for entry in fs::read_dir(from).unwrap() {
+            let entry = entry.unwrap();
+            copy(&entry.path(), &to.join(entry.file_name()));
+        }
+    } else {
+        fs::copy(from, to).unwrap();
+    }
+}
+
+/// What a reader has at hand.
+fn furnish(folder: &Path) {
+    let put = |from: &str, to: &str| copy(&root().join(from), &folder.join(to));
+    put("profiles", "profiles");
+    fs::create_dir(folder.join("sessions")).unwrap();
+    for entry in fs::read_dir(root().join("sessions")).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        // Not what else a user may have there.
+        if name.ends_with(".script.ron") || ["example", "soochow-example"].contains(&name.as_str()) {
+            put(&format!("sessions/{name}"), &format!("sessions/{name}"));
+        }
+    }
+    put("profiles/soochow.ron", "my-robot.ron");
+    put("sessions/example/measurements.csv", "points.csv");
+    put("sessions/example/calibration.ron", "calibration.ron");
+    put("sessions/soochow-example/verification.csv", "later.csv");
+    put("tests/urdf/ur5.urdf", "arm.urdf");
+    let targets = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\npick,10,20,-30,40,50,60\nplace,-40,10,5,30,-60,0\n";
+    fs::write(folder.join("targets.csv"), targets).unwrap();
+    let program =
+        "DEF part()\nPTP {A1 10,A2 20,A3 -30,A4 40,A5 50,A6 60}\nPTP {A1 -40,A2 10,A3 5,A4 30,A5 -60,A6 0}\nEND\n";
+    fs::write(folder.join("part.src"), program).unwrap();
+}
+
+/// Runs the commands of a document; gives back what went wrong and how many ran.
+fn run(document: &Path) -> (Vec<String>, usize) {
+    let folder = tempfile::tempdir().unwrap();
+    furnish(folder.path());
+    let (mut wrong, mut ran, mut done) = (Vec::new(), 0, BTreeSet::new());
+    for shown in commands(&fs::read_to_string(document).unwrap()) {
+        let place = format!("{}:{}: {}", document.display(), shown.line, shown.words.join(" "));
+        let cli = match Cli::try_parse_from(&shown.words) {
+            Ok(cli) => cli,
+            // '--help' and '--version' are no mistakes.
+            Err(error) if error.exit_code() == 0 => continue,
+            Err(error) => {
+                wrong.push(format!("{place}\n{error}"));
+                continue;
+            }
+        };
+        if !shown.is_run || needs_somebody(&cli) || !done.insert(shown.words.clone()) {
+            continue;
+        }
+        let mut arguments = shown.words[1..].to_vec();
+        if matches!(&cli.command, Some(Told::Plan(_))) && !arguments.iter().any(|word| word == "--candidates") {
+            // The same command in less time.
+            arguments.extend(["--candidates".to_owned(), "300".to_owned()]);
+        }
+        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
+        let output = command
+            .current_dir(folder.path())
+            .args(arguments)
+            .stdin(Stdio::null())
+            .env_remove("TERM")
+            .output()
+            .unwrap();
+        ran += 1;
+        if output.status.code() != Some(shown.exit_code) {
+            let error = String::from_utf8_lossy(&output.stderr);
+            wrong.push(format!(
+                "{place}\nends with {:?} instead of {}\n{error}",
+                output.status.code(),
+                shown.exit_code
+            ));
+        }
+    }
+    (wrong, ran)
+}
+
+fn documents() -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> =
+        fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    found.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
+    found.push(root().join("README.md"));
+    found.sort();
+    found
+}
+
+#[test]
+fn every_command_shown_does_what_is_said() {
+    let threads: Vec<_> = documents().into_iter().map(|path| thread::spawn(move || run(&path))).collect();
+    let (wrong, ran): (Vec<_>, Vec<_>) = threads.into_iter().map(|thread| thread.join().unwrap()).unzip();
+    let wrong = wrong.concat();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+    let ran: usize = ran.iter().sum();
+    assert!(ran >= 20, "only {ran} commands were found");
+}
+
+#[test]
+fn every_link_between_the_documents_leads_somewhere() {
+    // Documents of other parts of the program.
+    const ELSEWHERE: [&str; 4] = ["report.md", "report-schema.md", "recording.md", "links.md"];
+    let mut wrong = Vec::new();
+    for document in documents() {
+        let text = fs::read_to_string(&document).unwrap();
+        for (at, _) in text.match_indices("](") {
+            let target = text[at + 2..].split([')', '#']).next().unwrap();
+            let path = document.parent().unwrap().join(target);
+            let is_file = !target.is_empty() && !target.contains("://") && !text[at + 2..].starts_with('#');
+            let is_elsewhere = ELSEWHERE.iter().any(|name| path.ends_with(name));
+            if is_file && !is_elsewhere && !path.exists() {
+                wrong.push(format!("{}: {target}", document.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn commands_are_found_as_they_are_written() {
+    let text = "```sh\n# first\ntrupose identify --use \"kind == 'x'\" \\\n    --json   # exit code 2: why\ncargo test\n\
+                # not run: needs a viewer\ntrupose demo\ntrupose demo --seed 2\n```\ntrupose no\n```text\ntrupose no\n```\n";
+    let found = commands(text);
+    let of = |line, words: &[&str], exit_code, is_run| Shown {
+        line,
+        words: words.iter().map(|word| (*word).to_owned()).collect(),
+        exit_code,
+        is_run,
+    };
+    let expected = [
+        of(4, &["trupose", "identify", "--use", "kind == 'x'", "--json"], 2, true),
+        of(7, &["trupose", "demo"], 0, false),
+        of(8, &["trupose", "demo", "--seed", "2"], 0, true),
+    ];
+    assert_eq!(found, expected);
+}
