@@ -1,6 +1,11 @@
 //! What a recording costs: the wizard's thread, the disk, and the reader. The session of the demo, drawn from its journal.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark stops when its case is broken, and prints")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "a benchmark stops when its case is broken, and prints"
+)]
 
 use std::fs;
 use std::path::Path;

@@ -101,7 +101,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Profile(command) => profile::run(&command, console),
         Command::Link(command) => link::run(&command, console),
         Command::Simulate(args) => simulate::run(&args, console),
-        Command::Completions(args) => manual::completions(&args, console),
+        Command::Completions(args) => manual::completions(args, console),
         Command::Man(args) => manual::man(&args, console),
     }
 }

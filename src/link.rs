@@ -50,8 +50,7 @@ pub trait Link: Send {
 
     /// What there is to see while nothing is measured, and what has happened; takes up to `wait`. `None`: this link has nothing
     /// to show between measurements, and does not wait.
-    fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
-        let _nothing = wait;
+    fn watch(&mut self, _wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
         None
     }
 }

@@ -51,7 +51,7 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
         robot: args.robot.clone(),
         is_automatic: false,
     };
-    let mut wired = Wired::new(&choice, raw_log(args.raw_log.as_deref())?)
+    let mut wired = Wired::new(&choice, raw_log(args.raw_log.as_deref())?.as_ref())
         .map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
     console.print(&format!("connecting to {}\n", args.address))?;
     let peer = wired.connect_while(&keep_going).map_err(|error| problem(&error, "it does not connect"))?;
@@ -88,6 +88,7 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
 }
 
 /// What is seen while nothing is measured.
+#[expect(clippy::disallowed_methods, reason = "the edge of the program may look at the clock")]
 fn watch<O: Write, E: Write>(
     args: &LinkTestArgs,
     wired: &mut Wired,

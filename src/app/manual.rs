@@ -11,7 +11,7 @@ use crate::error::{ExitStatus, Failure};
 use crate::store;
 
 pub(super) fn completions<O: Write, E: Write>(
-    args: &CompletionsArgs,
+    args: CompletionsArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let mut script = Vec::new();

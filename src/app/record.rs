@@ -123,17 +123,17 @@ fn check(path: &Path) -> Result<Check, Failure> {
 }
 
 fn described(check: &Check) -> String {
-    let mut text = format!("{} bytes, {} journal entries, {} samples", check.bytes, check.lines, check.samples);
+    let mut parts = vec![format!("{} bytes, {} journal entries, {} samples", check.bytes, check.lines, check.samples)];
     if !check.has_index {
-        text.push_str(", no index (still being written, or ended by a crash)");
+        parts.push("no index (still being written, or ended by a crash)".to_owned());
     }
     if !check.missing.is_empty() {
-        text.push_str(&format!(", entries missing: {:?}", check.missing));
+        parts.push(format!("entries missing: {:?}", check.missing));
     }
     if check.damaged > 0 {
-        text.push_str(&format!(", {} messages cannot be read", check.damaged));
+        parts.push(format!("{} messages cannot be read", check.damaged));
     }
-    text
+    parts.join(", ")
 }
 
 /// What an error of a recording means to the operator.

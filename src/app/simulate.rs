@@ -82,10 +82,10 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     read_lines(sender)?;
     loop {
         match orders.recv_timeout(LOOK) {
-            Ok(Order::End) => return Ok(ExitStatus::Accepted),
+            Ok(Order::End) | Err(RecvTimeoutError::Disconnected) => break,
             Ok(Order::Line(line)) => match obey(line.trim(), &mut route, &mut served) {
                 Some(said) => console.remark(&said),
-                None => return Ok(ExitStatus::Accepted),
+                None => break,
             },
             Err(RecvTimeoutError::Timeout) => {
                 let is_done = args.shots > 0 && served.taken() >= args.shots && route.at + 1 < route.poses.len();
@@ -93,9 +93,9 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
                     console.remark(&said);
                 }
             }
-            Err(RecvTimeoutError::Disconnected) => return Ok(ExitStatus::Accepted),
         }
     }
+    Ok(ExitStatus::Accepted)
 }
 
 /// What is said to a line; none: it ends the program.

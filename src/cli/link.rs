@@ -1,7 +1,7 @@
 //! `trupose link` and `trupose simulate`: what was typed.
 
 use std::path::PathBuf;
-use std::str::FromStr;
+use std::str::FromStr as _;
 
 use clap::{Args, Subcommand};
 

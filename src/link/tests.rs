@@ -1,5 +1,7 @@
 //! Links over real sockets and pseudo-terminals, with simulators that misbehave: no wrong point, the right words, and back again.
 
+#![expect(clippy::disallowed_methods, reason = "deadlines of tests")]
+
 mod robots;
 mod wires;
 
@@ -20,12 +22,12 @@ use super::serve::{Pace, Place, serve};
 use super::simulator::PointSource;
 use super::transport::Stopwatch;
 use super::wire::Wire;
-use super::{Link, LinkError, LinkNews, RawLog, Wired, build};
+use super::{Link as _, LinkError, LinkNews, RawLog, Wired, build};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::wire::{WireAddress, WireProtocol};
 
 /// Nothing here takes longer.
-const DEADLINE: Duration = Duration::from_secs(60);
+const DEADLINE: Duration = Duration::from_mins(1);
 
 /// What a simulated instrument looks at, and a test with it.
 #[derive(Clone, Debug)]
@@ -130,7 +132,7 @@ impl Bench {
         place: &Place,
         of_instrument: &[&str],
         of_robot: Option<&[&str]>,
-        log: Option<RawLog>,
+        log: Option<&RawLog>,
     ) -> Self {
         let stage = Stage::new();
         let stop = Arc::new(AtomicBool::new(false));
@@ -138,7 +140,7 @@ impl Bench {
             let simulator = build::simulator(protocol, &faults(names)).unwrap();
             let rest = serve(place, simulator, stage.clone(), Pace(pace), Arc::clone(&stop)).unwrap();
             let address: WireAddress = format!("{protocol}:{rest}").parse().unwrap();
-            Wire::start(address, quick(protocol), log.clone()).unwrap()
+            Wire::start(address, quick(protocol), log.cloned()).unwrap()
         };
         let instrument = wire(protocol, place, of_instrument, 20);
         let robot = of_robot.map(|names| wire(WireProtocol::Rtde, &Place::Loopback, names, 1));

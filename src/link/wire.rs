@@ -280,9 +280,8 @@ impl Worker {
         let mut event = event;
         loop {
             match self.sender.try_send(event) {
-                Ok(()) => return true,
+                Ok(()) | Err(TrySendError::Full(WireEvent::Status(_) | WireEvent::Offered(_))) => return true,
                 Err(TrySendError::Disconnected(_)) => return false,
-                Err(TrySendError::Full(WireEvent::Status(_) | WireEvent::Offered(_))) => return true,
                 Err(TrySendError::Full(back)) => event = back,
             }
             if self.is_stopped() {

@@ -12,9 +12,9 @@ use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::wire::{LinkChoice, WireAddress};
 
 /// Longest time of a set-up: trackers initialise for more than a minute.
-const SET_UP: Duration = Duration::from_secs(120);
+const SET_UP: Duration = Duration::from_mins(2);
 /// Longest time for a shot; protocols answer earlier by their own limits.
-const SHOT: Duration = Duration::from_secs(120);
+const SHOT: Duration = Duration::from_mins(2);
 /// A reading that was not steady is tried so often in all, with this pause between.
 const TRIES: (u32, Duration) = (3, Duration::from_secs(2));
 /// The same pause where the instrument is a simulated one.
@@ -69,7 +69,7 @@ impl Wired {
     ///
     /// # Errors
     /// [`LinkError::SetUp`]: an address or an option that cannot be; the system refuses a thread.
-    pub fn new(choice: &LinkChoice, log: Option<RawLog>) -> Result<Self, LinkError> {
+    pub fn new(choice: &LinkChoice, log: Option<&RawLog>) -> Result<Self, LinkError> {
         let address: WireAddress = choice.address.parse().map_err(LinkError::SetUp)?;
         if address.protocol.is_robot() {
             let message = format!("'{address}' is a robot: it tells where it stands, but not where the SMR is");
@@ -81,7 +81,7 @@ impl Wired {
         }
         let start = |address: WireAddress, options: Option<&str>| {
             let protocol = build::protocol(&address, options).map_err(LinkError::SetUp)?;
-            Wire::start(address, protocol, log.clone())
+            Wire::start(address, protocol, log.cloned())
                 .map_err(|error| LinkError::SetUp(format!("the link cannot be started: {error}")))
         };
         let shown = address.to_string();
@@ -335,7 +335,7 @@ impl Link for Wired {
                 return Err(LinkError::Robot("it has moved while the point was measured".to_owned()));
             }
         }
-        let reading = mean(&shots, joints, (self.instrument.now() - began).as_secs_f64());
+        let reading = mean(&shots, joints, self.instrument.now().saturating_sub(began).as_secs_f64());
         Ok(reading)
     }
 
@@ -374,7 +374,7 @@ impl Wired {
         let reflector = identity.reflector.map_or_else(String::new, |reflector| {
             format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
         });
-        let warnings: String = identity.warnings.iter().map(|warning| format!("; {warning}")).collect();
+        let warnings = identity.warnings.iter().fold(String::new(), |all, warning| all + "; " + warning);
         let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
         Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
     }

@@ -62,8 +62,6 @@ fn is_like_universal_robots(chain: &KinematicChain) -> bool {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a failure of a test is a panic")]
-
     use super::*;
     use crate::profile::{builtin, builtin_names};
 

@@ -22,7 +22,7 @@ pub(super) fn store(messages: impl Iterator<Item = LogMsg>, path: &Path) -> Resu
     }
     encoder.finish().map_err(|error| failed(&error))?;
     let whole = encoder.into_inner().map_err(|error| failed(&error))?;
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     let write = |source| RecordingError::file("cannot write the recording", path, source);
     let mut file = temporary().tempfile_in(folder).map_err(write)?;
     let mut compacted = Vec::new();

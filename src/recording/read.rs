@@ -148,7 +148,6 @@ pub(super) fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
-            '\n' | ' '..='~' => plain.push(c),
             '\u{2212}' | '\u{2013}' | '\u{2014}' => plain.push('-'),
             '\u{394}' => plain.push('d'),
             'σ' => plain.push_str("sigma"),
@@ -162,7 +161,7 @@ pub(super) fn plain(text: &str) -> String {
             '²' => plain.push_str("^2"),
             '\u{2019}' => plain.push('\''),
             // Latin letters with marks are drawn everywhere.
-            'À'..='ÿ' => plain.push(c),
+            '\n' | ' '..='~' | 'À'..='ÿ' => plain.push(c),
             _ => plain.push('?'),
         }
     }

@@ -66,7 +66,7 @@ impl Live {
 
     /// A stream to whoever connects, early or late. The server's own limit of 1 GiB is a hundred times a long session.
     #[cfg(feature = "live")]
-    fn stream(&self, identity: &Identity) -> Result<RecordingStream, RecordingError> {
+    fn stream(self, identity: &Identity) -> Result<RecordingStream, RecordingError> {
         identity
             .builder()
             .serve_grpc_opts("127.0.0.1", self.port, rerun::external::re_grpc_server::ServerOptions::default())
@@ -175,7 +175,9 @@ impl<T: Fn(RecordingEvent)> Work<T> {
             match live.stream(&identity) {
                 Ok(stream) => {
                     let mut scribe = Scribe::new(stream, Purpose::Session, &[]);
-                    before.iter().for_each(|line| scribe.take(line));
+                    for line in before {
+                        scribe.take(line);
+                    }
                     self.view = Some(scribe);
                 }
                 Err(error) => (self.tell)(RecordingEvent::LiveFailed(text(&error))),
@@ -196,7 +198,9 @@ impl<T: Fn(RecordingEvent)> Work<T> {
         let path = segments::next_part(&self.folder);
         let stream = identity.file(self.path.insert(path))?;
         let mut scribe = Scribe::new(stream, Purpose::Session, drawn);
-        missing.iter().for_each(|line| scribe.take(line));
+        for line in missing {
+            scribe.take(line);
+        }
         if !earlier.void.is_empty() {
             scribe
                 .stream()
@@ -216,7 +220,9 @@ impl<T: Fn(RecordingEvent)> Work<T> {
             return;
         }
         for scribe in self.file.iter_mut().chain(&mut self.view) {
-            lines.iter().for_each(|line| scribe.take(line));
+            for line in lines {
+                scribe.take(line);
+            }
         }
         self.flush();
     }
@@ -264,6 +270,8 @@ fn text(error: &RecordingError) -> String {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::disallowed_methods, reason = "deadlines of tests")]
+
     use std::sync::mpsc::channel;
 
     use super::*;

@@ -165,7 +165,7 @@ impl Posture {
 
     /// The nominal arm of `profile` with its first target.
     pub(super) fn nominal(profile: &Profile, q: &[f64]) -> Self {
-        let target = profile.targets().first().map_or(Point3::origin(), |target| target.position_in_flange);
+        let target = profile.targets().first().map_or_else(Point3::origin, |target| target.position_in_flange);
         Self::new(profile.chain(), &target, q)
     }
 }

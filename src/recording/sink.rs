@@ -121,6 +121,8 @@ impl Drop for DurableSink {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::disallowed_methods, reason = "deadlines of tests")]
+
     use std::io;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::Instant;

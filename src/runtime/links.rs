@@ -142,7 +142,7 @@ fn connect(instrument: &InstrumentChoice, profile: &Profile, log: Option<&RawLog
             Ok((Some(Box::new(rehearsal)), identity, Vec::new()))
         }
         InstrumentChoice::Linked(choice) => {
-            let mut wired = Wired::new(choice, log.cloned())?;
+            let mut wired = Wired::new(choice, log)?;
             let identity = wired.connect()?;
             Ok((Some(Box::new(wired)), identity, Vec::new()))
         }

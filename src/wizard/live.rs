@@ -81,7 +81,7 @@ impl Live {
     }
 
     /// Distance of the SMR from where it should be at row `row` (m).
-    fn from_predicted(&self, session: &Session, row: usize) -> Option<(f64, f64)> {
+    fn off_predicted(&self, session: &Session, row: usize) -> Option<(f64, f64)> {
         let (_, here) = *self.points.back()?;
         let registered = registered(session)?;
         let predicted = predicted(session, &session.rows.get(row)?.planned.configuration)?;
@@ -107,8 +107,7 @@ impl Live {
         let rests = self.rest().is_some_and(|(seconds, _)| seconds >= REST_TIME);
         let stands = self.latest.as_ref().and_then(|latest| latest.is_still) != Some(false);
         let by_joints = self.joint_difference(session, row).map(|(_, difference)| difference <= AS_PLANNED);
-        let by_place =
-            self.from_predicted(session, row).map(|(distance, rms)| distance <= NEAR.max(NEAR_SPREADS * rms));
+        let by_place = self.off_predicted(session, row).map(|(distance, rms)| distance <= NEAR.max(NEAR_SPREADS * rms));
         // Without the robot's joints and before the tracker's place is known, nobody can tell which pose this is.
         let is_there =
             by_joints.unwrap_or(true) && by_place.unwrap_or(true) && (by_joints.is_some() || by_place.is_some());
@@ -131,7 +130,7 @@ impl Live {
             point_mm: latest.point.map(|point| point.coords.map(to_mm).into()),
             rest_s: rest.map(|(seconds, _)| seconds),
             scatter_mm: rest.map(|(_, scatter)| to_mm(scatter)),
-            from_predicted_mm: row_view(&|row| self.from_predicted(session, row).map(|(distance, _)| to_mm(distance))),
+            from_predicted_mm: row_view(&|row| self.off_predicted(session, row).map(|(distance, _)| to_mm(distance))),
             joints: latest.joints.clone(),
             joint_difference: row.and_then(|row| {
                 self.joint_difference(session, row).map(|(joint, difference)| (joint, to_deg(difference)))

@@ -1,5 +1,7 @@
 //! Robots that do not stand as they should while the instrument measures.
 
+#![expect(clippy::disallowed_methods, reason = "deadlines of tests")]
+
 use super::*;
 
 fn bench(faults: &[&str]) -> Bench {

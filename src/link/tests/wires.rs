@@ -1,5 +1,7 @@
 //! Instruments whose connection or lines are not as they should be.
 
+#![expect(clippy::disallowed_methods, reason = "deadlines and peers of tests")]
+
 use std::io::{Read as _, Seek as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::thread;
@@ -252,7 +254,7 @@ fn somebody_may_connect_to_this_program() {
 fn the_raw_log_holds_what_came_and_went() {
     let mut file = tempfile::tempfile().unwrap();
     let log = RawLog::new(file.try_clone().unwrap());
-    let mut bench = Bench::with(WireProtocol::Ascii, &Place::Loopback, &[], None, Some(log));
+    let mut bench = Bench::with(WireProtocol::Ascii, &Place::Loopback, &[], None, Some(&log));
     bench.wired.connect().unwrap();
     let reading = bench.measure().unwrap();
     let mut text = String::new();

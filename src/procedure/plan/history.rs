@@ -80,7 +80,9 @@ mod tests {
         ];
         let steps = |order: &[usize]| {
             let history = History::default();
-            order.iter().for_each(|index| history.take(&told[*index]));
+            for index in order {
+                history.take(&told[*index]);
+            }
             history.steps()
         };
         let found = steps(&[0, 1, 2, 3, 4, 5]);

@@ -243,6 +243,9 @@ fn pair(one: &Judged<'_>, other: &Judged<'_>) -> (f64, f64) {
     (measured - (one.nominal_at - other.nominal_at).norm(), measured - (one.identified_at - other.identified_at).norm())
 }
 
+/// The nominal or the identified one of two errors.
+type Pick = fn(&(f64, f64)) -> f64;
+
 /// The worst pairs as lines, and the errors of all pairs as a picture.
 fn pairs(canvas: &Canvas, judged: &[Judged<'_>]) {
     let step = judged.len().div_ceil(MAP_SIZE).max(1);
@@ -269,7 +272,6 @@ fn pairs(canvas: &Canvas, judged: &[Judged<'_>]) {
         let data = TensorData::new(shape(), rerun::TensorBuffer::U16(map.into()));
         canvas.fix(path, &Tensor::new(data).with_dim_names(["sample", "with sample"]));
     }
-    type Pick = fn(&(f64, f64)) -> f64;
     let picks: [(&str, Pick); 2] =
         [(names::PAIRS_NOMINAL, |errors| errors.0), (names::PAIRS_IDENTIFIED, |errors| errors.1)];
     for (path, pick) in picks {

@@ -285,6 +285,6 @@ mod tests {
 
     #[test]
     fn round_numbers_are_found() {
-        assert_eq!([0.0123, 3.0, 1.0, 6.0, 2000.0, 0.0].map(nice_above), [0.02, 5.0, 1.0, 10.0, 2000.0, 1.0]);
+        assert_eq!([0.0123, 3.0, 1.0, 6.0, 2000.0, 0.0].map(nice_above).to_vec(), [0.02, 5.0, 1.0, 10.0, 2000.0, 1.0]);
     }
 }

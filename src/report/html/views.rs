@@ -150,6 +150,9 @@ mod tests {
     #[test]
     fn the_exaggeration_is_round_and_never_below_one() {
         let shown = [(10.0, 2000.0), (0.01, 2000.0), (5000.0, 2000.0), (0.0, 2000.0), (f64::NAN, 1.0)];
-        assert_eq!(shown.map(|(longest, width)| exaggeration(longest, width)), [50.0, 50_000.0, 1.0, 1.0, 1.0]);
+        assert_eq!(
+            shown.map(|(longest, width)| exaggeration(longest, width)).to_vec(),
+            [50.0, 50_000.0, 1.0, 1.0, 1.0]
+        );
     }
 }
