@@ -20,6 +20,11 @@ use super::protocol::rtde::Rtde;
 use super::protocol::{JointState, Protocol, Shot};
 use super::serve::{Pace, Place, serve};
 use super::simulator::PointSource;
+use super::simulator::ascii::AsciiFault;
+use super::simulator::emscon::EmsconFault;
+use super::simulator::geocom::GeocomFault;
+use super::simulator::ndi::NdiFault;
+use super::simulator::rtde::RtdeFault;
 use super::transport::Stopwatch;
 use super::wire::Wire;
 use super::{Link as _, LinkError, LinkNews, RawLog, Wired, build};
@@ -118,6 +123,17 @@ fn quick(protocol: WireProtocol) -> Box<dyn Protocol> {
             Box::new(NdiProtocol::new(NdiOptions { timeout_s: 0.5, ..NdiOptions::default() }).unwrap())
         }
         WireProtocol::Rtde => Box::new(Rtde::default()),
+    }
+}
+
+/// Names of the faults of a simulator.
+fn fault_names(protocol: WireProtocol) -> Vec<&'static str> {
+    match protocol {
+        WireProtocol::Emscon => EmsconFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Rtde => RtdeFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Ascii => AsciiFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Geocom => GeocomFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Ndi => NdiFault::ALL.iter().map(|fault| fault.name()).collect(),
     }
 }
 

@@ -52,6 +52,9 @@ pub struct Wired {
     robot_since: f64,
 }
 
+/// Who is at the other end of the robot's wire, in messages.
+const CONTROLLER: &str = "the controller";
+
 /// Told before a shot is asked for.
 type BeforeShot = Box<dyn FnMut() + Send>;
 
@@ -132,7 +135,7 @@ impl Wired {
                         self.news.push(LinkNews::Up(format!("robot: {}", identity.name)));
                     }
                     WireEvent::Down(failure) => {
-                        self.news.push(LinkNews::Down(format!("robot: {failure}")));
+                        self.news.push(LinkNews::Down(format!("robot: {}", failure.words(CONTROLLER))));
                         self.robot_down = Some(failure);
                     }
                     WireEvent::Status(status) => self.news.push(LinkNews::Status(format!("robot: {}", status.text))),
@@ -221,7 +224,7 @@ impl Wired {
             }
             if self.instrument.now() > until {
                 let why = match (fresh, &self.robot_down) {
-                    (_, Some(failure)) => failure.to_string(),
+                    (_, Some(failure)) => failure.words(CONTROLLER),
                     (Some(_), None) => format!("it still moves after {} s", rest.as_secs()),
                     (None, None) => "it tells no joint angles".to_owned(),
                 };
@@ -318,7 +321,7 @@ impl Wired {
 
 impl Link for Wired {
     fn connect(&mut self) -> Result<String, LinkError> {
-        self.connect_while(&|| true)
+        self.connect_while(&|| true, &mut |_| ())
     }
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
@@ -347,22 +350,40 @@ impl Link for Wired {
 }
 
 impl Wired {
-    /// As [`Link::connect`], while it is wanted.
+    /// As [`Link::connect`], while it is wanted. What happens on the way, such as a laser that warms up, is `told`.
     ///
     /// # Errors
     /// As there; [`LinkError::Cancelled`].
-    pub fn connect_while(&mut self, keep_going: &dyn Fn() -> bool) -> Result<String, LinkError> {
+    pub fn connect_while(
+        &mut self,
+        keep_going: &dyn Fn() -> bool,
+        told: &mut dyn FnMut(LinkNews),
+    ) -> Result<String, LinkError> {
         let until = self.instrument.now() + SET_UP;
+        let mut last_told = None;
         while self.identity.is_none() {
-            if let Some(Err(failure)) = self.drain(LOOK) {
-                return Err(LinkError::Instrument(failure));
+            let answer = self.drain(LOOK);
+            if self.identity.is_some() {
+                break;
+            }
+            for news in self.news.drain(..) {
+                if let LinkNews::Status(text) = &news {
+                    last_told = Some(text.clone());
+                    told(news);
+                }
+            }
+            if let Some(Err(failure)) = answer {
+                return Err(LinkError::Instrument(in_set_up(failure)));
             }
             if !keep_going() {
                 return Err(LinkError::Cancelled);
             }
             if self.instrument.now() > until {
-                let what = format!("'{}' was being set up", self.address);
-                return Err(LinkError::Instrument(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
+                let seconds = SET_UP.as_secs_f64();
+                return Err(LinkError::Instrument(match last_told {
+                    Some(text) => Failure::NotReady(format!("{text}; the set-up was given up after {seconds:.0} s")),
+                    None => Failure::Silent { what: format!("'{}' was being set up", self.address), seconds },
+                }));
             }
         }
         if self.robot.is_some() {
@@ -374,9 +395,20 @@ impl Wired {
         let reflector = identity.reflector.map_or_else(String::new, |reflector| {
             format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
         });
-        let warnings = identity.warnings.iter().fold(String::new(), |all, warning| all + "; " + warning);
+        let told = identity.warnings.iter().chain(&identity.notes);
+        let warnings = told.fold(String::new(), |all, one| all + "; " + one);
         let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
         Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
+    }
+}
+
+/// Who hangs up in the middle of the set-up has perhaps not understood it.
+fn in_set_up(failure: Failure) -> Failure {
+    match failure {
+        Failure::Disconnected(why) => Failure::Disconnected(format!(
+            "{why}, in the middle of the set-up: is it this kind of instrument, and the right port?"
+        )),
+        other => other,
     }
 }
 
@@ -389,7 +421,7 @@ impl Wired {
         loop {
             drop(self.drain(LOOK));
             if let Some(failure) = &self.robot_down {
-                return Err(LinkError::Robot(failure.to_string()));
+                return Err(LinkError::Robot(failure.words(CONTROLLER)));
             }
             if self.robot.as_ref().is_none_or(|robot| robot.latest().joints.is_some()) {
                 return Ok(());

@@ -342,7 +342,7 @@ impl Engine {
         let flag = Arc::new(AtomicBool::new(false));
         self.cancelled.insert(id, Arc::clone(&flag));
         let is_started = match request {
-            Request::Connect { instrument, profile } => self.link.connect(id, instrument, profile),
+            Request::Connect { instrument, profile } => self.link.connect(id, instrument, profile, flag),
             Request::Measure(request) => self.link.measure(id, request, flag),
             Request::Deliver { files, left_out } => self.store.ask(Command::Replace { id, files, left_out }),
             request => jobs::start(id, request, flag, self.sender.clone()),

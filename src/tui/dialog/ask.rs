@@ -73,25 +73,26 @@ fn known(values: &[String]) -> Result<Intent, String> {
     Ok(Intent::ChooseTarget(TargetChoice::Known { xyz_mm, sigma_mm }))
 }
 
-/// An instrument on a wire.
-pub fn linked() -> Dialog {
+/// An instrument on a wire. What the profile says about it stands there already.
+pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
+    let proposed = proposal.cloned().unwrap_or_default();
     Dialog::Form(
         Form::new("An instrument on the network or a serial port", link)
             .text(
                 "instrument",
-                "",
+                &proposed.address,
                 "emscon:HOST, geocom:serial:/dev/ttyUSB0:9600, ndi:HOST, ascii:tcp:HOST:PORT, ascii:listen:0.0.0.0:5000",
             )
             .text(
                 "options",
-                "",
+                &proposed.options.unwrap_or_default(),
                 "Empty: the usual ones. For ascii a preset such as xyz or bridge; else as (measure_ms: 2000).",
             )
-            .text("robot", "", "rtde:HOST, if the robot's controller tells its joint angles. Empty: it does not.")
+            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, if the robot's controller tells its joint angles. Empty: it does not.")
             .pick(
                 "measure by itself",
                 &["no", "yes"],
-                0,
+                usize::from(proposed.is_automatic),
                 "Left/Right. yes: as soon as the SMR rests for 2 s near the predicted place.",
             ),
     )

@@ -9,7 +9,7 @@ use super::{EmsconBench, bench, bench_with, failure, ready, statuses};
 use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::Cell;
 use crate::link::simulator::emscon::EmsconFault;
-use crate::link::simulator::occasion::Planned;
+use crate::link::simulator::fault::Planned;
 
 /// The next shot is the point of the cell.
 #[track_caller]
