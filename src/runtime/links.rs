@@ -152,7 +152,7 @@ fn connect(
             Ok((None, format!("coordinates typed in, in {}", unit.sign()), Vec::new()))
         }
         InstrumentChoice::Simulated(simulation) if !simulation.wires.is_empty() => {
-            let mut rehearsal = Rehearsal::new(profile, simulation)?;
+            let mut rehearsal = Rehearsal::new(profile, simulation, log)?;
             let identity = rehearsal.connect()?;
             Ok((Some(Box::new(rehearsal)), identity, Vec::new()))
         }

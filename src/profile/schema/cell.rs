@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::super::decode::{Fields, choice, fields, list, not_negative, number, numbers, point, positive, range, text};
+use super::super::decode::{Fields, fields, flag, list, not_negative, number, numbers, point, positive, range, text};
 use super::super::diagnostic::Findings;
 use super::super::syntax::Ast;
 use super::super::wire::{LinkSettings, WireAddress};
@@ -52,7 +52,7 @@ pub(super) fn link(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Link
         .and_then(|ast| wire_address(ast, false, findings));
     let options = inside.get_or("options", None, |ast| text(ast, findings).map(Some));
     let robot = inside.get_or("robot", None, |ast| wire_address(ast, true, findings).map(Some));
-    let automatic = inside.get_or("automatic", false, |ast| choice(ast, &[("true", true), ("false", false)], findings));
+    let automatic = inside.get_or("automatic", false, |ast| flag(ast, findings));
     Some(LinkSettings { address: address?, options: options?, robot: robot?, is_automatic: automatic? })
 }
 
