@@ -44,6 +44,8 @@ struct Scene {
     joints: JointState,
     /// The first joint turns by so much with every shot (rad).
     turns: f64,
+    /// Standard deviation that is stated (m).
+    sigma: f64,
     clock: Stopwatch,
 }
 
@@ -51,7 +53,7 @@ impl Stage {
     fn new() -> Self {
         let positions = vec![0.1, -1.2, 1.3, -0.4, 0.5, -0.6];
         let joints = JointState { positions, speeds: Some(vec![0.0; 6]), controller_time: 0.0, stopped: None };
-        Self(Arc::new(Mutex::new(Scene { shots: 0, joints, turns: 0.0, clock: Stopwatch::start() })))
+        Self(Arc::new(Mutex::new(Scene { shots: 0, joints, turns: 0.0, sigma: 5e-6, clock: Stopwatch::start() })))
     }
 
     fn lock(&self) -> MutexGuard<'_, Scene> {
@@ -76,7 +78,7 @@ impl PointSource for Stage {
         if let Some(first) = scene.joints.positions.first_mut() {
             *first += turns;
         }
-        Some(Shot { sigma: Some([4e-6, 5e-6, 6e-6]), ..Shot::bare(Self::point(scene.shots)) })
+        Some(Shot { sigma: Some([scene.sigma; 3]), ..Shot::bare(Self::point(scene.shots)) })
     }
 
     fn look(&mut self) -> Option<Shot> {

@@ -1,5 +1,6 @@
 //! Instruments on a wire: what the wizard asks for, in the words of a protocol, with the gates that every point passes.
 
+use std::collections::VecDeque;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use super::wire::{Latest, RawLog, Wire, WireEvent};
 use super::{Link, LinkError, LinkNews, build};
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::wire::{LinkChoice, WireAddress};
+use crate::units::to_mm;
 
 /// Longest time of a set-up: trackers initialise for more than a minute.
 const SET_UP: Duration = Duration::from_mins(2);
@@ -31,6 +33,11 @@ const LOOK: Duration = Duration::from_millis(50);
 const LOOK_AT_JOINTS: Duration = Duration::from_millis(5);
 /// Events taken at once: the rest waits for the next look.
 const AT_ONCE: usize = 1024;
+/// A shot is not steady if it states so many times the usual standard deviation, and more than this (m), once there are so many
+/// shots to tell what is usual.
+const UNSTEADY: (f64, f64, usize) = (3.0, 0.05e-3, 5);
+/// So many shots tell what is usual.
+const USUAL: usize = 256;
 /// No instrument measures nearer or farther (m).
 const RANGE: (f64, f64) = (0.05, 100.0);
 
@@ -44,6 +51,8 @@ pub struct Wired {
     down: Option<Failure>,
     robot_down: Option<Failure>,
     news: Vec<LinkNews>,
+    /// Standard deviations that the instrument has stated for the shots so far (m), the newest last.
+    sigmas: VecDeque<f64>,
     /// The shot before this one: an instrument that is stuck gives the same again.
     before: Option<Point3<f64>>,
     /// For a simulated instrument: told before every shot.
@@ -102,6 +111,7 @@ impl Wired {
             down: None,
             robot_down: None,
             news: Vec::new(),
+            sigmas: VecDeque::new(),
             before: None,
             before_shot: None,
             robot_since: f64::NEG_INFINITY,
@@ -282,6 +292,13 @@ impl Wired {
     fn gate(&mut self, shot: Shot) -> Result<Shot, Failure> {
         let point = shot.point;
         let distance = point.coords.norm();
+        let sigma = shot.sigma.map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
+        if let (Some(sigma), Some(usual)) = (sigma, self.usual_sigma())
+            && sigma > (UNSTEADY.0 * usual).max(UNSTEADY.1)
+        {
+            let [sigma, usual] = [sigma, usual].map(to_mm);
+            return Err(Failure::Unstable(format!("it states a sigma of {sigma:.3} mm; usual are {usual:.3} mm")));
+        }
         let reason = match () {
             () if !point.coords.iter().all(|value| value.is_finite()) => "it is not a number".to_owned(),
             () if point.coords.amax() <= f64::EPSILON => "it is 0, 0, 0".to_owned(),
@@ -293,10 +310,21 @@ impl Wired {
             }
             () => {
                 self.before = Some(point);
+                self.sigmas.extend(sigma);
+                while self.sigmas.len() > USUAL {
+                    self.sigmas.pop_front();
+                }
                 return Ok(shot);
             }
         };
         Err(Failure::Unusable(reason))
+    }
+
+    /// The middle one of the standard deviations so far (m), once there are enough.
+    fn usual_sigma(&self) -> Option<f64> {
+        let mut sorted: Vec<f64> = self.sigmas.iter().copied().collect();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= UNSTEADY.2)
     }
 
     /// What there is to see now.
