@@ -222,3 +222,13 @@ fn request(shots: u32) -> MeasureRequest {
         shots,
     }
 }
+
+#[test]
+fn every_fault_of_every_simulator_is_in_the_document() {
+    let document = include_str!("../../docs/links.md");
+    for protocol in WireProtocol::ALL {
+        for name in fault_names(protocol) {
+            assert!(document.contains(&format!("| `{name}` |")), "{protocol}: {name}");
+        }
+    }
+}
