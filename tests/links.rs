@@ -255,6 +255,24 @@ fn the_wizard_measures_at_an_instrument_on_a_wire_and_logs_every_byte() {
     assert!(log.lines().any(|line| line.contains(" emscon in ") && line.contains("3100000000000000")), "{log}");
 }
 
+#[test]
+fn what_the_profile_says_about_the_link_is_proposed_and_stays_in_the_session() {
+    let folder = folder();
+    let profile = include_str!("../profiles/soochow.ron");
+    let (head, _) = profile.trim_end().rsplit_once(')').unwrap();
+    let link = "link: (address: \"emscon:192.168.0.2\", robot: \"rtde:192.168.0.10\", automatic: true),";
+    fs::write(folder.path().join("cell.ron"), format!("{head}{link}\n)\n")).unwrap();
+    let proposed = "Expect(\"instrument.link.address\", Is(\"emscon:tcp:192.168.0.2:700\")),
+        Expect(\"instrument.link.robot\", Is(\"rtde:tcp:192.168.0.10:30004\"))";
+    let begin = format!("Do(ChooseProfile(\"cell.ron\")), Do(NameSession(\"s\")), Do(Next), {proposed}");
+    for (arguments, steps) in [(vec![], begin.as_str()), (vec!["resume", "sessions/s"], proposed)] {
+        fs::write(folder.path().join("test.script.ron"), format!("(title: \"test\", steps: [{steps}])")).unwrap();
+        let output =
+            trupose(folder.path(), &[&arguments[..], &["--script", "test.script.ron", "--no-recording"]].concat());
+        assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    }
+}
+
 /// A source that prints so many lines a second to everybody, for ever.
 fn flood(lines_per_second: u32) -> u16 {
     const TURNS: u32 = 100;

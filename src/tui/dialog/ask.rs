@@ -251,6 +251,18 @@ mod tests {
     }
 
     #[test]
+    fn what_the_profile_says_about_the_link_stands_in_the_form() {
+        let choice = LinkChoice {
+            address: "emscon:tcp:192.168.0.2:700".to_owned(),
+            options: Some("(measure_ms: 2000)".to_owned()),
+            robot: None,
+            is_automatic: true,
+        };
+        let Dialog::Form(form) = linked(Some(&choice)) else { panic!() };
+        assert_eq!(form.value(), Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice))));
+    }
+
+    #[test]
     fn addresses_are_checked_where_they_are_typed() {
         let choice = LinkChoice {
             address: "emscon:tcp:192.168.0.2:700".to_owned(),
