@@ -17,10 +17,10 @@ use crate::planning::{BoxInBase, Objective};
 use crate::profile::{ExpectedDeviation, Level};
 use crate::program::{DEFAULT_DWELL, Dialect, MAX_SPEED};
 use crate::session::measurements::Layout;
-use crate::session::simulation::SimulatedWire;
 use crate::units::from_mm;
 
-pub use link::{LinkCommand, LinkTestArgs, SimulateArgs};
+use link::wires;
+pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
 pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
 
@@ -588,18 +588,6 @@ fn name_and_value(text: &str) -> Result<(String, String), String> {
         Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.to_owned())),
         _ => Err(format!("'{text}' is not a value; write NAME=VALUE")),
     }
-}
-
-/// `--over`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wires(pub Vec<SimulatedWire>);
-
-fn wires(text: &str) -> Result<Wires, String> {
-    let wire = |text: &str| match text.trim().strip_prefix("serial:") {
-        Some(protocol) => protocol.parse().map(SimulatedWire::Serial),
-        None => text.trim().parse().map(SimulatedWire::Tcp),
-    };
-    text.split(',').map(wire).collect::<Result<_, _>>().map(Wires)
 }
 
 fn speed_percent(text: &str) -> Result<f64, String> {

@@ -11,6 +11,7 @@ mod cell_view;
 pub mod protocol;
 mod rehearsal;
 mod replay;
+mod robot;
 mod serve;
 mod simulated;
 pub mod simulator;
@@ -26,6 +27,7 @@ use thiserror::Error;
 
 pub use rehearsal::Rehearsal;
 pub use replay::{Replay, ReplayRow};
+pub use robot::WiredRobot;
 pub use serve::Served;
 pub use simulated::{HiddenArm, SimulatedCell};
 pub use wire::RawLog;

@@ -15,6 +15,7 @@ mod expected;
 mod schema;
 mod syntax;
 mod text;
+pub mod wire;
 
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -23,6 +24,8 @@ pub use cell::{Capsule, Instrument, KeepOut, Tracker};
 pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
 pub use expected::{ExpectedDeviation, ExpectedDeviations};
 pub use text::{check_text, list_text, show_text};
+
+use wire::LinkSettings;
 
 use crate::kinematics::{Axis, FreeParameter, KinematicChain, LinkParameter, ParameterId};
 
@@ -46,6 +49,7 @@ pub struct Profile {
     expected_deviations: ExpectedDeviations,
     acceptance: Acceptance,
     instrument: Option<Instrument>,
+    link: Option<LinkSettings>,
     bodies: Vec<Capsule>,
     floor: Option<f64>,
     keep_out: Vec<KeepOut>,
@@ -175,6 +179,11 @@ impl Profile {
     /// The measuring instrument, if its uncertainty is known.
     pub const fn instrument(&self) -> Option<&Instrument> {
         self.instrument.as_ref()
+    }
+
+    /// How the instrument is reached, if it is always the same.
+    pub const fn link(&self) -> Option<&LinkSettings> {
+        self.link.as_ref()
     }
 
     /// Capsules around the links.

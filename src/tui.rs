@@ -47,6 +47,8 @@ use ui::{Ui, Wish};
 
 /// Shortest time between two frames: more would only fill an SSH line.
 const FRAME: Duration = Duration::from_millis(50);
+/// The same where a key has changed something: whoever presses it looks.
+const FRAME_OF_KEY: Duration = Duration::from_millis(25);
 /// What is under way gets this long to end before the change is drawn: saving an entry is shown only where it takes longer.
 const SETTLE: Duration = Duration::from_millis(40);
 /// Longest wait when there is nothing to do; something always ends it.
@@ -159,6 +161,7 @@ impl Driver<'_> {
         let mut drawn: Option<Instant> = None;
         let mut changed: Option<Instant> = None;
         let mut is_due = true;
+        let mut is_by_key = false;
         loop {
             if received.signal() == Some(SIGHUP) {
                 return End::Gone;
@@ -166,7 +169,8 @@ impl Driver<'_> {
             if self.engine.has_exited() {
                 return End::Exited;
             }
-            let mut early = drawn.map_or(Duration::ZERO, |drawn| FRAME.saturating_sub(since(drawn)));
+            let pace = if is_by_key { FRAME_OF_KEY } else { FRAME };
+            let mut early = drawn.map_or(Duration::ZERO, |drawn| pace.saturating_sub(since(drawn)));
             if is_due && !self.engine.wizard().is_idle() {
                 early = early.max(SETTLE.saturating_sub(since(*changed.get_or_insert_with(now))));
             }
@@ -179,7 +183,7 @@ impl Driver<'_> {
                 }
                 drawn = Some(now());
                 changed = None;
-                is_due = false;
+                (is_due, is_by_key) = (false, false);
             }
             let timeout = if is_due { early } else { IDLE };
             if self.engine.wait(timeout) {
@@ -188,6 +192,7 @@ impl Driver<'_> {
             }
             view = self.look(view, &mut is_due);
             while let Ok(input) = self.inputs.try_recv() {
+                is_by_key = true;
                 match self.ui.on_input(input, &view) {
                     Wish::None => {}
                     Wish::Intend(intent) => {

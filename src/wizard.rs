@@ -196,7 +196,8 @@ impl Wizard {
 
     /// A look through the instrument. It may be time to measure.
     fn on_live(&mut self, reading: LiveReading) -> Vec<Effect> {
-        self.live.take(reading);
+        let last_sample = self.session.samples.last().map(|sample| self.session.point_of(sample));
+        self.live.take(reading, last_sample);
         let is_wanted =
             matches!(&self.session.instrument, Some(InstrumentChoice::Linked(choice)) if choice.is_automatic);
         let Some(row) = self.phase.shown_row().filter(|_| is_wanted && self.is_idle() && self.ended.is_none()) else {
@@ -207,7 +208,6 @@ impl Wizard {
         if !can_measure || !self.live.is_time(&self.session, row) {
             return Vec::new();
         }
-        self.live.measures();
         self.on_intent(Intent::Measure)
     }
 
@@ -295,6 +295,9 @@ impl Wizard {
             return Vec::new();
         }
         self.notice = None;
+        if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo) {
+            self.live.stays();
+        }
         let cx = Cx { session: &self.session, connection: self.connection.as_ref(), now: self.now };
         let actions = self.phase.on_intent(intent, &cx);
         self.actions.extend(actions);

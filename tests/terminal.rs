@@ -125,8 +125,8 @@ fn the_whole_calibration_is_walked_by_keys() {
     terminal.wait_for("the robot", |shown| shown.has("not saved yet"));
     terminal.send(ENTER);
     terminal.wait_for_step(2);
-    // By hand in mm, m, inch; then the simulated cell, which asks for its seed first.
-    terminal.send("\u{1b}[B\u{1b}[B\u{1b}[B");
+    // By hand in mm, m, inch, over a wire; then the simulated cell, which asks for its seed first.
+    terminal.send("\u{1b}[B\u{1b}[B\u{1b}[B\u{1b}[B");
     terminal.send(ENTER);
     terminal.wait_for_text("hidden errors of the arm");
     terminal.send(ENTER);

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 use super::Console;
 use crate::cli::{LinkCommand, LinkTestArgs};
 use crate::error::{ExitStatus, Failure};
-use crate::link::{Link as _, LinkError, LinkNews, RawLog, Wired};
+use crate::link::{Link as _, LinkError, LinkNews, RawLog, Wired, WiredRobot};
 use crate::runtime::signals;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
-use crate::session::wire::LinkChoice;
+use crate::session::wire::{LinkChoice, WireAddress};
 use crate::units::{to_deg, to_mm};
 
 /// Between two lines of what is seen.
@@ -45,20 +45,29 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
     signals::each(move |_signal| told.store(true, Ordering::Relaxed))
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     let keep_going = || !ended.load(Ordering::Relaxed);
+    let usage = |message: String| Failure::new(ExitStatus::Usage, message);
+    let log = raw_log(args.raw_log.as_deref())?;
+    let address: WireAddress = args.address.parse().map_err(usage)?;
+    if address.protocol.is_robot() {
+        return test_robot(args, &address, log.as_ref(), console, &keep_going);
+    }
     let choice = LinkChoice {
         address: args.address.clone(),
         options: args.options.clone(),
         robot: args.robot.clone(),
         is_automatic: false,
     };
-    let mut wired = Wired::new(&choice, raw_log(args.raw_log.as_deref())?.as_ref())
-        .map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
-    console.print(&format!("connecting to {}\n", args.address))?;
-    let peer = wired.connect_while(&keep_going).map_err(|error| problem(&error, "it does not connect"))?;
-    console.print(&format!("connected: {peer}\n"))?;
+    let mut wired = Wired::new(&choice, log.as_ref()).map_err(|error| usage(error.to_string()))?;
+    console.print(&format!("connecting to {address}\n"))?;
+    let mut told = |news: LinkNews| console.remark(&news_text(&news));
+    wired.connect_while(&keep_going, &mut told).map_err(|error| problem(&error, "it does not connect"))?;
     let identity = wired.identity().cloned().unwrap_or_default();
+    console.print(&format!("connected: {}\n", identity.name))?;
     for item in &identity.checked {
         console.print(&format!("checked: {item}\n"))?;
+    }
+    if let Some(robot) = &args.robot {
+        console.print(&format!("robot: {robot} tells its joint angles\n"))?;
     }
     if let Some(reflector) = &identity.reflector {
         console.print(&format!(
@@ -68,6 +77,9 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
             to_mm(reflector.offset)
         ))?;
     }
+    for note in &identity.notes {
+        console.print(&format!("note: {note}\n"))?;
+    }
     for warning in &identity.warnings {
         console.print(&format!("WARNING: {warning}\n"))?;
     }
@@ -76,15 +88,65 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
         shoot(args.shots, &mut wired, console, &keep_going)?;
     }
     if !keep_going() {
-        return Err(Failure::new(ExitStatus::Instrument, "the test was ended before it was complete"));
+        return Err(ended_early());
     }
     if identity.warnings.is_empty() {
         console.print("the link works\n")?;
         Ok(ExitStatus::Accepted)
     } else {
         Err(Failure::new(ExitStatus::Instrument, "the link works, but not as it should: see the warnings above")
-            .hint(identity.warnings.join("; ")))
+            .hint("mend what the warnings say and test again; distances that are measured so may be wrong"))
     }
+}
+
+fn ended_early() -> Failure {
+    Failure::new(ExitStatus::Instrument, "the test was ended before it was complete")
+}
+
+/// A robot's controller alone: does it tell its joint angles, and does the robot stand.
+#[expect(clippy::disallowed_methods, reason = "the edge of the program may look at the clock")]
+fn test_robot<O: Write, E: Write>(
+    args: &LinkTestArgs,
+    address: &WireAddress,
+    log: Option<&RawLog>,
+    console: &mut Console<O, E>,
+    keep_going: &dyn Fn() -> bool,
+) -> Result<ExitStatus, Failure> {
+    let mut robot = WiredRobot::new(address, args.options.as_deref(), log)
+        .map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
+    console.print(&format!("connecting to {address}\n"))?;
+    let mut told = |news: LinkNews| console.remark(&news_text(&news));
+    let identity =
+        robot.connect_while(keep_going, &mut told).map_err(|error| problem(&error, "it does not connect"))?;
+    console.print(&format!("connected: {}\n", identity.name))?;
+    for item in &identity.checked {
+        console.print(&format!("checked: {item}\n"))?;
+    }
+    for warning in &identity.warnings {
+        console.print(&format!("WARNING: {warning}\n"))?;
+    }
+    let until = Instant::now() + Duration::try_from_secs_f64(args.seconds).unwrap_or_default();
+    while Instant::now() < until && keep_going() {
+        let (live, news) = robot.watch(LINE.min(until.saturating_duration_since(Instant::now())));
+        for one in news {
+            console.print(&format!("{}\n", news_text(&one)))?;
+        }
+        if let Some(cause) = live.down {
+            return Err(is_down(&cause));
+        }
+        console
+            .print(&format!("{}\n", joints_text(&live).unwrap_or_else(|| "no joint angles for a second".to_owned())))?;
+    }
+    if !keep_going() {
+        return Err(ended_early());
+    }
+    console.print("the link works; compare the angles with the pendant, sign by sign\n")?;
+    Ok(ExitStatus::Accepted)
+}
+
+fn is_down(cause: &str) -> Failure {
+    Failure::new(ExitStatus::Instrument, format!("the link is down: {cause}"))
+        .hint("check cable, address and whether the other end is on; then test again")
 }
 
 /// What is seen while nothing is measured.
@@ -105,8 +167,7 @@ fn watch<O: Write, E: Write>(
         }
         console.print(&format!("sees: {}\n", live_text(&live)))?;
         if let Some(cause) = live.down {
-            return Err(Failure::new(ExitStatus::Instrument, format!("the link is down: {cause}"))
-                .hint("check cable, address and whether the instrument is on; then test again"));
+            return Err(is_down(&cause));
         }
     }
     Ok(())
@@ -122,15 +183,17 @@ fn news_text(news: &LinkNews) -> String {
 
 fn live_text(live: &LiveReading) -> String {
     let mut parts = vec![live.point.map_or_else(
-        || "no position between measurements".to_owned(),
+        || "no position; it is told only when a shot is asked for".to_owned(),
         |point| format!("x {:.3}  y {:.3}  z {:.3} mm", to_mm(point.x), to_mm(point.y), to_mm(point.z)),
     )];
-    if let Some(joints) = &live.joints {
-        let joints: Vec<String> = joints.iter().map(|joint| format!("{:.3}", to_deg(*joint))).collect();
-        let rests = if live.is_still == Some(true) { "at rest" } else { "moving" };
-        parts.push(format!("robot {rests} at {} deg", joints.join(" ")));
-    }
+    parts.extend(joints_text(live));
     parts.join("; ")
+}
+
+fn joints_text(live: &LiveReading) -> Option<String> {
+    let joints: Vec<String> = live.joints.as_ref()?.iter().map(|joint| format!("{:.3}", to_deg(*joint))).collect();
+    let rests = if live.is_still == Some(true) { "at rest" } else { "moving" };
+    Some(format!("robot {rests} at {} deg", joints.join(" ")))
 }
 
 /// Single shots, and how they scatter.
@@ -187,6 +250,7 @@ fn problem(error: &LinkError, what: &str) -> Failure {
     match error {
         LinkError::Instrument(instrument) => failure.hint(instrument.hint()),
         LinkError::Robot(_) => failure.hint("bring the robot to rest and look at its pendant; then test again"),
+        LinkError::Cancelled => ended_early(),
         _ => failure,
     }
 }

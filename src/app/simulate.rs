@@ -59,11 +59,8 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     let mut route = Route { poses: poses(args, profile)?, at: 0 };
     let simulation = Simulation { seed: args.seed, ..Simulation::default() };
     let usage = |error: &LinkError| Failure::new(ExitStatus::Usage, error.to_string());
-    let mut served =
-        Served::new(profile, &simulation, args.protocol, args.listen.as_deref(), &args.faults).map_err(|error| {
-            let names = Served::fault_names(args.protocol).join(", ");
-            usage(&error).hint(format!("faults of {}: {names}", args.protocol))
-        })?;
+    let mut served = Served::new(profile, &simulation, args.protocol, args.listen.as_deref(), &args.faults)
+        .map_err(|error| usage(&error))?;
     route.go(&mut served).map_err(|error| usage(&error))?;
     console.print(&format!("listening: {}\n", served.address()))?;
     if let Some(options) = served.options() {

@@ -5,6 +5,7 @@ use std::str::FromStr as _;
 
 use clap::{Args, Subcommand};
 
+use crate::session::simulation::SimulatedWire;
 use crate::session::wire::WireProtocol;
 
 /// What to do with a link.
@@ -67,6 +68,19 @@ pub struct SimulateArgs {
     /// Go on to the next pose after so many shots and a second without another; 0: only when told
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub shots: usize,
+}
+
+/// `--over`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wires(pub Vec<SimulatedWire>);
+
+/// Wires as they are typed.
+pub(super) fn wires(text: &str) -> Result<Wires, String> {
+    let wire = |text: &str| match text.trim().strip_prefix("serial:") {
+        Some(protocol) => protocol.parse().map(SimulatedWire::Serial),
+        None => text.trim().parse().map(SimulatedWire::Tcp),
+    };
+    text.split(',').map(wire).collect::<Result<_, _>>().map(Wires)
 }
 
 /// A time from 0 on.

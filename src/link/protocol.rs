@@ -23,7 +23,6 @@ use std::fmt::Debug;
 use std::time::Duration;
 
 use nalgebra::Point3;
-use thiserror::Error;
 
 /// Time since some start that the owner of the protocol chose; only differences matter.
 pub type Moment = Duration;
@@ -87,6 +86,8 @@ pub struct Identity {
     pub checked: Vec<String>,
     /// What the operator should know before measuring, such as a frame that is not the instrument's own.
     pub warnings: Vec<String>,
+    /// What holds for every instrument of this kind, such as how accurate it can be at all.
+    pub notes: Vec<String>,
 }
 
 /// A reflector that the instrument knows.
@@ -172,20 +173,16 @@ pub struct Status {
 }
 
 /// Why there is no point, or no link. Every variant's message says what happened; [`Failure::hint`] says what to do.
-#[derive(Clone, Debug, Error, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Failure {
     /// No reflector is seen.
-    #[error("the instrument sees no reflector ({0})")]
     NoTarget(String),
     /// The reflector or the air is not steady.
-    #[error("the reading was not stable ({0})")]
     Unstable(String),
     /// Not now: warm-up, motion, another command.
-    #[error("the instrument is not ready ({0})")]
     NotReady(String),
     /// It said nothing in time.
-    #[error("the instrument said nothing for {seconds:.0} s while {what}")]
     Silent {
         /// What was waited for.
         what: String,
@@ -193,32 +190,50 @@ pub enum Failure {
         seconds: f64,
     },
     /// It refused.
-    #[error("the instrument refused: {0}")]
     Refused(String),
     /// It is set in another way than asked for: units, frame, mode, reflector.
-    #[error("the instrument is set differently: {0}")]
     Settings(String),
     /// A point came that cannot be one.
-    #[error("the reading is no measurement: {0}")]
     Unusable(String),
     /// What came cannot be understood.
-    #[error("cannot read what the instrument sends: {0}")]
     Garbled(String),
     /// Somebody else uses it.
-    #[error("the instrument is in use by another program ({0})")]
     InUse(String),
     /// There is no connection.
-    #[error("there is no connection: {0}")]
     Unreachable(String),
     /// The connection ended.
-    #[error("the connection is lost: {0}")]
     Disconnected(String),
     /// The shot was asked for while another was under way, or before the set-up was complete.
-    #[error("a shot was asked for too early: {0}")]
     TooEarly(String),
 }
 
+impl std::error::Error for Failure {}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.words("the instrument"))
+    }
+}
+
 impl Failure {
+    /// What happened, where `who` is at the other end, such as `the controller`.
+    pub fn words(&self, who: &str) -> String {
+        match self {
+            Self::NoTarget(why) => format!("{who} sees no reflector ({why})"),
+            Self::Unstable(why) => format!("the reading was not stable ({why})"),
+            Self::NotReady(why) => format!("{who} is not ready ({why})"),
+            Self::Silent { what, seconds } => format!("{who} said nothing for {seconds:.0} s while {what}"),
+            Self::Refused(why) => format!("{who} refused: {why}"),
+            Self::Settings(why) => format!("{who} is set differently: {why}"),
+            Self::Unusable(why) => format!("the reading is no measurement: {why}"),
+            Self::Garbled(why) => format!("cannot read what {who} sends: {why}"),
+            Self::InUse(why) => format!("{who} is in use by another program ({why})"),
+            Self::Unreachable(why) => format!("there is no connection: {why}"),
+            Self::Disconnected(why) => format!("the connection is lost: {why}"),
+            Self::TooEarly(why) => format!("a shot was asked for too early: {why}"),
+        }
+    }
+
     /// What the operator can do.
     pub const fn hint(&self) -> &'static str {
         match self {

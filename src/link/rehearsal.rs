@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::cell_view::{Advance, CellView, JOINTS, SharedView};
 use super::serve::{Pace, Place, serve};
-use super::{Link, LinkError, LinkNews, SimulatedCell, Wired, build};
+use super::{Link, LinkError, LinkNews, RawLog, SimulatedCell, Wired, build};
 use crate::profile::Profile;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::simulation::Simulation;
@@ -29,28 +29,18 @@ pub struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// The cell of a profile behind these wires.
+    /// The cell of a profile behind the wires of a simulation. `log` takes every byte that goes over them.
     ///
     /// # Errors
     /// As [`SimulatedCell::new`]; the arm cannot be shown by such a controller; the system refuses a port or a thread.
-    pub fn new(profile: &Profile, simulation: &Simulation) -> Result<Self, LinkError> {
-        Self::with_faults(profile, simulation, &[])
-    }
-
-    /// The same with faults of the instrument's simulator, by their names.
-    pub(super) fn with_faults(
-        profile: &Profile,
-        simulation: &Simulation,
-        faults: &[String],
-    ) -> Result<Self, LinkError> {
+    pub fn new(profile: &Profile, simulation: &Simulation, log: Option<&RawLog>) -> Result<Self, LinkError> {
         let cell = SimulatedCell::new(profile, simulation)?;
         let view = SharedView::new(CellView::new(cell, Advance::Told));
         let stop = Arc::new(AtomicBool::new(false));
         let mut choice = LinkChoice::default();
         let mut has_robot = false;
         let start = |protocol: WireProtocol, is_serial: bool| {
-            let faults = if protocol.is_robot() { &[] } else { faults };
-            let simulator = build::simulator(protocol, faults).map_err(LinkError::SetUp)?;
+            let simulator = build::simulator(protocol, &[]).map_err(LinkError::SetUp)?;
             let place = if is_serial { Place::PseudoTerminal } else { Place::Loopback };
             // The controller's own clock says when the robot stood where: it is not hurried.
             let pace = if protocol.is_robot() { Pace(1) } else { PACE };
@@ -86,7 +76,7 @@ impl Rehearsal {
             choice.options = build::rehearsal_options(WireProtocol::Emscon);
         }
         let before_shot = view.clone();
-        let wired = Wired::new(&choice, None)?.simulated(Box::new(move || before_shot.lock().advance()));
+        let wired = Wired::new(&choice, log)?.simulated(Box::new(move || before_shot.lock().advance()));
         Ok(Self { view, wired, has_robot, stop })
     }
 }

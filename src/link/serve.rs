@@ -219,7 +219,7 @@ pub struct Served {
 
 impl Served {
     /// The cell of a profile behind this protocol. `listen`: a TCP address; none: a pseudo-terminal. `faults`: by their names,
-    /// see [`Self::fault_names`].
+    /// see `docs/links.md`.
     ///
     /// # Errors
     /// [`LinkError::SetUp`]: an unknown fault, a cell that cannot be simulated, a port that the system refuses.
@@ -264,11 +264,6 @@ impl Served {
         serve(&Place::Tcp(listen.to_owned()), simulator, self.view.clone(), Pace(1), Arc::clone(&self.stop))
             .map(|rest| format!("{}:{rest}", WireProtocol::Rtde))
             .map_err(|error| LinkError::SetUp(format!("the simulated controller cannot listen: {error}")))
-    }
-
-    /// Names of the faults of a protocol's simulator.
-    pub fn fault_names(protocol: WireProtocol) -> Vec<&'static str> {
-        build::fault_names(protocol)
     }
 
     /// The address to give to whoever connects.

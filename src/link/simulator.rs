@@ -12,7 +12,6 @@ pub mod emscon;
 pub mod fault;
 pub mod geocom;
 pub mod ndi;
-pub mod occasion;
 mod outbox;
 pub mod rtde;
 

@@ -20,6 +20,11 @@ use super::protocol::rtde::Rtde;
 use super::protocol::{JointState, Protocol, Shot};
 use super::serve::{Pace, Place, serve};
 use super::simulator::PointSource;
+use super::simulator::ascii::AsciiFault;
+use super::simulator::emscon::EmsconFault;
+use super::simulator::geocom::GeocomFault;
+use super::simulator::ndi::NdiFault;
+use super::simulator::rtde::RtdeFault;
 use super::transport::Stopwatch;
 use super::wire::Wire;
 use super::{Link as _, LinkError, LinkNews, RawLog, Wired, build};
@@ -39,6 +44,8 @@ struct Scene {
     joints: JointState,
     /// The first joint turns by so much with every shot (rad).
     turns: f64,
+    /// Standard deviation that is stated (m).
+    sigma: f64,
     clock: Stopwatch,
 }
 
@@ -46,7 +53,7 @@ impl Stage {
     fn new() -> Self {
         let positions = vec![0.1, -1.2, 1.3, -0.4, 0.5, -0.6];
         let joints = JointState { positions, speeds: Some(vec![0.0; 6]), controller_time: 0.0, stopped: None };
-        Self(Arc::new(Mutex::new(Scene { shots: 0, joints, turns: 0.0, clock: Stopwatch::start() })))
+        Self(Arc::new(Mutex::new(Scene { shots: 0, joints, turns: 0.0, sigma: 5e-6, clock: Stopwatch::start() })))
     }
 
     fn lock(&self) -> MutexGuard<'_, Scene> {
@@ -71,7 +78,7 @@ impl PointSource for Stage {
         if let Some(first) = scene.joints.positions.first_mut() {
             *first += turns;
         }
-        Some(Shot { sigma: Some([4e-6, 5e-6, 6e-6]), ..Shot::bare(Self::point(scene.shots)) })
+        Some(Shot { sigma: Some([scene.sigma; 3]), ..Shot::bare(Self::point(scene.shots)) })
     }
 
     fn look(&mut self) -> Option<Shot> {
@@ -118,6 +125,17 @@ fn quick(protocol: WireProtocol) -> Box<dyn Protocol> {
             Box::new(NdiProtocol::new(NdiOptions { timeout_s: 0.5, ..NdiOptions::default() }).unwrap())
         }
         WireProtocol::Rtde => Box::new(Rtde::default()),
+    }
+}
+
+/// Names of the faults of a simulator.
+fn fault_names(protocol: WireProtocol) -> Vec<&'static str> {
+    match protocol {
+        WireProtocol::Emscon => EmsconFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Rtde => RtdeFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Ascii => AsciiFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Geocom => GeocomFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Ndi => NdiFault::ALL.iter().map(|fault| fault.name()).collect(),
     }
 }
 
@@ -202,5 +220,15 @@ fn request(shots: u32) -> MeasureRequest {
         following: None,
         settle: 0.0,
         shots,
+    }
+}
+
+#[test]
+fn every_fault_of_every_simulator_is_in_the_document() {
+    let document = include_str!("../../docs/links.md");
+    for protocol in WireProtocol::ALL {
+        for name in fault_names(protocol) {
+            assert!(document.contains(&format!("| `{name}` |")), "{protocol}: {name}");
+        }
     }
 }

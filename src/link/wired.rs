@@ -1,5 +1,6 @@
 //! Instruments on a wire: what the wizard asks for, in the words of a protocol, with the gates that every point passes.
 
+use std::collections::VecDeque;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use super::wire::{Latest, RawLog, Wire, WireEvent};
 use super::{Link, LinkError, LinkNews, build};
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::wire::{LinkChoice, WireAddress};
+use crate::units::to_mm;
 
 /// Longest time of a set-up: trackers initialise for more than a minute.
 const SET_UP: Duration = Duration::from_mins(2);
@@ -31,6 +33,11 @@ const LOOK: Duration = Duration::from_millis(50);
 const LOOK_AT_JOINTS: Duration = Duration::from_millis(5);
 /// Events taken at once: the rest waits for the next look.
 const AT_ONCE: usize = 1024;
+/// A shot is not steady if it states so many times the usual standard deviation, and more than this (m), once there are so many
+/// shots to tell what is usual.
+const UNSTEADY: (f64, f64, usize) = (3.0, 0.05e-3, 5);
+/// So many shots tell what is usual.
+const USUAL: usize = 256;
 /// No instrument measures nearer or farther (m).
 const RANGE: (f64, f64) = (0.05, 100.0);
 
@@ -44,6 +51,8 @@ pub struct Wired {
     down: Option<Failure>,
     robot_down: Option<Failure>,
     news: Vec<LinkNews>,
+    /// Standard deviations that the instrument has stated for the shots so far (m), the newest last.
+    sigmas: VecDeque<f64>,
     /// The shot before this one: an instrument that is stuck gives the same again.
     before: Option<Point3<f64>>,
     /// For a simulated instrument: told before every shot.
@@ -51,6 +60,9 @@ pub struct Wired {
     /// For a simulated robot: what it told before this is of the place before (s, its own clock).
     robot_since: f64,
 }
+
+/// Who is at the other end of the robot's wire, in messages.
+const CONTROLLER: &str = "the controller";
 
 /// Told before a shot is asked for.
 type BeforeShot = Box<dyn FnMut() + Send>;
@@ -99,6 +111,7 @@ impl Wired {
             down: None,
             robot_down: None,
             news: Vec::new(),
+            sigmas: VecDeque::new(),
             before: None,
             before_shot: None,
             robot_since: f64::NEG_INFINITY,
@@ -132,7 +145,7 @@ impl Wired {
                         self.news.push(LinkNews::Up(format!("robot: {}", identity.name)));
                     }
                     WireEvent::Down(failure) => {
-                        self.news.push(LinkNews::Down(format!("robot: {failure}")));
+                        self.news.push(LinkNews::Down(format!("robot: {}", failure.words(CONTROLLER))));
                         self.robot_down = Some(failure);
                     }
                     WireEvent::Status(status) => self.news.push(LinkNews::Status(format!("robot: {}", status.text))),
@@ -221,7 +234,7 @@ impl Wired {
             }
             if self.instrument.now() > until {
                 let why = match (fresh, &self.robot_down) {
-                    (_, Some(failure)) => failure.to_string(),
+                    (_, Some(failure)) => failure.words(CONTROLLER),
                     (Some(_), None) => format!("it still moves after {} s", rest.as_secs()),
                     (None, None) => "it tells no joint angles".to_owned(),
                 };
@@ -279,6 +292,13 @@ impl Wired {
     fn gate(&mut self, shot: Shot) -> Result<Shot, Failure> {
         let point = shot.point;
         let distance = point.coords.norm();
+        let sigma = shot.sigma.map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
+        if let (Some(sigma), Some(usual)) = (sigma, self.usual_sigma())
+            && sigma > (UNSTEADY.0 * usual).max(UNSTEADY.1)
+        {
+            let [sigma, usual] = [sigma, usual].map(to_mm);
+            return Err(Failure::Unstable(format!("it states a sigma of {sigma:.3} mm; usual are {usual:.3} mm")));
+        }
         let reason = match () {
             () if !point.coords.iter().all(|value| value.is_finite()) => "it is not a number".to_owned(),
             () if point.coords.amax() <= f64::EPSILON => "it is 0, 0, 0".to_owned(),
@@ -290,10 +310,21 @@ impl Wired {
             }
             () => {
                 self.before = Some(point);
+                self.sigmas.extend(sigma);
+                while self.sigmas.len() > USUAL {
+                    self.sigmas.pop_front();
+                }
                 return Ok(shot);
             }
         };
         Err(Failure::Unusable(reason))
+    }
+
+    /// The middle one of the standard deviations so far (m), once there are enough.
+    fn usual_sigma(&self) -> Option<f64> {
+        let mut sorted: Vec<f64> = self.sigmas.iter().copied().collect();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= UNSTEADY.2)
     }
 
     /// What there is to see now.
@@ -318,7 +349,7 @@ impl Wired {
 
 impl Link for Wired {
     fn connect(&mut self) -> Result<String, LinkError> {
-        self.connect_while(&|| true)
+        self.connect_while(&|| true, &mut |_| ())
     }
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
@@ -347,22 +378,40 @@ impl Link for Wired {
 }
 
 impl Wired {
-    /// As [`Link::connect`], while it is wanted.
+    /// As [`Link::connect`], while it is wanted. What happens on the way, such as a laser that warms up, is `told`.
     ///
     /// # Errors
     /// As there; [`LinkError::Cancelled`].
-    pub fn connect_while(&mut self, keep_going: &dyn Fn() -> bool) -> Result<String, LinkError> {
+    pub fn connect_while(
+        &mut self,
+        keep_going: &dyn Fn() -> bool,
+        told: &mut dyn FnMut(LinkNews),
+    ) -> Result<String, LinkError> {
         let until = self.instrument.now() + SET_UP;
+        let mut last_told = None;
         while self.identity.is_none() {
-            if let Some(Err(failure)) = self.drain(LOOK) {
-                return Err(LinkError::Instrument(failure));
+            let answer = self.drain(LOOK);
+            if self.identity.is_some() {
+                break;
+            }
+            for news in self.news.drain(..) {
+                if let LinkNews::Status(text) = &news {
+                    last_told = Some(text.clone());
+                    told(news);
+                }
+            }
+            if let Some(Err(failure)) = answer {
+                return Err(LinkError::Instrument(in_set_up(failure)));
             }
             if !keep_going() {
                 return Err(LinkError::Cancelled);
             }
             if self.instrument.now() > until {
-                let what = format!("'{}' was being set up", self.address);
-                return Err(LinkError::Instrument(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
+                let seconds = SET_UP.as_secs_f64();
+                return Err(LinkError::Instrument(match last_told {
+                    Some(text) => Failure::NotReady(format!("{text}; the set-up was given up after {seconds:.0} s")),
+                    None => Failure::Silent { what: format!("'{}' was being set up", self.address), seconds },
+                }));
             }
         }
         if self.robot.is_some() {
@@ -374,9 +423,20 @@ impl Wired {
         let reflector = identity.reflector.map_or_else(String::new, |reflector| {
             format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
         });
-        let warnings = identity.warnings.iter().fold(String::new(), |all, warning| all + "; " + warning);
+        let told = identity.warnings.iter().chain(&identity.notes);
+        let warnings = told.fold(String::new(), |all, one| all + "; " + one);
         let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
         Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
+    }
+}
+
+/// Who hangs up in the middle of the set-up has perhaps not understood it.
+fn in_set_up(failure: Failure) -> Failure {
+    match failure {
+        Failure::Disconnected(why) => Failure::Disconnected(format!(
+            "{why}, in the middle of the set-up: is it this kind of instrument, and the right port?"
+        )),
+        other => other,
     }
 }
 
@@ -389,7 +449,7 @@ impl Wired {
         loop {
             drop(self.drain(LOOK));
             if let Some(failure) = &self.robot_down {
-                return Err(LinkError::Robot(failure.to_string()));
+                return Err(LinkError::Robot(failure.words(CONTROLLER)));
             }
             if self.robot.as_ref().is_none_or(|robot| robot.latest().joints.is_some()) {
                 return Ok(());

@@ -180,6 +180,15 @@ pub(super) fn text(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
     Some(text.clone())
 }
 
+/// `true` or `false`.
+pub(super) fn flag(ast: &Ast, findings: &mut Findings<'_>) -> Option<bool> {
+    if let Node::Flag(flag) = ast.node {
+        return Some(flag);
+    }
+    findings.error(ast.span, format!("expected true or false, found {}", ast.node.describe()), None);
+    None
+}
+
 /// One of a few names.
 pub(super) fn choice<T: Copy>(ast: &Ast, choices: &[(&str, T)], findings: &mut Findings<'_>) -> Option<T> {
     let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();

@@ -15,6 +15,7 @@
 //! | `expected_deviations` | 1 mm, α β 2 mrad, joint offset 10 mrad, prismatic offset 1 mm |
 //! | `acceptance` | no limit |
 //! | `instrument` | unknown; σ is estimated from the residuals |
+//! | `link`: `(address, options, robot, automatic)` | no proposal; the address is typed in the instrument step |
 //! | `tracker` | at (3000, 0, 1000) mm, 30°, 500 to 20000 mm |
 //! | `floor_mm` | no floor |
 
@@ -49,6 +50,7 @@ const FIELDS: &[&str] = &[
     "expected_deviations",
     "acceptance",
     "instrument",
+    "link",
     "tracker",
     "bodies",
     "floor_mm",
@@ -85,6 +87,7 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let targets = targets(&top, findings);
     let acceptance = cell::acceptance(&top, findings);
     let instrument = cell::instrument(&top, findings);
+    let link = cell::link(&top, findings);
     let tracker = cell::tracker(&top, findings);
     let floor = top.get("floor_mm").and_then(|ast| number(ast, findings)).map(from_mm);
     let keep_out = cell::keep_out(&top, findings);
@@ -119,6 +122,7 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
         expected_deviations: expected_deviations?,
         acceptance: acceptance?,
         instrument,
+        link,
         bodies: bodies?,
         floor,
         keep_out: keep_out?,

@@ -187,6 +187,11 @@ fn cell_lines(profile: &Profile) -> Vec<String> {
         ),
         WIDTH,
     ));
+    if let Some(link) = profile.link() {
+        let robot = link.robot.as_ref().map_or_else(String::new, |robot| format!(", robot at {robot}"));
+        let automatic = if link.is_automatic { ", measuring by itself" } else { "" };
+        lines.extend(wrapped(&format!("link: {}{robot}{automatic}", link.address), WIDTH));
+    }
     let floor =
         profile.floor().map_or_else(|| "no floor".to_owned(), |z| format!("floor at {} mm", fixed(to_mm(z), 0)));
     lines.push(format!(

@@ -342,7 +342,7 @@ impl Engine {
         let flag = Arc::new(AtomicBool::new(false));
         self.cancelled.insert(id, Arc::clone(&flag));
         let is_started = match request {
-            Request::Connect { instrument, profile } => self.link.connect(id, instrument, profile),
+            Request::Connect { instrument, profile } => self.link.connect(id, instrument, profile, flag),
             Request::Measure(request) => self.link.measure(id, request, flag),
             Request::Deliver { files, left_out } => self.store.ask(Command::Replace { id, files, left_out }),
             request => jobs::start(id, request, flag, self.sender.clone()),
@@ -386,6 +386,8 @@ impl Drop for Engine {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::set_up::InstrumentChoice;
+    use crate::session::wire::LinkChoice;
 
     #[test]
     fn what_was_done_is_known_and_what_was_refused_is_not() {
@@ -403,6 +405,33 @@ mod tests {
         let deeds: Vec<(&str, bool)> =
             engine.deeds().iter().map(|deed| (deed.intent.name(), deed.failure.is_some())).collect();
         assert_eq!(deeds, [("ChooseProfile", true), ("ChooseProfile", false)]);
+    }
+
+    #[test]
+    fn connecting_can_be_cancelled_while_nobody_answers() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut engine = Engine::new(Options::unrecorded(folder.path().to_owned(), Clock::System)).unwrap();
+        let settle = |engine: &mut Engine| {
+            while !engine.wizard().is_idle() {
+                assert!(engine.wait(Duration::from_mins(1)));
+            }
+        };
+        for intent in [Intent::ChooseProfile("soochow".to_owned()), Intent::Next] {
+            engine.intend(intent);
+            settle(&mut engine);
+        }
+        let address = "emscon:listen:127.0.0.1:0".to_owned();
+        let choice = LinkChoice { address, ..LinkChoice::default() };
+        engine.intend(Intent::ChooseInstrument(InstrumentChoice::Linked(choice)));
+        let can_cancel = |engine: &Engine| engine.wizard().intents().iter().any(|offer| offer.intent == Intent::Cancel);
+        while !can_cancel(&engine) {
+            assert!(engine.wait(Duration::from_mins(1)));
+        }
+        engine.intend(Intent::Cancel);
+        settle(&mut engine);
+        let offers = engine.wizard().intents();
+        assert!(offers.iter().any(|offer| offer.intent == Intent::Retry && offer.is_enabled()), "{offers:?}");
+        assert_eq!(engine.wizard().notice().map(|notice| notice.what.as_str()), Some("cancelled"));
     }
 
     #[test]

@@ -27,7 +27,7 @@ const WAITING: usize = 4;
 const WATCH: Duration = Duration::from_millis(100);
 
 enum Command {
-    Connect { id: RequestId, instrument: InstrumentChoice, profile: Box<Profile> },
+    Connect { id: RequestId, instrument: InstrumentChoice, profile: Box<Profile>, cancelled: Arc<AtomicBool> },
     Measure { id: RequestId, request: MeasureRequest, cancelled: Arc<AtomicBool> },
 }
 
@@ -45,8 +45,14 @@ impl LinkThread {
         Ok(Self { commands })
     }
 
-    pub(super) fn connect(&self, id: RequestId, instrument: InstrumentChoice, profile: Box<Profile>) -> bool {
-        self.commands.try_send(Command::Connect { id, instrument, profile }).is_ok()
+    pub(super) fn connect(
+        &self,
+        id: RequestId,
+        instrument: InstrumentChoice,
+        profile: Box<Profile>,
+        cancelled: Arc<AtomicBool>,
+    ) -> bool {
+        self.commands.try_send(Command::Connect { id, instrument, profile, cancelled }).is_ok()
     }
 
     pub(super) fn measure(&self, id: RequestId, request: MeasureRequest, cancelled: Arc<AtomicBool>) -> bool {
@@ -58,13 +64,16 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
     let mut link: Option<Box<dyn Link>> = None;
     while let Some(command) = next(commands, link.as_deref_mut(), events) {
         let (id, answer) = match command {
-            Command::Connect { id, instrument, profile } => {
+            Command::Connect { id, instrument, profile, cancelled } => {
                 link = None;
-                match connect(&instrument, &profile, log) {
+                let keep_going = || !cancelled.load(Ordering::Relaxed);
+                let told = &mut |news| events.offer(Event::Remark(remark(news)));
+                match connect(&instrument, &profile, log, &keep_going, told) {
                     Ok((connected, identity, recorded)) => {
                         link = connected;
                         (id, Answer::Connected { identity, recorded })
                     }
+                    Err(LinkError::Cancelled) => (id, Answer::Cancelled),
                     Err(error) => (id, failed(&error)),
                 }
             }
@@ -131,19 +140,25 @@ fn failed(error: &LinkError) -> Answer {
 
 type Connected = (Option<Box<dyn Link>>, String, Vec<PlannedPose>);
 
-fn connect(instrument: &InstrumentChoice, profile: &Profile, log: Option<&RawLog>) -> Result<Connected, LinkError> {
+fn connect(
+    instrument: &InstrumentChoice,
+    profile: &Profile,
+    log: Option<&RawLog>,
+    keep_going: &dyn Fn() -> bool,
+    told: &mut dyn FnMut(LinkNews),
+) -> Result<Connected, LinkError> {
     match instrument {
         InstrumentChoice::Manual { unit } => {
             Ok((None, format!("coordinates typed in, in {}", unit.sign()), Vec::new()))
         }
         InstrumentChoice::Simulated(simulation) if !simulation.wires.is_empty() => {
-            let mut rehearsal = Rehearsal::new(profile, simulation)?;
+            let mut rehearsal = Rehearsal::new(profile, simulation, log)?;
             let identity = rehearsal.connect()?;
             Ok((Some(Box::new(rehearsal)), identity, Vec::new()))
         }
         InstrumentChoice::Linked(choice) => {
             let mut wired = Wired::new(choice, log)?;
-            let identity = wired.connect()?;
+            let identity = wired.connect_while(keep_going, told)?;
             Ok((Some(Box::new(wired)), identity, Vec::new()))
         }
         InstrumentChoice::Simulated(simulation) => {

@@ -36,8 +36,10 @@ pub(super) const AS_PLANNED: f64 = 0.05 * DEGREE;
 pub(super) struct Live {
     latest: Option<LiveReading>,
     points: VecDeque<(f64, Point3<f64>)>,
-    /// Where the wizard measured by itself last.
+    /// Where was measured last, or where a sample was taken back, until the SMR is seen elsewhere.
     measured_at: Option<Point3<f64>>,
+    /// Something was seen since the link is there.
+    has_seen: bool,
 }
 
 /// Where the tracker stands as the samples so far tell it.
@@ -47,14 +49,18 @@ struct Registered {
 }
 
 impl Live {
-    /// Takes a look.
-    pub(super) fn take(&mut self, reading: LiveReading) {
+    /// Takes a look. `last_sample`: where the session measured last (m).
+    pub(super) fn take(&mut self, reading: LiveReading, last_sample: Option<Point3<f64>>) {
         let restarted = self.latest.as_ref().is_some_and(|before| reading.seconds < before.seconds);
         if restarted || reading.point.is_none() {
             self.points.clear();
         }
         if let Some(point) = reading.point.filter(|point| point.coords.iter().all(|value| value.is_finite())) {
             self.points.push_back((reading.seconds, point));
+            if !std::mem::replace(&mut self.has_seen, true) {
+                self.measured_at = last_sample;
+            }
+            self.measured_at = self.measured_at.filter(|before| (point - before).norm() <= MOVED);
         }
         let oldest = reading.seconds - KEPT;
         while self.points.front().is_some_and(|(at, _)| *at < oldest) || self.points.len() > MOST {
@@ -101,9 +107,7 @@ impl Live {
 
     /// Whether the wizard should measure row `row` by itself now.
     pub(super) fn is_time(&self, session: &Session, row: usize) -> bool {
-        let Some((_, here)) = self.points.back() else { return false };
-        let has_moved = self.measured_at.is_none_or(|before| (here - before).norm() > MOVED);
-        let is_new = session.samples.last().is_none_or(|last| (session.point_of(last) - here).norm() > MOVED);
+        let is_up = self.latest.as_ref().is_some_and(|latest| latest.down.is_none());
         let rests = self.rest().is_some_and(|(seconds, _)| seconds >= REST_TIME);
         let stands = self.latest.as_ref().and_then(|latest| latest.is_still) != Some(false);
         let by_joints = self.joint_difference(session, row).map(|(_, difference)| difference <= AS_PLANNED);
@@ -111,12 +115,12 @@ impl Live {
         // Without the robot's joints and before the tracker's place is known, nobody can tell which pose this is.
         let is_there =
             by_joints.unwrap_or(true) && by_place.unwrap_or(true) && (by_joints.is_some() || by_place.is_some());
-        has_moved && is_new && rests && stands && is_there
+        is_up && self.measured_at.is_none() && rests && stands && is_there
     }
 
-    /// The wizard measures by itself here.
-    pub(super) fn measures(&mut self) {
-        self.measured_at = self.points.back().map(|(_, point)| *point);
+    /// Here is measured, or a sample taken back: the wizard does not measure by itself until the SMR has moved.
+    pub(super) fn stays(&mut self) {
+        self.measured_at = self.points.back().map(|(_, point)| *point).or(self.measured_at);
     }
 
     /// What there is to see, at row `row` of the plan.

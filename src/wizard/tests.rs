@@ -1,5 +1,6 @@
 //! The wizard as a function: events in, effects out.
 
+mod automatic;
 mod bench;
 mod capture;
 mod gates;

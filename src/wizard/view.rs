@@ -14,6 +14,7 @@ use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{About, Step};
 use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummary, Warning};
+use crate::session::wire::LinkChoice;
 use crate::units::to_mm;
 
 /// Everything on a screen.
@@ -190,6 +191,8 @@ impl ProfileCard {
 /// The instrument step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InstrumentView {
+    /// Instrument on a wire that the profile names.
+    pub link: Option<LinkChoice>,
     /// What was chosen.
     pub choice: Option<String>,
     /// Who answers.

@@ -6,10 +6,7 @@ use std::time::Duration;
 use super::Output;
 use super::PointSource;
 use super::Simulator;
-use super::fault::FaultPlan;
-use super::fault::NamedFault;
-use super::fault::Scheduled;
-use super::fault::text_of_faults;
+use super::fault::{FaultPlan, Planned, faults};
 use crate::link::protocol::Moment;
 use crate::link::protocol::Shot;
 use crate::link::protocol::ascii::AsciiOptions;
@@ -44,98 +41,30 @@ const MAX_RECEIVED: usize = 4096;
 /// Most lines that wait to be sent.
 const MAX_WAITING: usize = 256;
 
-/// What can go wrong with a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AsciiFault {
-    /// Half the line, a pause, the other half.
-    Halves,
-    /// Half the line, then its end: the rest is lost.
-    Cut,
-    /// Two lines in one write.
-    TwoInOne,
-    /// Two lines with no end between them.
-    Joined,
-    /// CR alone ends the line.
-    CarriageReturnOnly,
-    /// The other decimal sign than the one that was set.
-    DecimalComma,
-    /// `NaN` for a coordinate.
-    NotANumber,
-    /// Digits grouped in thousands: `1,234.5`.
-    Thousands,
-    /// Some empty lines before the line.
-    EmptyLines,
-    /// 10,000 bytes without an end before the line.
-    LongLine,
-    /// An error text in place of the line.
-    ErrorText,
-    /// The line before again.
-    StaleRepeat,
-    /// Hangs up in the middle of the line.
-    DisconnectMidLine,
-    /// 0, 0, 0: what some programs print when a measurement failed.
-    Origin,
-    /// A point a thousand times too far: metres taken for millimetres.
-    WrongUnit,
-    /// A digit that changed on the way; a check value shows it.
-    BitError,
-    /// Bytes as they look at a wrong baud rate.
-    Noise,
-    /// Nothing is sent.
-    Silent,
-    /// The line comes long after the driver gave up.
-    Late,
-}
-
-impl NamedFault for AsciiFault {
-    const ALL: &'static [Self] = &[
-        Self::Halves,
-        Self::Cut,
-        Self::TwoInOne,
-        Self::Joined,
-        Self::CarriageReturnOnly,
-        Self::DecimalComma,
-        Self::NotANumber,
-        Self::Thousands,
-        Self::EmptyLines,
-        Self::LongLine,
-        Self::ErrorText,
-        Self::StaleRepeat,
-        Self::DisconnectMidLine,
-        Self::Origin,
-        Self::WrongUnit,
-        Self::BitError,
-        Self::Noise,
-        Self::Silent,
-        Self::Late,
-    ];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Halves => "halves",
-            Self::Cut => "cut",
-            Self::TwoInOne => "two-in-one",
-            Self::Joined => "joined",
-            Self::CarriageReturnOnly => "carriage-return-only",
-            Self::DecimalComma => "decimal-comma",
-            Self::NotANumber => "not-a-number",
-            Self::Thousands => "thousands",
-            Self::EmptyLines => "empty-lines",
-            Self::LongLine => "long-line",
-            Self::ErrorText => "error-text",
-            Self::StaleRepeat => "stale-repeat",
-            Self::DisconnectMidLine => "disconnect-mid-line",
-            Self::Origin => "origin",
-            Self::WrongUnit => "wrong-unit",
-            Self::BitError => "bit-error",
-            Self::Noise => "noise",
-            Self::Silent => "silent",
-            Self::Late => "late",
-        }
+faults! {
+    /// What can go wrong with a line.
+    pub AsciiFault {
+        Halves "halves" "Half the line, a pause, the other half.",
+        Cut "cut" "Half the line, then its end: the rest is lost.",
+        TwoInOne "two-in-one" "Two lines in one write.",
+        Joined "joined" "Two lines with no end between them.",
+        CarriageReturnOnly "carriage-return-only" "CR alone ends the line.",
+        DecimalComma "decimal-comma" "The other decimal sign than the one that was set.",
+        NotANumber "not-a-number" "`NaN` for a coordinate.",
+        Thousands "thousands" "Digits grouped in thousands: `1,234.5`.",
+        EmptyLines "empty-lines" "Some empty lines before the line.",
+        LongLine "long-line" "10,000 bytes without an end before the line.",
+        ErrorText "error-text" "An error text in place of the line.",
+        StaleRepeat "stale-repeat" "The line before again.",
+        DisconnectMidLine "disconnect-mid-line" "Hangs up in the middle of the line.",
+        Origin "origin" "0, 0, 0: what some programs print when a measurement failed.",
+        WrongUnit "wrong-unit" "A point a thousand times too far: metres taken for millimetres.",
+        BitError "bit-error" "A digit that changed on the way; a check value shows it.",
+        Noise "noise" "Bytes as they look at a wrong baud rate.",
+        Silent "silent" "Nothing is sent.",
+        Late "late" "The line comes long after the driver gave up.",
     }
 }
-
-text_of_faults!(AsciiFault);
 
 /// Prints lines: one for each trigger, or ten per second.
 #[derive(Debug)]
@@ -154,7 +83,7 @@ pub struct AsciiSimulator {
 
 impl AsciiSimulator {
     /// Fails where [`AsciiOptions::validate`] does. A layout by regular expression is answered in the words of T2SA.
-    pub fn new(options: AsciiOptions, faults: impl IntoIterator<Item = Scheduled<AsciiFault>>) -> Result<Self, String> {
+    pub fn new(options: AsciiOptions, faults: impl IntoIterator<Item = Planned<AsciiFault>>) -> Result<Self, String> {
         options.validate()?;
         let trigger = match &options.mode {
             Mode::Polled { trigger } => unescape(trigger)?,

@@ -17,7 +17,7 @@ pub use fault::EmsconFault;
 
 use self::tracker::Tracker;
 use self::wire::PacketWriter;
-use super::occasion::{FaultPlan, Planned};
+use super::fault::{FaultPlan, Planned};
 use super::outbox::Outbox;
 use super::{Output, PointSource, Simulator};
 use crate::link::protocol::Moment;

@@ -1,108 +1,254 @@
-//! When a simulated instrument misbehaves: named faults that begin at a counted occasion and end after some more.
+//! When a fault of a simulator strikes: on which of its occasions, counted from 1, and how often.
+//!
+//! What an occasion is, such as a connection, a measurement or a packet of data, stands with each fault. As text a planned
+//! fault is `name`, `name@3` from the third occasion, `name@3x2` twice from there, `name@1x*` for ever.
 
-use std::fmt;
+use std::fmt::{self, Debug, Display};
 use std::str::FromStr;
 
-/// A kind of fault that has a name.
-pub trait NamedFault: Copy + PartialEq + fmt::Debug + 'static {
-    /// All faults of the kind.
-    const ALL: &'static [Self];
+use thiserror::Error;
 
-    /// Its name, in lower case with hyphens.
-    fn name(self) -> &'static str;
+/// A list of faults: names for scripts and command lines, and what they do.
+macro_rules! faults {
+    ($(#[$doc:meta])* $vis:vis $name:ident { $($variant:ident $text:literal $words:literal,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        $vis enum $name {
+            $(#[doc = $words] $variant,)*
+        }
 
-    /// Finds it by its name.
-    fn find(name: &str) -> Result<Self, String> {
-        Self::ALL.iter().copied().find(|fault| fault.name() == name).ok_or_else(|| {
-            let known: Vec<&str> = Self::ALL.iter().map(|fault| fault.name()).collect();
-            format!("no fault is called `{name}`; there are: {}", known.join(", "))
-        })
-    }
+        impl $name {
+            /// All of them.
+            $vis const ALL: &[Self] = &[$(Self::$variant),*];
+
+            /// Its name as text.
+            $vis const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)*
+                }
+            }
+
+            /// What it does.
+            $vis const fn words(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $words,)*
+                }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = $crate::link::simulator::fault::FaultError;
+
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                let known = Self::ALL.iter().copied().find(|fault| fault.name() == text);
+                known.ok_or_else(|| $crate::link::simulator::fault::FaultError::Unknown {
+                    name: text.to_owned(),
+                    known: Self::ALL.iter().map(|fault| fault.name()).collect::<Vec<_>>().join(", "),
+                })
+            }
+        }
+    };
+}
+pub(crate) use faults;
+
+/// Why a text is no planned fault.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum FaultError {
+    /// There is no such fault.
+    #[error("there is no fault '{name}'; there are {known}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// All names.
+        known: String,
+    },
+    /// What stands behind the `@` cannot be read.
+    #[error("cannot read the occasions '{0}'; write name@first or name@firstxtimes, such as drip@2x3 or drip@1x*")]
+    Occasions(String),
 }
 
-/// A fault with its time: written `name@from xtimes`, such as `not-a-number@3x2` for the third and fourth occasion.
+/// A fault with its occasions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Scheduled<F> {
-    /// What goes wrong.
+pub struct Planned<F> {
+    /// Which.
     pub fault: F,
-    /// First occasion at which it does, counted from 1.
-    pub from: u32,
-    /// At how many occasions.
+    /// From which occasion, counted from 1.
+    pub first: u32,
+    /// On how many occasions; `u32::MAX` for ever.
     pub times: u32,
 }
 
-impl<F> Scheduled<F> {
-    /// Once, at an occasion counted from 1.
-    pub const fn once(fault: F, from: u32) -> Self {
-        Self { fault, from, times: 1 }
+impl<F> Planned<F> {
+    /// On the first occasion only.
+    pub const fn once(fault: F) -> Self {
+        Self { fault, first: 1, times: 1 }
+    }
+
+    /// Once, on this occasion.
+    pub const fn at(fault: F, first: u32) -> Self {
+        Self { fault, first, times: 1 }
+    }
+
+    /// On every occasion.
+    pub const fn always(fault: F) -> Self {
+        Self { fault, first: 1, times: u32::MAX }
+    }
+
+    /// On some occasions in a row.
+    pub const fn from(fault: F, first: u32, times: u32) -> Self {
+        Self { fault, first, times }
+    }
+
+    /// True on the occasion with this number, counted from 1.
+    const fn is_due(&self, occasion: u32) -> bool {
+        occasion >= self.first && occasion - self.first < self.times
     }
 }
 
-impl<F: NamedFault> fmt::Display for Scheduled<F> {
+impl<F: Display> Display for Planned<F> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}@{}x{}", self.fault.name(), self.from, self.times)
+        match (self.first, self.times) {
+            (1, 1) => write!(f, "{}", self.fault),
+            (first, 1) => write!(f, "{}@{first}", self.fault),
+            (first, u32::MAX) => write!(f, "{}@{first}x*", self.fault),
+            (first, times) => write!(f, "{}@{first}x{times}", self.fault),
+        }
     }
 }
 
-impl<F: NamedFault> FromStr for Scheduled<F> {
-    type Err = String;
+impl<F: FromStr<Err = FaultError>> FromStr for Planned<F> {
+    type Err = FaultError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (name, when) = text.split_once('@').unwrap_or((text, "1"));
-        let (from, times) = when.split_once('x').unwrap_or((when, "1"));
-        let count = |digits: &str| match digits.parse::<u32>() {
-            Ok(count) if count > 0 => Ok(count),
-            _ => Err(format!("`{digits}` in `{text}` is not a count from 1 on; write it like `{name}@3x2`")),
+    fn from_str(text: &str) -> Result<Self, FaultError> {
+        let Some((name, occasions)) = text.split_once('@') else { return Ok(Self::once(text.parse()?)) };
+        let unreadable = || FaultError::Occasions(occasions.to_owned());
+        let count = |text: &str| text.parse::<u32>().ok().filter(|count| *count > 0).ok_or_else(unreadable);
+        let (first, times) = match occasions.split_once('x') {
+            None => (count(occasions)?, 1),
+            Some((first, "*")) => (count(first)?, u32::MAX),
+            Some((first, times)) => (count(first)?, count(times)?),
         };
-        Ok(Self { fault: F::find(name)?, from: count(from)?, times: count(times)? })
+        Ok(Self { fault: name.parse()?, first, times })
     }
 }
 
-/// The faults of one simulator, each with the number of occasions that it has seen.
-#[derive(Clone, Debug)]
+/// Planned faults with the occasions that have passed.
+#[derive(Clone, Debug, Default)]
 pub struct FaultPlan<F> {
-    faults: Vec<(Scheduled<F>, u32)>,
+    faults: Vec<(Planned<F>, u32)>,
 }
 
-impl<F: NamedFault> FaultPlan<F> {
-    /// Nothing has happened yet.
-    pub fn new(faults: impl IntoIterator<Item = Scheduled<F>>) -> Self {
-        Self { faults: faults.into_iter().map(|fault| (fault, 0)).collect() }
+impl<F: Copy + PartialEq> FaultPlan<F> {
+    /// No occasion has passed.
+    pub fn new(faults: impl IntoIterator<Item = Planned<F>>) -> Self {
+        Self { faults: faults.into_iter().map(|planned| (planned, 0)).collect() }
     }
 
-    /// An occasion at which some faults could happen; the first that is due.
+    /// An occasion for a fault: whether it strikes.
+    pub fn strikes(&mut self, fault: F) -> bool {
+        let mut strikes = false;
+        for (planned, passed) in self.faults.iter_mut().filter(|(planned, _)| planned.fault == fault) {
+            *passed = passed.saturating_add(1);
+            strikes |= planned.is_due(*passed);
+        }
+        strikes
+    }
+
+    /// An occasion for several faults: the first one that strikes.
     pub fn occasion(&mut self, could: impl Fn(F) -> bool) -> Option<F> {
         let mut due = None;
-        for (scheduled, seen) in self.faults.iter_mut().filter(|(scheduled, _)| could(scheduled.fault)) {
-            *seen = seen.saturating_add(1);
-            let is_due = *seen >= scheduled.from && *seen - scheduled.from < scheduled.times;
-            if is_due && due.is_none() {
-                due = Some(scheduled.fault);
+        for (planned, passed) in self.faults.iter_mut().filter(|(planned, _)| could(planned.fault)) {
+            *passed = passed.saturating_add(1);
+            if due.is_none() && planned.is_due(*passed) {
+                due = Some(planned.fault);
             }
         }
         due
     }
 }
 
-/// Writes `Display` and `FromStr` of a kind of fault by its names.
-macro_rules! text_of_faults {
-    ($kind:ty) => {
-        impl std::fmt::Display for $kind {
-            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str($crate::link::simulator::fault::NamedFault::name(*self))
-            }
-        }
-
-        impl std::str::FromStr for $kind {
-            type Err = String;
-
-            fn from_str(name: &str) -> Result<Self, String> {
-                $crate::link::simulator::fault::NamedFault::find(name)
-            }
-        }
-    };
-}
-pub(super) use text_of_faults;
-
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::super::ascii::AsciiFault;
+    use super::super::emscon::EmsconFault;
+    use super::super::geocom::GeocomFault;
+    use super::super::ndi::NdiFault;
+    use super::super::rtde::RtdeFault;
+    use super::*;
+
+    faults! {
+        /// For the tests.
+        Example {
+            Drip "drip" "Single bytes.",
+            CutOff "cut-20" "Cuts.",
+        }
+    }
+
+    #[test]
+    fn a_planned_fault_reads_back_from_its_text() {
+        let plans = [
+            Planned::once(Example::Drip),
+            Planned::always(Example::CutOff),
+            Planned::from(Example::Drip, 3, 2),
+            Planned::from(Example::Drip, 7, 1),
+        ];
+        assert_eq!(plans.map(|plan| plan.to_string()), ["drip", "cut-20@1x*", "drip@3x2", "drip@7"]);
+        for plan in plans {
+            assert_eq!(plan.to_string().parse(), Ok(plan));
+        }
+    }
+
+    #[test]
+    fn what_is_no_planned_fault_is_refused_with_the_names_that_exist() {
+        let refused = |text: &str| text.parse::<Planned<Example>>().unwrap_err().to_string();
+        assert_eq!(refused("drop"), "there is no fault 'drop'; there are drip, cut-20");
+        for text in ["drip@", "drip@0", "drip@1x", "drip@1x0", "drip@x2", "drip@-1", "drip@1x2x3"] {
+            assert!(refused(text).starts_with("cannot read the occasions"), "{text}");
+        }
+    }
+
+    #[test]
+    fn every_fault_has_a_name_of_its_own_and_words() {
+        fn check<F: Copy + Debug + PartialEq + FromStr>(
+            faults: &[F],
+            name: fn(F) -> &'static str,
+            words: fn(F) -> &'static str,
+        ) {
+            for fault in faults {
+                let is_name = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+                assert!(name(*fault).chars().all(is_name), "{fault:?}");
+                assert!(words(*fault).ends_with('.'), "{fault:?}");
+                assert_eq!(name(*fault).parse().ok(), Some(*fault));
+            }
+        }
+        check(EmsconFault::ALL, EmsconFault::name, EmsconFault::words);
+        check(AsciiFault::ALL, AsciiFault::name, AsciiFault::words);
+        check(GeocomFault::ALL, GeocomFault::name, GeocomFault::words);
+        check(NdiFault::ALL, NdiFault::name, NdiFault::words);
+        check(RtdeFault::ALL, RtdeFault::name, RtdeFault::words);
+        check(Example::ALL, Example::name, Example::words);
+    }
+
+    #[test]
+    fn a_fault_strikes_on_its_occasions_only() {
+        let mut plan = FaultPlan::new(vec![Planned::from(Example::Drip, 2, 2), Planned::from(Example::Drip, 6, 1)]);
+        let strikes: Vec<bool> = (0..7).map(|_| plan.strikes(Example::Drip)).collect();
+        assert_eq!(strikes, [false, true, true, false, false, true, false]);
+        assert!(!plan.strikes(Example::CutOff));
+    }
+
+    #[test]
+    fn an_occasion_for_several_faults_counts_for_each_and_the_first_one_strikes() {
+        let mut plan = FaultPlan::new([Planned::at(Example::Drip, 2), Planned::at(Example::CutOff, 2)]);
+        assert_eq!(plan.occasion(|_| true), None);
+        assert_eq!(plan.occasion(|fault| fault == Example::CutOff), Some(Example::CutOff));
+        assert_eq!(plan.occasion(|_| true), Some(Example::Drip));
+        assert_eq!(plan.occasion(|_| true), None);
+    }
+}

@@ -7,10 +7,7 @@ use std::time::Duration;
 use super::Output;
 use super::PointSource;
 use super::Simulator;
-use super::fault::FaultPlan;
-use super::fault::NamedFault;
-use super::fault::Scheduled;
-use super::fault::text_of_faults;
+use super::fault::{FaultPlan, Planned, faults};
 use crate::link::protocol::Moment;
 use crate::link::protocol::Shot;
 use crate::link::protocol::geocom::Request;
@@ -32,49 +29,30 @@ const MAX_RECEIVED: usize = 4096;
 /// Most answers that wait to be sent.
 const MAX_WAITING: usize = 256;
 
-/// What can go wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GeocomFault {
-    /// The answer has the number of another request.
-    WrongTransaction,
-    /// The answer comes only just before the next one.
-    LateReply,
-    /// The answer carries a wrong CRC.
-    CrcError,
-    /// Half the answer, a pause, the other half.
-    HalfLine,
-    /// CR alone ends the answer.
-    CarriageReturnOnly,
-    /// Code 1285 with the plausible numbers of the measurement before.
-    AngleOnly,
-    /// Code 8710, and zeros for numbers.
-    NoTarget,
-    /// Code 1293.
-    Busy,
-    /// Code 1284 with a good point.
-    AccuracyNotGuaranteed,
-    /// Code 1283 with a good point.
-    NoFullCorrection,
-    /// Code 27: the licence is missing.
-    LicenceMissing,
-    /// The transport times out: 3077.
-    TransportTimeout,
-    /// Everything is well, but the numbers are those of the measurement before.
-    StaleRepeat,
-    /// Everything is well, but the numbers are not.
-    NotANumber,
-    /// No answer.
-    Silent,
-    /// Hangs up in the middle of the answer.
-    DisconnectMidLine,
-    /// Noise of a wrong baud rate in place of the answer.
-    Noise,
-    /// Sleeps when connected: what wakes it is lost.
-    Asleep,
-    /// Every request comes back before its answer, as some Bluetooth adapters do.
-    Echo,
-    /// No answer to anything, as from an instrument that is off.
-    Dead,
+faults! {
+    /// What can go wrong.
+    pub GeocomFault {
+        WrongTransaction "wrong-transaction" "The answer has the number of another request.",
+        LateReply "late-reply" "The answer comes only just before the next one.",
+        CrcError "crc-error" "The answer carries a wrong CRC.",
+        HalfLine "half-line" "Half the answer, a pause, the other half.",
+        CarriageReturnOnly "carriage-return-only" "CR alone ends the answer.",
+        AngleOnly "angle-only" "Code 1285 with the plausible numbers of the measurement before.",
+        NoTarget "no-target" "Code 8710, and zeros for numbers.",
+        Busy "busy" "Code 1293.",
+        AccuracyNotGuaranteed "accuracy-not-guaranteed" "Code 1284 with a good point.",
+        NoFullCorrection "no-full-correction" "Code 1283 with a good point.",
+        LicenceMissing "licence-missing" "Code 27: the licence is missing.",
+        TransportTimeout "transport-timeout" "The transport times out: 3077.",
+        StaleRepeat "stale-repeat" "Everything is well, but the numbers are those of the measurement before.",
+        NotANumber "not-a-number" "Everything is well, but the numbers are not.",
+        Silent "silent" "No answer.",
+        DisconnectMidLine "disconnect-mid-line" "Hangs up in the middle of the answer.",
+        Noise "noise" "Noise of a wrong baud rate in place of the answer.",
+        Asleep "asleep" "Sleeps when connected: what wakes it is lost.",
+        Echo "echo" "Every request comes back before its answer, as some Bluetooth adapters do.",
+        Dead "dead" "No answer to anything, as from an instrument that is off.",
+    }
 }
 
 /// When a fault can happen.
@@ -95,58 +73,6 @@ impl GeocomFault {
     }
 }
 
-impl NamedFault for GeocomFault {
-    const ALL: &'static [Self] = &[
-        Self::WrongTransaction,
-        Self::LateReply,
-        Self::CrcError,
-        Self::HalfLine,
-        Self::CarriageReturnOnly,
-        Self::AngleOnly,
-        Self::NoTarget,
-        Self::Busy,
-        Self::AccuracyNotGuaranteed,
-        Self::NoFullCorrection,
-        Self::LicenceMissing,
-        Self::TransportTimeout,
-        Self::StaleRepeat,
-        Self::NotANumber,
-        Self::Silent,
-        Self::DisconnectMidLine,
-        Self::Noise,
-        Self::Asleep,
-        Self::Echo,
-        Self::Dead,
-    ];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::WrongTransaction => "wrong-transaction",
-            Self::LateReply => "late-reply",
-            Self::CrcError => "crc-error",
-            Self::HalfLine => "half-line",
-            Self::CarriageReturnOnly => "carriage-return-only",
-            Self::AngleOnly => "angle-only",
-            Self::NoTarget => "no-target",
-            Self::Busy => "busy",
-            Self::AccuracyNotGuaranteed => "accuracy-not-guaranteed",
-            Self::NoFullCorrection => "no-full-correction",
-            Self::LicenceMissing => "licence-missing",
-            Self::TransportTimeout => "transport-timeout",
-            Self::StaleRepeat => "stale-repeat",
-            Self::NotANumber => "not-a-number",
-            Self::Silent => "silent",
-            Self::DisconnectMidLine => "disconnect-mid-line",
-            Self::Noise => "noise",
-            Self::Asleep => "asleep",
-            Self::Echo => "echo",
-            Self::Dead => "dead",
-        }
-    }
-}
-
-text_of_faults!(GeocomFault);
-
 /// A total station.
 #[derive(Debug)]
 pub struct GeocomSimulator {
@@ -163,7 +89,7 @@ pub struct GeocomSimulator {
 
 impl GeocomSimulator {
     /// An instrument with some faults.
-    pub fn new(faults: impl IntoIterator<Item = Scheduled<GeocomFault>>) -> Self {
+    pub fn new(faults: impl IntoIterator<Item = Planned<GeocomFault>>) -> Self {
         Self {
             faults: FaultPlan::new(faults),
             received: Vec::new(),

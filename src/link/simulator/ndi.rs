@@ -9,10 +9,7 @@ use nalgebra::Vector3;
 use super::Output;
 use super::PointSource;
 use super::Simulator;
-use super::fault::FaultPlan;
-use super::fault::NamedFault;
-use super::fault::Scheduled;
-use super::fault::text_of_faults;
+use super::fault::{FaultPlan, Planned, faults};
 use crate::link::protocol::Moment;
 use crate::link::protocol::ndi::Frame;
 use crate::link::protocol::ndi::FrameDecoder;
@@ -40,98 +37,30 @@ const MAX_WAITING: usize = 256;
 /// Port handle of the tool.
 const HANDLE: u8 = 0x0A;
 
-/// What can go wrong with a position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NdiFault {
-    /// The reply carries a wrong CRC.
-    BadCrc,
-    /// The tool is not seen.
-    Missing,
-    /// The port of the tool is disabled.
-    Disabled,
-    /// `ERROR0C`: wrong mode.
-    WrongMode,
-    /// `ERROR04`: the command arrived damaged.
-    CommandDamaged,
-    /// `ERROR05`: it took too long.
-    CommandTimeout,
-    /// The reply comes after the driver gave up.
-    LateReply,
-    /// Half the packet, a pause, the other half.
-    Halves,
-    /// Half the packet; the rest is lost.
-    Cut,
-    /// The header announces another length; its CRC is right.
-    WrongLength,
-    /// The body has another length than its tools need; its CRCs are right.
-    WrongBody,
-    /// The number of the frame stands still.
-    FrozenFrame,
-    /// A position that is no number.
-    NotANumber,
-    /// A rotation that is none.
-    NoRotation,
-    /// 0, 0, 0.
-    Origin,
-    /// No reply.
-    Silent,
-    /// `RESET`: it was switched off and on.
-    Reset,
-    /// Hangs up in the middle of the reply.
-    DisconnectMidPacket,
-    /// `INIT` fails, when connected.
-    InitialisationFails,
-}
-
-impl NamedFault for NdiFault {
-    const ALL: &'static [Self] = &[
-        Self::BadCrc,
-        Self::Missing,
-        Self::Disabled,
-        Self::WrongMode,
-        Self::CommandDamaged,
-        Self::CommandTimeout,
-        Self::LateReply,
-        Self::Halves,
-        Self::Cut,
-        Self::WrongLength,
-        Self::WrongBody,
-        Self::FrozenFrame,
-        Self::NotANumber,
-        Self::NoRotation,
-        Self::Origin,
-        Self::Silent,
-        Self::Reset,
-        Self::DisconnectMidPacket,
-        Self::InitialisationFails,
-    ];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::BadCrc => "bad-crc",
-            Self::Missing => "missing",
-            Self::Disabled => "disabled",
-            Self::WrongMode => "wrong-mode",
-            Self::CommandDamaged => "command-damaged",
-            Self::CommandTimeout => "command-timeout",
-            Self::LateReply => "late-reply",
-            Self::Halves => "halves",
-            Self::Cut => "cut",
-            Self::WrongLength => "wrong-length",
-            Self::WrongBody => "wrong-body",
-            Self::FrozenFrame => "frozen-frame",
-            Self::NotANumber => "not-a-number",
-            Self::NoRotation => "no-rotation",
-            Self::Origin => "origin",
-            Self::Silent => "silent",
-            Self::Reset => "reset",
-            Self::DisconnectMidPacket => "disconnect-mid-packet",
-            Self::InitialisationFails => "initialisation-fails",
-        }
+faults! {
+    /// What can go wrong with a position.
+    pub NdiFault {
+        BadCrc "bad-crc" "The reply carries a wrong CRC.",
+        Missing "missing" "The tool is not seen.",
+        Disabled "disabled" "The port of the tool is disabled.",
+        WrongMode "wrong-mode" "`ERROR0C`: wrong mode.",
+        CommandDamaged "command-damaged" "`ERROR04`: the command arrived damaged.",
+        CommandTimeout "command-timeout" "`ERROR05`: it took too long.",
+        LateReply "late-reply" "The reply comes after the driver gave up.",
+        Halves "halves" "Half the packet, a pause, the other half.",
+        Cut "cut" "Half the packet; the rest is lost.",
+        WrongLength "wrong-length" "The header announces another length; its CRC is right.",
+        WrongBody "wrong-body" "The body has another length than its tools need; its CRCs are right.",
+        FrozenFrame "frozen-frame" "The number of the frame stands still.",
+        NotANumber "not-a-number" "A position that is no number.",
+        NoRotation "no-rotation" "A rotation that is none.",
+        Origin "origin" "0, 0, 0.",
+        Silent "silent" "No reply.",
+        Reset "reset" "`RESET`: it was switched off and on.",
+        DisconnectMidPacket "disconnect-mid-packet" "Hangs up in the middle of the reply.",
+        InitialisationFails "initialisation-fails" "`INIT` fails, when connected.",
     }
 }
-
-text_of_faults!(NdiFault);
 
 /// Position of the tool in one frame.
 #[derive(Clone, Copy, Debug)]
@@ -159,7 +88,7 @@ pub struct NdiSimulator {
 
 impl NdiSimulator {
     /// The points of the source are at `tip_mm` in the frame of the tool (mm).
-    pub fn new(tip_mm: [f64; 3], faults: impl IntoIterator<Item = Scheduled<NdiFault>>) -> Self {
+    pub fn new(tip_mm: [f64; 3], faults: impl IntoIterator<Item = Planned<NdiFault>>) -> Self {
         Self {
             faults: FaultPlan::new(faults),
             tip: Vector3::from(tip_mm) * 1e-3,

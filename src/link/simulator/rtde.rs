@@ -9,7 +9,7 @@ mod tests;
 
 use std::time::Duration;
 
-use super::occasion::{FaultPlan, Planned, faults};
+use super::fault::{FaultPlan, Planned, faults};
 use super::outbox::Outbox;
 use super::{Output, PointSource, Simulator};
 use crate::link::protocol::Moment;

@@ -63,11 +63,18 @@ fn a_protective_stop_is_said_at_once_and_nothing_is_measured() {
 
 #[test]
 fn every_fault_of_the_controller_is_survived_or_said() {
-    for name in build::fault_names(WireProtocol::Rtde) {
+    for name in fault_names(WireProtocol::Rtde) {
         let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(&[&format!("{name}@2x1")]), None);
-        bench.wired.connect().unwrap_or_else(|error| panic!("{name}: {error}"));
-        let said = bench.recover();
-        assert!(said.iter().all(|message| message.starts_with("the robot: ")), "{name}: {said:?}");
+        // Where the fault comes early, it is the set-up that fails; it is tried again.
+        let end = Instant::now() + DEADLINE;
+        let mut said = Vec::new();
+        while let Err(error) = bench.wired.connect() {
+            said.push(error.to_string());
+            assert!(Instant::now() < end, "{name}: {said:?}");
+        }
+        said.extend(bench.recover());
+        let is_of_robot = |message: &String| message.starts_with("the robot: ") && !message.contains("instrument");
+        assert!(said.iter().all(is_of_robot), "{name}: {said:?}");
     }
 }
 

@@ -3,7 +3,7 @@
 #![expect(clippy::disallowed_methods, reason = "deadlines and peers of tests")]
 
 use std::io::{Read as _, Seek as _, Write as _};
-use std::net::{TcpListener, TcpStream};
+use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::thread;
 
 use super::*;
@@ -13,7 +13,7 @@ use crate::session::wire::LinkChoice;
 /// Every fault of a protocol over a real socket at its second occasion, with a good shot before it: whatever comes out is a shot that
 /// was taken for it, and in the end the link measures again.
 fn every_fault(protocol: WireProtocol, left_out: &[&str]) {
-    for name in build::fault_names(protocol).into_iter().filter(|name| !left_out.contains(name)) {
+    for name in fault_names(protocol).into_iter().filter(|name| !left_out.contains(name)) {
         let mut bench = Bench::tcp(protocol, &[&format!("{name}@2x1")]);
         bench.wired.connect().unwrap_or_else(|error| panic!("{protocol} {name}: {error}"));
         for _ in 0..3 {
@@ -103,15 +103,16 @@ fn settings_that_lie_are_found_in_the_set_up_and_said() {
         ("warming-up@1x*", "not ready"),
     ] {
         let mut bench = Bench::tcp(WireProtocol::Emscon, &[fault]);
+        let mut told = Vec::new();
         // A tracker that warms up is waited for; here nobody has so much time.
         let error = if fault.starts_with("warming") {
             let end = Instant::now() + Duration::from_millis(1500);
-            bench.wired.connect_while(&|| Instant::now() < end).unwrap_err()
+            bench.wired.connect_while(&|| Instant::now() < end, &mut |news| told.push(news)).unwrap_err()
         } else {
             bench.wired.connect().unwrap_err()
         };
-        let is_said =
-            error.to_string().contains(part) || (fault.starts_with("warming") && error == LinkError::Cancelled);
+        let waits = |news: &LinkNews| matches!(news, LinkNews::Status(text) if text.contains("warming up"));
+        let is_said = error.to_string().contains(part) || (error == LinkError::Cancelled && told.iter().any(waits));
         assert!(is_said, "{fault}: {error}");
     }
 }
@@ -129,6 +130,72 @@ fn points_in_another_unit_are_refused() {
 
 fn choice(address: &str) -> LinkChoice {
     LinkChoice { address: address.to_owned(), ..LinkChoice::default() }
+}
+
+#[test]
+fn what_is_not_stable_is_tried_three_times_and_then_said() {
+    let mut bench = Bench::tcp(WireProtocol::Emscon, &["bad-status@1x2"]);
+    bench.wired.connect().unwrap();
+    bench.measure().unwrap();
+    let mut bench = Bench::tcp(WireProtocol::Emscon, &["bad-status@1x3"]);
+    bench.wired.connect().unwrap();
+    let error = bench.measure().unwrap_err();
+    assert!(matches!(error, LinkError::Instrument(Failure::Unstable(_))), "{error:?}");
+    bench.measure().unwrap();
+}
+
+#[test]
+fn a_shot_that_states_a_much_larger_sigma_than_usual_is_no_point() {
+    let mut bench = Bench::tcp(WireProtocol::Emscon, &[]);
+    bench.wired.connect().unwrap();
+    for _ in 0..5 {
+        bench.measure().unwrap();
+    }
+    bench.stage.lock().sigma = 0.2e-3;
+    let error = bench.measure().unwrap_err();
+    let LinkError::Instrument(Failure::Unstable(why)) = &error else { panic!("{error:?}") };
+    assert_eq!(why, "it states a sigma of 0.346 mm; usual are 0.009 mm");
+    // What is more than usual, but still small, is a point: it stands farther away.
+    bench.stage.lock().sigma = 20e-6;
+    bench.measure().unwrap();
+}
+
+#[test]
+fn datagrams_are_lines_and_half_a_datagram_is_none() {
+    let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let options = Some("UDP xyz+time".to_owned());
+    let mut wired =
+        Wired::new(&LinkChoice { options, ..choice(&format!("ascii:udp:127.0.0.1:{port}")) }, None).unwrap();
+    wired.connect().unwrap();
+    let stop = Arc::new(AtomicBool::new(false));
+    let ended = Arc::clone(&stop);
+    let sender = thread::spawn(move || {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let mut number = 0_u32;
+        while !ended.load(Ordering::Relaxed) {
+            number += 1;
+            // Without a line end: a datagram is whole.
+            let line = format!("{:.4},-678.25,90.125,{number}", 1234.0 + f64::from(number));
+            for text in ["1234.5,-678", line.as_str()] {
+                // Nobody may listen yet.
+                drop(socket.send_to(text.as_bytes(), ("127.0.0.1", port)));
+            }
+            thread::park_timeout(Duration::from_millis(5));
+        }
+    });
+    let mut points: Vec<Point3<f64>> = Vec::new();
+    let end = Instant::now() + DEADLINE;
+    while points.len() < 3 {
+        match wired.measure(&request(1), &|| true) {
+            Ok(reading) => points.push(reading.point),
+            Err(error) => assert!(matches!(error, LinkError::Instrument(Failure::Garbled(_))), "{error:?}"),
+        }
+        assert!(Instant::now() < end, "{points:?}");
+    }
+    stop.store(true, Ordering::Relaxed);
+    sender.join().unwrap();
+    assert!(points.iter().all(|point| (point.y + 0.67825).abs() < 1e-9 && (point.z - 0.090_125).abs() < 1e-9));
+    assert!(points.windows(2).all(|pair| pair[1].x > pair[0].x), "{points:?}");
 }
 
 #[test]

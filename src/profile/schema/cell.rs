@@ -2,9 +2,10 @@
 
 use nalgebra::Point3;
 
-use super::super::decode::{Fields, fields, list, not_negative, number, numbers, point, positive, range, text};
+use super::super::decode::{Fields, fields, flag, list, not_negative, number, numbers, point, positive, range, text};
 use super::super::diagnostic::Findings;
 use super::super::syntax::Ast;
+use super::super::wire::{LinkSettings, WireAddress};
 use super::super::{Acceptance, Capsule, Instrument, KeepOut, Tracker};
 use crate::units::{MICROMETRE, Quantity, from_deg, from_mm};
 
@@ -40,6 +41,32 @@ pub(super) fn instrument(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
     let sigma = inside.require("sigma_um", "10.0", findings).and_then(|ast| positive(ast, findings));
     let per_metre = inside.get_or("sigma_um_per_m", 0.0, |ast| not_negative(ast, findings));
     Some(Instrument { name: name?, sigma: sigma? * MICROMETRE, sigma_per_metre: per_metre? * MICROMETRE })
+}
+
+/// How the instrument is reached. Problems are in `findings`; absent and bad both give `None`.
+pub(super) fn link(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<LinkSettings> {
+    let ast = top.get("link")?;
+    let inside = fields(ast, "'link'", &["address", "options", "robot", "automatic"], findings)?;
+    let address = inside
+        .require("address", "\"emscon:192.168.0.2\"", findings)
+        .and_then(|ast| wire_address(ast, false, findings));
+    let options = inside.get_or("options", None, |ast| text(ast, findings).map(Some));
+    let robot = inside.get_or("robot", None, |ast| wire_address(ast, true, findings).map(Some));
+    let automatic = inside.get_or("automatic", false, |ast| flag(ast, findings));
+    Some(LinkSettings { address: address?, options: options?, robot: robot?, is_automatic: automatic? })
+}
+
+/// The address of an instrument or of a robot.
+fn wire_address(ast: &Ast, is_robot: bool, findings: &mut Findings<'_>) -> Option<WireAddress> {
+    let hint = if is_robot { "write \"rtde:192.168.0.10\"" } else { "write \"emscon:192.168.0.2\", see docs/links.md" };
+    let wrong = match text(ast, findings)?.parse::<WireAddress>() {
+        Ok(address) if address.protocol.is_robot() == is_robot => return Some(address),
+        Ok(address) if is_robot => format!("{} is spoken by instruments, not by robots", address.protocol),
+        Ok(address) => format!("{} is spoken by robots: it belongs into 'robot'", address.protocol),
+        Err(wrong) => wrong,
+    };
+    findings.error(ast.span, wrong, hint.to_owned());
+    None
 }
 
 pub(super) fn tracker(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Tracker> {

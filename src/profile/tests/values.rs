@@ -27,6 +27,7 @@ const EVERYTHING: &str = r#"(
         parameters_mm: {"a2": 4.0, "target1.x": 7.0}, parameters_mrad: {"beta2": 0.1}),
     acceptance: (position_max_mm: 1.5, distance_rms_mm: 0.25),
     instrument: (name: "tracker", sigma_um: 15.0, sigma_um_per_m: 6.0),
+    link: (address: "emscon:192.168.0.2", options: "(measure_ms: 2000)", robot: "rtde:192.168.0.10", automatic: true),
     tracker: (position_mm: (0.0, 2500.0, 500.0), acceptance_angle_deg: 45.0, range_mm: (1000.0, 9000.0)),
     bodies: [(link: 3, from_mm: (0.0, 0.0, 0.0), to_mm: (0.0, 0.0, 100.0), radius_mm: 40.0)],
     floor_mm: -20.0,
@@ -140,4 +141,19 @@ fn beta_is_proposed_on_the_right_link() {
     let (_, warnings) = Profile::parse(&without, "all.ron").unwrap();
     assert_eq!(warnings.len(), 1);
     assert_eq!(warnings[0].message, "the axes of 'A' and 'B' are parallel, but 'B' has no 'beta_deg'");
+}
+
+#[test]
+fn the_link_of_the_cell_arrives_with_its_addresses_in_full() {
+    let profile = everything();
+    let link = profile.link().unwrap();
+    assert_eq!(link.address.to_string(), "emscon:tcp:192.168.0.2:700");
+    assert_eq!(link.options.as_deref(), Some("(measure_ms: 2000)"));
+    assert_eq!(link.robot.as_ref().unwrap().to_string(), "rtde:tcp:192.168.0.10:30004");
+    assert!(link.is_automatic);
+    // What is shown can be written into a profile again.
+    let shown = EVERYTHING.replace("emscon:192.168.0.2", &link.address.to_string());
+    assert_eq!(Profile::parse(&shown, "all.ron").unwrap().0, profile);
+    let text = show_text(&profile);
+    assert!(text.contains("link: emscon:tcp:192.168.0.2:700, robot at rtde:tcp:192.168.0.10:30004"), "{text}");
 }

@@ -73,25 +73,26 @@ fn known(values: &[String]) -> Result<Intent, String> {
     Ok(Intent::ChooseTarget(TargetChoice::Known { xyz_mm, sigma_mm }))
 }
 
-/// An instrument on a wire.
-pub fn linked() -> Dialog {
+/// An instrument on a wire. What the profile says about it stands there already.
+pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
+    let proposed = proposal.cloned().unwrap_or_default();
     Dialog::Form(
         Form::new("An instrument on the network or a serial port", link)
             .text(
                 "instrument",
-                "",
+                &proposed.address,
                 "emscon:HOST, geocom:serial:/dev/ttyUSB0:9600, ndi:HOST, ascii:tcp:HOST:PORT, ascii:listen:0.0.0.0:5000",
             )
             .text(
                 "options",
-                "",
+                &proposed.options.unwrap_or_default(),
                 "Empty: the usual ones. For ascii a preset such as xyz or bridge; else as (measure_ms: 2000).",
             )
-            .text("robot", "", "rtde:HOST, if the robot's controller tells its joint angles. Empty: it does not.")
+            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, if the robot's controller tells its joint angles. Empty: it does not.")
             .pick(
                 "measure by itself",
                 &["no", "yes"],
-                0,
+                usize::from(proposed.is_automatic),
                 "Left/Right. yes: as soon as the SMR rests for 2 s near the predicted place.",
             ),
     )
@@ -247,6 +248,18 @@ mod tests {
         assert_eq!(known(&values(&["1,5", "-2", "70", "0"])), Ok(Intent::ChooseTarget(target)));
         assert_eq!(known(&values(&["1", "x", "70", "0"])), Err("y: 'x' is not a number".to_owned()));
         assert_eq!(known(&values(&["1", "2", "70", "-1"])), Err("sigma cannot be negative".to_owned()));
+    }
+
+    #[test]
+    fn what_the_profile_says_about_the_link_stands_in_the_form() {
+        let choice = LinkChoice {
+            address: "emscon:tcp:192.168.0.2:700".to_owned(),
+            options: Some("(measure_ms: 2000)".to_owned()),
+            robot: None,
+            is_automatic: true,
+        };
+        let Dialog::Form(form) = linked(Some(&choice)) else { panic!() };
+        assert_eq!(form.value(), Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice))));
     }
 
     #[test]

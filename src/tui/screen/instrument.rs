@@ -58,7 +58,9 @@ impl InstrumentScreen {
         let at = self.menu.at.take().unwrap_or(0);
         match UNITS.get(at) {
             Some(unit) => Reply::Intend(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
-            None if at == UNITS.len() => Reply::Ask(Box::new(ask::linked())),
+            None if at == UNITS.len() => {
+                Reply::Ask(Box::new(ask::linked(content(cx).and_then(|content| content.link.as_ref()))))
+            }
             None if at == UNITS.len() + 1 => {
                 let is_paper = cx.view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper"));
                 Reply::Ask(Box::new(ask::simulated(is_paper)))

@@ -71,6 +71,7 @@ fn profile(has_card: bool) -> ViewModel {
 
 fn instrument(choice: Option<&str>, identity: Option<&str>) -> ViewModel {
     let content = Content::Instrument(InstrumentView {
+        link: None,
         choice: choice.map(str::to_owned),
         identity: identity.map(str::to_owned),
         recorded_poses: 0,

@@ -3,6 +3,7 @@
 use super::{Action, Cx, StepMachine};
 use crate::session::journal::{Entry, instrument_text};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
+use crate::session::wire::LinkChoice;
 use crate::wizard::effect::Request;
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::view::{Content, InstrumentView};
@@ -15,6 +16,11 @@ pub(in crate::wizard) struct InstrumentStep;
 fn connect(cx: &Cx<'_>) -> Vec<Action> {
     let (Some(instrument), Some(robot)) = (&cx.session.instrument, cx.robot()) else { return Vec::new() };
     vec![Action::Ask(Request::Connect { instrument: instrument.clone(), profile: Box::new(robot.profile.clone()) })]
+}
+
+/// What the profile says about the instrument's wire.
+fn link(cx: &Cx<'_>) -> Option<LinkChoice> {
+    cx.robot().and_then(|robot| robot.profile.link()).map(LinkChoice::from)
 }
 
 impl StepMachine for InstrumentStep {
@@ -31,7 +37,8 @@ impl StepMachine for InstrumentStep {
         let fixed = cx.session.has_measurements().then(|| {
             "points of another instrument cannot be mixed with those measured; start another session".to_owned()
         });
-        let proposal = InstrumentChoice::Manual { unit: CoordinateUnit::Millimetre };
+        let proposal =
+            link(cx).map_or(InstrumentChoice::Manual { unit: CoordinateUnit::Millimetre }, InstrumentChoice::Linked);
         vec![
             IntentInfo::new(Intent::Next, "measure with this").unless(none).default_action(),
             IntentInfo::new(Intent::ChooseInstrument(proposal), "choose an instrument").unless(fixed),
@@ -57,6 +64,7 @@ impl StepMachine for InstrumentStep {
     fn content(&self, cx: &Cx<'_>) -> Content {
         let profile = cx.robot().map(|robot| &robot.profile);
         Content::Instrument(InstrumentView {
+            link: link(cx),
             choice: cx.session.instrument.as_ref().map(instrument_text),
             identity: cx.connection.map(|connection| connection.identity.clone()),
             recorded_poses: cx.connection.map_or(0, |connection| connection.recorded.len()),

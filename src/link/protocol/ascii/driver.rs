@@ -118,10 +118,11 @@ impl AsciiProtocol {
 
     fn identity(&self) -> Identity {
         let options = self.parser.options();
-        let mut warnings = vec!["unit, frame and reflector are as set here: a line of text cannot say them".to_owned()];
+        let mut notes = vec!["unit, frame and reflector are as set here: a line of text cannot say them".to_owned()];
         if options.checksum == Checksum::None {
-            warnings.push("lines carry no check value: a damaged digit cannot be seen".to_owned());
+            notes.push("lines carry no check value: a damaged digit cannot be seen".to_owned());
         }
+        let mut warnings = Vec::new();
         if options.allow_identical {
             warnings.push("equal readings are allowed: a source that repeats its last line is not noticed".to_owned());
         }
@@ -130,6 +131,7 @@ impl AsciiProtocol {
             reflector: None,
             checked: vec![format!("unit: {} (as set)", options.unit.symbol())],
             warnings,
+            notes,
         }
     }
 
@@ -320,6 +322,10 @@ impl AsciiProtocol {
             Some(Capture::Averaging { last_fault: Some(text), .. }) => Failure::Garbled(text),
             Some(Capture::Averaging { shots, .. }) if !shots.is_empty() => {
                 Failure::Silent { what: format!("collecting lines ({} had come)", shots.len()), seconds }
+            }
+            _ if self.lines().is_some() => {
+                let what = "waiting for its lines (if it has to be asked for each, set the option 'mode')".to_owned();
+                Failure::Silent { what, seconds }
             }
             _ => Failure::Silent { what: "waiting for a line".to_owned(), seconds },
         };

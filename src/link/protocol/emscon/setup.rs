@@ -155,6 +155,7 @@ impl SetUp {
             reflector: self.current_reflector(),
             checked: std::mem::take(&mut self.checked),
             warnings: std::mem::take(&mut self.warnings),
+            notes: Vec::new(),
         }
     }
 

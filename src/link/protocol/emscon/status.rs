@@ -258,6 +258,14 @@ impl ResultStatus {
             Self::SensorNotStable => Failure::Unstable(text),
             Self::UsageConflict | Self::MultiConnectionsNotAllowed => Failure::InUse(text),
             Self::WrongCurrentReflector => Failure::Settings(text),
+            Self::NoWeatherMonitor
+            | Self::MeteoDataOutOfRange
+            | Self::NoTemperatureFromWeatherMonitor
+            | Self::NoPressureFromWeatherMonitor
+            | Self::NoHumidityFromWeatherMonitor
+            | Self::PressureSensorProblem => {
+                Failure::Settings(format!("{text}; enter temperature, pressure and humidity at the tracker"))
+            }
             Self::ServerBusy
             | Self::TrackerNotInitialized
             | Self::MeasurementStatusNotReady

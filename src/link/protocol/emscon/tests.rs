@@ -10,7 +10,7 @@ use super::{Emscon, EmsconOptions, i32_at};
 use crate::link::protocol::{Failure, ProtocolEvent};
 use crate::link::simulator::bench::Bench;
 use crate::link::simulator::emscon::{EmsconFault, EmsconSimulator};
-use crate::link::simulator::occasion::Planned;
+use crate::link::simulator::fault::Planned;
 
 type EmsconBench = Bench<Emscon, EmsconSimulator>;
 

@@ -377,8 +377,7 @@ impl Known {
             return Err(Failure::Settings(format!("the prism constant stays at {:.2} mm", constant * 1e3)));
         }
         self.checked.push(format!("prism constant: {:.2} mm (read back)", constant * 1e3));
-        self.reflector =
-            Some(Reflector { id: 0, name: "prism (offset is the prism constant)".to_owned(), offset: constant });
+        self.reflector = Some(Reflector { id: 0, name: "prism by its constant".to_owned(), offset: constant });
         Ok(())
     }
 
@@ -392,8 +391,13 @@ impl Known {
         );
         self.checked.insert(0, "units: m, rad (fixed in GeoCOM)".to_owned());
         self.checked.insert(1, "frame: the instrument's own, from angles and distance".to_owned());
-        self.warnings.insert(0, ACCURACY.to_owned());
-        Identity { name, reflector: self.reflector, checked: self.checked, warnings: self.warnings }
+        Identity {
+            name,
+            reflector: self.reflector,
+            checked: self.checked,
+            warnings: self.warnings,
+            notes: vec![ACCURACY.to_owned()],
+        }
     }
 }
 

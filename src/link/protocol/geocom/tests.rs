@@ -189,3 +189,46 @@ fn transaction_numbers_wrap_and_skip_none_and_zero() {
         protocol.feed(format!("%R1P,0,{}:0\r\n", parsed.transaction).as_bytes(), now);
     }
 }
+
+#[test]
+fn every_code_has_its_kind_and_its_words() {
+    let kind = |code: u32| match failure_of(code) {
+        Failure::NoTarget(text) => ("no target", text),
+        Failure::Unstable(text) => ("unstable", text),
+        Failure::NotReady(text) => ("not ready", text),
+        Failure::Settings(text) => ("settings", text),
+        Failure::Unusable(text) => ("unusable", text),
+        Failure::Garbled(text) => ("garbled", text),
+        Failure::Refused(text) => ("refused", text),
+        other => panic!("{code}: {other:?}"),
+    };
+    for (code, wanted, part) in [
+        (1285, "no target", "only angles"),
+        (1292, "no target", "no distance"),
+        (770, "no target", "no signal"),
+        (8710, "no target", "no target"),
+        (8708, "unstable", "moves"),
+        (8716, "unstable", "accuracy"),
+        (776, "unstable", "turbulent"),
+        (22, "unstable", "not level"),
+        (13, "not ready", "busy"),
+        (786, "not ready", "busy"),
+        (1293, "not ready", "busy"),
+        (16, "not ready", "battery"),
+        (3108, "not ready", "sleeps"),
+        (823, "unusable", "several targets"),
+        (8711, "unusable", "several targets"),
+        (8714, "settings", "not switched on"),
+        (3074, "garbled", "could not read"),
+        (3078, "garbled", "wrong form"),
+        (3093, "garbled", "transaction"),
+        (3101, "garbled", "CRC"),
+        (27, "refused", "licence"),
+        (2, "refused", "parameter"),
+        (4242, "refused", "unknown code"),
+    ] {
+        let (found, text) = kind(code);
+        assert_eq!(found, wanted, "{code}: {text}");
+        assert!(text.contains(part) && text.contains(&code.to_string()), "{code}: {text}");
+    }
+}

@@ -104,13 +104,13 @@ impl SetUp {
     }
 
     pub(super) fn identity(self, handle: u8, options: &NdiOptions) -> Identity {
-        let mut warnings =
+        let mut notes =
             vec!["optical and magnetic trackers are of the 0.1 to 1 mm class: see the data sheet".to_owned()];
         if options.reply == ReplyFormat::Text {
-            warnings.push("TX gives positions in steps of 0.01 mm; BX is finer".to_owned());
+            notes.push("TX gives positions in steps of 0.01 mm; BX is finer".to_owned());
         }
         if options.tip_mm.iter().all(|value| *value == 0.0) {
-            warnings.push("no tip is set: the point is the origin of the tool, not what it touches".to_owned());
+            notes.push("no tip is set: the point is the origin of the tool, not what it touches".to_owned());
         }
         let [x, y, z] = options.tip_mm;
         Identity {
@@ -121,7 +121,8 @@ impl SetUp {
                 format!("tool: {handle:02X}, initialised and enabled"),
                 format!("tip: {x:.3}, {y:.3}, {z:.3} mm in the frame of the tool (as set)"),
             ],
-            warnings,
+            warnings: Vec::new(),
+            notes,
         }
     }
 }

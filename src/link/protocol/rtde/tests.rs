@@ -14,7 +14,7 @@ use crate::link::simulator::bench::fuzz::{
     assert_same_at_every_cut, assert_same_in_pieces, fuzz_protocol, fuzz_simulator,
 };
 use crate::link::simulator::bench::{Bench, Cell};
-use crate::link::simulator::occasion::Planned;
+use crate::link::simulator::fault::Planned;
 use crate::link::simulator::rtde::{RtdeFault, RtdeSimulator};
 
 type RtdeBench = Bench<Rtde, RtdeSimulator>;

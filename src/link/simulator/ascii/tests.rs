@@ -5,10 +5,9 @@ use std::time::Duration;
 use super::super::bench2::Bench;
 use super::super::bench2::Helix;
 use super::super::bench2::streams;
+use super::super::fault::Planned;
 use super::AsciiFault;
 use super::AsciiSimulator;
-use super::NamedFault as _;
-use super::Scheduled;
 use crate::link::protocol::Failure;
 use crate::link::protocol::ProtocolEvent;
 use crate::link::protocol::Shot;
@@ -24,7 +23,7 @@ use crate::link::protocol::lines::MAX_LINE;
 
 type AsciiBench = Bench<AsciiProtocol, AsciiSimulator>;
 
-fn bench(options: &AsciiOptions, faults: impl IntoIterator<Item = Scheduled<AsciiFault>>) -> AsciiBench {
+fn bench(options: &AsciiOptions, faults: impl IntoIterator<Item = Planned<AsciiFault>>) -> AsciiBench {
     let protocol = AsciiProtocol::new(options.clone()).unwrap();
     let mut bench = Bench::new(protocol, AsciiSimulator::new(options.clone(), faults).unwrap());
     bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
@@ -136,7 +135,7 @@ const fn expected(fault: AsciiFault) -> Option<&'static str> {
 #[test]
 fn every_fault_of_a_polled_source_is_said_and_passes() {
     for &fault in AsciiFault::ALL {
-        let mut bench = bench(&polled(), [Scheduled::once(fault, 2)]);
+        let mut bench = bench(&polled(), [Planned::at(fault, 2)]);
         shot(&mut bench);
         let (answer, _) = bench.shoot();
         match (expected(fault), answer) {
@@ -166,7 +165,7 @@ fn every_fault_of_a_stream_gives_no_wrong_point() {
             continue;
         }
         for at in 1..6 {
-            let mut bench = bench(&streamed(1), [Scheduled::once(fault, at)]);
+            let mut bench = bench(&streamed(1), [Planned::at(fault, at)]);
             for _ in 0..8 {
                 match bench.shoot().0 {
                     Some(ProtocolEvent::Shot(shot)) => {
@@ -188,7 +187,7 @@ fn every_fault_of_a_stream_gives_no_wrong_point() {
 
 #[test]
 fn a_late_answer_is_never_taken_for_the_next_one() {
-    let mut bench = bench(&polled(), [Scheduled::once(AsciiFault::Late, 1)]);
+    let mut bench = bench(&polled(), [Planned::at(AsciiFault::Late, 1)]);
     assert!(matches!(failure(&mut bench), Failure::Silent { .. }));
     // Shots before, around and after the time at which the late line comes.
     for _ in 0..12 {
@@ -220,7 +219,7 @@ fn a_broken_beam_is_the_instruments_own_words() {
 
 #[test]
 fn a_wrong_baud_rate_is_said_after_three_lines() {
-    let mut bench = bench(&streamed(1), [Scheduled { fault: AsciiFault::Noise, from: 1, times: 100 }]);
+    let mut bench = bench(&streamed(1), [Planned::from(AsciiFault::Noise, 1, 100)]);
     let events = bench.run(Duration::from_secs(1));
     let hints: Vec<_> = events.iter().filter(|event| matches!(event, ProtocolEvent::Status(_))).collect();
     assert!(format!("{hints:?}").contains("check baud rate, line ending"));
@@ -230,7 +229,7 @@ fn a_wrong_baud_rate_is_said_after_three_lines() {
 #[test]
 fn a_stream_that_stops_is_said_once() {
     let options = AsciiOptions { timeout_s: 2.0, ..streamed(1) };
-    let mut bench = bench(&options, [Scheduled { fault: AsciiFault::Silent, from: 5, times: 1000 }]);
+    let mut bench = bench(&options, [Planned::from(AsciiFault::Silent, 5, 1000)]);
     let events = bench.run(Duration::from_secs(20));
     let said = events.iter().filter(|event| matches!(event, ProtocolEvent::Status(_))).count();
     assert_eq!(said, 1, "{events:?}");
@@ -240,7 +239,7 @@ fn a_stream_that_stops_is_said_once() {
 fn conversation(options: &AsciiOptions) -> AsciiBench {
     let faults =
         AsciiFault::ALL.iter().filter(|fault| !matches!(fault, AsciiFault::DisconnectMidLine | AsciiFault::Late));
-    let mut bench = bench(options, faults.zip(2..).map(|(&fault, at)| Scheduled::once(fault, at)));
+    let mut bench = bench(options, faults.zip(2..).map(|(&fault, at)| Planned::at(fault, at)));
     for _ in 0..24 {
         bench.shoot();
     }

@@ -1,6 +1,6 @@
 //! What a simulated tracker can do wrong.
 
-use super::super::occasion::faults;
+use super::super::fault::faults;
 
 faults! {
     /// A fault of the simulated tracker. The occasion is a measurement that was asked for unless its text says otherwise.

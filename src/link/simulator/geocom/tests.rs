@@ -5,11 +5,10 @@ use std::time::Duration;
 use super::super::bench2::Bench;
 use super::super::bench2::Helix;
 use super::super::bench2::streams;
+use super::super::fault::Planned;
 use super::GeocomFault;
 use super::GeocomSimulator;
 use super::MAX_RECEIVED;
-use super::NamedFault as _;
-use super::Scheduled;
 use crate::link::protocol::Failure;
 use crate::link::protocol::Identity;
 use crate::link::protocol::ProtocolEvent;
@@ -21,7 +20,7 @@ use crate::link::protocol::lines::MAX_LINE;
 
 type GeocomBench = Bench<GeocomProtocol, GeocomSimulator>;
 
-fn connected(options: &GeocomOptions, faults: impl IntoIterator<Item = Scheduled<GeocomFault>>) -> GeocomBench {
+fn connected(options: &GeocomOptions, faults: impl IntoIterator<Item = Planned<GeocomFault>>) -> GeocomBench {
     Bench::new(GeocomProtocol::new(options.clone()).unwrap(), GeocomSimulator::new(faults))
 }
 
@@ -33,7 +32,7 @@ fn identity(bench: &mut GeocomBench) -> Identity {
     }
 }
 
-fn bench(faults: impl IntoIterator<Item = Scheduled<GeocomFault>>) -> GeocomBench {
+fn bench(faults: impl IntoIterator<Item = Planned<GeocomFault>>) -> GeocomBench {
     let mut bench = connected(&GeocomOptions::default(), faults);
     identity(&mut bench);
     bench
@@ -68,7 +67,7 @@ fn a_point_comes_back_by_every_way_of_measuring() {
 fn the_set_up_says_who_answers_and_what_it_cannot_do() {
     let identity = identity(&mut connected(&GeocomOptions::default(), []));
     assert_eq!(identity.name, "TS30, simulated, serial number 362541, GeoCOM 1.50.3");
-    assert!(identity.warnings.iter().any(|text| text.contains("0.5 to 1 mm")));
+    assert!(identity.notes.iter().any(|text| text.contains("0.5 to 1 mm")));
     assert!(identity.checked.iter().any(|text| text == "prism constant: -34.40 mm (read back)"), "{identity:?}");
     assert_eq!(identity.reflector.map(|reflector| reflector.offset), Some(-0.0344));
 }
@@ -120,7 +119,7 @@ const fn expected(fault: GeocomFault) -> Option<&'static str> {
 fn every_fault_is_said_and_passes() {
     for &fault in GeocomFault::ALL.iter().filter(|fault| **fault != GeocomFault::Dead) {
         let from = if fault == GeocomFault::Asleep { 1 } else { 2 };
-        let mut bench = bench([Scheduled::once(fault, from)]);
+        let mut bench = bench([Planned::at(fault, from)]);
         shot(&mut bench);
         let (answer, _) = bench.shoot();
         match (expected(fault), answer) {
@@ -143,7 +142,7 @@ fn every_fault_is_said_and_passes() {
 
 #[test]
 fn three_times_busy_costs_patience_only() {
-    let mut bench = bench([Scheduled { fault: GeocomFault::Busy, from: 1, times: 3 }]);
+    let mut bench = bench([Planned::from(GeocomFault::Busy, 1, 3)]);
     let before = bench.now;
     shot(&mut bench);
     assert!(bench.now < before + Duration::from_secs(10));
@@ -151,7 +150,7 @@ fn three_times_busy_costs_patience_only() {
 
 #[test]
 fn busy_for_ever_is_said_and_the_link_stays() {
-    let mut bench = bench([Scheduled { fault: GeocomFault::Busy, from: 1, times: 40 }]);
+    let mut bench = bench([Planned::from(GeocomFault::Busy, 1, 40)]);
     match bench.shoot().0 {
         Some(ProtocolEvent::Failed(Failure::NotReady(text))) => assert_eq!(text, "code 1293: a measurement is busy"),
         other => panic!("{other:?}"),
@@ -161,7 +160,7 @@ fn busy_for_ever_is_said_and_the_link_stays() {
 
 #[test]
 fn a_damaged_link_is_said_after_three_attempts() {
-    let mut bench = bench([Scheduled { fault: GeocomFault::CrcError, from: 1, times: 3 }]);
+    let mut bench = bench([Planned::from(GeocomFault::CrcError, 1, 3)]);
     let (answer, said) = bench.shoot();
     assert!(matches!(answer, Some(ProtocolEvent::Failed(Failure::Garbled(_)))), "{answer:?}");
     assert!(format!("{said:?}").contains("check baud rate"), "{said:?}");
@@ -171,7 +170,7 @@ fn a_damaged_link_is_said_after_three_attempts() {
 
 #[test]
 fn a_late_answer_is_thrown_away_and_said() {
-    let mut bench = bench([Scheduled::once(GeocomFault::LateReply, 1)]);
+    let mut bench = bench([Planned::at(GeocomFault::LateReply, 1)]);
     assert!(matches!(bench.shoot().0, Some(ProtocolEvent::Failed(Failure::Silent { .. }))));
     let said = format!("{:?}", bench.run(Duration::from_secs(3)));
     assert!(said.contains("late or foreign answer") && said.contains("answers again"), "{said}");
@@ -180,7 +179,7 @@ fn a_late_answer_is_thrown_away_and_said() {
 
 #[test]
 fn a_dead_instrument_is_given_up_and_found_again() {
-    let mut bench = connected(&GeocomOptions::default(), [Scheduled { fault: GeocomFault::Dead, from: 1, times: 16 }]);
+    let mut bench = connected(&GeocomOptions::default(), [Planned::from(GeocomFault::Dead, 1, 16)]);
     let events = bench.until(|event| matches!(event, ProtocolEvent::Lost(_)));
     assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
     bench.connect();
@@ -189,7 +188,7 @@ fn a_dead_instrument_is_given_up_and_found_again() {
 
 #[test]
 fn a_pulled_cable_is_noticed_when_idle() {
-    let mut bench = bench([Scheduled { fault: GeocomFault::Dead, from: 12, times: 1000 }]);
+    let mut bench = bench([Planned::from(GeocomFault::Dead, 12, 1000)]);
     let events = bench.run(Duration::from_mins(1));
     assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
 }
@@ -225,7 +224,7 @@ fn a_broken_beam_gives_no_point() {
 fn conversation(checksum: bool) -> GeocomBench {
     let faults =
         GeocomFault::ALL.iter().filter(|fault| !matches!(fault, GeocomFault::DisconnectMidLine | GeocomFault::Dead));
-    let faults = faults.zip(2..).map(|(&fault, at)| Scheduled::once(fault, at));
+    let faults = faults.zip(2..).map(|(&fault, at)| Planned::at(fault, at));
     let mut bench = connected(&GeocomOptions { checksum, ..GeocomOptions::default() }, faults);
     identity(&mut bench);
     for _ in 0..24 {

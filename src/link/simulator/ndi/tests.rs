@@ -5,10 +5,9 @@ use std::time::Duration;
 use super::super::bench2::Bench;
 use super::super::bench2::Helix;
 use super::super::bench2::streams;
-use super::NamedFault as _;
+use super::super::fault::Planned;
 use super::NdiFault;
 use super::NdiSimulator;
-use super::Scheduled;
 use crate::link::protocol::Failure;
 use crate::link::protocol::ProtocolEvent;
 use crate::link::protocol::Shot;
@@ -34,7 +33,7 @@ fn options(reply: ReplyFormat) -> NdiOptions {
     NdiOptions { reply, tip_mm: TIP_MM, ..NdiOptions::default() }
 }
 
-fn bench(reply: ReplyFormat, faults: impl IntoIterator<Item = Scheduled<NdiFault>>) -> NdiBench {
+fn bench(reply: ReplyFormat, faults: impl IntoIterator<Item = Planned<NdiFault>>) -> NdiBench {
     let mut bench = Bench::new(NdiProtocol::new(options(reply)).unwrap(), NdiSimulator::new(TIP_MM, faults));
     let events = bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
     assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))), "{events:?}");
@@ -79,7 +78,7 @@ fn the_identity_says_what_text_cannot() {
             panic!("not ready");
         };
         assert_eq!(identity.name, "NDI tracker, version G.003.001");
-        assert_eq!(identity.warnings.iter().any(|text| text.contains("0.01 mm")), reply == ReplyFormat::Text);
+        assert_eq!(identity.notes.iter().any(|text| text.contains("0.01 mm")), reply == ReplyFormat::Text);
     }
 }
 
@@ -93,7 +92,7 @@ fn a_handle_that_is_not_there_ends_the_set_up() {
 
 #[test]
 fn a_failed_initialisation_is_said() {
-    let fault = Scheduled::once(NdiFault::InitialisationFails, 1);
+    let fault = Planned::at(NdiFault::InitialisationFails, 1);
     let mut bench =
         Bench::new(NdiProtocol::new(options(ReplyFormat::Text)).unwrap(), NdiSimulator::new(TIP_MM, [fault]));
     let lost = bench.until(|event| matches!(event, ProtocolEvent::Lost(_))).pop();
@@ -131,7 +130,7 @@ const fn expected(fault: NdiFault, reply: ReplyFormat) -> &'static str {
 
 /// The first position answers a live question; the fault lasts for the whole shot after it.
 fn faulty_shot(fault: NdiFault, reply: ReplyFormat, times: u32) {
-    let mut bench = bench(reply, [Scheduled { fault, from: 3, times }]);
+    let mut bench = bench(reply, [Planned::from(fault, 3, times)]);
     shoot(&mut bench, reply);
     let before = bench.source.taken();
     match bench.shoot().0 {
@@ -177,7 +176,7 @@ fn a_lasting_fault_is_said_in_its_words() {
             if matches!(expected(fault, reply), "" | "lost") {
                 continue;
             }
-            let mut bench = bench(reply, [Scheduled { fault, from: 2, times: 1000 }]);
+            let mut bench = bench(reply, [Planned::from(fault, 2, 1000)]);
             match bench.shoot().0 {
                 Some(ProtocolEvent::Failed(failure)) => {
                     assert!(failure.to_string().contains(expected(fault, reply)), "{fault} {reply:?}: {failure}");
@@ -190,7 +189,7 @@ fn a_lasting_fault_is_said_in_its_words() {
 
 #[test]
 fn a_silent_instrument_is_lost_when_idle() {
-    let mut bench = bench(ReplyFormat::Binary, [Scheduled { fault: NdiFault::Silent, from: 2, times: 1000 }]);
+    let mut bench = bench(ReplyFormat::Binary, [Planned::from(NdiFault::Silent, 2, 1000)]);
     let events = bench.run(Duration::from_secs(30));
     assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
 }
@@ -212,7 +211,7 @@ fn conversation(reply: ReplyFormat) -> NdiBench {
         matches!(fault, NdiFault::DisconnectMidPacket | NdiFault::Reset | NdiFault::InitialisationFails)
     };
     let faults = NdiFault::ALL.iter().filter(|fault| !is_left_out(**fault)).zip(1..);
-    let mut bench = bench(reply, faults.map(|(&fault, at)| Scheduled::once(fault, 4 * at)));
+    let mut bench = bench(reply, faults.map(|(&fault, at)| Planned::at(fault, 4 * at)));
     for _ in 0..20 {
         bench.shoot();
     }

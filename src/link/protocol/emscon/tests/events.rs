@@ -7,7 +7,7 @@ use super::super::{Command, CommandId};
 use super::{EmsconBench, bench, commands, ready, statuses};
 use crate::link::protocol::{Failure, Moment, Protocol as _, ProtocolEvent};
 use crate::link::simulator::emscon::EmsconFault;
-use crate::link::simulator::occasion::Planned;
+use crate::link::simulator::fault::Planned;
 
 /// A packet of integers, sized right.
 fn packet(fields: &[i32]) -> Vec<u8> {

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 
-use super::super::EmsconOptions;
+use super::super::{EmsconOptions, ResultStatus};
 use super::{EmsconBench, bench, bench_with, failure, ready, statuses};
 use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::Cell;
 use crate::link::simulator::emscon::EmsconFault;
-use crate::link::simulator::occasion::Planned;
+use crate::link::simulator::fault::Planned;
 
 /// The next shot is the point of the cell.
 #[track_caller]
@@ -132,6 +132,52 @@ fn failures_of_one_shot_say_what_happened_and_the_next_one_is_right() {
     ];
     for (fault, words) in cases {
         assert_fails_then_recovers(fault, words);
+    }
+}
+
+#[test]
+fn every_number_that_a_tracker_refuses_with_has_its_kind_and_its_words() {
+    let kind = |number: i32| match ResultStatus::from_number(number).failure("measuring") {
+        Failure::NoTarget(text) => ("no target", text),
+        Failure::Unstable(text) => ("unstable", text),
+        Failure::NotReady(text) => ("not ready", text),
+        Failure::Settings(text) => ("settings", text),
+        Failure::InUse(text) => ("in use", text),
+        Failure::Refused(text) => ("refused", text),
+        other => panic!("{number}: {other:?}"),
+    };
+    for (number, wanted, part) in [
+        (37, "no target", "the beam was interrupted"),
+        (10009, "no target", "no result"),
+        (10013, "unstable", "not stable"),
+        (1, "not ready", "busy"),
+        (39, "not ready", "not initialised"),
+        (10004, "not ready", "not ready"),
+        (10005, "not ready", "starting up"),
+        (10012, "not ready", "not warmed up"),
+        (10014, "not ready", "not ready"),
+        (23, "settings", "reflector"),
+        (27, "settings", "enter temperature, pressure and humidity"),
+        (57, "settings", "weather values out of range"),
+        (94, "settings", "enter temperature, pressure and humidity"),
+        (95, "settings", "enter temperature, pressure and humidity"),
+        (96, "settings", "enter temperature, pressure and humidity"),
+        (10003, "settings", "pressure sensor"),
+        (35, "in use", "usage conflict"),
+        (10011, "in use", "another program"),
+        (2, "refused", "not implemented"),
+        (38, "refused", "no tracker connected"),
+        (10010, "refused", "not levelled"),
+        (10015, "refused", "cannot reach the sensor"),
+        (10016, "refused", "battery"),
+        (10020, "refused", "hardware problem"),
+        (7, "refused", "wrong parameter (7)"),
+        (15, "refused", "parameter out of range (15)"),
+        (4242, "refused", "4242"),
+    ] {
+        let (found, text) = kind(number);
+        assert_eq!(found, wanted, "{number}: {text}");
+        assert!(text.contains(part) && text.contains(&number.to_string()), "{number}: {text}");
     }
 }
 

@@ -12,7 +12,7 @@ use crate::link::simulator::bench::fuzz::{
     assert_same_at_every_cut, assert_same_in_pieces, fuzz_protocol, fuzz_simulator,
 };
 use crate::link::simulator::emscon::{EmsconFault, EmsconSimulator};
-use crate::link::simulator::occasion::Planned;
+use crate::link::simulator::fault::Planned;
 
 /// A link that has started, and the bytes that bring it to ready.
 fn starting() -> (Emscon, Vec<u8>) {

@@ -1,0 +1,278 @@
+//! Addresses of instruments and robots on a wire, as text:
+//!
+//! ```text
+//! emscon:192.168.0.2              protocol and host; the port is the protocol's own
+//! emscon:tcp:192.168.0.2:700      the same in full
+//! geocom:serial:/dev/ttyUSB0:9600 serial port and speed
+//! ascii:listen:0.0.0.0:5000       whoever connects here
+//! ascii:udp:0.0.0.0:5000          datagrams that arrive here
+//! rtde:192.168.1.10               a robot
+//! ```
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::diagnostic::printable;
+
+/// What is spoken on a wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum WireProtocol {
+    /// Leica emScon, binary.
+    Emscon,
+    /// Lines of text with coordinates.
+    Ascii,
+    /// Leica GeoCOM.
+    Geocom,
+    /// NDI combined API.
+    Ndi,
+    /// Universal Robots RTDE: joint angles of the robot.
+    Rtde,
+}
+
+impl WireProtocol {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Emscon, Self::Ascii, Self::Geocom, Self::Ndi, Self::Rtde];
+
+    /// In addresses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Emscon => "emscon",
+            Self::Ascii => "ascii",
+            Self::Geocom => "geocom",
+            Self::Ndi => "ndi",
+            Self::Rtde => "rtde",
+        }
+    }
+
+    /// TCP port where the other end usually listens.
+    pub const fn usual_port(self) -> Option<u16> {
+        match self {
+            Self::Emscon => Some(700),
+            Self::Ndi => Some(8765),
+            Self::Rtde => Some(30004),
+            Self::Ascii | Self::Geocom => None,
+        }
+    }
+
+    /// Usual speed of a serial line (baud).
+    const fn usual_speed(self) -> Option<u32> {
+        match self {
+            Self::Ascii | Self::Geocom | Self::Ndi => Some(9600),
+            Self::Emscon | Self::Rtde => None,
+        }
+    }
+
+    /// Whether it tells where a robot stands, not where a reflector is.
+    pub const fn is_robot(self) -> bool {
+        matches!(self, Self::Rtde)
+    }
+}
+
+impl fmt::Display for WireProtocol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for WireProtocol {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|one| one.name() == text).ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|one| one.name()).collect();
+            format!("'{}' is no protocol; there are {}", printable(text), names.join(", "))
+        })
+    }
+}
+
+/// How the other end is reached.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Route {
+    /// A serial port, 8 data bits, no parity, one stop bit.
+    Serial {
+        /// Path of the device.
+        device: String,
+        /// Speed (baud).
+        speed: u32,
+    },
+    /// It listens, this program connects.
+    Tcp {
+        /// Host name or address.
+        host: String,
+        /// Port.
+        port: u16,
+    },
+    /// This program listens for one connection.
+    Listen {
+        /// Address of this machine.
+        host: String,
+        /// Port.
+        port: u16,
+    },
+    /// Datagrams arrive here.
+    Udp {
+        /// Address of this machine.
+        host: String,
+        /// Port.
+        port: u16,
+    },
+}
+
+/// An address.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WireAddress {
+    /// What is spoken.
+    pub protocol: WireProtocol,
+    /// How it is reached.
+    pub route: Route,
+}
+
+impl fmt::Display for WireAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.route {
+            Route::Serial { device, speed } => write!(f, "{}:serial:{device}:{speed}", self.protocol),
+            Route::Tcp { host, port } => write!(f, "{}:tcp:{host}:{port}", self.protocol),
+            Route::Listen { host, port } => write!(f, "{}:listen:{host}:{port}", self.protocol),
+            Route::Udp { host, port } => write!(f, "{}:udp:{host}:{port}", self.protocol),
+        }
+    }
+}
+
+impl FromStr for WireAddress {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let (protocol, rest) = text
+            .split_once(':')
+            .ok_or_else(|| format!("'{}' is no address; it reads like 'emscon:192.168.0.2'", printable(text)))?;
+        let protocol: WireProtocol = protocol.parse()?;
+        let route = match rest.split_once(':') {
+            Some(("serial", device)) => serial(protocol, device)?,
+            Some(("tcp", place)) => {
+                let (host, port) = place_of(protocol, place)?;
+                Route::Tcp { host, port }
+            }
+            Some(("listen", place)) => {
+                let (host, port) = place_of(protocol, place)?;
+                Route::Listen { host, port }
+            }
+            Some(("udp", place)) => {
+                let (host, port) = place_of(protocol, place)?;
+                Route::Udp { host, port }
+            }
+            _ => {
+                let (host, port) = place_of(protocol, rest)?;
+                Route::Tcp { host, port }
+            }
+        };
+        match (&route, protocol) {
+            (Route::Udp { .. }, WireProtocol::Ascii) => {}
+            (Route::Udp { .. }, _) => return Err(format!("{protocol} is not spoken over UDP; use tcp")),
+            (Route::Serial { .. }, WireProtocol::Emscon | WireProtocol::Rtde) => {
+                return Err(format!("{protocol} is not spoken on serial lines; use tcp"));
+            }
+            _ => {}
+        }
+        Ok(Self { protocol, route })
+    }
+}
+
+fn serial(protocol: WireProtocol, text: &str) -> Result<Route, String> {
+    // A device may have colons in its name, its speed is a number.
+    let (device, speed) = match text.rsplit_once(':').and_then(|(device, speed)| Some((device, speed.parse().ok()?))) {
+        Some((device, speed)) => (device, speed),
+        None => (text, protocol.usual_speed().unwrap_or(9600)),
+    };
+    if device.is_empty() {
+        return Err("the serial port is missing, such as '/dev/ttyUSB0'".to_owned());
+    }
+    if !(110..=12_000_000).contains(&speed) {
+        return Err(format!("a serial line does not run at {speed} baud"));
+    }
+    Ok(Route::Serial { device: device.to_owned(), speed })
+}
+
+/// Host and port; IPv6 hosts stand in square brackets.
+fn place_of(protocol: WireProtocol, text: &str) -> Result<(String, u16), String> {
+    let (host, port) = match text.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+        Some((host, rest)) => (host, rest.strip_prefix(':')),
+        None => match text.rsplit_once(':') {
+            Some((host, port)) => (host, Some(port)),
+            None => (text, None),
+        },
+    };
+    if host.is_empty() || host.contains(char::is_whitespace) {
+        return Err(format!("'{}' names no host", printable(text)));
+    }
+    let port = match port {
+        Some(port) => {
+            port.parse().ok().ok_or_else(|| format!("'{}' is no port; ports are 1 to 65535", printable(port)))?
+        }
+        None => protocol.usual_port().ok_or_else(|| {
+            format!("the port is missing, as in '{protocol}:tcp:{host}:5000': {protocol} has no usual one")
+        })?,
+    };
+    Ok((host.to_owned(), port))
+}
+
+/// How the instrument of a cell is reached, as its profile says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LinkSettings {
+    /// The instrument.
+    pub address: WireAddress,
+    /// Options of its protocol: the name of a preset, or a RON struct of what differs from the usual. Checked where it connects.
+    pub options: Option<String>,
+    /// The robot's controller, if it tells its joint angles.
+    pub robot: Option<WireAddress>,
+    /// Measures by itself when the SMR rests near the predicted place.
+    pub is_automatic: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn full(text: &str) -> Result<String, String> {
+        text.parse::<WireAddress>().map(|address| address.to_string())
+    }
+
+    #[test]
+    fn addresses_are_read_as_people_write_them_and_written_in_full() {
+        for (text, wanted) in [
+            ("emscon:192.168.0.2", "emscon:tcp:192.168.0.2:700"),
+            ("emscon:tcp:tracker.local:701", "emscon:tcp:tracker.local:701"),
+            ("ndi:192.168.0.9", "ndi:tcp:192.168.0.9:8765"),
+            ("rtde:10.0.0.1", "rtde:tcp:10.0.0.1:30004"),
+            ("geocom:serial:/dev/ttyUSB0", "geocom:serial:/dev/ttyUSB0:9600"),
+            ("ascii:serial:/dev/serial/by-id/usb-a:b:115200", "ascii:serial:/dev/serial/by-id/usb-a:b:115200"),
+            ("ascii:listen:0.0.0.0:5000", "ascii:listen:0.0.0.0:5000"),
+            ("ascii:udp:127.0.0.1:5000", "ascii:udp:127.0.0.1:5000"),
+            ("geocom:host:1212", "geocom:tcp:host:1212"),
+        ] {
+            assert_eq!(full(text).as_deref(), Ok(wanted), "{text}");
+            assert_eq!(full(wanted).as_deref(), Ok(wanted), "{wanted}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_address_is_refused_with_a_reason() {
+        for (text, part) in [
+            ("", "is no address"),
+            ("192.168.0.2", "is no address"),
+            ("leica:192.168.0.2", "is no protocol"),
+            ("emscon:serial:/dev/ttyUSB0", "not spoken on serial lines"),
+            ("emscon:udp:0.0.0.0:1", "not spoken over UDP"),
+            ("geocom:host", "the port is missing"),
+            ("emscon:host:70000", "ports are 1 to 65535"),
+            ("emscon:tcp::700", "names no host"),
+            ("geocom:serial:", "the serial port is missing"),
+            ("geocom:serial:/dev/ttyS0:7", "does not run at 7 baud"),
+        ] {
+            let error = full(text).unwrap_err();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! Instruments on a wire, through the program itself: rehearsals over every wire, `simulate` against `link test`, a flood.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a failure of a test is a panic; deadlines need a clock; test files need no atomic writes"
+)]
+#![cfg(target_os = "linux")]
+
+#[path = "support/pty.rs"]
+#[expect(dead_code, reason = "some of it is for the tests of the terminal")]
+mod pty;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use pty::{ENTER, Terminal};
+use tempfile::TempDir;
+use trupose::session::calibration::Calibration;
+use trupose::session::journal::Entry;
+use trupose::store::session::read_journal;
+
+fn trupose(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_trupose")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A folder with a plan of 18 poses.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("plan.csv"), include_str!("sessions/plan.csv")).unwrap();
+    folder
+}
+
+/// Runs a script whose instrument is the one given, up to the plan and on with `steps`.
+fn run(folder: &Path, instrument: &str, steps: &str, more: &[&str]) -> Output {
+    let script = format!(
+        r#"(title: "test", clock: Some("2026-01-05T08:00:00Z"), steps: [
+            Do(ChooseProfile("soochow")), Do(NameSession("s")), Do(Next),
+            Do(ChooseInstrument({instrument})), Expect("instrument.identity", Exists), Do(Next),
+            Do(ChooseTarget(Profile)), Do(Next), Do(LoadPlan("plan.csv")), Do(AcceptPlan), {steps}
+        ])"#
+    );
+    fs::write(folder.join("test.script.ron"), script).unwrap();
+    trupose(folder, &[&["--script", "test.script.ron", "--no-recording"], more].concat())
+}
+
+/// What a rehearsal ends with.
+struct Ended {
+    /// Measured points (mm).
+    points: Vec<[f64; 3]>,
+    calibration: Calibration,
+    transcript: String,
+    /// 0 or, for so few poses, 1: not accepted.
+    code: Option<i32>,
+}
+
+/// The whole calibration on the simulated cell, over these wires.
+fn rehearsed(wires: &str) -> Ended {
+    let folder = folder();
+    let instrument = format!("Simulated((seed: 1, truth: Paper, wires: [{wires}]))");
+    let steps = "CaptureAll(Fail), Do(Next), Do(Identify), Do(Next), Do(Next), Do(Deliver)";
+    let output = run(folder.path(), &instrument, steps, &[]);
+    assert_eq!(text(&output.stderr), "", "{wires}: {}", text(&output.stdout));
+    let session = folder.path().join("sessions/s");
+    let table = fs::read_to_string(session.join("measurements.csv")).unwrap();
+    let point = |line: &str| -> [f64; 3] {
+        let fields: Vec<&str> = line.split(',').collect();
+        [7, 8, 9].map(|field| fields[field].parse().unwrap())
+    };
+    assert!(table.starts_with("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm"), "{table}");
+    Ended {
+        points: table.lines().skip(1).map(point).collect(),
+        calibration: Calibration::parse(&fs::read_to_string(session.join("calibration.ron")).unwrap()).unwrap(),
+        transcript: text(&output.stdout),
+        code: output.status.code(),
+    }
+}
+
+/// Largest difference of the deviations in a unit.
+fn difference(one: &Calibration, other: &Calibration, unit: &str) -> f64 {
+    let pairs = one.parameters.iter().zip(&other.parameters);
+    let of_unit = pairs.filter(|(one, _)| one.unit == unit);
+    of_unit.map(|(one, other)| (one.deviation - other.deviation).abs()).fold(0.0, f64::max)
+}
+
+/// Over a wire that tells the standard deviations of its points, the same calibration comes out to the last digit that the wire
+/// carries. Others leave it to the profile's instrument; so the prior weighs a little differently.
+#[test]
+fn a_rehearsal_over_every_wire_ends_with_the_calibration_of_one_in_process() {
+    let wires = [
+        ("Tcp(Emscon)", 1e-9),
+        ("Tcp(Ascii)", 1e-3),
+        ("Tcp(Geocom)", 0.05),
+        ("Tcp(Ndi)", 0.05),
+        ("Tcp(Emscon), Tcp(Rtde)", 1e-9),
+        ("Serial(Ascii)", 1e-3),
+        ("Serial(Geocom)", 0.05),
+        ("Serial(Ndi)", 0.05),
+    ];
+    thread::scope(|scope| {
+        let in_process = scope.spawn(|| rehearsed(""));
+        let over = wires.map(|(wires, tolerance)| (wires, tolerance, scope.spawn(move || rehearsed(wires))));
+        let in_process = in_process.join().unwrap();
+        assert!(in_process.points.len() >= 18);
+        for (wires, tolerance, run) in over {
+            let found = run.join().unwrap();
+            assert_eq!(found.points.len(), in_process.points.len(), "{wires}");
+            let pairs = found.points.iter().zip(&in_process.points);
+            let off = pairs.flat_map(|(one, other)| [0, 1, 2].map(|axis| (one[axis] - other[axis]).abs()));
+            let off = off.fold(0.0, f64::max);
+            // NDI tells single precision; the shots of every other wire are exact to 0.1 um.
+            assert!(off <= if wires.contains("Ndi") { 3e-4 } else { 1e-4 }, "{wires}: points are off by {off} mm");
+            assert_eq!(found.calibration.rank, in_process.calibration.rank, "{wires}");
+            assert_eq!(found.calibration.verdict.status, in_process.calibration.verdict.status, "{wires}");
+            for unit in ["mm", "deg"] {
+                let difference = difference(&found.calibration, &in_process.calibration, unit);
+                assert!(difference <= tolerance, "{wires}: {difference} {unit}");
+            }
+            assert_eq!(found.code, in_process.code, "{wires}");
+            assert!(found.transcript.contains("simulated cell, seed 1, over "), "{wires}: {}", found.transcript);
+        }
+    });
+}
+
+/// `trupose simulate`, until this is dropped.
+struct Simulator {
+    child: Child,
+    address: String,
+    options: Option<String>,
+    robot: Option<String>,
+}
+
+impl Simulator {
+    fn start(arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
+        command.arg("simulate").args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut child = command.spawn().unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(Result::unwrap);
+        let told = |line: String, what: &str| line.strip_prefix(what).map(str::to_owned);
+        let address = told(lines.next().unwrap(), "listening: ").unwrap();
+        let options = address.starts_with("ascii").then(|| told(lines.next().unwrap(), "options: ").unwrap());
+        let mut robot = None;
+        if arguments.contains(&"--robot") {
+            while robot.is_none() {
+                robot = told(lines.next().unwrap(), "robot: ");
+            }
+        }
+        Self { child, address, options, robot }
+    }
+
+    /// `trupose link test` against it: exit code, output, errors.
+    fn tested(&self, more: &[&str]) -> (Option<i32>, String, String) {
+        let mut arguments = vec!["link", "test", self.address.as_str()];
+        if let Some(options) = &self.options {
+            arguments.extend(["--options", options.as_str()]);
+        }
+        if let Some(robot) = &self.robot {
+            arguments.extend(["--robot", robot.as_str()]);
+        }
+        arguments.extend(more);
+        let output = trupose(Path::new("."), &arguments);
+        (output.status.code(), text(&output.stdout), text(&output.stderr))
+    }
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
+
+const LISTEN: [&str; 2] = ["--listen", "127.0.0.1:0"];
+
+#[test]
+fn every_simulated_instrument_passes_the_test_of_its_link() {
+    for (protocol, listen, said) in [
+        ("emscon", &LISTEN[..], "units: mm, rad"),
+        ("ascii", &LISTEN, "unit: mm (as set)"),
+        ("geocom", &LISTEN, "prism constant"),
+        ("ndi", &LISTEN, "tool: 0A"),
+        ("ascii", &["--pty"], "unit: mm (as set)"),
+        ("geocom", &["--pty"], "prism constant"),
+        ("ndi", &["--pty"], "tool: 0A"),
+    ] {
+        let simulator = Simulator::start(&[&[protocol], listen].concat());
+        let (code, output, errors) = simulator.tested(&["--shots", "2", "--seconds", "0.3"]);
+        assert_eq!((code, errors.as_str()), (Some(0), ""), "{protocol}: {output}");
+        for part in ["connected: ", said, "shot 2: x -", "scatter of 2 shots", "the link works"] {
+            assert!(output.contains(part), "{protocol}: '{part}' is missing: {output}");
+        }
+    }
+}
+
+#[test]
+fn a_robot_is_tested_with_its_instrument_and_alone() {
+    let simulator = Simulator::start(&["emscon", "--listen", "127.0.0.1:0", "--robot", "127.0.0.1:0"]);
+    let (code, output, errors) = simulator.tested(&["--shots", "1", "--seconds", "1.5"]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{output}");
+    assert!(output.contains("robot at rest at 0.000 15.000 -5.000"), "{output}");
+    let alone = trupose(Path::new("."), &["link", "test", simulator.robot.as_deref().unwrap(), "--seconds", "1.5"]);
+    let output = text(&alone.stdout);
+    assert!(alone.status.success(), "{output}{}", text(&alone.stderr));
+    assert!(output.contains("robot at rest at 0.000 15.000 -5.000") && output.contains("sign by sign"), "{output}");
+}
+
+#[test]
+fn the_test_of_a_link_says_what_is_wrong_and_what_to_do() {
+    for (protocol, fault, said, hint) in [
+        ("emscon", "metres@1x*", "the instrument is set differently: units", "connect again"),
+        ("emscon", "in-use@1x*", "in use by another program", "close the other program"),
+        ("emscon", "lost-beam@1x*", "sees no reflector", "return the SMR to the nest"),
+        ("emscon", "scaled@1x*", "but not as it should", "mend what the warnings say"),
+        ("geocom", "no-target@1x*", "sees no reflector", "return the SMR to the nest"),
+        ("ascii", "wrong-unit@1x*", "farther than the 80.0 m set as the range", "settings of the instrument"),
+        ("ndi", "missing@1x*", "sees no reflector", "return the SMR to the nest"),
+    ] {
+        let simulator = Simulator::start(&[protocol, "--listen", "127.0.0.1:0", "--fault", fault]);
+        let (code, output, errors) = simulator.tested(&["--shots", "1", "--seconds", "0"]);
+        assert_eq!(code, Some(3), "{protocol} {fault}: {output}{errors}");
+        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        for part in [said, hint] {
+            assert!(words(&errors).contains(part), "{protocol} {fault}: '{part}' is missing: {errors}");
+        }
+    }
+    let refused = trupose(Path::new("."), &["simulate", "ndi", "--listen", "127.0.0.1:0", "--fault", "earthquake"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("there is no fault 'earthquake'"), "{}", text(&refused.stderr));
+}
+
+#[test]
+fn the_wizard_measures_at_an_instrument_on_a_wire_and_logs_every_byte() {
+    let simulator = Simulator::start(&["emscon", "--listen", "127.0.0.1:0", "--plan", "tests/sessions/plan.csv"]);
+    let folder = folder();
+    let instrument = format!("Linked((address: \"{}\", options: Some(\"(measure_ms: 50)\")))", simulator.address);
+    let output = run(folder.path(), &instrument, "Capture(1, Fail)", &["--raw-log", "raw.log"]);
+    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    let log = fs::read_to_string(folder.path().join("raw.log")).unwrap();
+    // StartMeasurement as the tracker gets it, and its acceptance.
+    assert!(
+        log.lines().any(|line| line.contains(" emscon out ") && line.contains("0c0000000000000031000000")),
+        "{log}"
+    );
+    assert!(log.lines().any(|line| line.contains(" emscon in ") && line.contains("3100000000000000")), "{log}");
+}
+
+#[test]
+fn what_the_profile_says_about_the_link_is_proposed_and_stays_in_the_session() {
+    let folder = folder();
+    let profile = include_str!("../profiles/soochow.ron");
+    let (head, _) = profile.trim_end().rsplit_once(')').unwrap();
+    let link = "link: (address: \"emscon:192.168.0.2\", robot: \"rtde:192.168.0.10\", automatic: true),";
+    fs::write(folder.path().join("cell.ron"), format!("{head}{link}\n)\n")).unwrap();
+    let proposed = "Expect(\"instrument.link.address\", Is(\"emscon:tcp:192.168.0.2:700\")),
+        Expect(\"instrument.link.robot\", Is(\"rtde:tcp:192.168.0.10:30004\"))";
+    let begin = format!("Do(ChooseProfile(\"cell.ron\")), Do(NameSession(\"s\")), Do(Next), {proposed}");
+    for (arguments, steps) in [(vec![], begin.as_str()), (vec!["resume", "sessions/s"], proposed)] {
+        fs::write(folder.path().join("test.script.ron"), format!("(title: \"test\", steps: [{steps}])")).unwrap();
+        let output =
+            trupose(folder.path(), &[&arguments[..], &["--script", "test.script.ron", "--no-recording"]].concat());
+        assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    }
+}
+
+/// A source that prints so many lines a second to everybody, for ever.
+fn flood(lines_per_second: u32) -> u16 {
+    const TURNS: u32 = 100;
+    fn print(mut stream: TcpStream, lines: u32) {
+        let mut number = 0_u32;
+        let start = Instant::now();
+        for turn in 1_u32.. {
+            let mut text = String::new();
+            for _ in 0..lines {
+                number += 1;
+                writeln!(text, "{:.4},-678.25,90.125", 1000.0 + 1e-6 * f64::from(number)).unwrap();
+            }
+            if stream.write_all(text.as_bytes()).is_err() {
+                return;
+            }
+            thread::park_timeout((Duration::from_secs(1) / TURNS * turn).saturating_sub(start.elapsed()));
+        }
+    }
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    thread::spawn(move || {
+        for stream in listener.incoming().map_while(Result::ok) {
+            thread::spawn(move || print(stream, lines_per_second / TURNS));
+        }
+    });
+    port
+}
+
+/// From the key to the frame that shows it, in a real terminal, while ten thousand lines a second arrive.
+#[test]
+fn ten_thousand_lines_a_second_leave_the_wizard_responsive() {
+    const KEYS: usize = 15;
+    const HELP: &str = "any key back";
+    let folder = folder();
+    let instrument = format!("Linked((address: \"ascii:tcp:127.0.0.1:{}\"))", flood(10_000));
+    let output = run(folder.path(), &instrument, "Capture(1, Fail)", &[]);
+    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    let mut terminal = Terminal::start(folder.path(), &["resume", "sessions/s"], (80, 24));
+    terminal.wait_for_step(5);
+    // The link is up again, and measures what comes after the key.
+    terminal.send_until(ENTER, "a sample", |shown| shown.samples() >= 2);
+    let mut times: Vec<Duration> = (0..KEYS)
+        .map(|_| {
+            let start = Instant::now();
+            terminal.send("?");
+            terminal.wait_for("the help", |shown| shown.has(HELP));
+            let time = start.elapsed();
+            terminal.send("?");
+            terminal.wait_for("the end of the help", |shown| !shown.has(HELP));
+            time
+        })
+        .collect();
+    times.sort();
+    println!("key to frame: median {:?}, largest {:?}", times[KEYS / 2], times[KEYS - 1]);
+    assert!(times[KEYS / 2] <= Duration::from_millis(50), "{times:?}");
+    drop(terminal);
+    let journal = read_journal(&folder.path().join("sessions/s")).unwrap();
+    let samples = journal.lines.iter().filter_map(|line| match &line.entry {
+        Entry::Sample(noted) => Some(noted),
+        _ => None,
+    });
+    assert!(samples.clone().count() >= 2);
+    for noted in samples {
+        let (x, y, z) = noted.xyz_mm;
+        assert!((1000.0..1100.0).contains(&x) && (y + 678.25).abs() < 1e-9 && (z - 90.125).abs() < 1e-9, "{noted:?}");
+    }
+}
