@@ -160,8 +160,8 @@ pub(super) fn merge(folder: &Path) -> Result<Option<PathBuf>, RecordingError> {
         return Ok(whole.exists().then_some(whole));
     }
     let all = files(folder);
-    let messages: Vec<_> = compact::messages(all.iter().map(PathBuf::as_path))?.collect();
-    compact::store(messages.into_iter(), &whole)?;
+    let messages = compact::messages(all.iter().map(PathBuf::as_path))?;
+    compact::write(messages.into_iter(), &whole)?;
     for (_, part) in parts {
         fs::remove_file(&part).map_err(|source| RecordingError::file("cannot remove", &part, source))?;
     }
@@ -203,5 +203,5 @@ fn write_for(path: &Path, lines: &[Line], purpose: Purpose) -> Result<(), Record
         scribe.take(line);
     }
     scribe.stream().flush_blocking().map_err(|error| RecordingError::library("drawing the recording", error))?;
-    compact::store(storage.take().into_iter(), path)
+    compact::write(storage.take().into_iter(), path)
 }
