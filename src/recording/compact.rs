@@ -13,13 +13,20 @@ use super::{RecordingError, read};
 use crate::session::journal::Entry;
 use crate::store;
 
-/// Writes messages as one compact file at `path`, which is replaced only when all is on disk.
-pub(super) fn write(messages: impl Iterator<Item = LogMsg>, path: &Path) -> Result<(), RecordingError> {
+/// Writes messages as one compact file at `path`, which is replaced only when all is on disk. Of several layouts the last stays.
+pub(super) fn write(messages: &[LogMsg], path: &Path) -> Result<(), RecordingError> {
     let failed = |error: &dyn std::fmt::Display| RecordingError::library("compacting the recording", error);
     let mut encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, Vec::new())
         .map_err(|error| failed(&error))?;
+    let layout = messages.iter().rev().find_map(|message| match message {
+        LogMsg::BlueprintActivationCommand(command) => Some(&command.blueprint_id),
+        _ => None,
+    });
     for message in messages {
-        encoder.append(&message).map_err(|error| failed(&error))?;
+        let store = message.store_id();
+        if store.is_recording() || Some(store) == layout {
+            encoder.append(message).map_err(|error| failed(&error))?;
+        }
     }
     encoder.finish().map_err(|error| failed(&error))?;
     let whole = encoder.into_inner().map_err(|error| failed(&error))?;
@@ -68,7 +75,7 @@ pub fn compact_file(path: &Path) -> Result<(), RecordingError> {
     // Says what is wrong with a file that is none.
     read(path)?;
     let all = messages(std::iter::once(path))?;
-    write(all.into_iter(), path)
+    write(&all, path)
 }
 
 /// What was found in a recording.
