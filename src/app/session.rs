@@ -7,7 +7,7 @@ use super::script::session_failure;
 use super::{Console, to_json};
 use crate::cli::SessionCommand;
 use crate::error::{ExitStatus, Failure};
-use crate::procedure::deliver;
+use crate::procedure::{deliver, models};
 use crate::session::export;
 use crate::session::journal::{Journal, instrument_text, target_text};
 use crate::session::plan::PoseKind;
@@ -162,7 +162,8 @@ fn report<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let (_, session) = load(folder)?;
     let internal = |message: String| Failure::new(ExitStatus::Internal, message);
-    let files = deliver::data_files(&session).map_err(internal)?;
+    let mut files = deliver::data_files(&session).map_err(internal)?;
+    files.extend(models::delivered(&session));
     let failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
     for (name, text) in deliver::reports(&session, &files).map_err(internal)? {
         let place = folder.join(&name);
