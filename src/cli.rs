@@ -170,6 +170,9 @@ pub enum SessionCommand {
         /// Name of the HTML file; the JSON file lies beside it [default: report.html in the session's folder]
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
+        /// Print the report as plain text and write no file
+        #[arg(long, conflicts_with = "out")]
+        text: bool,
     },
     /// Write the tables of a session
     Export {
