@@ -168,7 +168,7 @@ fn run(document: &Path) -> (Vec<String>, usize) {
         let mut arguments = shown.words[1..].to_vec();
         // The same command in less time.
         let quicker = match &cli.command {
-            Some(Told::Plan(_)) => &["--candidates", "300"][..],
+            Some(Told::Plan(_)) => &["--candidates", "200", "--time-limit", "5"][..],
             Some(Told::Demo(_)) => &["--set", "candidates=200", "--set", "poses=20", "--set", "verification=10"],
             _ => &[],
         };
