@@ -3,7 +3,11 @@
 //! `soochow-example` is made here from the method paper's tables. To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test example`.
 //! `example` is a finished session; the head of `sessions/example.script.ron` has the command that makes it.
 
-#![expect(clippy::disallowed_methods, reason = "a failure of a test is a panic; test files need no atomic writes")]
+#![expect(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "a failure of a test is a panic; test files need no atomic writes"
+)]
 
 mod support;
 
@@ -110,7 +114,10 @@ fn compare(made: &Value, committed: &Value, place: &str) {
         }
         (Value::Number(made), Value::Number(committed)) => {
             let (made, committed) = (made.as_f64().unwrap(), committed.as_f64().unwrap());
-            assert!((made - committed).abs() <= 1e-6 * committed.abs().max(1.0), "{place}: {made} instead of {committed}");
+            assert!(
+                (made - committed).abs() <= 1e-6 * committed.abs().max(1.0),
+                "{place}: {made} instead of {committed}"
+            );
         }
         _ => assert_eq!(made, committed, "{place}"),
     }

@@ -141,7 +141,7 @@ fn a_factory_calibrated_ur_comes_out_sane() {
     assert!((links[1].a + 0.42531).abs() < 2e-4 && (links[2].a + 0.39206).abs() < 1e-3, "{}", table(&arm.chain));
     assert!((links[4].d - 0.09472).abs() < 2e-4 && links[1].theta.abs() < 1e-3, "{}", table(&arm.chain));
     let speed = arm.ranges[0].max_speed.unwrap();
-    assert!((to_deg(speed) - 180.0).abs() < 1e-9 && arm.ranges[2].limits.unwrap().0 < -3.14);
+    assert!((to_deg(speed) - 180.0).abs() < 1e-9 && arm.ranges[2].limits.unwrap().0 < -3.1);
 }
 
 #[test]

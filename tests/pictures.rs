@@ -64,7 +64,7 @@ fn place(document: &str, name: &str) -> (usize, usize) {
 
 /// The screen as it stands in the document.
 fn drawn(shown: &Shown) -> String {
-    shown.text().lines().map(|line| format!("{}\n", line.trim_end())).collect()
+    shown.text().lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
 /// A folder with the session as it was after some entries, and the program there.

@@ -2,6 +2,7 @@
 //! session has one, however little is in it.
 
 #![expect(
+    clippy::panic,
     clippy::unwrap_used,
     clippy::disallowed_methods,
     clippy::indexing_slicing,
