@@ -18,6 +18,8 @@ use crate::store;
 
 /// How often it is looked whether the robot goes on.
 const LOOK: Duration = Duration::from_millis(50);
+/// The robot goes on when no shot came for so many looks: whoever measures looks at its joints once more after the last one.
+const PAUSE: u32 = 20;
 
 /// What may happen.
 enum Order {
@@ -80,6 +82,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     signals::each(move |_signal| drop(signalled.send(Order::End)))
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     read_lines(sender)?;
+    let (mut seen, mut quiet) = (0, 0);
     loop {
         match orders.recv_timeout(LOOK) {
             Ok(Order::End) | Err(RecvTimeoutError::Disconnected) => break,
@@ -88,8 +91,12 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
                 None => break,
             },
             Err(RecvTimeoutError::Timeout) => {
-                let is_done = args.shots > 0 && served.taken() >= args.shots && route.at + 1 < route.poses.len();
+                let taken = served.taken();
+                quiet = if taken == seen && taken >= args.shots { quiet + 1 } else { 0 };
+                seen = taken;
+                let is_done = args.shots > 0 && quiet >= PAUSE && route.at + 1 < route.poses.len();
                 if is_done && let Some(said) = obey("next", &mut route, &mut served) {
+                    quiet = 0;
                     console.remark(&said);
                 }
             }

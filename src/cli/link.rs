@@ -64,7 +64,7 @@ pub struct SimulateArgs {
     /// Poses that the robot visits; without a plan it stands in the middle of its joint ranges
     #[arg(long, value_name = "CSV")]
     pub plan: Option<PathBuf>,
-    /// Go on to the next pose after so many shots; 0: only when told
+    /// Go on to the next pose after so many shots and a second without another; 0: only when told
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub shots: usize,
 }

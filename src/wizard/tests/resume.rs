@@ -78,7 +78,7 @@ fn every_prefix_can_be_brought_to_the_end() {
                 bench.pass(&simulated());
             }
         }
-        assert_eq!(bench.wizard.session().delivered.len(), 5, "{kept} lines");
+        assert_eq!(bench.wizard.session().delivered.len(), 9, "{kept} lines");
         assert_eq!(*bench.wizard.session(), fold(&bench.journal), "{kept} lines");
         bench.does(Intent::Quit);
         assert_eq!(bench.exits, 1);

@@ -45,14 +45,17 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
 }
 
 fn lines(live: &LiveView, content: &CaptureView) -> Vec<(String, Role)> {
-    let mut lines = Vec::new();
     if let Some(down) = &live.down {
-        lines.push((format!("The link is down: {down}"), Role::Warn));
+        // What was seen before would be taken for what is.
+        return vec![
+            (format!("The link is down: {down}"), Role::Warn),
+            ("It is tried again by itself. Nothing is measured meanwhile.".to_owned(), Role::Plain),
+        ];
     }
-    lines.push(match live.point_mm {
+    let mut lines = vec![match live.point_mm {
         Some([x, y, z]) => (format!("SMR at x {x:.3}  y {y:.3}  z {z:.3} mm"), Role::Title),
         None => ("No SMR is seen.".to_owned(), Role::Warn),
-    });
+    }];
     lines.extend(values::live(live).map(|text| (text, Role::Plain)));
     if let (Some((joint, difference)), Some(pose)) = (live.joint_difference, &content.pose) {
         let name = content.joints.get(joint).map_or_else(|| (joint + 1).to_string(), |joint| joint.name.clone());
