@@ -24,7 +24,7 @@ use clap::Parser as _;
 use trupose::cli::{Cli, Command as Told};
 
 /// Other programs that the documents show; none of them is run.
-const OTHERS: [&str; 8] = ["cargo", "pip", "rerun", "ssh", "apt-get", "XDG_RUNTIME_DIR=$(mktemp", "sha256sum", "man"];
+const OTHERS: [&str; 7] = ["cargo", "pip", "rerun", "ssh", "apt-get", "mkdir", "XDG_RUNTIME_DIR=$(mktemp"];
 
 /// Languages of blocks.
 const LANGUAGES: [&str; 4] = ["sh", "text", "ron", ""];
@@ -139,6 +139,10 @@ fn furnish(folder: &Path) {
     put("sessions/example/calibration.ron", "calibration.ron");
     put("sessions/soochow-example/verification.csv", "later.csv");
     put("tests/urdf/ur5.urdf", "arm.urdf");
+    // A session as it was earlier.
+    let journal = fs::read_to_string(root().join("sessions/example/journal.ron")).unwrap();
+    fs::create_dir(folder.join("then")).unwrap();
+    fs::write(folder.join("then/journal.ron"), journal.split_inclusive('\n').take(40).collect::<String>()).unwrap();
     let targets = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\npick,10,20,-30,40,50,60\nplace,-40,10,5,30,-60,0\n";
     fs::write(folder.join("targets.csv"), targets).unwrap();
     let program =
