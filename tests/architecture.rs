@@ -21,7 +21,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("link", &["units", "geometry", "kinematics", "profile", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "kinematics", "profile", "session"]),
-    ("recording", &["units", "geometry", "kinematics", "profile", "session"]),
+    ("recording", &["units", "geometry", "kinematics", "profile", "session", "store"]),
     ("error", &["session"]),
     (
         "procedure",
