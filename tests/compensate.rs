@@ -369,7 +369,7 @@ fn closed_loop_in_the_cell(robot: &str, truth: Truth) -> [f64; 3] {
     let identified = CalibratedArm::new(&read, &nominal).unwrap();
     let planning: Vec<_> = nominal.joints().iter().map(|range| range.planning_limits).collect();
     let goals = configurations(nominal.chain(), &planning, 400);
-    let header = (1..=6).map(|joint| format!(",q{joint}_deg")).collect::<String>();
+    let header = ["", "q1_deg", "q2_deg", "q3_deg", "q4_deg", "q5_deg", "q6_deg"].join(",");
     let rows = goals.iter().enumerate().map(|(index, q)| {
         let cells: Vec<String> = q.iter().map(|value| to_deg(*value).to_string()).collect();
         format!("{index},{}\n", cells.join(","))
