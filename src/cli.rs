@@ -2,6 +2,7 @@
 
 mod link;
 mod recording;
+mod session;
 mod terminal;
 
 pub mod compensate;
@@ -22,6 +23,7 @@ use crate::units::from_mm;
 use link::wires;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
+pub use session::SessionCommand;
 pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
 
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
@@ -139,50 +141,6 @@ pub struct ReplayArgs {
     /// How to use the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
-}
-
-/// What to do with sessions.
-#[derive(Debug, Subcommand)]
-pub enum SessionCommand {
-    /// List the sessions of a folder
-    List {
-        /// Folder in which they are
-        #[arg(value_name = "DIR", default_value = "sessions")]
-        sessions: PathBuf,
-    },
-    /// Show what a session has: robot, samples, result
-    Show {
-        /// Folder of the session
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// All entries of the journal as well
-        #[arg(long)]
-        journal: bool,
-        /// All entries as one JSON array
-        #[arg(long, conflicts_with = "journal")]
-        json: bool,
-    },
-    /// Write the report of a session anew from its journal: report.html to read and print, report.json for programs
-    Report {
-        /// Folder of the session
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// Name of the HTML file; the JSON file lies beside it [default: report.html in the session's folder]
-        #[arg(long, value_name = "FILE")]
-        out: Option<PathBuf>,
-    },
-    /// Write the tables of a session
-    Export {
-        /// Folder of the session
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// Measurements (and, with '--out', the plan) as CSV
-        #[arg(long, required = true)]
-        csv: bool,
-        /// Folder for the files [default: print the measurements]
-        #[arg(long, value_name = "DIR")]
-        out: Option<PathBuf>,
-    },
 }
 
 /// The commands.

@@ -61,8 +61,8 @@ fn horn_rotation(cross: &Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(vector[0], vector[1], vector[2], vector[3]))
 }
 
-/// How many times longer something of length `largest` (m) is drawn so that it is about `shown` (m) long: 1, 2 or 5 times a
-/// power of ten, not more than that and at least 1.
+/// How many times longer something of length `largest` is drawn so that it is about `shown` long, in the same unit: 1, 2 or 5
+/// times a power of ten, not longer than that unless it is already, and at least 1.
 pub fn enlargement(largest: f64, shown: f64) -> f64 {
     let factor = shown / largest;
     if !factor.is_finite() || factor < 1.0 {
@@ -96,6 +96,15 @@ mod tests {
 
     fn point() -> impl Strategy<Value = Point3<f64>> {
         prop::array::uniform3(-2.0..2.0_f64).prop_map(Point3::from)
+    }
+
+    #[test]
+    fn an_enlargement_is_round_and_never_below_one() {
+        let shown = [(10.0, 500.0), (0.01, 500.0), (3.0, 500.0), (5000.0, 500.0), (0.0, 500.0), (f64::NAN, 0.25)];
+        assert_eq!(
+            shown.map(|(largest, shown)| enlargement(largest, shown)).to_vec(),
+            [50.0, 50_000.0, 100.0, 1.0, 1.0, 1.0]
+        );
     }
 
     proptest! {

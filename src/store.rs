@@ -76,10 +76,9 @@ pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
 pub fn replace_bytes(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let written = || -> io::Result<()> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-        let mut file = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder)?;
+        let mut file = temporary().prefix(TEMPORARY).tempfile_in(folder)?;
         file.write_all(bytes)?;
         file.as_file().sync_all()?;
-        set_readable(file.as_file())?;
         file.persist(path).map_err(|failed| failed.error)?;
         // The rename itself must survive a power cut.
         File::open(folder)?.sync_all()
@@ -87,16 +86,16 @@ pub fn replace_bytes(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     written().map_err(|source| StoreError::Write { path: path.to_owned(), source })
 }
 
-/// Temporary files are private; results are for everybody who may read the folder.
-#[cfg(unix)]
-fn set_readable(file: &File) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt as _;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn set_readable(_file: &File) -> io::Result<()> {
-    Ok(())
+/// Temporary files that will be results: not private as the library's are, but for whom the process allows it.
+pub(crate) fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
+    #[cfg_attr(not(unix), expect(unused_mut, reason = "only Unix has modes"))]
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder
 }
 
 #[cfg(test)]

@@ -337,6 +337,57 @@ fn a_robot_program_is_corrected_in_place() {
     assert_eq!((before.len(), changed), (after.len(), vec![2, 4]));
 }
 
+#[test]
+fn programs_of_every_dialect_get_the_same_corrections() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = "sessions/example/calibration.ron";
+    let mut summaries = Vec::new();
+    // The file that holds the targets, and how many lines name each of them.
+    for (dialect, file, lines_each) in [
+        ("rapid", "calposes.mod", 1),
+        ("krl", "calposes.src", 1),
+        ("fanuc", "CALPOSES.LS", 2),
+        ("urscript", "calposes.script", 1),
+        ("val3", "calposes.dtx", 1),
+        ("ros", "calposes.yaml", 1),
+    ] {
+        let place = folder.path().join(dialect);
+        let plan = ["program", "--profile", "soochow", "--plan", "sessions/example/plan.csv", "--dialect", dialect];
+        let output = trupose(&[&plan[..], &["--out", place.to_str().unwrap()]].concat());
+        assert!(output.status.success(), "{dialect}: {}", String::from_utf8_lossy(&output.stderr));
+        let (before, after) = (place.join(file), place.join("corrected"));
+        let run = |program: &Path, out: &Path| {
+            let output = trupose(&[
+                "compensate",
+                "--calibration",
+                calibration,
+                "--program",
+                program.to_str().unwrap(),
+                "--dialect",
+                dialect,
+                "--out",
+                out.to_str().unwrap(),
+            ]);
+            (output.status.code(), String::from_utf8(output.stderr).unwrap())
+        };
+        let (code, said) = run(&before, &after);
+        // Two wrists are nearly straight: said, but usable.
+        assert_eq!(code, Some(0), "{dialect}: {said}");
+        let summary = said.lines().find(|line| line.contains("joint targets replaced (2 in position only)")).unwrap();
+        let targets: usize = summary.split(' ').next().unwrap().parse().unwrap();
+        summaries.push(summary.split_once("largest corrections").unwrap().1.to_owned());
+        let (old, new) = (fs::read_to_string(before).unwrap(), fs::read_to_string(&after).unwrap());
+        assert_eq!(old.lines().count(), new.lines().count(), "{dialect}");
+        let changed = old.lines().zip(new.lines()).filter(|(old, new)| old != new).count();
+        assert_eq!(changed, lines_each * targets, "{dialect}");
+        // What was written is a program of the same dialect.
+        let (_, again) = run(&after, &place.join("twice"));
+        assert!(again.contains(&format!("of {targets} joint targets replaced")), "{dialect}: {again}");
+    }
+    // Digits differ between the dialects, corrections do not.
+    assert!(summaries.iter().all(|summary| *summary == summaries[0]), "{summaries:#?}");
+}
+
 /// A whole calibration by the wizard on its simulated cell, applied to the arm that hides in that cell. Mean errors of the SMR (m):
 /// commanded naively, of the identified model, commanded with compensation.
 fn closed_loop_in_the_cell(robot: &str, truth: Truth) -> [f64; 3] {
@@ -369,7 +420,7 @@ fn closed_loop_in_the_cell(robot: &str, truth: Truth) -> [f64; 3] {
     let identified = CalibratedArm::new(&read, &nominal).unwrap();
     let planning: Vec<_> = nominal.joints().iter().map(|range| range.planning_limits).collect();
     let goals = configurations(nominal.chain(), &planning, 400);
-    let header = ["", "q1_deg", "q2_deg", "q3_deg", "q4_deg", "q5_deg", "q6_deg"].join(",");
+    let header = ",q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
     let rows = goals.iter().enumerate().map(|(index, q)| {
         let cells: Vec<String> = q.iter().map(|value| to_deg(*value).to_string()).collect();
         format!("{index},{}\n", cells.join(","))

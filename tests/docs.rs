@@ -3,7 +3,8 @@
 //!
 //! In blocks ```` ```sh ```` every line that begins with `trupose` is a command; `\` at its end joins lines. It must end with exit code 0, or with
 //! that of a remark `# exit code N` behind it. `# not run: REASON` behind it, or on the line before, leaves it out; so does a command that needs a
-//! terminal. What is not run must at least be a command line that the program understands. Each document has a folder of its own, its commands run in order.
+//! terminal, an instrument, or somebody who ends it. What is not run must at least be a command line that the program understands. Other programs
+//! that may be shown are in [`OTHERS`]. Each document has a folder of its own, its commands run in order.
 
 #![expect(
     clippy::unwrap_used,
@@ -21,6 +22,12 @@ use std::thread;
 
 use clap::Parser as _;
 use trupose::cli::{Cli, Command as Told};
+
+/// Other programs that the documents show; none of them is run.
+const OTHERS: [&str; 7] = ["cargo", "pip", "rerun", "ssh", "apt-get", "mkdir", "XDG_RUNTIME_DIR=$(mktemp"];
+
+/// Languages of blocks.
+const LANGUAGES: [&str; 4] = ["sh", "text", "ron", ""];
 
 /// A command of a document.
 #[derive(Debug, PartialEq)]
@@ -62,7 +69,8 @@ fn commands(text: &str) -> Vec<Shown> {
     let (mut is_inside, mut before, mut joined) = (false, String::new(), String::new());
     for (index, line) in text.lines().enumerate() {
         let line = line.trim();
-        if line.starts_with("```") {
+        if let Some(language) = line.strip_prefix("```") {
+            assert!(LANGUAGES.contains(&language), "line {}: {line}", index + 1);
             is_inside = !is_inside && line == "```sh";
             before.clear();
             continue;
@@ -83,17 +91,19 @@ fn commands(text: &str) -> Vec<Shown> {
             });
             let is_run = ![remark, &before].iter().any(|remark| remark.contains("# not run:"));
             shown.push(Shown { line: index + 1, words, exit_code, is_run });
+        } else if let Some(program) = whole.split_whitespace().next().filter(|word| !word.starts_with('#')) {
+            assert!(OTHERS.contains(&program), "line {}: what is '{program}'?", index + 1);
         }
         before = whole;
     }
     shown
 }
 
-/// Whether a command needs a terminal, another program or hardware.
+/// Whether a command needs a terminal, another program or hardware; or runs a script of the repository, as `tests/scripts.rs` does.
 fn needs_somebody(cli: &Cli) -> bool {
     match &cli.command {
-        None => cli.script.is_none(),
-        Some(Told::Wizard(_)) => true,
+        None => cli.script.as_ref().is_none_or(|script| root().join(script).exists()),
+        Some(Told::Wizard(_) | Told::Link(_) | Told::Simulate(_)) => true,
         Some(Told::Resume(args)) => args.script.is_none(),
         Some(Told::Replay(args)) => !args.print && !args.csv,
         Some(_) => false,
@@ -129,6 +139,10 @@ fn furnish(folder: &Path) {
     put("sessions/example/calibration.ron", "calibration.ron");
     put("sessions/soochow-example/verification.csv", "later.csv");
     put("tests/urdf/ur5.urdf", "arm.urdf");
+    // A session as it was earlier.
+    let journal = fs::read_to_string(root().join("sessions/example/journal.ron")).unwrap();
+    fs::create_dir(folder.join("then")).unwrap();
+    fs::write(folder.join("then/journal.ron"), journal.split_inclusive('\n').take(40).collect::<String>()).unwrap();
     let targets = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\npick,10,20,-30,40,50,60\nplace,-40,10,5,30,-60,0\n";
     fs::write(folder.join("targets.csv"), targets).unwrap();
     let program =
@@ -156,9 +170,14 @@ fn run(document: &Path) -> (Vec<String>, usize) {
             continue;
         }
         let mut arguments = shown.words[1..].to_vec();
-        if matches!(&cli.command, Some(Told::Plan(_))) && !arguments.iter().any(|word| word == "--candidates") {
-            // The same command in less time.
-            arguments.extend(["--candidates".to_owned(), "300".to_owned()]);
+        // The same command in less time.
+        let quicker = match &cli.command {
+            Some(Told::Plan(_)) => &["--candidates", "200", "--time-limit", "5"][..],
+            Some(Told::Demo(_)) => &["--set", "candidates=200", "--set", "poses=20", "--set", "verification=10"],
+            _ => &[],
+        };
+        if !arguments.iter().any(|word| word.contains("candidates")) {
+            arguments.extend(quicker.iter().map(|word| (*word).to_owned()));
         }
         let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
         let output = command
@@ -202,8 +221,6 @@ fn every_command_shown_does_what_is_said() {
 
 #[test]
 fn every_link_between_the_documents_leads_somewhere() {
-    // Documents of other parts of the program.
-    const ELSEWHERE: [&str; 4] = ["report.md", "report-schema.md", "recording.md", "links.md"];
     let mut wrong = Vec::new();
     for document in documents() {
         let text = fs::read_to_string(&document).unwrap();
@@ -211,13 +228,45 @@ fn every_link_between_the_documents_leads_somewhere() {
             let target = text[at + 2..].split([')', '#']).next().unwrap();
             let path = document.parent().unwrap().join(target);
             let is_file = !target.is_empty() && !target.contains("://") && !text[at + 2..].starts_with('#');
-            let is_elsewhere = ELSEWHERE.iter().any(|name| path.ends_with(name));
-            if is_file && !is_elsewhere && !path.exists() {
+            if is_file && !path.exists() {
                 wrong.push(format!("{}: {target}", document.display()));
             }
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// Text of all sources, with string literals that go on over several lines joined.
+fn sources(folder: &Path, text: &mut String) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, text);
+        } else {
+            let mut lines = fs::read_to_string(&path).unwrap();
+            while let Some(at) = lines.find("\\\n") {
+                let end = at + 2 + lines[at + 2..].find(|c: char| !c.is_whitespace()).unwrap();
+                lines.replace_range(at..end, "");
+            }
+            text.push_str(&lines);
+        }
+    }
+}
+
+#[test]
+fn the_messages_of_the_technician_are_those_of_the_program() {
+    let mut source = String::new();
+    sources(&root().join("src"), &mut source);
+    let document = fs::read_to_string(root().join("docs/technician.md")).unwrap();
+    let (_, table) = document.split_once("| it says |").unwrap();
+    let messages: Vec<&str> =
+        table.lines().skip(2).map_while(|line| line.strip_prefix("| ")?.split(" | ").next()).collect();
+    assert!(messages.len() > 20, "{messages:?}");
+    for message in messages {
+        let parts = message.split('…').map(|part| part.trim_matches([' ', '(', ')', ':', ',']));
+        let unknown: Vec<&str> = parts.filter(|part| !source.contains(part)).collect();
+        assert!(unknown.is_empty(), "'{message}': the program never says {unknown:?}");
+    }
 }
 
 #[test]

@@ -1,17 +1,25 @@
-//! The example in `sessions/soochow-example`: made here from the method paper's tables, and checked against what is committed.
+//! The examples in `sessions/`, made anew and checked against what is committed.
 //!
-//! To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test example`.
+//! `soochow-example` is made here from the method paper's tables. To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test example`.
+//! `example` is a finished session; the head of `sessions/example.script.ron` has the command that makes it.
 
-#![expect(clippy::disallowed_methods, reason = "a failure of a test is a panic; test files need no atomic writes")]
+#![expect(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "a failure of a test is a panic; test files need no atomic writes"
+)]
 
 mod support;
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use serde_json::Value;
 use support::{PaperCase, measure, paper_deviations, random_configurations, seeded};
 use trupose::identification::ArmModel;
 use trupose::kinematics::JointType;
+use trupose::session::calibration::Calibration;
 use trupose::session::measurements::{Row, read, write};
 use trupose::units::{MICROMETRE, to_mm};
 
@@ -55,10 +63,10 @@ fn the_committed_example_is_what_the_generator_makes() {
     for (name, text) in example() {
         let path = folder().join(name);
         if std::env::var_os("TRUPOSE_WRITE_EXAMPLE").is_some() {
-            std::fs::create_dir_all(folder()).unwrap();
-            std::fs::write(&path, &text).unwrap();
+            fs::create_dir_all(folder()).unwrap();
+            fs::write(&path, &text).unwrap();
         }
-        let committed = std::fs::read_to_string(&path).unwrap();
+        let committed = fs::read_to_string(&path).unwrap();
         let (made, committed) = (read(&text, name, &JOINTS).unwrap(), read(&committed, name, &JOINTS).unwrap());
         assert_eq!(made.rows.len(), committed.rows.len());
         // Sines and cosines may differ in the last digit from one machine to the next.
@@ -84,4 +92,77 @@ fn the_first_identification_of_the_readme() {
     let volatile = text.lines().filter(|line| !line.starts_with("  trupose "));
     insta::assert_snapshot!(volatile.collect::<Vec<_>>().join("\n"));
     assert!(text.lines().all(|line| line.chars().count() <= 80), "wider than 80 columns");
+}
+
+/// Fails where two JSON values differ by more than a machine's last digits; what depends on the program's version or holds sums of
+/// other files is left out.
+fn compare(made: &Value, committed: &Value, place: &str) {
+    match (made, committed) {
+        (Value::Object(made), Value::Object(committed)) => {
+            assert_eq!(made.keys().collect::<Vec<_>>(), committed.keys().collect::<Vec<_>>(), "{place}");
+            for (name, value) in made {
+                if !["program", "sha256", "singular_value_gap", "iterations"].contains(&name.as_str()) {
+                    compare(value, &committed[name], &format!("{place}.{name}"));
+                }
+            }
+        }
+        (Value::Array(made), Value::Array(committed)) => {
+            assert_eq!(made.len(), committed.len(), "{place}");
+            for (index, (made, committed)) in made.iter().zip(committed).enumerate() {
+                compare(made, committed, &format!("{place}[{index}]"));
+            }
+        }
+        (Value::Number(made), Value::Number(committed)) => {
+            let (made, committed) = (made.as_f64().unwrap(), committed.as_f64().unwrap());
+            assert!(
+                (made - committed).abs() <= 1e-6 * committed.abs().max(1.0),
+                "{place}: {made} instead of {committed}"
+            );
+        }
+        _ => assert_eq!(made, committed, "{place}"),
+    }
+}
+
+#[test]
+fn the_finished_session_is_what_its_script_makes() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let command = "trupose --script sessions/example.script.ron --sessions sessions";
+    assert!(fs::read_to_string(root.join("sessions/example.script.ron")).unwrap().contains(command));
+    let place = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_trupose"))
+        .current_dir(root)
+        .args(["--script", "sessions/example.script.ron", "--sessions", place.path().to_str().unwrap()])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let (made, committed) = (place.path().join("example"), root.join("sessions/example"));
+    let names = |folder: &Path| {
+        let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.filter(|name| name != ".lock").collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&made), names(&committed));
+    let text = |folder: &Path, name: &str| fs::read_to_string(folder.join(name)).unwrap();
+    let report = |folder: &Path| serde_json::from_str::<Value>(&text(folder, "report.json")).unwrap();
+    compare(&report(&made), &report(&committed), "report");
+    let calibration = |folder: &Path| {
+        let calibration = Calibration::parse(&text(folder, "calibration.ron")).unwrap();
+        calibration.parameters.into_iter().map(|parameter| (parameter.name, parameter.deviation, parameter.sigma))
+    };
+    for (made, committed) in calibration(&made).zip(calibration(&committed)) {
+        assert_eq!(made.0, committed.0);
+        let (sigma, committed_sigma) = (made.2.unwrap_or_default(), committed.2.unwrap_or_default());
+        let is_same = (made.1 - committed.1).abs() < 1e-6 && (sigma - committed_sigma).abs() < 1e-6;
+        assert!(is_same, "{made:?} {committed:?}");
+    }
+    let points = |folder: &Path| read(&text(folder, "measurements.csv"), "measurements.csv", &JOINTS).unwrap();
+    let (made, again) = (points(&made), points(&committed));
+    assert_eq!(made.rows.len(), again.rows.len());
+    for (made, again) in made.rows.iter().zip(&again.rows) {
+        assert!(to_mm((made.point - again.point).norm()) < 1e-5 && made.configuration == again.configuration);
+    }
+    // Nothing of it but small.
+    let size: u64 = fs::read_dir(&committed).unwrap().map(|entry| entry.unwrap().metadata().unwrap().len()).sum();
+    assert!(size < 1_000_000, "{size} bytes");
 }

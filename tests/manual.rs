@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; its files need no store"
+    reason = "a failure of a test is a panic; test files need no atomic writes"
 )]
 
 use std::fs;

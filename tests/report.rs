@@ -2,6 +2,7 @@
 //! session has one, however little is in it.
 
 #![expect(
+    clippy::panic,
     clippy::unwrap_used,
     clippy::panic,
     clippy::disallowed_methods,
@@ -518,6 +519,26 @@ fn the_command_makes_the_same_report_anew() {
     check_page(&fs::read_to_string(place.join("again/mine.html")).unwrap());
     let output = trupose(place, &["session", "report", "nowhere"]);
     assert_ne!(output.status.code(), Some(0));
+}
+
+#[test]
+fn the_report_is_printed_as_plain_text() {
+    let place = CALIBRATED.folder.path();
+    let before = fs::read_dir(place.join("sessions/s")).unwrap().count();
+    let output = trupose(place, &["session", "report", "sessions/s", "--text"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty());
+    let said = String::from_utf8(output.stdout).unwrap();
+    let delivered: Value =
+        serde_json::from_str(&fs::read_to_string(place.join("sessions/s/report.json")).unwrap()).unwrap();
+    let mean = delivered["verification"]["identified"]["position_mm"]["mean"].as_f64().unwrap();
+    assert!(said.contains("Verdict: NOT ACCEPTED") && said.contains(&format!("{mean:.4}")), "{said}");
+    // No colour, no control characters, no line that a terminal would break.
+    assert!(said.chars().all(|c| c == '\n' || !c.is_control()), "{said:?}");
+    assert!(said.lines().all(|line| line.chars().count() <= 80), "{said}");
+    assert_eq!(fs::read_dir(place.join("sessions/s")).unwrap().count(), before);
+    let output = trupose(place, &["session", "report", "sessions/s", "--text", "--out", "x.html"]);
+    assert_eq!(output.status.code(), Some(2));
 }
 
 #[test]

@@ -7,7 +7,8 @@ use super::script::session_failure;
 use super::{Console, to_json};
 use crate::cli::SessionCommand;
 use crate::error::{ExitStatus, Failure};
-use crate::procedure::deliver;
+use crate::procedure::{deliver, models};
+use crate::report::identification_text;
 use crate::session::export;
 use crate::session::journal::{Journal, instrument_text, target_text};
 use crate::session::plan::PoseKind;
@@ -23,7 +24,8 @@ pub(super) fn run<O: Write, E: Write>(
     match command {
         SessionCommand::List { sessions } => list(sessions, console),
         SessionCommand::Show { folder, journal, json } => show(folder, *journal, *json, console),
-        SessionCommand::Report { folder, out } => report(folder, out.as_deref(), console),
+        SessionCommand::Report { folder, text: true, .. } => print_report(folder, console),
+        SessionCommand::Report { folder, out, .. } => report(folder, out.as_deref(), console),
         SessionCommand::Export { folder, csv, out } => export_tables(folder, *csv, out.as_deref(), console),
     }
 }
@@ -162,7 +164,8 @@ fn report<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let (_, session) = load(folder)?;
     let internal = |message: String| Failure::new(ExitStatus::Internal, message);
-    let files = deliver::data_files(&session).map_err(internal)?;
+    let mut files = deliver::data_files(&session).map_err(internal)?;
+    files.extend(models::delivered(&session));
     let failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
     for (name, text) in deliver::reports(&session, &files).map_err(internal)? {
         let place = folder.join(&name);
@@ -178,6 +181,21 @@ fn report<O: Write, E: Write>(
     } else if !session.is_current() {
         console.remark("samples have changed since the identification; the report says so");
     }
+    Ok(ExitStatus::Accepted)
+}
+
+/// The report as text.
+fn print_report<O: Write, E: Write>(folder: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    let (_, session) = load(folder)?;
+    let Some(result) = &session.identified else {
+        let message = format!("nothing has been identified in session '{}' yet", folder.display());
+        return Err(Failure::new(ExitStatus::Numerical, message)
+            .hint("'trupose session show DIR' shows what it has; 'trupose resume DIR' goes on with it"));
+    };
+    if !session.is_current() {
+        console.print("OUT OF DATE: samples have changed since this result; identify again\n\n")?;
+    }
+    console.print(&identification_text(&result.summary))?;
     Ok(ExitStatus::Accepted)
 }
 

@@ -1,9 +1,12 @@
 //! The models that a session delivers: the identified arm in every format that can carry it, each read back and proven.
 
+use std::path::Path;
+
 use crate::kinematics::{JointType, KinematicChain, Link};
 use crate::model::{CalibratedArm, ExportOptions, Format, export};
 use crate::profile::Profile;
 use crate::session::calibration::Calibration;
+use crate::session::state::Session;
 use crate::units::{DEGREE, MICROMETRE};
 
 /// What is asked for.
@@ -22,6 +25,24 @@ pub struct Models {
     pub files: Vec<(String, String)>,
     /// The files that this arm does not fit into, with the reason: `NAME: REASON`.
     pub left_out: Vec<String>,
+}
+
+impl ModelsRequest {
+    /// The request for the models of a session's result; none without a usable one.
+    pub fn of(session: &Session) -> Option<Self> {
+        let calibration = session.identified.as_deref()?.calibration.clone()?;
+        Some(Self { calibration, profile: session.robot.as_ref()?.profile.clone() })
+    }
+}
+
+/// The models that were delivered with the result of a session, written anew.
+pub fn delivered(session: &Session) -> Vec<(String, String)> {
+    if session.delivered.is_empty() {
+        return Vec::new();
+    }
+    let mut files = ModelsRequest::of(session).map(|request| models(&request)).unwrap_or_default().files;
+    files.retain(|(name, _)| session.delivered.iter().any(|file| Path::new(file).file_name() == Some(name.as_ref())));
+    files
 }
 
 /// Writes the models and proves them.

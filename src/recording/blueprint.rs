@@ -25,8 +25,10 @@ use crate::profile::Profile;
 /// What a recording is looked at for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// A session: poses first.
-    Session,
+    /// A session that is measured: the poses, and what the measurement says about itself.
+    Capture,
+    /// A session with a result: errors of both arms at the poses.
+    Result,
     /// A plan: the search first.
     Plan,
 }
@@ -48,32 +50,12 @@ pub(super) fn send(canvas: &Canvas, profile: &Profile, purpose: Purpose) {
 fn messages(profile: &Profile, purpose: Purpose) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
     let mut extras = Vec::new();
     let picture = picture(profile, &mut extras);
-    let plots = plots(&mut extras);
-    let (positions, distances, solver, search) = plots;
-    let texts = |first: ContainerLike, second: ContainerLike| {
-        Tabs::new([first, second, view(TextLogView::new("Log").with_origin(names::LOG))])
+    let (right, timeline) = match purpose {
+        Purpose::Capture => (capturing(&mut extras), names::POSE),
+        Purpose::Result => (result(&mut extras), names::POSE),
+        Purpose::Plan => (planning(&mut extras), names::PLAN_ITERATION),
     };
-    let report = view(TextDocumentView::new("Report").with_origin(names::REPORT));
-    let guide = view(TextDocumentView::new("How to read this picture").with_origin(names::GUIDE));
-    let bars = Tabs::new([
-        view(BarChartView::new("Deviations in sigma (bar numbers: see report)").with_origin(names::SIGNIFICANCE)),
-        view(TensorView::new("All pairs, nominal (um)").with_origin(names::MAP_NOMINAL)),
-        view(TensorView::new("All pairs, identified (um)").with_origin(names::MAP_IDENTIFIED)),
-    ]);
-    let (plots, timeline) = match purpose {
-        Purpose::Session => (Tabs::new([positions, distances, capture(&mut extras), solver, search]), names::POSE),
-        Purpose::Plan => (Tabs::new([search]), names::PLAN_ITERATION),
-    };
-    let right = match purpose {
-        Purpose::Session => Vertical::new([
-            ContainerLike::from(plots.with_name("Errors")),
-            bars.with_name("Parameters and pairs").into(),
-            texts(report, guide).with_name("Texts").into(),
-        ])
-        .with_row_shares([1.1, 0.8, 1.1]),
-        Purpose::Plan => Vertical::new([ContainerLike::from(plots), texts(guide, report).into()]),
-    };
-    let root = Horizontal::new([picture, right.into()]).with_column_shares([1.45, 1.0]);
+    let root = Horizontal::new([picture, right]).with_column_shares([1.45, 1.0]);
     let blueprint = Blueprint::new(root)
         .with_auto_views(false)
         .with_auto_layout(false)
@@ -87,6 +69,49 @@ fn messages(profile: &Profile, purpose: Purpose) -> Result<(Vec<LogMsg>, Bluepri
                 .with_play_state(PlayState::Following),
         );
     with_extras(&blueprint, &extras)
+}
+
+/// Beside the picture while there is no result: nothing that would be empty.
+fn capturing(extras: &mut Vec<Extra>) -> ContainerLike {
+    let plots = Tabs::new([capture(extras), search(extras)]).with_name("Measurement");
+    Vertical::new([plots.into(), log(), Tabs::new([guide(), report()]).with_name("Texts").into()])
+        .with_row_shares([1.0, 0.7, 1.3])
+        .into()
+}
+
+/// Beside the picture when there is a result.
+fn result(extras: &mut Vec<Extra>) -> ContainerLike {
+    let (positions, distances) = errors(extras);
+    let plots = Tabs::new([positions, distances, capture(extras), solver(extras), search(extras)]);
+    let bars = Tabs::new([
+        view(BarChartView::new("Deviations in sigma (bar numbers: see report)").with_origin(names::SIGNIFICANCE)),
+        view(TensorView::new("All pairs, nominal (um)").with_origin(names::MAP_NOMINAL)),
+        view(TensorView::new("All pairs, identified (um)").with_origin(names::MAP_IDENTIFIED)),
+    ]);
+    Vertical::new([
+        ContainerLike::from(plots.with_name("Errors")),
+        bars.with_name("Parameters and pairs").into(),
+        Tabs::new([report(), guide(), log()]).with_name("Texts").into(),
+    ])
+    .with_row_shares([1.1, 0.8, 1.1])
+    .into()
+}
+
+/// Beside the picture of a plan.
+fn planning(extras: &mut Vec<Extra>) -> ContainerLike {
+    Vertical::new([search(extras), Tabs::new([guide(), report(), log()]).with_name("Texts").into()]).into()
+}
+
+fn report() -> ContainerLike {
+    view(TextDocumentView::new("Report").with_origin(names::REPORT))
+}
+
+fn guide() -> ContainerLike {
+    view(TextDocumentView::new("How to read this picture").with_origin(names::GUIDE))
+}
+
+fn log() -> ContainerLike {
+    view(TextLogView::new("Log").with_origin(names::LOG))
 }
 
 /// The 3D view.
@@ -160,37 +185,45 @@ fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
     let aside = Vector3::new(towards.y, -towards.x, 0.0);
     // A tracker far away is not worth an arm of a few pixels.
     let behind = (distance - radius).clamp(0.0, 0.8 * radius);
-    let target = centre + towards * (0.4 * behind) - Vector3::z() * (0.1 * radius);
+    let target = centre + towards * (0.5 * behind) - Vector3::z() * (0.1 * radius);
     let from = (aside * 0.8 - towards * 0.75 + Vector3::z() * 0.45).normalize();
-    (target + from * (2.0 * radius + 0.6 * behind), target)
+    (target + from * (2.0 * radius + 0.7 * behind), target)
 }
 
-/// Plots: errors of positions and of distances at the poses, the solver, the search.
-fn plots(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike, ContainerLike, ContainerLike) {
-    let mut plot = |name: &str, contents: &[&str]| series(name, contents, extras);
+/// Plots of the errors of positions and of distances at the poses.
+fn errors(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike) {
     // Each arm has a plot of its own: beside the nominal errors the identified ones would not be seen.
     let mut both = |quantity: &str, title: &str, name: &str| {
         let mut of = |arm: &str| {
-            plot(&format!("{title}, {arm} arm (mm)"), &[&format!("+ /{}/**", names::all_errors(quantity, arm))])
+            let contents = format!("+ /{}/**", names::all_errors(quantity, arm));
+            series(&format!("{title}, {arm} arm (mm)"), &[&contents], extras)
         };
         ContainerLike::from(Vertical::new([of("nominal"), of("identified")]).with_name(name))
     };
-    let positions = both("position", "Position error", "Position errors, once identified");
+    let positions = both("position", "Position error", "Position errors");
     let distances = both("distance", "Mean distance error to all others", "Distance errors");
-    let solver = Vertical::new([
-        plot("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"]),
-        plot("Cost and largest step (log10), per solver step", &["+ /solver/cost_and_step_log10"]),
+    (positions, distances)
+}
+
+/// Plots of the solver.
+fn solver(extras: &mut Vec<Extra>) -> ContainerLike {
+    Vertical::new([
+        series("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"], extras),
+        series("Cost and largest step (log10), per solver step", &["+ /solver/cost_and_step_log10"], extras),
     ])
-    .with_name("Solver");
-    let search = Vertical::new([
-        plot("Condition number, per sweep", &["+ /search/condition_number"]),
-        plot(
-            "Observability O1 (mm), predicted error (sigma), per sweep",
-            &["+ /search/observability_o1_mm", "+ /search/predicted_error_sigma"],
-        ),
+    .with_name("Solver")
+    .into()
+}
+
+/// Plots of the search for poses.
+fn search(extras: &mut Vec<Extra>) -> ContainerLike {
+    let others = ["+ /search/observability_o1_mm", "+ /search/predicted_error_sigma"];
+    Vertical::new([
+        series("Condition number, per sweep", &["+ /search/condition_number"], extras),
+        series("Observability O1 (mm), predicted error (sigma), per sweep", &others, extras),
     ])
-    .with_name("Search");
-    (positions, distances, solver.into(), search.into())
+    .with_name("Search")
+    .into()
 }
 
 /// Plots of the capture.

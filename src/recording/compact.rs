@@ -1,54 +1,51 @@
 //! Files with an index: many small pieces become few large ones, and what was replaced is dropped.
 
 use std::fs::File;
-use std::io::{BufReader, Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 
 use rerun::external::re_build_info::CrateVersion;
-use rerun::external::re_log_encoding::{Decodable as _, DecoderApp, Encoder, EncodingOptions, StreamFooter};
+use rerun::external::re_log_encoding::{Decodable as _, Encoder, EncodingOptions, StreamFooter};
 use rerun::log::LogMsg;
 use rerun::rrd::{OptimizationProfile, optimize};
 
 use super::{RecordingError, read};
 use crate::session::journal::Entry;
+use crate::store;
 
-/// Writes messages as one compact file at `path`, which is replaced only when all is on disk.
-pub(super) fn store(messages: impl Iterator<Item = LogMsg>, path: &Path) -> Result<(), RecordingError> {
+/// Writes messages as one compact file at `path`, which is replaced only when all is on disk. Of several layouts the last stays.
+pub(super) fn write(messages: &[LogMsg], path: &Path) -> Result<(), RecordingError> {
     let failed = |error: &dyn std::fmt::Display| RecordingError::library("compacting the recording", error);
     let mut encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, Vec::new())
         .map_err(|error| failed(&error))?;
+    let layout = messages.iter().rev().find_map(|message| match message {
+        LogMsg::BlueprintActivationCommand(command) => Some(&command.blueprint_id),
+        _ => None,
+    });
     for message in messages {
-        encoder.append(&message).map_err(|error| failed(&error))?;
+        let store = message.store_id();
+        if store.is_recording() || Some(store) == layout {
+            encoder.append(message).map_err(|error| failed(&error))?;
+        }
     }
     encoder.finish().map_err(|error| failed(&error))?;
     let whole = encoder.into_inner().map_err(|error| failed(&error))?;
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let write = |source| RecordingError::file("cannot write the recording", path, source);
-    let mut file = temporary().tempfile_in(folder).map_err(write)?;
+    let failed_to_write = |source| RecordingError::file("cannot write the recording", path, source);
+    let mut file =
+        store::temporary().prefix(TEMPORARY.0).suffix(TEMPORARY.1).tempfile_in(folder).map_err(failed_to_write)?;
     let mut compacted = Vec::new();
     read::guarded(|| optimize(whole.as_slice(), &mut compacted, &OptimizationProfile::LIVE))
         .ok_or_else(|| failed(&"the data are damaged"))?
         .map_err(|error| failed(&format!("{error:#}")))?;
-    file.write_all(&compacted).and_then(|()| file.as_file().sync_all()).map_err(write)?;
-    file.persist(path).map_err(|error| write(error.error))?;
+    file.write_all(&compacted).and_then(|()| file.as_file().sync_all()).map_err(failed_to_write)?;
+    file.persist(path).map_err(|error| failed_to_write(error.error))?;
     // The rename itself must survive a power cut.
-    File::open(folder).and_then(|folder| folder.sync_all()).map_err(write)
+    File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed_to_write)
 }
 
 /// How the names of files begin and end that will be recordings.
 const TEMPORARY: (&str, &str) = (".recording-", ".tmp");
-
-/// Files for everybody who may read the folder, as far as the process allows it.
-fn temporary() -> tempfile::Builder<'static, 'static> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(std::fs::Permissions::from_mode(0o644));
-    }
-    builder
-}
 
 /// Whether a name is that of a file that a program did not finish.
 pub(super) fn is_temporary(name: &str) -> bool {
@@ -58,17 +55,16 @@ pub(super) fn is_temporary(name: &str) -> bool {
 /// All messages of files that can be read, in order; what is damaged or torn is passed over.
 ///
 /// # Errors
-/// A file cannot be opened.
-pub(super) fn messages<'a>(
-    paths: impl Iterator<Item = &'a Path>,
-) -> Result<impl Iterator<Item = LogMsg>, RecordingError> {
-    let files: Vec<_> = paths
-        .map(|path| File::open(path).map_err(|source| RecordingError::file("cannot open the recording", path, source)))
-        .collect::<Result<_, _>>()?;
-    Ok(files.into_iter().flat_map(|file| {
-        let mut messages = DecoderApp::decode_lazy(BufReader::new(file));
-        std::iter::from_fn(move || read::guarded(|| messages.next()).flatten()).filter_map(Result::ok)
-    }))
+/// A file cannot be read.
+pub(super) fn messages<'a>(paths: impl Iterator<Item = &'a Path>) -> Result<Vec<LogMsg>, RecordingError> {
+    let mut all = Vec::new();
+    for path in paths {
+        read::messages(path, |message| {
+            all.extend(message.ok());
+            Ok(())
+        })?;
+    }
+    Ok(all)
 }
 
 /// Makes one file compact, in place.
@@ -78,8 +74,8 @@ pub(super) fn messages<'a>(
 pub fn compact_file(path: &Path) -> Result<(), RecordingError> {
     // Says what is wrong with a file that is none.
     read(path)?;
-    let all: Vec<LogMsg> = messages(std::iter::once(path))?.collect();
-    store(all.into_iter(), path)
+    let all = messages(std::iter::once(path))?;
+    write(&all, path)
 }
 
 /// What was found in a recording.

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::Once;
 
 use rerun::external::re_log_encoding::DecoderApp;
+use rerun::external::re_log_encoding::rrd::DecodeError;
 use rerun::log::{Chunk, LogMsg};
 use rerun::{TextDocument, TimelineName};
 
@@ -82,16 +83,8 @@ fn journal_lines(path: &Path) -> Result<(BTreeMap<i64, String>, usize), Recordin
 
 /// Gives all chunks of data of the recording at `path` to `take`; returns how many messages could not be read.
 pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize, RecordingError> {
-    let file = File::open(path).map_err(|source| RecordingError::file("cannot open the recording", path, source))?;
     let (mut damaged, mut known) = (0, false);
-    let mut messages = DecoderApp::decode_lazy(BufReader::new(file));
-    loop {
-        let Some(next) = guarded(|| messages.next()) else {
-            // Nothing behind it can be told from garbage.
-            damaged += 1;
-            break;
-        };
-        let Some(message) = next else { break };
+    messages(path, |message| {
         match message {
             Ok(LogMsg::SetStoreInfo(info)) => {
                 let application = info.info.store_id.application_id().to_string();
@@ -107,17 +100,40 @@ pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize,
                 damaged += usize::from(taken != Some(true));
             }
             Ok(_) => {}
-            Err(error) if !known => {
-                let message = plain(&error.to_string());
-                return Err(RecordingError::Foreign { path: path.to_owned(), message });
-            }
-            Err(_error) => damaged += 1,
+            Err(message) if !known => return Err(RecordingError::Foreign { path: path.to_owned(), message }),
+            Err(_damage) => damaged += 1,
         }
-    }
+        Ok(())
+    })?;
     if known {
         Ok(damaged)
     } else {
         Err(RecordingError::Foreign { path: path.to_owned(), message: "there is nothing in it".to_owned() })
+    }
+}
+
+/// Gives all messages of the file at `path` to `take`, and what is wrong with those that are damaged.
+///
+/// # Errors
+/// The file cannot be read, or `take` refuses.
+pub(super) fn messages(
+    path: &Path,
+    mut take: impl FnMut(Result<LogMsg, String>) -> Result<(), RecordingError>,
+) -> Result<(), RecordingError> {
+    let failed = |source| RecordingError::file("cannot read the recording", path, source);
+    let mut messages = DecoderApp::decode_lazy(BufReader::new(File::open(path).map_err(failed)?));
+    loop {
+        let Some(next) = guarded(|| messages.next()) else {
+            // Nothing behind it can be told from garbage.
+            return take(Err("it is damaged".to_owned()));
+        };
+        match next {
+            Some(Ok(message)) => take(Ok(message))?,
+            // It would be tried again for ever.
+            Some(Err(DecodeError::Read(source))) => return Err(failed(source)),
+            Some(Err(error)) => take(Err(plain(&error.to_string())))?,
+            None => return Ok(()),
+        }
     }
 }
 

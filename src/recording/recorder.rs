@@ -174,7 +174,7 @@ impl<T: Fn(RecordingEvent)> Work<T> {
         if let Some(live) = self.live.take() {
             match live.stream(&identity) {
                 Ok(stream) => {
-                    let mut scribe = Scribe::new(stream, Purpose::Session, &[]);
+                    let mut scribe = Scribe::new(stream, Purpose::Capture, &[]);
                     for line in before {
                         scribe.take(line);
                     }
@@ -197,7 +197,7 @@ impl<T: Fn(RecordingEvent)> Work<T> {
         let (drawn, missing) = before.split_at(earlier.lines.min(before.len()));
         let path = segments::next_part(&self.folder);
         let stream = identity.file(self.path.insert(path))?;
-        let mut scribe = Scribe::new(stream, Purpose::Session, drawn);
+        let mut scribe = Scribe::new(stream, Purpose::Capture, drawn);
         for line in missing {
             scribe.take(line);
         }

@@ -70,9 +70,7 @@ impl Scribe {
             Entry::Opened { program, name, .. } => document::opening(&self.canvas, program, name, line.time),
             Entry::Profile { .. } => {
                 self.cell();
-                if let Some(profile) = self.session.mounted_profile() {
-                    blueprint::send(&self.canvas, &profile, self.purpose);
-                }
+                self.layout(self.purpose);
             }
             Entry::Target(_) => self.cell(),
             Entry::Plan(plan) | Entry::PlanExtended(plan) => {
@@ -92,6 +90,9 @@ impl Scribe {
             }
             Entry::Decision { .. } | Entry::Row(_) | Entry::Skipped { .. } => self.points(),
             Entry::Identified(identified) => {
+                if self.runs == 1 && self.purpose == Purpose::Capture {
+                    self.layout(Purpose::Result);
+                }
                 result::draw(&self.canvas, &self.session, identified, self.runs, line.time);
             }
             _ => {}
@@ -114,6 +115,13 @@ impl Scribe {
     fn cell(&self) {
         if let Some(profile) = self.session.mounted_profile() {
             cell::draw(&self.canvas, &profile);
+        }
+    }
+
+    /// What a viewer arranges from now on.
+    fn layout(&self, purpose: Purpose) {
+        if let Some(profile) = self.session.mounted_profile() {
+            blueprint::send(&self.canvas, &profile, purpose);
         }
     }
 

@@ -160,8 +160,8 @@ pub(super) fn merge(folder: &Path) -> Result<Option<PathBuf>, RecordingError> {
         return Ok(whole.exists().then_some(whole));
     }
     let all = files(folder);
-    let messages: Vec<_> = compact::messages(all.iter().map(PathBuf::as_path))?.collect();
-    compact::store(messages.into_iter(), &whole)?;
+    let messages = compact::messages(all.iter().map(PathBuf::as_path))?;
+    compact::write(&messages, &whole)?;
     for (_, part) in parts {
         fs::remove_file(&part).map_err(|source| RecordingError::file("cannot remove", &part, source))?;
     }
@@ -175,7 +175,7 @@ pub(super) fn merge(folder: &Path) -> Result<Option<PathBuf>, RecordingError> {
 pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<PathBuf, RecordingError> {
     clean(folder);
     let whole = folder.join(FILE_NAME);
-    write_for(&whole, lines, Purpose::Session)?;
+    write_for(&whole, lines, Purpose::Capture)?;
     for (_, part) in parts(folder) {
         fs::remove_file(&part).map_err(|source| RecordingError::file("cannot remove", &part, source))?;
     }
@@ -187,7 +187,7 @@ pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<PathBuf, RecordingError>
 /// # Errors
 /// There are no lines, or the file cannot be written.
 pub fn write(path: &Path, lines: &[Line], of_plan: bool) -> Result<(), RecordingError> {
-    write_for(path, lines, if of_plan { Purpose::Plan } else { Purpose::Session })
+    write_for(path, lines, if of_plan { Purpose::Plan } else { Purpose::Capture })
 }
 
 fn write_for(path: &Path, lines: &[Line], purpose: Purpose) -> Result<(), RecordingError> {
@@ -203,5 +203,5 @@ fn write_for(path: &Path, lines: &[Line], purpose: Purpose) -> Result<(), Record
         scribe.take(line);
     }
     scribe.stream().flush_blocking().map_err(|error| RecordingError::library("drawing the recording", error))?;
-    compact::store(storage.take().into_iter(), path)
+    compact::write(&storage.take(), path)
 }

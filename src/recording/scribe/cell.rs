@@ -111,7 +111,7 @@ fn tracker(canvas: &Canvas, profile: &Profile) {
         Boxes3D::from_centers_and_half_sizes([layout::at(&profile.tracker().position_in_base)], [TRACKER_SIZE])
             .with_colors([layout::TRACKER])
             .with_fill_mode(FillMode::Solid)
-            .with_labels(["laser tracker (roughly)"]);
+            .with_labels(["tracker"]);
     canvas.fix(names::TRACKER, &tracker);
 }
 

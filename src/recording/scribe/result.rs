@@ -327,6 +327,7 @@ fn solver(
     let nothing = vec![0.0; calibration.parameters.len()];
     cell::pose(canvas, profile, &rest, Moment::solver(0));
     canvas.fix(names::ERRORS_SOLVING, &arrow_style(layout::NOMINAL_ERROR));
+    canvas.fix(names::COST_AND_STEP, &SeriesLines::new().with_names(["cost", "largest step"]));
     let steps = identified.summary.iterations.iter().map(|step| (Some(step), &step.deviations));
     for (index, (step, deviations)) in iter::once((None, &nothing)).chain(steps).enumerate() {
         let moment = Moment::solver(index);

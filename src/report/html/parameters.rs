@@ -28,7 +28,7 @@ fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> Stri
     let most = parameters.iter().map(decimals).max().unwrap_or(PLAIN).max(PLAIN);
     let columns = [
         ("parameter", Column::Word),
-        ("what it is", Column::Text),
+        ("what it is", Column::Word),
         ("unit", Column::Word),
         ("nominal", Column::Number),
         ("deviation", Column::Number),

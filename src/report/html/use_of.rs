@@ -10,6 +10,10 @@ fn about(file: &str) -> &'static str {
         "calibration.ron" => "the identified arm with everything needed to use or verify it: the result to apply",
         "measurements.csv" => "everything measured that counts; any program can identify from it again",
         "plan.csv" => "the poses that were planned",
+        "corrected.ron" => "a robot profile with the identified geometry",
+        "corrected.urdf" => "the identified chain as a robot description (URDF); read back and compared",
+        "dh.csv" => "the identified link constants with all digits, convention and couplings",
+        "default_kinematics.yaml" => "kinematics for the ROS description of Universal Robots",
         "drift.csv" => "the pose that was measured again and again",
         _ => "",
     }

@@ -3,6 +3,7 @@
 use super::charts::norm;
 use super::markup::{add, counted};
 use super::plot::{Mark, figure, nice_above};
+use crate::geometry::enlargement;
 use crate::report::document::{Details, PointPart};
 
 /// Size of a view.
@@ -69,7 +70,7 @@ fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pi
     let at =
         |(x, y): (f64, f64)| ((x - middle.0).mul_add(scale, WIDTH / 2.0), (y - middle.1).mul_add(-scale, HEIGHT / 2.0));
     let longest = points.iter().map(|point| norm(error(point))).fold(0.0, f64::max);
-    let exaggeration = exaggeration(longest, size(report));
+    let exaggeration = enlargement(longest, LARGEST * size(report));
 
     let mut body = String::new();
     let line = |class: &str, places: &[(f64, f64)]| {
@@ -107,16 +108,6 @@ fn size(report: &Details) -> f64 {
     (0..3).map(span).filter(|span| span.is_finite()).fold(1.0, f64::max)
 }
 
-/// A round factor with which the longest error (mm) is well seen beside something of this size (mm).
-fn exaggeration(longest: f64, width: f64) -> f64 {
-    if longest > 0.0 && longest.is_finite() {
-        // The next smaller round number.
-        (1.0 / nice_above(longest / (LARGEST * width))).max(1.0).round()
-    } else {
-        1.0
-    }
-}
-
 /// A bar of a round length.
 fn bar(wide: f64, scale: f64) -> String {
     let length = nice_above(wide / 8.0);
@@ -141,18 +132,4 @@ fn cross((right, up): (&str, &str)) -> String {
         x - 3.0,
         y - 16.0
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_exaggeration_is_round_and_never_below_one() {
-        let shown = [(10.0, 2000.0), (0.01, 2000.0), (5000.0, 2000.0), (0.0, 2000.0), (f64::NAN, 1.0)];
-        assert_eq!(
-            shown.map(|(longest, width)| exaggeration(longest, width)).to_vec(),
-            [50.0, 50_000.0, 1.0, 1.0, 1.0]
-        );
-    }
 }

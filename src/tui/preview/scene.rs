@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use crate::geometry::enlargement;
 use crate::kinematics::{ForwardKinematics, KinematicChain};
 use crate::profile::{KeepOut, Profile};
 use crate::session::journal::from_xyz_mm;
@@ -18,15 +19,6 @@ const BASE: f64 = 0.09;
 
 /// Longest error or difference as a part of the arm's reach.
 const LONGEST_ERROR: f64 = 0.15;
-
-/// A factor that is said easily: 1, 2 or 5 times a power of ten, not above `factor` and at least 1.
-fn round_factor(factor: f64) -> f64 {
-    if !factor.is_finite() || factor < 1.0 {
-        return 1.0;
-    }
-    let power = 10_f64.powf(factor.log10().floor());
-    [5.0, 2.0].into_iter().map(|step| step * power).find(|round| *round <= factor).unwrap_or(power)
-}
 
 /// The middle of each range (rad) or (m).
 fn rest(profile: &Profile) -> Vec<f64> {
@@ -267,7 +259,7 @@ impl Scene {
         let pick = |one: &Checked| if of_identified { one.identified } else { one.nominal };
         self.errors = self.checked.iter().map(|one| ErrorVector { at: one.at, error: pick(one) }).collect();
         let largest = self.errors.iter().map(|vector| vector.error.norm()).fold(0.0, f64::max);
-        self.exaggeration = round_factor(LONGEST_ERROR * self.radius() / largest);
+        self.exaggeration = enlargement(largest, LONGEST_ERROR * self.radius());
     }
 
     /// Moves the second arm away from the first until the difference is seen.
@@ -277,7 +269,7 @@ impl Scene {
         let points = || nominal.joints.iter().chain(&nominal.reflector);
         let others = identified.joints.iter().chain(&identified.reflector);
         let largest = points().zip(others).map(|(one, other)| (other - one).norm()).fold(0.0, f64::max);
-        let factor = round_factor(room / largest);
+        let factor = enlargement(largest, room);
         for (one, other) in points().zip(identified.joints.iter_mut().chain(&mut identified.reflector)) {
             *other = one + (*other - one) * factor;
         }

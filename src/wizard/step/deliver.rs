@@ -14,12 +14,6 @@ use crate::wizard::view::{Content, DeliverView};
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct DeliverStep;
 
-/// The request for the models of the identified arm; none without a usable result.
-fn models_request(cx: &Cx<'_>) -> Option<ModelsRequest> {
-    let calibration = cx.session.identified.as_deref()?.calibration.clone()?;
-    Some(ModelsRequest { calibration, profile: cx.robot()?.profile.clone() })
-}
-
 /// Asks for all files to be written.
 fn write_files(cx: &Cx<'_>, models: Models) -> Action {
     match deliver::files(cx.session, models.files) {
@@ -48,7 +42,7 @@ impl StepMachine for DeliverStep {
         if intent != Intent::Deliver {
             return Vec::new();
         }
-        match models_request(cx) {
+        match ModelsRequest::of(cx.session) {
             Some(request) => vec![Action::Ask(Request::Model(Box::new(request)))],
             None => vec![write_files(cx, Models::default())],
         }
