@@ -4,7 +4,6 @@
 #![expect(
     clippy::panic,
     clippy::unwrap_used,
-    clippy::panic,
     clippy::disallowed_methods,
     clippy::indexing_slicing,
     clippy::string_slice,
