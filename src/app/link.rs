@@ -183,7 +183,7 @@ fn news_text(news: &LinkNews) -> String {
 
 fn live_text(live: &LiveReading) -> String {
     let mut parts = vec![live.point.map_or_else(
-        || "no position; it is told only when a shot is asked for".to_owned(),
+        || "no position between shots so far".to_owned(),
         |point| format!("x {:.3}  y {:.3}  z {:.3} mm", to_mm(point.x), to_mm(point.y), to_mm(point.z)),
     )];
     parts.extend(joints_text(live));
@@ -192,7 +192,7 @@ fn live_text(live: &LiveReading) -> String {
 
 fn joints_text(live: &LiveReading) -> Option<String> {
     let joints: Vec<String> = live.joints.as_ref()?.iter().map(|joint| format!("{:.3}", to_deg(*joint))).collect();
-    let rests = if live.is_still == Some(true) { "at rest" } else { "moving" };
+    let rests = if live.is_still == Some(true) { "at rest" } else { "not at rest" };
     Some(format!("robot {rests} at {} deg", joints.join(" ")))
 }
 
