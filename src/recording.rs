@@ -1,6 +1,6 @@
 //! The recording of a session: every pose, error and arm for a 3D viewer. The only module that knows the viewer's library.
 //!
-//! A recording is a picture of the journal and never the truth: [`scribe`] turns journal lines into entities, line by line, so a
+//! A recording is a picture of the journal and never the truth: `scribe` turns journal lines into entities, line by line, so a
 //! recording that is lost or damaged is made anew from the journal ([`rebuild`]) with the same content. It carries the text
 //! of the journal as well, so a recording that was sent by mail can be looked at in a terminal.
 //!

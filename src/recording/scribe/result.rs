@@ -381,7 +381,7 @@ const fn finite(value: f64) -> f64 {
 /// What the enlargements are, above the robot.
 fn note(canvas: &Canvas, profile: &Profile, scales: &Scales) {
     let text = format!(
-        "drawn larger: red errors (nominal) {} x, green errors (identified) {} x, green arm's deviations {} x",
+        "drawn larger:\nred errors (nominal) {} x\ngreen errors (identified) {} x\ngreen arm's deviations {} x",
         scales.nominal, scales.identified, scales.arm
     );
     // Above the arm: points are rarely there.
