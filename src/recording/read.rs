@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 use std::sync::Once;
@@ -15,6 +15,15 @@ use rerun::{TextDocument, TimelineName};
 
 use super::{RecordingError, names};
 use crate::session::journal::{self, Journal};
+
+/// Bytes before the first piece of a file.
+const STREAM_HEADER: u64 = 12;
+/// Bytes that say kind and length of a piece.
+const PIECE_HEADER: u64 = 16;
+/// Kind of the last piece, before the index.
+const LAST_PIECE: u64 = 0;
+/// By so many bytes a piece may be longer than the file before it is taken for damaged.
+const ROOM: u64 = 64 << 20;
 
 /// What a recording carries of its session.
 #[derive(Clone, Debug, Default)]
@@ -112,6 +121,29 @@ pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize,
     }
 }
 
+/// Bytes before the first piece that says that it is far longer than the file of `size` bytes; `size` if there is none. The
+/// library takes memory for as much as a piece says, and the program ends where there is not so much.
+fn sound_length(file: &mut File, size: u64) -> io::Result<u64> {
+    let mut at = STREAM_HEADER;
+    while at + PIECE_HEADER <= size {
+        file.seek(SeekFrom::Start(at))?;
+        let mut number = || {
+            let mut bytes = [0; 8];
+            file.read_exact(&mut bytes).map(|()| u64::from_le_bytes(bytes))
+        };
+        let (kind, length) = (number()?, number()?);
+        if kind == LAST_PIECE {
+            break;
+        }
+        // The last piece of a file that is being written may be cut.
+        if length > size.saturating_add(ROOM) {
+            return Ok(at);
+        }
+        at += PIECE_HEADER + length;
+    }
+    Ok(size)
+}
+
 /// Gives all messages of the file at `path` to `take`, and what is wrong with those that are damaged.
 ///
 /// # Errors
@@ -121,7 +153,11 @@ pub(super) fn messages(
     mut take: impl FnMut(Result<LogMsg, String>) -> Result<(), RecordingError>,
 ) -> Result<(), RecordingError> {
     let failed = |source| RecordingError::file("cannot read the recording", path, source);
-    let mut messages = DecoderApp::decode_lazy(BufReader::new(File::open(path).map_err(failed)?));
+    let mut file = File::open(path).map_err(failed)?;
+    let size = file.metadata().map_err(failed)?.len();
+    let sound = sound_length(&mut file, size).map_err(failed)?;
+    file.rewind().map_err(failed)?;
+    let mut messages = DecoderApp::decode_lazy(BufReader::new(file.take(sound)));
     loop {
         let Some(next) = guarded(|| messages.next()) else {
             // Nothing behind it can be told from garbage.
@@ -132,6 +168,7 @@ pub(super) fn messages(
             // It would be tried again for ever.
             Some(Err(DecodeError::Read(source))) => return Err(failed(source)),
             Some(Err(error)) => take(Err(plain(&error.to_string())))?,
+            None if sound < size => return take(Err("a piece of it says that it is longer than the file".to_owned())),
             None => return Ok(()),
         }
     }
@@ -182,4 +219,32 @@ pub(super) fn plain(text: &str) -> String {
         }
     }
     plain
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    #[test]
+    fn a_piece_longer_than_the_file_ends_what_is_read_and_is_told() {
+        let whole = include_bytes!("../../sessions/example/recording.rrd");
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        // The length of the second piece.
+        let length = |at: u64| u64::from_le_bytes(*whole[usize::try_from(at).unwrap()..].first_chunk().unwrap());
+        let second = STREAM_HEADER + PIECE_HEADER + length(STREAM_HEADER + 8);
+        let mut bytes = whole.to_vec();
+        bytes[usize::try_from(second).unwrap() + 14] ^= 1;
+        file.write_all(&bytes).unwrap();
+        let size = bytes.len() as u64;
+        assert_eq!(sound_length(file.as_file_mut(), size).unwrap(), second);
+        let mut told = Vec::new();
+        messages(file.path(), |message| {
+            told.push(message.map(drop));
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(told, [Ok(()), Err("a piece of it says that it is longer than the file".to_owned())]);
+    }
 }

@@ -102,7 +102,7 @@ impl Recorder {
         let (done, finished) = sync_channel(1);
         let folder = folder.to_owned();
         thread::Builder::new().name("recorder".to_owned()).spawn(move || {
-            let mut work = Work { folder, live, tell, file: None, path: None, view: None, has_failed: false };
+            let mut work = Work { folder, live, tell, file: None, path: None, view: None, failure: None };
             if !before.is_empty() {
                 work.begin(&before);
             }
@@ -163,7 +163,8 @@ struct Work<T: Fn(RecordingEvent)> {
     /// Where it writes.
     path: Option<PathBuf>,
     view: Option<Scribe>,
-    has_failed: bool,
+    /// Why it has stopped.
+    failure: Option<String>,
 }
 
 impl<T: Fn(RecordingEvent)> Work<T> {
@@ -214,7 +215,7 @@ impl<T: Fn(RecordingEvent)> Work<T> {
     fn take(&mut self, lines: &[Line]) {
         if self.file.is_none() && self.view.is_none() {
             // The first lines of a session, or all has failed.
-            if !self.has_failed {
+            if self.failure.is_none() {
                 self.begin(lines);
             }
             return;
@@ -236,7 +237,7 @@ impl<T: Fn(RecordingEvent)> Work<T> {
     }
 
     fn fail(&mut self, message: String) {
-        self.has_failed = true;
+        self.failure = Some(message.clone());
         self.file = None;
         if let Some(path) = self.path.take() {
             // It has a gap, and the journal may need the room.
@@ -252,8 +253,8 @@ impl<T: Fn(RecordingEvent)> Work<T> {
             drop(thread::Builder::new().name("live-end".to_owned()).spawn(move || drop(view)));
         }
         match self.file.take() {
-            // It failed, and that was told; the next program goes on from its parts.
-            None => Ok(()),
+            // The next program goes on from its parts.
+            None => self.failure.take().map_or(Ok(()), Err),
             Some(file) => {
                 drop(file);
                 segments::merge(&self.folder).map(drop).map_err(|error| text(&error))
