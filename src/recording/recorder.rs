@@ -3,6 +3,8 @@
 use std::io;
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread;
 use std::time::Duration;
@@ -85,6 +87,7 @@ impl Live {
 pub struct Recorder {
     lines: Option<SyncSender<Vec<Line>>>,
     finished: Receiver<Result<(), String>>,
+    is_hurried: Arc<AtomicBool>,
 }
 
 impl Recorder {
@@ -101,6 +104,8 @@ impl Recorder {
         let (lines, received) = sync_channel::<Vec<Line>>(WAITING);
         let (done, finished) = sync_channel(1);
         let folder = folder.to_owned();
+        let is_hurried = Arc::new(AtomicBool::new(false));
+        let hurried = Arc::clone(&is_hurried);
         thread::Builder::new().name("recorder".to_owned()).spawn(move || {
             let mut work = Work { folder, live, tell, file: None, path: None, view: None, failure: None };
             if !before.is_empty() {
@@ -112,9 +117,9 @@ impl Recorder {
                 work.take(&lines);
             }
             // Nobody may be waiting any more.
-            let _nobody = done.send(work.end());
+            let _nobody = done.send(work.end(&hurried));
         })?;
-        Ok(Self { lines: Some(lines), finished })
+        Ok(Self { lines: Some(lines), finished, is_hurried })
     }
 
     /// Takes lines that are on disk. Never waits.
@@ -130,6 +135,11 @@ impl Recorder {
         };
         self.lines = None;
         Err(refused)
+    }
+
+    /// There is no time to make one file of the parts: they stay, and whoever goes on with the session joins them.
+    pub fn hurry(&self) {
+        self.is_hurried.store(true, Ordering::Relaxed);
     }
 
     /// Makes one file of the parts. Waits for it, but not for ever.
@@ -247,7 +257,7 @@ impl<T: Fn(RecordingEvent)> Work<T> {
     }
 
     /// Ends the part and makes one file of all.
-    fn end(&mut self) -> Result<(), String> {
+    fn end(&mut self, is_hurried: &AtomicBool) -> Result<(), String> {
         if let Some(view) = self.view.take() {
             // It may wait for a viewer that does not answer.
             drop(thread::Builder::new().name("live-end".to_owned()).spawn(move || drop(view)));
@@ -257,6 +267,9 @@ impl<T: Fn(RecordingEvent)> Work<T> {
             None => self.failure.take().map_or(Ok(()), Err),
             Some(file) => {
                 drop(file);
+                if is_hurried.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
                 segments::merge(&self.folder).map(drop).map_err(|error| text(&error))
             }
         }

@@ -245,6 +245,13 @@ impl Engine {
         self.store.finish();
     }
 
+    /// There is little time to end: the recording stays in its parts.
+    pub fn hurry(&self) {
+        if let Some(recorder) = &self.recording.recorder {
+            recorder.hurry();
+        }
+    }
+
     /// Makes one file of the recording while the session's folder is still held. Says what the operator should know if that
     /// fails; the parts stay then, and the next program joins them.
     pub fn end_recording(&mut self) -> Option<String> {
