@@ -7,6 +7,7 @@ use std::io;
 use std::panic;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
+use std::time::Duration;
 
 use crossterm::event::{self, Event, KeyEventKind, MouseEventKind};
 
@@ -14,6 +15,8 @@ use super::keymap::Key;
 
 /// Inputs that wait; then the terminal's own buffer holds what is typed.
 const WAITING: usize = 256;
+/// So long the start waits for the thread to listen.
+const LISTENS: Duration = Duration::from_millis(500);
 
 /// Something from the terminal.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +41,16 @@ pub enum Input {
 /// The system refuses a thread.
 pub(super) fn start(wake: impl Fn() -> bool + Send + 'static) -> io::Result<Receiver<Input>> {
     let (sender, inputs) = sync_channel(WAITING);
-    thread::Builder::new().name("input".to_owned()).spawn(move || read(&sender, &wake))?;
+    let (ready, listens) = sync_channel(1);
+    let work = move || {
+        // The first look has the system tell of new sizes. Nobody may be waiting any more, and `read` says what is wrong.
+        drop(panic::catch_unwind(|| event::poll(Duration::ZERO)));
+        drop(ready.send(()));
+        read(&sender, &wake);
+    };
+    thread::Builder::new().name("input".to_owned()).spawn(work)?;
+    // Whoever draws before would not hear of a size that changes right after. A terminal that hangs holds nobody up for long.
+    drop(listens.recv_timeout(LISTENS));
     Ok(inputs)
 }
 
