@@ -101,6 +101,9 @@ impl Place {
 /// What is written when the terminal is given back, in this order.
 #[track_caller]
 fn is_given_back(terminal: &Terminal) {
+    // The program may have ended before all that it wrote is read here.
+    terminal
+        .wait_for("the last that is written", |shown| String::from_utf8_lossy(&shown.raw).contains("\u{1b}[?1049l"));
     let raw = String::from_utf8_lossy(&terminal.raw()).into_owned();
     let place = |code: &str| raw.rfind(code).unwrap_or_else(|| panic!("{code:?} was not written"));
     assert!(place("\u{1b}[?25h") > place("\u{1b}[?25l"), "the cursor is hidden");

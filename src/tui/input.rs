@@ -45,12 +45,12 @@ pub(super) fn start(wake: impl Fn() -> bool + Send + 'static) -> io::Result<Rece
     let work = move || {
         // The first look has the system tell of new sizes. Nobody may be waiting any more, and `read` says what is wrong.
         drop(panic::catch_unwind(|| event::poll(Duration::ZERO)));
-        drop(ready.send(()));
+        let _nobody = ready.send(());
         read(&sender, &wake);
     };
     thread::Builder::new().name("input".to_owned()).spawn(work)?;
     // Whoever draws before would not hear of a size that changes right after. A terminal that hangs holds nobody up for long.
-    drop(listens.recv_timeout(LISTENS));
+    let _late = listens.recv_timeout(LISTENS);
     Ok(inputs)
 }
 
