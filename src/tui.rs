@@ -47,7 +47,7 @@ use ui::{Ui, Wish};
 
 /// Shortest time between two frames: more would only fill an SSH line.
 const FRAME: Duration = Duration::from_millis(50);
-/// The same where a key has changed something: whoever presses it looks.
+/// The same where a key has changed something, without the picture of the robot: whoever presses it looks.
 const FRAME_OF_KEY: Duration = Duration::from_millis(25);
 /// What is under way gets this long to end before the change is drawn: saving an entry is shown only where it takes longer.
 const SETTLE: Duration = Duration::from_millis(40);
@@ -163,6 +163,7 @@ impl Driver<'_> {
         let mut changed: Option<Instant> = None;
         let mut is_due = true;
         let mut is_by_key = false;
+        let mut has_picture = false;
         loop {
             if received.signal() == Some(SIGHUP) {
                 return End::Gone;
@@ -170,7 +171,7 @@ impl Driver<'_> {
             if self.engine.has_exited() {
                 return End::Exited;
             }
-            let pace = if is_by_key { FRAME_OF_KEY } else { FRAME };
+            let pace = if is_by_key && !has_picture { FRAME_OF_KEY } else { FRAME };
             let mut early = drawn.map_or(Duration::ZERO, |drawn| pace.saturating_sub(since(drawn)));
             if is_due && !self.engine.wizard().is_idle() {
                 early = early.max(SETTLE.saturating_sub(since(*changed.get_or_insert_with(now))));
@@ -179,10 +180,9 @@ impl Driver<'_> {
                 return End::Gone;
             }
             if is_due && early.is_zero() {
-                if self.draw(&view).is_err() {
-                    return End::Gone;
-                }
+                let Ok(shows_picture) = self.draw(&view) else { return End::Gone };
                 drawn = Some(now());
+                has_picture = shows_picture;
                 changed = None;
                 (is_due, is_by_key) = (false, false);
             }
@@ -234,13 +234,17 @@ impl Driver<'_> {
         view
     }
 
-    fn draw(&mut self, view: &crate::wizard::ViewModel) -> io::Result<()> {
+    /// Draws a frame; whether the robot is in it.
+    fn draw(&mut self, view: &crate::wizard::ViewModel) -> io::Result<bool> {
         let ui = &self.ui;
-        self.screen.draw(|frame| {
-            let area = frame.area();
-            ui.draw(view, area, frame.buffer_mut());
-        })?;
-        Ok(())
+        let area = self
+            .screen
+            .draw(|frame| {
+                let area = frame.area();
+                ui.draw(view, area, frame.buffer_mut());
+            })?
+            .area;
+        Ok(ui.shows_picture(view, area))
     }
 
     /// Everything is to be drawn anew, without asking the terminal anything.

@@ -7,6 +7,9 @@
 )]
 #![cfg(unix)]
 
+#[path = "support/place.rs"]
+mod place;
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
@@ -18,6 +21,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
+use place::Place;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rerun::external::arrow::array::Array as _;
@@ -36,36 +40,9 @@ const SINGLE: f64 = 1e-6;
 
 // ------------------------------------------------------------------------------------------------------------------ running
 
-/// A folder in which the program runs.
-struct Place(tempfile::TempDir);
-
 impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("plan.csv"), include_str!("sessions/plan.csv")).unwrap();
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn session(&self) -> PathBuf {
-        self.path("sessions/s")
-    }
-
     fn recording(&self) -> PathBuf {
         self.session().join(recording::FILE_NAME)
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
-        command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
-        command
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().unwrap()
     }
 
     fn write_script(&self, name: &str, steps: &str) -> String {

@@ -9,6 +9,9 @@
 )]
 #![cfg(unix)]
 
+#[path = "support/place.rs"]
+mod place;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
@@ -16,6 +19,7 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, ChildStdout, Command, Output, Stdio};
 
+use place::Place;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -72,34 +76,7 @@ fn long_say() -> String {
     format!("Say(\"{}\")", "x".repeat(200_000))
 }
 
-/// A folder in which the program runs.
-struct Place(tempfile::TempDir);
-
 impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("plan.csv"), include_str!("sessions/plan.csv")).unwrap();
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn session(&self) -> PathBuf {
-        self.path("sessions/s")
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
-        command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
-        command
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().unwrap()
-    }
-
     fn write_script(&self, name: &str, steps: &[String]) -> String {
         fs::write(self.path(name), script_of(Some("2026-01-05T08:00:00Z"), steps)).unwrap();
         name.to_owned()

@@ -10,15 +10,16 @@
 )]
 #![cfg(target_os = "linux")]
 
+#[path = "support/place.rs"]
+mod place;
 #[path = "support/pty.rs"]
 #[expect(dead_code, reason = "some of it is for the benchmark")]
 mod pty;
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::Command;
 use std::time::Duration;
 
+use place::Place;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use pty::{CTRL_U, CTRL_Z, ENTER, PATIENCE, Terminal, processor_seconds};
@@ -45,27 +46,13 @@ const SCRIPT: [&str; 7] = [
     "Do(Next)",
 ];
 
-/// A folder in which the program runs.
-struct Place(tempfile::TempDir);
-
 impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("plan.csv"), include_str!("sessions/plan.csv")).unwrap();
-        Self(folder)
-    }
-
-    fn session(&self) -> PathBuf {
-        self.0.path().join("sessions/s")
-    }
-
     /// A session that is in `step`.
     fn session_in(&self, step: Step) {
         let steps = SCRIPT[..step.number() - 1].join(", ");
         let script = format!("(title: \"test\", steps: [{steps}])");
-        fs::write(self.0.path().join("to.script.ron"), script).unwrap();
-        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
-        let output = command.current_dir(self.0.path()).args(["--script", "to.script.ron"]).output().unwrap();
+        fs::write(self.path("to.script.ron"), script).unwrap();
+        let output = self.run(&["--script", "to.script.ron"]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
 

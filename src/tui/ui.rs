@@ -249,9 +249,7 @@ impl Ui {
         let arrows = if takes_up_and_down { glyphs.sideways() } else { glyphs.arrows() };
         items.extend(own);
         items.sort_by_key(|item| item.rank);
-        let content = frame::room(cx.view, &items, self.theme, area);
-        let place = content.map_or(PicturePlace::Nowhere, |content| self.screen.picture_place(cx, content));
-        let rank = match place {
+        let rank = match self.picture_place(cx, &items, area) {
             PicturePlace::Nowhere => return items,
             PicturePlace::Beside => 8,
             PicturePlace::Alone => 3,
@@ -259,6 +257,20 @@ impl Ui {
         items.push(Item::new(arrows, "turn the picture", rank));
         items.sort_by_key(|item| item.rank);
         items
+    }
+
+    /// Where in `area` the page with these keys shows the robot.
+    fn picture_place(&self, cx: &ScreenCx<'_>, items: &[Item], area: Rect) -> PicturePlace {
+        let content = frame::room(cx.view, items, self.theme, area);
+        content.map_or(PicturePlace::Nowhere, |content| self.screen.picture_place(cx, content))
+    }
+
+    /// Whether the robot is to be seen in `area`.
+    pub fn shows_picture(&self, view: &ViewModel, area: Rect) -> bool {
+        let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
+        self.dialog.is_none()
+            && self.help.is_none()
+            && self.picture_place(&cx, &self.items(&cx, area), area) != PicturePlace::Nowhere
     }
 
     /// Draws everything; nothing changes by it.

@@ -156,6 +156,18 @@ fn a_key_without_effect_hides_no_change() {
     assert!(!ui.take_dirty());
 }
 
+#[test]
+fn the_robot_is_seen_where_there_is_room_and_nothing_before_it() {
+    let view = crowded();
+    let mut ui = Ui::new(themes()[0]);
+    ui.refresh(&view, &Session::default());
+    let large = Rect::new(0, 0, 120, 40);
+    assert!(ui.shows_picture(&view, large));
+    assert!(!ui.shows_picture(&view, Rect::new(0, 0, 20, 5)));
+    ui.on_input(Input::Key(Key::char('?')), &view);
+    assert!(!ui.shows_picture(&view, large));
+}
+
 /// The terminal's loop without a terminal.
 struct Walk {
     engine: Engine,
