@@ -36,6 +36,7 @@ fn samples(profile: &Profile) -> Vec<NamedSample> {
                 point: row.point,
                 sigma: row.sigma,
             },
+            temperature: row.temperature,
         })
         .collect()
 }

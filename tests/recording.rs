@@ -431,8 +431,11 @@ fn a_recording_carries_one_layout_that_opens_on_the_poses() {
     // While there is no result there is no room for it.
     let place = recorded(&format!("{} Capture(2, Fail)", begun("")));
     let shown = views(&place.recording());
-    assert!(!shown.contains(&errors) && shown.contains("[Temperature (degC)]"), "{shown:?}");
+    assert!(!shown.contains(&errors) && !shown.contains(TEMPERATURES), "{shown:?}");
 }
+
+/// The plot that is there where temperatures were measured.
+const TEMPERATURES: &str = "[Temperature (degC)]";
 
 /// Names of what a viewer shows.
 fn views(path: &Path) -> std::collections::BTreeSet<String> {
@@ -789,6 +792,20 @@ fn an_identification_from_files_is_recorded() {
     let profile = session.mounted_profile().unwrap();
     compare_frames(&path, &session, "/world/nominal/frames", "nominal", profile.chain());
     assert_eq!(results(&journal).len(), 1);
+    assert!(!views(&path).contains(TEMPERATURES));
+    // An instrument that knows the temperature.
+    let rows = text(&table.stdout);
+    let lines = rows.lines().map(str::to_owned).enumerate();
+    let warm: Vec<String> =
+        lines.map(|(row, line)| if row == 0 { line + ",temperature_degc" } else { line + ",21.5" }).collect();
+    fs::write(place.path("warm.csv"), warm.join("\n")).unwrap();
+    let output = place.run(&["identify", "--profile", "soochow", "--measurements", "warm.csv", "--record", "warm.rrd"]);
+    assert!([0, 1].contains(&output.status.code().unwrap()), "{}", text(&output.stderr));
+    let path = place.path("warm.rrd");
+    assert!(views(&path).contains(TEMPERATURES));
+    let temperatures = numbers(&path, "/capture/temperature_degc", "pose", "Scalars:scalars");
+    assert_eq!(temperatures.len(), session.samples.len());
+    assert!(temperatures.iter().all(|(_, values)| values == &[21.5]), "{temperatures:?}");
 }
 
 #[test]

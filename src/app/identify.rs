@@ -87,7 +87,12 @@ fn sample_set(
     odd: &[TableProblem],
 ) -> Result<SampleSet, Failure> {
     let samples = load::samples(rows, profile)?;
-    let named = |(row, sample): (&&Row, _)| NamedSample { pose: row.pose.clone(), line: row.line, sample };
+    let named = |(row, sample): (&&Row, _)| NamedSample {
+        pose: row.pose.clone(),
+        line: row.line,
+        sample,
+        temperature: row.temperature,
+    };
     Ok(SampleSet {
         samples: rows.iter().zip(samples).map(named).collect(),
         file: file.map(str::to_owned),

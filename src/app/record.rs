@@ -235,7 +235,7 @@ fn measured(row: usize, kind: PoseKind, named: &NamedSample, types: &[JointType]
         sigma_mm: sample.sigma.map(to_mm),
         scatter_mm: None,
         shots: 1,
-        temperature_degc: None,
+        temperature_degc: named.temperature,
         seconds: 0.0,
         predicted_error_sigma: None,
         findings: Vec::new(),

@@ -25,6 +25,8 @@ pub struct NamedSample {
     pub line: usize,
     /// What was measured: configuration (rad, sliding joints m) and point (m).
     pub sample: PointSample,
+    /// Temperature when it was measured (°C), for the record only.
+    pub temperature: Option<f64>,
 }
 
 /// Samples that serve one purpose.

@@ -22,6 +22,15 @@ use super::scribe::Posture;
 use super::{RecordingError, layout, names};
 use crate::profile::Profile;
 
+/// What there is to see of a recording.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contents {
+    /// What it is looked at for.
+    pub(super) purpose: Purpose,
+    /// Temperatures were measured.
+    pub(super) has_temperatures: bool,
+}
+
 /// What a recording is looked at for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
@@ -40,19 +49,22 @@ const BACKGROUND: Color = layout::rgb(24, 28, 33);
 type Extra = (String, Box<dyn AsComponents>);
 
 /// Sends the layout for the cell of `profile`.
-pub(super) fn send(canvas: &Canvas, profile: &Profile, purpose: Purpose) {
+pub(super) fn send(canvas: &Canvas, profile: &Profile, contents: Contents) {
     // A layout that cannot be made leaves the viewer's own: no reason to lose a recording.
-    if let Ok((messages, activation)) = messages(profile, purpose) {
+    if let Ok((messages, activation)) = messages(profile, contents) {
         canvas.stream().send_blueprint(messages, activation);
     }
 }
 
-fn messages(profile: &Profile, purpose: Purpose) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
+fn messages(
+    profile: &Profile,
+    contents: Contents,
+) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
     let mut extras = Vec::new();
     let picture = picture(profile, &mut extras);
-    let (right, timeline) = match purpose {
-        Purpose::Capture => (capturing(&mut extras), names::POSE),
-        Purpose::Result => (result(&mut extras), names::POSE),
+    let (right, timeline) = match contents.purpose {
+        Purpose::Capture => (capturing(contents.has_temperatures, &mut extras), names::POSE),
+        Purpose::Result => (result(contents.has_temperatures, &mut extras), names::POSE),
         Purpose::Plan => (planning(&mut extras), names::PLAN_ITERATION),
     };
     let root = Horizontal::new([picture, right]).with_column_shares([1.45, 1.0]);
@@ -72,17 +84,17 @@ fn messages(profile: &Profile, purpose: Purpose) -> Result<(Vec<LogMsg>, Bluepri
 }
 
 /// Beside the picture while there is no result: nothing that would be empty.
-fn capturing(extras: &mut Vec<Extra>) -> ContainerLike {
-    let plots = Tabs::new([capture(extras), search(extras)]).with_name("Measurement");
+fn capturing(has_temperatures: bool, extras: &mut Vec<Extra>) -> ContainerLike {
+    let plots = Tabs::new([capture(has_temperatures, extras), search(extras)]).with_name("Measurement");
     Vertical::new([plots.into(), log(), Tabs::new([guide(), report()]).with_name("Texts").into()])
         .with_row_shares([1.0, 0.7, 1.3])
         .into()
 }
 
 /// Beside the picture when there is a result.
-fn result(extras: &mut Vec<Extra>) -> ContainerLike {
+fn result(has_temperatures: bool, extras: &mut Vec<Extra>) -> ContainerLike {
     let (positions, distances) = errors(extras);
-    let plots = Tabs::new([positions, distances, capture(extras), solver(extras), search(extras)]);
+    let plots = Tabs::new([positions, distances, capture(has_temperatures, extras), solver(extras), search(extras)]);
     let bars = Tabs::new([
         view(BarChartView::new("Deviations in sigma (bar numbers: see report)").with_origin(names::SIGNIFICANCE)),
         view(TensorView::new("All pairs, nominal (um)").with_origin(names::MAP_NOMINAL)),
@@ -226,18 +238,18 @@ fn search(extras: &mut Vec<Extra>) -> ContainerLike {
     .into()
 }
 
-/// Plots of the capture.
-fn capture(extras: &mut Vec<Extra>) -> ContainerLike {
-    let mut plot = |name: &str, contents: &[&str]| series(name, contents, extras);
-    Vertical::new([
-        plot(
-            "Predicted error of a calibration so far, scatter, drift (mm)",
-            &["+ /capture/predicted_error_mm", "+ /capture/scatter_mm", "+ /capture/drift_mm"],
-        ),
-        plot("Temperature (degC)", &["+ /capture/temperature_degc"]),
-    ])
-    .with_name("Capture")
-    .into()
+/// Plots of the capture. Nothing that would be empty: many instruments report no temperature.
+fn capture(has_temperatures: bool, extras: &mut Vec<Extra>) -> ContainerLike {
+    let lengths = series(
+        "Predicted error of a calibration so far, scatter, drift (mm)",
+        &["+ /capture/predicted_error_mm", "+ /capture/scatter_mm", "+ /capture/drift_mm"],
+        extras,
+    );
+    let mut plots = vec![lengths];
+    if has_temperatures {
+        plots.push(series("Temperature (degC)", &["+ /capture/temperature_degc"], extras));
+    }
+    Vertical::new(plots).with_name("Capture").into()
 }
 
 fn series(name: &str, contents: &[&str], extras: &mut Vec<Extra>) -> ContainerLike {

@@ -9,7 +9,7 @@ mod result;
 use jiff::Timestamp;
 use rerun::{RecordingStream, TextDocument, TextLog};
 
-use super::blueprint::{self, Purpose};
+use super::blueprint::{self, Contents, Purpose};
 use super::canvas::{Canvas, Moment};
 use super::names;
 use crate::kinematics::{ForwardKinematics, KinematicChain};
@@ -27,6 +27,8 @@ pub(super) struct Scribe {
     sum: Sum,
     /// Results so far.
     runs: usize,
+    /// A sample has a temperature.
+    has_temperatures: bool,
     /// Whether a line did not fit: nothing after it can be drawn.
     is_lost: bool,
 }
@@ -40,6 +42,7 @@ impl Scribe {
             session: Session::default(),
             sum: Sum::default(),
             runs: 0,
+            has_temperatures: false,
             is_lost: false,
         };
         for line in before {
@@ -56,6 +59,7 @@ impl Scribe {
     /// Draws a line of the journal.
     pub(super) fn take(&mut self, line: &Line) {
         let before = self.sum.clone();
+        let had_temperatures = self.has_temperatures;
         let follows = self.follow(line);
         if let Ok((text, _)) = encode(line, &before) {
             let number = i64::try_from(line.number).unwrap_or(i64::MAX);
@@ -70,7 +74,7 @@ impl Scribe {
             Entry::Opened { program, name, .. } => document::opening(&self.canvas, program, name, line.time),
             Entry::Profile { .. } => {
                 self.cell();
-                self.layout(self.purpose);
+                self.layout();
             }
             Entry::Target(_) => self.cell(),
             Entry::Plan(plan) | Entry::PlanExtended(plan) => {
@@ -80,6 +84,9 @@ impl Scribe {
             Entry::Sample(noted) => {
                 measured::sample(&self.canvas, &self.session, noted, line.time);
                 plan::points(&self.canvas, &self.session, false);
+                if self.has_temperatures != had_temperatures {
+                    self.layout();
+                }
             }
             Entry::Correction(_) => {
                 // It may have changed where the robot stood, or the unit, at any of them.
@@ -90,8 +97,8 @@ impl Scribe {
             }
             Entry::Decision { .. } | Entry::Row(_) | Entry::Skipped { .. } => self.points(),
             Entry::Identified(identified) => {
-                if self.runs == 1 && self.purpose == Purpose::Capture {
-                    self.layout(Purpose::Result);
+                if self.runs == 1 {
+                    self.layout();
                 }
                 result::draw(&self.canvas, &self.session, identified, self.runs, line.time);
             }
@@ -104,8 +111,10 @@ impl Scribe {
         if let Ok((_, sum)) = encode(line, &self.sum) {
             self.sum = sum;
         }
-        if matches!(line.entry, Entry::Identified(_)) {
-            self.runs += 1;
+        match &line.entry {
+            Entry::Identified(_) => self.runs += 1,
+            Entry::Sample(noted) => self.has_temperatures |= noted.temperature_degc.is_some(),
+            _ => {}
         }
         self.is_lost = self.is_lost || self.session.apply(line).is_err();
         !self.is_lost
@@ -119,9 +128,14 @@ impl Scribe {
     }
 
     /// What a viewer arranges from now on.
-    fn layout(&self, purpose: Purpose) {
+    fn layout(&self) {
+        let purpose = match self.purpose {
+            Purpose::Capture if self.runs > 0 => Purpose::Result,
+            purpose => purpose,
+        };
+        let contents = Contents { purpose, has_temperatures: self.has_temperatures };
         if let Some(profile) = self.session.mounted_profile() {
-            blueprint::send(&self.canvas, &profile, purpose);
+            blueprint::send(&self.canvas, &profile, contents);
         }
     }
 

@@ -136,6 +136,7 @@ fn identified() -> IdentifiedText {
                 point: row.point,
                 sigma: row.sigma,
             },
+            temperature: row.temperature,
         })
         .collect();
     let (verification, identification) = named.split_at(12);

@@ -41,6 +41,7 @@ pub(super) fn samples(session: &Session, kind: PoseKind) -> Vec<NamedSample> {
                 point: session.point_of(sample),
                 sigma: session.sigma_of(sample),
             },
+            temperature: sample.noted.temperature_degc,
         })
         .collect()
 }
