@@ -153,6 +153,8 @@ pub struct Options {
     pub speed: f64,
     /// When the plan was made into a program, for heads that have a date.
     pub created: DateTime,
+    /// What the arm would run into, for the head.
+    pub dangers: Vec<String>,
 }
 
 /// Part of full speed unless asked otherwise.
@@ -303,6 +305,7 @@ impl Job<'_> {
                 Pause::Acknowledge => "Each measured pose is held until the operator goes on.".to_owned(),
             },
         ];
+        lines.extend(self.options.dangers.iter().map(|danger| format!("DANGER: {}", names::ascii(danger))));
         lines.extend(self.dialect.advice().map(str::to_owned));
         lines.iter().flat_map(|line| names::wrapped(line, width)).collect()
     }

@@ -217,7 +217,7 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
         run("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,20,-30,40,50,60\nb,0,0,0,0,400,0\n", &[]);
     assert_eq!(code, 1, "{out}{err}");
     let lines: Vec<&str> = out.lines().collect();
-    assert_eq!(lines[0], "pose,status,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,position_error_mm,angle_error_deg");
+    assert_eq!(lines[0], "pose,status,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,left_mm,left_deg");
     assert!(lines[1].starts_with("a,reached,") && lines[2] == "b,beyond_limit,,,,,,,,", "{out}");
     assert!(err.contains("pose b (line 3): not reached: J5 is meant to be beyond its limit"), "{err}");
     assert!(err.contains("1 of 2 targets reached"), "{err}");
@@ -240,6 +240,78 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
     assert!(code == 2 && err.contains("z_mm is missing"), "{err}");
     let (code, _, err) = run("pose,x_mm,y_mm,z_mm\nnear,900,100,3\n", &["--target", "ball"]);
     assert!(code == 2 && err.contains("targets: "), "{err}");
+
+    // What the data do not tell is said where it matters.
+    let joints = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,20,-30,40,50,60\n";
+    let (code, commands, err) = run(joints, &[]);
+    assert!(code == 0 && err.contains("theta6 (0."), "{err}");
+    let (code, _, err) = run(joints, &["--target", "smr"]);
+    assert!(code == 0 && !err.contains("theta6 (0."), "{err}");
+    // What is corrected is not corrected once more.
+    let (code, out, err) = run(&commands, &[]);
+    assert_eq!((code, out.as_str()), (2, ""), "{err}");
+    assert!(err.contains("it is a table of commands"), "{err}");
+    let (code, out, err) = run(joints, &["--out", targets.to_str().unwrap()]);
+    assert_eq!((code, out.as_str()), (2, ""), "{err}");
+    assert_eq!(fs::read_to_string(&targets).unwrap(), joints);
+}
+
+#[test]
+fn what_speaks_against_a_calibration_is_said_wherever_it_is_applied() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibrate(folder.path());
+    let text = fs::read_to_string(&calibration).unwrap();
+    let (accepted, refused) = ("status: accepted", "status: not_accepted");
+    assert!(text.contains(accepted), "{text}");
+    fs::write(&calibration, text.replace(accepted, refused)).unwrap();
+    let out = folder.path().join("c.urdf").to_str().unwrap().to_owned();
+    let output = trupose(&["export", "--calibration", &calibration, "--format", "urdf", "--out", &out]);
+    assert!(output.status.success());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("WARNING: this calibration was not accepted"), "{said}");
+    assert!(fs::read_to_string(&out).unwrap().contains("WARNING: this calibration was not accepted"));
+    let targets = folder.path().join("t.csv");
+    fs::write(&targets, "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,40,50,60\n").unwrap();
+    let output = trupose(&["compensate", "--calibration", &calibration, "--targets", targets.to_str().unwrap()]);
+    assert!(output.status.success());
+    assert!(String::from_utf8(output.stderr).unwrap().contains("WARNING: this calibration was not accepted"));
+    // Those of a simulated cell are for no real arm, and a later verification says so too.
+    let example = "sessions/example/calibration.ron";
+    let output = trupose(&["export", "--calibration", example, "--format", "dh-csv", "--out", &out]);
+    assert!(String::from_utf8(output.stderr).unwrap().contains("WARNING: SIMULATED"));
+    assert!(fs::read_to_string(&out).unwrap().contains("# WARNING: SIMULATED"));
+    let again = ["verify", "--calibration", example, "--measurements", "sessions/example/measurements.csv"];
+    let output = trupose(&[&again[..], &["--use", "kind == 'verification'"]].concat());
+    assert!(String::from_utf8(output.stdout).unwrap().contains("SIMULATED"));
+}
+
+#[test]
+fn a_tracker_that_moved_is_named_by_verify() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibrate(folder.path());
+    // The same points seen from elsewhere.
+    let table = fs::read_to_string("sessions/soochow-example/verification.csv").unwrap();
+    let moved: Vec<String> = table
+        .lines()
+        .map(|line| match line.split(',').collect::<Vec<_>>()[..] {
+            [ref before @ .., x, y, z] if x.parse::<f64>().is_ok() => {
+                let number = |text: &str| text.parse::<f64>().unwrap();
+                format!("{},{},{},{}", before.join(","), 500.0 - number(y), number(x) + 20.0, number(z) - 7.0)
+            }
+            _ => line.to_owned(),
+        })
+        .collect();
+    let path = folder.path().join("moved.csv").to_str().unwrap().to_owned();
+    fs::write(&path, moved.join("\n")).unwrap();
+    let verify = ["verify", "--calibration", &calibration, "--measurements", &path];
+    let output = trupose(&verify);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    let words: Vec<&str> = text.split_whitespace().collect();
+    assert!(words.join(" ").contains("'--refit frame' fits the place of the tracker"), "{text}");
+    let output = trupose(&[&verify[..], &["--refit", "frame"]].concat());
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && !text.contains("is not where it was"), "{text}");
 }
 
 #[test]
@@ -273,6 +345,21 @@ fn models_are_exported_and_a_urdf_is_imported() {
         assert!((a.translation.vector - b.translation.vector).norm() < 1e-9 && a.rotation.angle_to(&b.rotation) < 1e-9);
     }
     assert!(trupose(&["profile", "show", &imported]).status.success());
+    // Millimetres where metres belong.
+    let urdf = fs::read_to_string(path("c.urdf")).unwrap();
+    let mut pieces = urdf.split("xyz=\"");
+    let mut text = pieces.next().unwrap().to_owned();
+    for piece in pieces {
+        let (numbers, rest) = piece.split_once('"').unwrap();
+        let larger = numbers.split_whitespace().map(|number| (1e3 * number.parse::<f64>().unwrap()).to_string());
+        text += &format!("xyz=\"{}\"{rest}", larger.collect::<Vec<_>>().join(" "));
+    }
+    fs::write(path("mm.urdf"), text).unwrap();
+    for (file, is_long) in [("c.urdf", false), ("mm.urdf", true)] {
+        let output = trupose(&["profile", "import-urdf", &path(file), "--base", "base", "--tip", "flange"]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(said.contains("are they millimetres in this one?"), is_long, "{file}: {said}");
+    }
     let output = trupose(&[
         "profile",
         "import-urdf",

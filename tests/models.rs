@@ -66,6 +66,8 @@ fn calibrated(profile: &Profile) -> CalibratedArm {
         targets: profile.targets().to_vec(),
         other_effects: Vec::new(),
         about: vec!["Identified geometry of a test".to_owned()],
+        cautions: Vec::new(),
+        untold: Vec::new(),
         profile: profile.clone(),
     }
 }

@@ -248,6 +248,15 @@ fn a_program_is_written_for_a_plan() {
     assert!(code == 2 && out.is_empty() && err.contains("pulses"), "{err}");
     let (code, _, err) = written("basic", "ur5e");
     assert!(code == 2 && err.contains("basic"), "{err}");
+    // What the arm would run into is said in the program, too.
+    let hit = folder.path().join("hit.csv");
+    let rows = "pose,kind,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\nhit,identification,0,0,170,0,0,0\n";
+    fs::write(&hit, rows).unwrap();
+    let output = trupose(&["program", "--profile", "ur5e", "--plan", hit.to_str().unwrap(), "--dialect", "urscript"]);
+    let program = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{program}");
+    assert!(program.contains("# DANGER: in pose hit "), "{program}");
+    assert!(String::from_utf8(output.stderr).unwrap().contains("WARNING: in pose hit "));
     let out = folder.path().join("programs");
     let output = trupose(&[
         "program",

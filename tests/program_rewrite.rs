@@ -65,6 +65,7 @@ fn written(dialect: Dialect, arm: &Arm, shift: f64) -> Vec<u8> {
         pause: Pause::Dwell(3.0),
         speed: 0.1,
         created: date(2025, 3, 9).at(14, 5, 0, 0),
+        dangers: Vec::new(),
     };
     let program = write(dialect, &arm.robot(), &poses(shift), &options).unwrap();
     program.files[0].text.clone().into_bytes()

@@ -54,7 +54,13 @@ fn plan() -> Vec<PlannedPose> {
 }
 
 fn options(pause: Pause) -> Options {
-    Options { name: "Cal poses".to_owned(), pause, speed: 0.1, created: date(2025, 3, 9).at(14, 5, 0, 0) }
+    Options {
+        name: "Cal poses".to_owned(),
+        pause,
+        speed: 0.1,
+        created: date(2025, 3, 9).at(14, 5, 0, 0),
+        dangers: Vec::new(),
+    }
 }
 
 /// The robot that a dialect is shown for.

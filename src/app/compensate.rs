@@ -24,15 +24,36 @@ pub(super) fn run<O: Write, E: Write>(
     args: &CompensateArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let arm = export::calibrated_arm(&args.calibration)?;
+    if let (Some(out), Some(source)) = (&args.out, args.targets.as_ref().or(args.program.as_ref()))
+        && is_same_file(out, source)
+    {
+        let message = format!("'{}' is what is to be compensated", out.display());
+        return Err(Failure::new(ExitStatus::Usage, message)
+            .hint("write to another file: what is corrected already must not be corrected again"));
+    }
+    let arm = export::calibrated_arm(&args.calibration, console)?;
     for effect in &arm.other_effects {
         console.remark(&format!("note: compensated for geometry only; identified, but not in it: {effect}"));
+    }
+    if !args.position_only && args.target.is_none() && !arm.untold.is_empty() {
+        let names: Vec<&str> = arm.targets.iter().map(|target| target.name.as_str()).collect();
+        console.remark(&format!(
+            "note: the measured points tell these constants only combined with others (standard deviations): {}. As uncertain are \
+             orientations, and points of the tool away from the target that was measured; '--target {}' compensates that point",
+            arm.untold.join(", "),
+            names.first().unwrap_or(&"NAME")
+        ));
     }
     match (&args.program, args.dialect, &args.targets) {
         (Some(path), Some(dialect), _) => program::run(args, &arm, path, dialect, console),
         (_, _, Some(path)) => table(args, &arm, path, console),
         _ => Err(Failure::new(ExitStatus::Usage, "nothing to compensate").hint("give '--targets' or '--program'")),
     }
+}
+
+/// Whether two paths lead to one file that exists.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 /// A table of targets becomes a table of commands.
@@ -115,11 +136,11 @@ fn goal(goal: &TargetGoal) -> Goal {
     }
 }
 
-/// `pose,status,q1_deg,…,position_error_mm,angle_error_deg`.
+/// `pose,status,q1_deg,…,left_mm,left_deg`: what is left is that of the calculation, no error of the arm.
 fn header(joints: &[Joint]) -> String {
     let names = joints.iter().enumerate();
     let names = names.map(|(index, joint)| format!("q{}_{}", index + 1, joint.joint_type.quantity().unit()));
-    format!("pose,status,{},position_error_mm,angle_error_deg", names.collect::<Vec<_>>().join(","))
+    format!("pose,status,{},left_mm,left_deg", names.collect::<Vec<_>>().join(","))
 }
 
 /// A target that is not reached has no joint values: they must not be commanded.

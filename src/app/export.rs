@@ -13,8 +13,11 @@ use crate::session::calibration::Calibration;
 use crate::store;
 use crate::units::{MICROMETRE, MILLIRADIAN};
 
+/// No arm is longer (m).
+const LONGEST_ARM: f64 = 20.0;
+
 pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let arm = calibrated_arm(&args.calibration)?;
+    let arm = calibrated_arm(&args.calibration, console)?;
     let given = args.into.as_deref().map(load::text).transpose()?;
     let format = Format::from(args.format);
     if given.is_some() && format != Format::Urdf {
@@ -40,8 +43,11 @@ pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O
     Ok(ExitStatus::Accepted)
 }
 
-/// The arm of a calibration file.
-pub(super) fn calibrated_arm(path: &Path) -> Result<CalibratedArm, Failure> {
+/// The arm of a calibration file. Says what speaks against applying it.
+pub(super) fn calibrated_arm<O: Write, E: Write>(
+    path: &Path,
+    console: &mut Console<O, E>,
+) -> Result<CalibratedArm, Failure> {
     let file = path.display().to_string();
     let text = load::text(path)?;
     let calibration = Calibration::parse(&text).map_err(|error| {
@@ -49,8 +55,12 @@ pub(super) fn calibrated_arm(path: &Path) -> Result<CalibratedArm, Failure> {
             .hint("a calibration is written by 'trupose identify --out DIR'")
     })?;
     let loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
-    CalibratedArm::new(&calibration, &loaded.profile)
-        .map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))
+    let arm = CalibratedArm::new(&calibration, &loaded.profile)
+        .map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))?;
+    for caution in &arm.cautions {
+        console.remark(&format!("WARNING: {caution}"));
+    }
+    Ok(arm)
 }
 
 /// `trupose profile import-urdf`.
@@ -78,6 +88,12 @@ pub(super) fn import_urdf<O: Write, E: Write>(
     load::parse_profile(profile.clone(), "the imported profile")?;
     for note in &arm.notes {
         console.remark(&format!("note: {note}"));
+    }
+    let length = arm.chain.length();
+    if length > LONGEST_ARM {
+        console.remark(&format!(
+            "WARNING: stretched out this arm is {length:.0} m long: lengths of a URDF are metres; are they millimetres in this one?"
+        ));
     }
     match &args.out {
         Some(path) => {

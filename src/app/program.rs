@@ -48,7 +48,11 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
             }
         }
     }
-    for danger in dangers(profile, &listed.rows)? {
+    if profile.bodies().is_empty() {
+        console.remark("WARNING: the profile has no bodies: collisions were not checked");
+    }
+    let found = dangers(profile, &listed.rows)?;
+    for danger in &found {
         console.remark(&format!("WARNING: {danger}"));
     }
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
@@ -60,6 +64,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
         pause: if args.acknowledge { Pause::Acknowledge } else { Pause::Dwell(args.dwell_s) },
         speed: args.speed_percent / 100.0,
         created: load::today(),
+        dangers: found,
     };
     let program = write(args.dialect, &robot, &listed.rows, &options)
         .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
@@ -80,14 +85,14 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
             console.print(&file.text)?;
         }
     }
-    Ok(ExitStatus::Accepted)
+    Ok(if options.dangers.is_empty() { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
 }
 
 /// What the arm would run into, by the bodies of the profile: the first few findings of poses and of moves between them.
 fn dangers(profile: &Profile, rows: &[PlannedPose]) -> Result<Vec<String>, Failure> {
     const SHOWN: usize = 5;
     if profile.bodies().is_empty() {
-        return Ok(vec!["the profile has no bodies: collisions were not checked".to_owned()]);
+        return Ok(Vec::new());
     }
     let usage = |error: &CellError| Failure::from_error(ExitStatus::Usage, error);
     let wide = |joint: &Joint, limits: Option<(f64, f64)>| {

@@ -17,11 +17,13 @@ use crate::procedure::{identification_failure, input_file, nominal_targets, prov
 use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
-use crate::session::summary::{SCHEMA, VerificationReport, Warning};
-use crate::units::{MILLIMETRE, from_mm};
+use crate::session::summary::{ModelSummary, SCHEMA, SIMULATED, VerificationReport, Warning};
+use crate::units::{MICROMETRE, MILLIMETRE, from_mm, to_mm};
 
 /// How freely a target that was mounted anew is fitted (m).
 const NEW_MOUNTING: f64 = 50.0 * MILLIMETRE;
+/// Positions this many times worse than distances are not those of the same set-up.
+const MOVED: f64 = 10.0;
 /// Fewer points than this cannot show a mistake in a whole table.
 const ENOUGH_TO_COMPARE: usize = 4;
 
@@ -54,6 +56,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let configurations = rows.iter().map(|row| (row.line, row.configuration.as_slice()));
     warnings.extend(checks::limit_warning(profile, None, configurations));
     warnings.extend(carried_over(&calibration));
+    warnings.extend(calibration.warnings.iter().filter(|warning| warning.code == SIMULATED).cloned());
     warnings.extend(plausible.and_then(|compared| compared.warning));
     let (refit, basis, fitted) = match args.refit {
         RefitArg::None => ("none", "same set-up as the identification", 0),
@@ -84,6 +87,9 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         refit,
     );
     verification.independent = checks::is_independent(&warnings);
+    if args.refit == RefitArg::None {
+        warnings.splice(0..0, moved_set_up(&verification.identified));
+    }
     let inputs = vec![input_file("calibration", file, text.as_bytes()), measured.input];
     let report = VerificationReport {
         schema: SCHEMA,
@@ -112,6 +118,19 @@ fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) ->
     let problem =
         Problem { chain: profile.chain(), targets: &targets, parameters: &parameters, observations: &observations };
     checks::check_plausibility(&problem).map(Some)
+}
+
+/// Distances do not feel where the tracker stands, positions do.
+fn moved_set_up(identified: &ModelSummary) -> Option<Warning> {
+    let (position, distance) = (identified.position_mm?.mean, identified.distance_mm?.mean);
+    (position > MOVED * distance.max(to_mm(MICROMETRE))).then(|| {
+        let message = format!(
+            "the distances fit ({} mm), the positions do not ({} mm): the tracker, or the SMR, is not where it was at the identification. '--refit frame' fits the place of the tracker, '--refit frame+target' that of the SMR too",
+            report::number(distance, 4),
+            report::number(position, 4)
+        );
+        warning("another_set_up", message, true)
+    })
 }
 
 /// What ruled out acceptance of the identification itself also rules it out here.

@@ -122,6 +122,11 @@ impl Plausibility {
 /// Sizes or indices that do not fit.
 pub fn compare_with_nominal(problem: &Problem<'_>) -> Result<Plausibility, IdentificationError> {
     problem.check()?;
+    // All points weigh the same here: what the instrument promises for each is no yardstick for a mistake, and residuals would
+    // be counted in those standard deviations instead of metres.
+    let points = problem.observations.points.iter().map(|sample| PointSample { sigma: None, ..sample.clone() });
+    let observations = Observations { points: points.collect(), ..problem.observations.clone() };
+    let problem = &Problem { observations: &observations, ..*problem };
     let expected = expected_residual(problem);
     let trial = Trial::new(problem);
     let all = &problem.observations.points;
@@ -135,7 +140,8 @@ pub fn compare_with_nominal(problem: &Problem<'_>) -> Result<Plausibility, Ident
     Ok(plausibility)
 }
 
-/// Root mean square residual (m) that the expected deviations predict once frame and target are fitted.
+/// Root mean square residual (m) that the expected deviations predict once frame and target are fitted. Readings must not have
+/// standard deviations of their own.
 fn expected_residual(problem: &Problem<'_>) -> f64 {
     let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
     let evaluation = Evaluation::new(problem, &model);

@@ -11,6 +11,7 @@ use super::{ModelError, urdf_write};
 use crate::kinematics::{Axis, ForwardKinematics, JointType, KinematicChain, LinkParameter, ParameterId};
 use crate::profile::{Profile, Target};
 use crate::session::calibration::Calibration;
+use crate::session::summary::{SIMULATED, VerdictStatus};
 use crate::units::{from_mm, to_deg, to_mm};
 
 /// A format of a model.
@@ -71,8 +72,13 @@ pub struct CalibratedArm {
     pub targets: Vec<Target>,
     /// Names of identified effects that are no link constants and no targets: no format here can carry them.
     pub other_effects: Vec<String>,
-    /// Where the result comes from, a few lines.
+    /// Where the result comes from and how it was judged, a few lines.
     pub about: Vec<String>,
+    /// What speaks against applying it: it was not accepted, or nothing was measured.
+    pub cautions: Vec<String>,
+    /// Constants of the last link that the data tell only combined with others, with their standard deviations: as uncertain are
+    /// orientations, and points of the tool away from the target that was measured.
+    pub untold: Vec<String>,
 }
 
 impl CalibratedArm {
@@ -99,16 +105,52 @@ impl CalibratedArm {
             }
         }
         let provenance = &calibration.provenance;
-        let about = vec![
+        let cautions = cautions(calibration);
+        let mut about = vec![
             format!("Identified geometry of '{}'", profile.title()),
             format!("profile {}, calibrated with {}", profile.name(), provenance.program),
+            format!("verdict on the calibration: {}", words(calibration.verdict.status)),
         ];
-        Ok(Self { profile, identified, targets, other_effects, about })
+        about.extend(cautions.iter().map(|caution| format!("WARNING: {caution}")));
+        let untold = untold(calibration, profile.chain().dof());
+        Ok(Self { profile, identified, targets, other_effects, about, cautions, untold })
     }
 
     fn limits(&self) -> Vec<Option<(f64, f64)>> {
         self.profile.joints().iter().map(|range| range.limits).collect()
     }
+}
+
+const fn words(status: VerdictStatus) -> &'static str {
+    match status {
+        VerdictStatus::Accepted => "accepted",
+        VerdictStatus::NotAccepted => "NOT ACCEPTED",
+        VerdictStatus::NotEvaluated => "not evaluated",
+    }
+}
+
+/// What speaks against applying a calibration.
+fn cautions(calibration: &Calibration) -> Vec<String> {
+    let verdict = &calibration.verdict;
+    let refused = (verdict.status == VerdictStatus::NotAccepted)
+        .then(|| format!("this calibration was not accepted: {}", verdict.reasons.join("; ")));
+    let warnings = calibration.warnings.iter();
+    let serious = warnings.filter(|warning| warning.blocks_acceptance || warning.code == SIMULATED);
+    refused.into_iter().chain(serious.map(|warning| warning.message.clone())).collect()
+}
+
+/// Constants of the last of `joints` links that the data tell only combined with others.
+fn untold(calibration: &Calibration, joints: usize) -> Vec<String> {
+    let of_last_link =
+        |name: &str| matches!(parameter_id(name), Some(ParameterId::Link { joint, .. }) if joint + 1 == joints);
+    let parameters = calibration.parameters.iter();
+    parameters
+        .filter(|parameter| !parameter.identifiable && of_last_link(&parameter.name))
+        .filter_map(|parameter| {
+            let sigma = parameter.sigma.filter(|sigma| *sigma > 0.0)?;
+            Some(format!("{} ({:.2} {})", parameter.name, sigma, parameter.unit))
+        })
+        .collect()
 }
 
 /// The parameter of a printed name.

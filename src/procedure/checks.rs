@@ -103,7 +103,7 @@ pub(crate) fn set_warnings(joints: &[Joint], known: &[TargetAt], tested: &[Targe
     if shared > 0 {
         let verb = if shared == 1 { "is" } else { "are" };
         let message = format!(
-            "{shared} of {} {verb} also in the identification set: the figures below are not an independent verification",
+            "{shared} of {} {verb} of a pose that is also in the identification set: the figures below say nothing about other poses and are no independent verification; '--use' picks rows, such as \"kind == 'verification'\"",
             counted(tested.len())
         );
         warnings.push(warning(NOT_INDEPENDENT, message, true));

@@ -6,7 +6,7 @@ use crate::identification::{Identification, Prior, Problem, Settings, Terminatio
 use crate::profile::Level;
 use crate::report::number;
 use crate::session::summary::Warning;
-use crate::units::{MILLIMETRE, to_mm};
+use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
 /// A parameter further from nominal than this many expected deviations is called out.
 const RAN_AWAY: f64 = 5.0;
@@ -69,7 +69,7 @@ pub(crate) fn result_warnings(
             "the residuals ({} mm per coordinate) are {} times the stated sigma ({} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below are widened by that factor",
             number(to_mm(residual), 4),
             number(found.sigma.excess(), 1),
-            number(to_mm(found.sigma.used), 4)
+            number(to_mm(found.sigma.used), if found.sigma.used < 10.0 * MICROMETRE { 6 } else { 4 })
         );
         warnings.push(warning("sigma_excess", message, false));
     }

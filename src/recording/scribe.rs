@@ -194,6 +194,5 @@ impl Posture {
 
 /// Length of the arm stretched out (m), for sizes in the picture.
 fn reach(profile: &Profile) -> f64 {
-    let link = |joint: &crate::kinematics::Joint| joint.link.a.abs() + joint.link.d.abs();
-    profile.chain().joints().iter().map(link).sum::<f64>().max(0.1)
+    profile.chain().length().max(0.1)
 }

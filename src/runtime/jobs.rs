@@ -75,7 +75,9 @@ impl Job {
         };
         let summary = procedure::plan::plan(profile, text, request, &keep_going, &told).map_err(problem)?;
         let rows = procedure::plan::rows(&summary, &procedure::joint_types(profile));
-        let origin = format!("chosen from {} candidates, seed {}", request.candidates, request.seed);
+        // Which set a search has when it is stopped depends on the machine: the seed does not bring it back.
+        let end = if self.is_cancelled() { "; the search was stopped before its end" } else { "" };
+        let origin = format!("chosen from {} candidates, seed {}{end}", request.candidates, request.seed);
         Ok(Answer::Planned { summary: Some(Box::new(summary)), rows, origin })
     }
 

@@ -200,6 +200,9 @@ pub struct RejectedSummary {
     pub reason: String,
 }
 
+/// Code of the warning that nothing was measured: the points come from a simulated cell.
+pub const SIMULATED: &str = "simulated";
+
 /// Something the reader must know before the numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Warning {

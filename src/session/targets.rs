@@ -38,6 +38,9 @@ pub struct TargetRow {
     pub goal: TargetGoal,
 }
 
+/// Column of a table of commands, which must not be compensated once more.
+const COMMANDS: &str = "status";
+
 /// Reads targets for a robot with these joints. `file` is its name in messages.
 ///
 /// # Errors
@@ -60,7 +63,12 @@ fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> O
     if table.records.is_empty() && problems.is_empty() {
         problems.push(Defect::NoRows.of_table());
     }
-    let mut header = Header::new(table.header?, problems)?;
+    let names = table.header?;
+    if names.cells.iter().any(|name| name == COMMANDS) {
+        problems.push(Defect::AlreadyCompensated.of_table());
+        return None;
+    }
+    let mut header = Header::new(names, problems)?;
     let pose = header.text("pose");
     let (point, angles) = (["x", "y", "z"], ["roll", "pitch", "yaw"]);
     let is_cartesian = point.iter().chain(&angles).any(|name| header.has_quantity(name));

@@ -115,6 +115,11 @@ pub enum Defect {
         /// The table has tracker coordinates.
         has_points: bool,
     },
+    /// A table of commands where one of targets should be.
+    #[error(
+        "it is a table of commands that 'compensate' wrote: corrected once more they would lead elsewhere; give the targets that were meant"
+    )]
+    AlreadyCompensated,
     /// Nothing to read.
     #[error("the table has no rows; it needs column names and below them one row per reading")]
     NoRows,

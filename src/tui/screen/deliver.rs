@@ -111,7 +111,10 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             page.marked(("1 ", Role::Dim), wait, Role::Warn);
         }
         page.marked(("2 ", Role::Dim), "verify on new points, later or after a collision:", Role::Plain);
-        let verify = format!("trupose verify --calibration {} --measurements NEW.csv", path("calibration.ron"));
+        let verify = format!(
+            "trupose verify --calibration {} --measurements NEW.csv --refit frame+target",
+            path("calibration.ron")
+        );
         page.paragraph(&verify, Role::Plain);
         page.marked(("3 ", Role::Dim), "measure more:", Role::Plain);
         page.paragraph(&format!("trupose resume {folder}"), Role::Plain);

@@ -11,7 +11,7 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, Step};
 use crate::session::sha256;
 use crate::session::state::{Sample, SampleState, Session};
-use crate::session::summary::{InputFile, VerificationMode, Warning};
+use crate::session::summary::{InputFile, SIMULATED, VerificationMode, Warning};
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::Notice;
@@ -81,7 +81,7 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
 fn remarks(session: &Session) -> Vec<Warning> {
     let simulated = match &session.instrument {
         Some(InstrumentChoice::Simulated(simulation)) => Some(Warning {
-            code: "simulated".to_owned(),
+            code: SIMULATED.to_owned(),
             message: format!(
                 "SIMULATED: the points come from the simulated cell (seed {}), not from a robot; this result is for no real arm",
                 simulation.seed
