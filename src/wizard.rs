@@ -321,6 +321,10 @@ impl Wizard {
         self.busy = None;
         if let Answer::Connected { identity, recorded } = &answer {
             self.connection = Some(Connection { identity: identity.clone(), recorded: recorded.clone() });
+            let is_linked = matches!(self.session.instrument, Some(InstrumentChoice::Linked(_)));
+            if is_linked && self.session.identities.last() != Some(identity) {
+                self.actions.push_back(Action::Write(vec![Entry::Connected { identity: identity.clone() }]));
+            }
         }
         let cx = Cx { session: &self.session, connection: self.connection.as_ref(), now: self.now };
         let actions = self.phase.on_answer(answer, &cx);

@@ -57,6 +57,8 @@ pub struct Session {
     pub samples: Vec<Sample>,
     /// Measurements that gave no sample.
     pub refused: Vec<Refused>,
+    /// Who the instrument on a wire said it is; several where another one answered later.
+    pub identities: Vec<String>,
     /// Number of the last measurement.
     pub measurements: u64,
     /// From which measurement on noted coordinates have to be multiplied by what.
@@ -222,10 +224,15 @@ impl Session {
                 self.plan = None;
             }
             Entry::Step(step) => self.step = *step,
-            Entry::Instrument(instrument) => self.instrument = Some(instrument.clone()),
-            Entry::Target(target) => {
-                self.target = Some(*target);
+            Entry::Instrument(instrument) => {
+                self.instrument = Some(instrument.clone());
+                self.identities.clear();
             }
+            Entry::Connected { identity } => {
+                self.identities.retain(|known| known != identity);
+                self.identities.push(identity.clone());
+            }
+            Entry::Target(target) => self.target = Some(*target),
             Entry::CirclePoint(point) => {
                 self.measurements = self.measurements.max(point.number);
                 self.circle_points.push(point.clone());
@@ -316,6 +323,12 @@ impl Session {
     pub fn mounted_profile(&self) -> Option<Profile> {
         let profile = &self.robot.as_ref()?.profile;
         Some(self.mounted().map_or_else(|| profile.clone(), |mounted| mounted.on(profile)))
+    }
+
+    /// Whether nothing is really measured: in the simulated cell, or by an instrument that says that it is simulated.
+    pub fn is_simulated(&self) -> bool {
+        let says_so = |identity: &String| identity.to_lowercase().contains("simulated");
+        matches!(self.instrument, Some(InstrumentChoice::Simulated(_))) || self.identities.iter().any(says_so)
     }
 
     /// Whether anything was measured.

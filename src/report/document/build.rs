@@ -33,13 +33,17 @@ impl Document {
                 None => PointOrigin::Tables,
                 Some(InstrumentChoice::Manual { .. }) => PointOrigin::Typed,
                 Some(InstrumentChoice::Simulated(_)) => PointOrigin::Simulated,
+                Some(InstrumentChoice::Linked(_)) if session.is_simulated() => PointOrigin::Simulated,
                 Some(InstrumentChoice::Linked(_)) => PointOrigin::Instrument,
                 Some(InstrumentChoice::Replay { .. }) => PointOrigin::Recorded,
             },
             session: session_part(session),
             about: session.about.clone(),
             robot: session.robot.as_ref().map(robot_part),
-            instrument: session.instrument.as_ref().map(instrument_text),
+            instrument: session.instrument.as_ref().map(|instrument| {
+                let identities = session.identities.iter().map(|identity| format!("; {identity}"));
+                instrument_text(instrument) + &identities.collect::<String>()
+            }),
             target: target(session),
             temperature: temperature(session),
             counts: counts(session),

@@ -49,7 +49,7 @@ pub(super) fn section(document: &Document) -> String {
         |text: &str| if text.is_empty() { "<span class=\"soft\">not given</span>".to_owned() } else { escape(text) };
     let robot = report.robot.as_ref();
     let instrument = match (&report.instrument, robot.and_then(|robot| robot.instrument.as_ref())) {
-        (Some(how), Some(name)) => format!("{}; {}", escape(name), escape(how)),
+        (Some(how), Some(name)) => format!("{} (as the profile says); {}", escape(name), escape(how)),
         (Some(how), None) => escape(how),
         (None, Some(name)) => format!("{} (as the profile says)", escape(name)),
         (None, None) => NONE.to_owned(),

@@ -16,6 +16,7 @@ impl Entry {
             }
             Self::Step(step) => format!("step {} of 8: {step}", step.number()),
             Self::Instrument(instrument) => format!("instrument: {}", instrument_text(instrument)),
+            Self::Connected { identity } => format!("connected: {identity}"),
             Self::Target(target) => format!("SMR: {}", target_text(target)),
             Self::CirclePoint(point) => {
                 format!("measurement {}: joint {} turned, at {}", point.number, point.joint + 1, xyz(point.xyz_mm))

@@ -36,6 +36,11 @@ pub enum Entry {
     Step(Step),
     /// What measures.
     Instrument(InstrumentChoice),
+    /// An instrument on a wire has answered.
+    Connected {
+        /// Who it says it is, with its reflector and what is odd about it.
+        identity: String,
+    },
     /// Where the SMR sits on the flange.
     Target(TargetChoice),
     /// A point of the circle-point analysis.

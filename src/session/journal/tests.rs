@@ -242,6 +242,7 @@ fn all_entries() -> Vec<Entry> {
         Entry::Delivered { files: vec!["a.csv".to_owned()], left_out: vec![TRICKY.to_owned()] },
         Entry::Resumed { program: "trupose 9".to_owned(), torn_bytes: usize::MAX },
         Entry::Closed { reason: TRICKY.to_owned() },
+        Entry::Connected { identity: TRICKY.to_owned() },
     ];
     entries.extend(Step::ALL.map(Entry::Step));
     entries.push(Entry::About(About { serial: TRICKY.to_owned(), ..About::default() }));
@@ -277,6 +278,7 @@ fn variant(entry: &Entry) -> usize {
         Entry::Closed { .. } => 18,
         Entry::Row(_) => 19,
         Entry::About(_) => 20,
+        Entry::Connected { .. } => 21,
     }
 }
 
@@ -284,7 +286,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 21);
+    assert_eq!(variants.len(), 22);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

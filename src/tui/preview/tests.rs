@@ -64,20 +64,6 @@ fn everything_at_120x40() {
 }
 
 #[test]
-fn a_frame_takes_milliseconds() {
-    let scene = with_everything();
-    #[expect(clippy::disallowed_methods, reason = "a test of speed")]
-    let start = std::time::Instant::now();
-    for _ in 0..20 {
-        drawn(&scene, &Camera::default(), Glyphs::Unicode, 200, 50);
-    }
-    let per_frame = start.elapsed().as_secs_f64() * 1e3 / 20.0;
-    println!("{per_frame:.2} ms per frame");
-    // Less than 5 ms on an idle core; other work may share it.
-    assert!(per_frame < 40.0, "{per_frame} ms");
-}
-
-#[test]
 fn every_shipped_robot_is_drawn() {
     for name in crate::profile::builtin_names() {
         let scene = Scene::at_rest(&profile(name));

@@ -79,17 +79,15 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
 
 /// What a reader of the result must know about how it was measured.
 fn remarks(session: &Session) -> Vec<Warning> {
-    let simulated = match &session.instrument {
-        Some(InstrumentChoice::Simulated(simulation)) => Some(Warning {
-            code: SIMULATED.to_owned(),
-            message: format!(
-                "SIMULATED: the points come from the simulated cell (seed {}), not from a robot; this result is for no real arm",
-                simulation.seed
-            ),
-            blocks_acceptance: false,
-        }),
-        _ => None,
+    let cause = match &session.instrument {
+        Some(InstrumentChoice::Simulated(simulation)) => format!("the simulated cell (seed {})", simulation.seed),
+        _ => format!("a simulated instrument ({})", session.identities.join("; ")),
     };
+    let simulated = session.is_simulated().then(|| Warning {
+        code: SIMULATED.to_owned(),
+        message: format!("SIMULATED: the points come from {cause}, not from a robot; this result is for no real arm"),
+        blocks_acceptance: false,
+    });
     simulated.into_iter().chain(left_out(session, PoseKind::Identification)).collect()
 }
 
