@@ -171,7 +171,7 @@ impl AsciiProtocol {
         self.old_in_a_row = self.old_in_a_row.saturating_add(1);
         if self.old_in_a_row == BAD_IN_A_ROW {
             let text = "the times in the lines do not advance: if the instrument's clock was set back, connect again";
-            self.outbox.status(Severity::Warning, text);
+            self.outbox.say(Severity::Warning, text);
         }
         self.owed.pop_front();
         if let Some(Capture::Waiting { unsure, old, .. }) = &mut self.capture {
@@ -193,7 +193,7 @@ impl AsciiProtocol {
                 self.finish(shot);
             }
             _ if was_owed || self.is_repeat(&shot) => {}
-            _ if self.started => self.outbox.offered(shot),
+            _ if self.started => self.outbox.push(ProtocolEvent::Offered(shot)),
             _ => {}
         }
     }
@@ -209,7 +209,7 @@ impl AsciiProtocol {
                     self.finish(mean);
                 }
             }
-            _ if self.started => self.outbox.live(shot),
+            _ if self.started => self.outbox.push(ProtocolEvent::Live(shot)),
             _ => {}
         }
     }
@@ -223,7 +223,7 @@ impl AsciiProtocol {
         self.capture = None;
         if self.is_repeat(&shot) {
             let text = "it is equal to the point before to the last digit, so it was not measured anew";
-            return self.outbox.push(ProtocolEvent::Failed(Failure::Unusable(text.to_owned())));
+            return self.outbox.fail(Failure::Unusable(text.to_owned()));
         }
         self.previous = Some(shot.point);
         self.outbox.push(ProtocolEvent::Shot(shot));
@@ -250,7 +250,7 @@ impl AsciiProtocol {
             None => {
                 let was_owed = self.owed.pop_front().is_some();
                 if !was_owed && let Rejection::Instrument(text) = rejection {
-                    self.outbox.status(Severity::Warning, format!("the instrument says: {text}"));
+                    self.outbox.say(Severity::Warning, format!("the instrument says: {text}"));
                 }
             }
         }
@@ -284,13 +284,13 @@ impl AsciiProtocol {
             let said = format!(
                 "{BAD_IN_A_ROW} lines in a row cannot be read ({text}): check baud rate, line ending, separator and decimal sign"
             );
-            self.outbox.status(Severity::Warning, said);
+            self.outbox.say(Severity::Warning, said);
         }
     }
 
     fn fail(&mut self, failure: Failure) {
         self.capture = None;
-        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
     }
 
     fn send_trigger(&mut self, unsure: usize, now: Moment) {
@@ -329,7 +329,7 @@ impl AsciiProtocol {
             }
             _ => Failure::Silent { what: "waiting for a line".to_owned(), seconds },
         };
-        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
     }
 
     /// When a stream that stopped is to be noticed.
@@ -342,7 +342,7 @@ impl AsciiProtocol {
 impl Protocol for AsciiProtocol {
     fn start(&mut self, now: Moment) {
         self.splitter.clear();
-        self.outbox.clear_output();
+        self.outbox.clear();
         self.capture = None;
         self.owed.clear();
         self.bad_in_a_row = 0;
@@ -353,7 +353,7 @@ impl Protocol for AsciiProtocol {
         self.silence_said = false;
         self.started = true;
         let identity = self.identity();
-        self.outbox.ready(identity);
+        self.outbox.push(ProtocolEvent::Ready(identity));
     }
 
     fn feed(&mut self, bytes: &[u8], now: Moment) {
@@ -390,7 +390,7 @@ impl Protocol for AsciiProtocol {
         if self.silence_deadline().is_some_and(|deadline| deadline <= now) {
             self.silence_said = true;
             let text = format!("no readable line for {:.1} s", self.timeout.as_secs_f64());
-            self.outbox.status(Severity::Warning, text);
+            self.outbox.say(Severity::Warning, text);
         }
     }
 
@@ -401,7 +401,7 @@ impl Protocol for AsciiProtocol {
             (true, None) => None,
         };
         if let Some(text) = refused {
-            return self.outbox.push(ProtocolEvent::Failed(Failure::TooEarly(text.to_owned())));
+            return self.outbox.fail(Failure::TooEarly(text.to_owned()));
         }
         if self.lines().is_none() {
             return self.begin_polled(now);

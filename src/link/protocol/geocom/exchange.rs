@@ -7,6 +7,7 @@ use super::super::Severity;
 use super::super::lines::LineSplitter;
 use super::super::lines::Piece;
 use super::super::outbox::Outbox;
+use super::super::patience::Patience;
 use super::codes::SLEEPING;
 use super::codes::is_busy;
 use super::wire::Reply;
@@ -14,14 +15,8 @@ use super::wire::Request;
 use super::wire::decode_reply;
 use super::wire::encode_request;
 
-/// First pause before a busy instrument is asked again; doubled each time.
-const FIRST_DELAY: Duration = Duration::from_millis(200);
-
-/// Longest pause.
-const LAST_DELAY: Duration = Duration::from_secs(2);
-
-/// Patience with a busy instrument in all.
-const PATIENCE: Duration = Duration::from_secs(15);
+/// Pause before a request is sent again that was damaged on its way.
+const RESEND_DELAY: Duration = Duration::from_millis(200);
 
 /// How often a request is sent again that was damaged on its way.
 const MAX_RESENDS: u32 = 2;
@@ -72,8 +67,7 @@ struct Pending {
     transaction: Option<u16>,
     deadline: Moment,
     retry_at: Option<Moment>,
-    busy_since: Option<Moment>,
-    delay: Duration,
+    patience: Patience,
     resends: u32,
 }
 
@@ -121,8 +115,7 @@ impl Exchange {
             call,
             transaction: None,
             retry_at: None,
-            busy_since: None,
-            delay: FIRST_DELAY,
+            patience: Patience::default(),
             resends: 0,
         });
         self.send(now, outbox);
@@ -179,7 +172,7 @@ impl Exchange {
         let is_unread = reply.transport != 0 && reply.transaction == 0;
         let is_mine = pending.transaction.is_some_and(|own| own == reply.transaction || is_unread);
         if !is_mine {
-            outbox.status(
+            outbox.say(
                 Severity::Info,
                 format!("a late or foreign answer was thrown away (number {})", reply.transaction),
             );
@@ -201,15 +194,12 @@ impl Exchange {
 
     fn be_patient(&mut self, code: u32, now: Moment) -> Option<Outcome> {
         let pending = self.pending.as_mut()?;
-        let since = *pending.busy_since.get_or_insert(now);
-        let at = now + pending.delay;
-        if at > since + PATIENCE {
-            self.pending = None;
-            return Some(Outcome::Busy(code));
+        pending.retry_at = pending.patience.again_at(now);
+        if pending.retry_at.is_some() {
+            return None;
         }
-        pending.retry_at = Some(at);
-        pending.delay = (pending.delay * 2).min(LAST_DELAY);
-        None
+        self.pending = None;
+        Some(Outcome::Busy(code))
     }
 
     fn send_again(&mut self, damage: Damage, now: Moment) -> Option<Outcome> {
@@ -220,7 +210,7 @@ impl Exchange {
         }
         if pending.retry_at.is_none() {
             pending.resends += 1;
-            pending.retry_at = Some(now + FIRST_DELAY);
+            pending.retry_at = Some(now + RESEND_DELAY);
         }
         None
     }
@@ -232,7 +222,7 @@ impl Exchange {
             let said = format!(
                 "{BAD_IN_A_ROW} lines in a row cannot be read ({text}): check baud rate, line ending and that GeoCOM is switched on"
             );
-            outbox.status(Severity::Warning, said);
+            outbox.say(Severity::Warning, said);
         }
         if !is_reply {
             return None;

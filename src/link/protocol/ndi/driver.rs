@@ -11,6 +11,7 @@ use super::super::ProtocolEvent;
 use super::super::Severity;
 use super::super::Shot;
 use super::super::outbox::Outbox;
+use super::super::text::shown;
 use super::codes::BAD_CRC;
 use super::codes::failure_of_error;
 use super::options::NdiOptions;
@@ -165,7 +166,7 @@ impl NdiProtocol {
         if let Frame::Text(text) = frame
             && text.starts_with("WARNING")
         {
-            self.outbox.status(Severity::Warning, format!("the instrument says: {}", text.escape_default()));
+            self.outbox.say(Severity::Warning, format!("the instrument says: {}", shown(text)));
         }
         match (std::mem::replace(&mut self.phase, Phase::Closed), error) {
             (Phase::Closed, _) => {}
@@ -199,7 +200,7 @@ impl NdiProtocol {
             Ok(Next::Ready(handle)) => {
                 self.handle = handle;
                 let identity = std::mem::take(&mut self.set_up).identity(handle, &self.options);
-                self.outbox.ready(identity);
+                self.outbox.push(ProtocolEvent::Ready(identity));
                 self.rest(now);
             }
         }
@@ -215,7 +216,7 @@ impl NdiProtocol {
         if let Ok(tool) = self.tool(frame)
             && let Ok(shot) = self.shot(&tool, frame)
         {
-            self.outbox.live(shot);
+            self.outbox.push(ProtocolEvent::Live(shot));
         }
     }
 
@@ -284,7 +285,7 @@ impl NdiProtocol {
             let said = format!(
                 "{BAD_IN_A_ROW} replies in a row cannot be read ({text}): check baud rate and kind of instrument"
             );
-            self.outbox.status(Severity::Warning, said);
+            self.outbox.say(Severity::Warning, said);
         }
         if self.send_again(now) {
             return;
@@ -339,14 +340,14 @@ impl NdiProtocol {
     }
 
     fn fail(&mut self, failure: Failure, now: Moment) {
-        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
         self.rest(now);
     }
 
     fn lose(&mut self, failure: Failure) {
         self.phase = Phase::Closed;
         self.pending = None;
-        self.outbox.push(ProtocolEvent::Lost(failure));
+        self.outbox.lose(failure);
     }
 
     fn time_out(&mut self, now: Moment) {
@@ -371,7 +372,7 @@ fn error_of(frame: &Frame) -> Option<u8> {
 impl Protocol for NdiProtocol {
     fn start(&mut self, now: Moment) {
         self.decoder.resync();
-        self.outbox.clear_output();
+        self.outbox.clear();
         self.set_up = SetUp::default();
         self.owed = 0;
         self.unanswered = 0;
@@ -402,7 +403,7 @@ impl Protocol for NdiProtocol {
         if !matches!(self.phase, Phase::Idle) {
             let is_set_up = matches!(self.phase, Phase::Shot { .. });
             let text = if is_set_up { "another shot is under way" } else { "the set-up is not complete" };
-            return self.outbox.push(ProtocolEvent::Failed(Failure::TooEarly(text.to_owned())));
+            return self.outbox.fail(Failure::TooEarly(text.to_owned()));
         }
         // A live position that is on its way belongs to a frame before the trigger: it is not looked at.
         let is_asked = self.pending.as_ref().is_some_and(|pending| pending.is_sent);
