@@ -236,6 +236,11 @@ impl Failure {
         }
     }
 
+    /// A point came that is the one before again: no real instrument measures the same twice, a stuck one does.
+    pub fn repeated() -> Self {
+        Self::Unusable("it is equal to the point before to the last digit, so it was not measured anew".to_owned())
+    }
+
     /// What the operator can do.
     pub const fn hint(&self) -> &'static str {
         match self {

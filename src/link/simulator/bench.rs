@@ -216,3 +216,10 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
 pub const fn is_answer(event: &ProtocolEvent) -> bool {
     matches!(event, ProtocolEvent::Shot(_) | ProtocolEvent::Failed(_))
 }
+
+/// Bytes of a text of hexadecimal digits.
+pub fn hex(text: &str) -> Vec<u8> {
+    let digits: String = text.split_whitespace().collect();
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    digits.as_bytes().chunks(2).map(byte).collect()
+}

@@ -222,8 +222,7 @@ impl AsciiProtocol {
     fn finish(&mut self, shot: Shot) {
         self.capture = None;
         if self.is_repeat(&shot) {
-            let text = "it is equal to the point before to the last digit, so it was not measured anew";
-            return self.outbox.fail(Failure::Unusable(text.to_owned()));
+            return self.outbox.fail(Failure::repeated());
         }
         self.previous = Some(shot.point);
         self.outbox.push(ProtocolEvent::Shot(shot));

@@ -233,8 +233,7 @@ impl GeocomProtocol {
         };
         let (point, face) = point_from_polar(&reply.parameters)?;
         if self.previous == Some(point) {
-            let text = "it is equal to the point before to the last digit, so it was not measured anew";
-            return Err(Failure::Unusable(text.to_owned()));
+            return Err(Failure::repeated());
         }
         self.previous = Some(point);
         let raw = format!("{},{}", reply.code, reply.parameters.join(",")).into_bytes();

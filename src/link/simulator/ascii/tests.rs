@@ -102,6 +102,16 @@ fn every_preset_but_the_gauge_gives_points() {
 }
 
 #[test]
+fn standard_deviations_are_those_of_the_source_or_none() {
+    let mut bench = bench(&Preset::Bridge.options(), []);
+    let stated = bench.cell.sigma.unwrap();
+    let sigma = shot(&mut bench).sigma.unwrap();
+    assert!(sigma.iter().zip(stated).all(|(found, stated)| (found - stated).abs() < 1e-12), "{sigma:?}");
+    bench.cell.sigma = None;
+    assert_eq!(shot(&mut bench).sigma, None);
+}
+
+#[test]
 fn a_stream_is_averaged_over_lines_after_the_trigger() {
     let mut bench = bench(&streamed(4), []);
     let live = bench.run_for(Duration::from_secs(1));
@@ -254,7 +264,7 @@ fn splits_change_nothing() {
 
 #[test]
 fn noise_breaks_nothing() {
-    for options in [polled(), streamed(2), Preset::T2sa.options()] {
+    for options in [polled(), streamed(2), Preset::T2sa.options(), Preset::UdpXyzTime.options()] {
         let bench = conversation(&options);
         let make = || AsciiProtocol::new(options.clone()).unwrap();
         fuzz_protocol(make, &bench.tape, AsciiProtocol::pending, Bounds::of_protocol(MAX_LINE));

@@ -203,7 +203,7 @@ fn who_answers_twice_hoards_or_floods_is_found() {
         assert!(fails(|| fuzz(flaw)), "{flaw:?}");
     }
     let sent = vec![b"?!".to_vec(); 10];
-    let bounds = Bounds { pending: 100, outputs: 6000 };
+    let bounds = Bounds { pending: 100, outputs: 512 };
     let fuzz = |flaw| fuzz_simulator(|| Peer(Toy::new(flaw)), &sent, |peer: &Peer| peer.0.kept(), bounds);
     fuzz(Flaw::None);
     for flaw in [Flaw::Hoards, Flaw::Floods] {
