@@ -126,11 +126,11 @@ impl AsciiSimulator {
             Some(AsciiFault::TwoInOne) => self.schedule.send(now, line.repeat(2).into_bytes()),
             Some(AsciiFault::Joined) => self.schedule.send(now, [line.trim_end().as_bytes(), &bytes].concat()),
             Some(AsciiFault::CarriageReturnOnly) => {
-                self.schedule.send(now, format!("{}\r", line.trim_end()).into_bytes())
+                self.schedule.send(now, format!("{}\r", line.trim_end()).into_bytes());
             }
             Some(AsciiFault::EmptyLines) => self.schedule.send(now, format!("\r\n\n\r{line}").into_bytes()),
             Some(AsciiFault::LongLine) => {
-                self.schedule.send(now, format!("{}\r\n{line}", "x".repeat(10_000)).into_bytes())
+                self.schedule.send(now, format!("{}\r\n{line}", "x".repeat(10_000)).into_bytes());
             }
             Some(AsciiFault::ErrorText) => self.schedule.send(now, self.line(ERROR_TEXT).into_bytes()),
             Some(AsciiFault::StaleRepeat) => {
@@ -140,7 +140,7 @@ impl AsciiSimulator {
             Some(AsciiFault::DisconnectMidLine) => self.schedule.break_off(now, &bytes),
             Some(AsciiFault::BitError) => self.schedule.send(now, with_digit_changed(bytes)),
             Some(AsciiFault::Noise) => {
-                self.schedule.send(now, [b"\xF8\x80\x78\xFE\x98\r".as_slice(), b"\x06\xE6\n"].concat())
+                self.schedule.send(now, [b"\xF8\x80\x78\xFE\x98\r".as_slice(), b"\x06\xE6\n"].concat());
             }
             Some(AsciiFault::Silent) => {}
             Some(AsciiFault::Late) => self.schedule.send(now + LATE, bytes),

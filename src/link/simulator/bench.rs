@@ -62,7 +62,7 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
 
     /// Virtual time that has passed.
     pub fn elapsed(&self) -> Duration {
-        self.now - START
+        self.now.saturating_sub(START)
     }
 
     /// Connects, or connects again.
@@ -218,6 +218,9 @@ pub const fn is_answer(event: &ProtocolEvent) -> bool {
 }
 
 /// Bytes of a text of hexadecimal digits.
+///
+/// # Panics
+/// It is none.
 pub fn hex(text: &str) -> Vec<u8> {
     let digits: String = text.split_whitespace().collect();
     let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();

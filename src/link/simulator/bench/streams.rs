@@ -57,6 +57,7 @@ impl Tape {
     }
 
     /// The same without pauses: everything between two orders comes in one piece and at one moment.
+    #[must_use]
     pub fn joined(&self) -> Self {
         let mut joined: Vec<Input> = Vec::new();
         for input in &self.0 {
