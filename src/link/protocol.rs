@@ -20,6 +20,7 @@ pub mod patience;
 pub mod rtde;
 pub mod text;
 pub mod unread;
+pub mod unreadable;
 
 use std::fmt::Debug;
 use std::time::Duration;

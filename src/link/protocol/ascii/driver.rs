@@ -16,6 +16,7 @@ use super::super::Shot;
 use super::super::lines::LineSplitter;
 use super::super::lines::Piece;
 use super::super::outbox::Outbox;
+use super::super::unreadable::Unreadable;
 use super::escape::unescape;
 use super::options::AsciiOptions;
 use super::options::Checksum;
@@ -33,8 +34,8 @@ const FORGET: Duration = Duration::from_mins(1);
 /// Most triggers without an answer that are remembered.
 const MAX_OWED: usize = 16;
 
-/// So many unreadable lines in a row are a wrong setting, not noise.
-const BAD_IN_A_ROW: u32 = 3;
+/// So many lines in a row with an old time are a clock that was set back, not late lines.
+const OLD_IN_A_ROW: u32 = 3;
 
 /// So often an average is begun again after an unreadable line.
 const MAX_RESTARTS: u32 = 3;
@@ -60,7 +61,7 @@ pub struct AsciiProtocol {
     silence_said: bool,
     last_time: Option<f64>,
     previous: Option<Point3<f64>>,
-    bad_in_a_row: u32,
+    unreadable: Unreadable,
     old_in_a_row: u32,
 }
 
@@ -99,7 +100,7 @@ impl AsciiProtocol {
             silence_said: false,
             last_time: None,
             previous: None,
-            bad_in_a_row: 0,
+            unreadable: Unreadable::default(),
             old_in_a_row: 0,
         })
     }
@@ -150,7 +151,7 @@ impl AsciiProtocol {
 
     /// A line that can be read.
     fn accept(&mut self, shot: Shot, now: Moment) {
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         self.last_line = Some(now);
         self.silence_said = false;
         let is_old = matches!((shot.instrument_time, self.last_time), (Some(time), Some(last)) if time <= last);
@@ -169,7 +170,7 @@ impl AsciiProtocol {
     /// A line whose time is not after that of an earlier line: a repeat or a late one.
     fn pass_over_old(&mut self) {
         self.old_in_a_row = self.old_in_a_row.saturating_add(1);
-        if self.old_in_a_row == BAD_IN_A_ROW {
+        if self.old_in_a_row == OLD_IN_A_ROW {
             let text = "the times in the lines do not advance: if the instrument's clock was set back, connect again";
             self.outbox.say(Severity::Warning, text);
         }
@@ -236,7 +237,7 @@ impl AsciiProtocol {
         if let Rejection::Garbled(text) = &rejection {
             self.count_bad(text);
         } else {
-            self.bad_in_a_row = 0;
+            self.unreadable.clear();
             self.last_line = Some(now);
             self.silence_said = false;
         }
@@ -278,11 +279,8 @@ impl AsciiProtocol {
     }
 
     fn count_bad(&mut self, text: &str) {
-        self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
-        if self.bad_in_a_row == BAD_IN_A_ROW {
-            let said = format!(
-                "{BAD_IN_A_ROW} lines in a row cannot be read ({text}): check baud rate, line ending, separator and decimal sign"
-            );
+        let check = "baud rate, line ending, separator and decimal sign";
+        if let Some(said) = self.unreadable.one_more("lines", text, check) {
             self.outbox.say(Severity::Warning, said);
         }
     }
@@ -344,7 +342,7 @@ impl Protocol for AsciiProtocol {
         self.outbox.clear();
         self.capture = None;
         self.owed.clear();
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         self.old_in_a_row = 0;
         self.last_byte = None;
         self.last_time = None;

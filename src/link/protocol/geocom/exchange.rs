@@ -8,6 +8,7 @@ use super::super::lines::LineSplitter;
 use super::super::lines::Piece;
 use super::super::outbox::Outbox;
 use super::super::patience::Patience;
+use super::super::unreadable::Unreadable;
 use super::codes::SLEEPING;
 use super::codes::is_busy;
 use super::wire::Reply;
@@ -20,9 +21,6 @@ const RESEND_DELAY: Duration = Duration::from_millis(200);
 
 /// How often a request is sent again that was damaged on its way.
 const MAX_RESENDS: u32 = 2;
-
-/// So many unreadable lines in a row are a wrong setting, not noise.
-const BAD_IN_A_ROW: u32 = 3;
 
 /// Largest transaction number.
 const LAST_TRANSACTION: u16 = 32_767;
@@ -80,7 +78,7 @@ pub(super) struct Exchange {
     pending: Option<Pending>,
     /// The instrument may have half a request in its buffer: a line feed clears it.
     is_dirty: bool,
-    bad_in_a_row: u32,
+    unreadable: Unreadable,
 }
 
 impl Exchange {
@@ -91,7 +89,7 @@ impl Exchange {
             last_transaction: 0,
             pending: None,
             is_dirty: true,
-            bad_in_a_row: 0,
+            unreadable: Unreadable::default(),
         }
     }
 
@@ -100,7 +98,7 @@ impl Exchange {
         self.splitter.clear();
         self.pending = None;
         self.is_dirty = true;
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
     }
 
     pub(super) const fn pending_bytes(&self) -> usize {
@@ -159,7 +157,7 @@ impl Exchange {
                 self.damaged("it carries no CRC".to_owned(), is_reply, now, outbox)
             }
             Ok(reply) => {
-                self.bad_in_a_row = 0;
+                self.unreadable.clear();
                 self.reply(reply, now, outbox)
             }
             Err(text) => self.damaged(text, is_reply, now, outbox),
@@ -217,11 +215,8 @@ impl Exchange {
 
     /// A line that cannot be read. A damaged reply is asked for again; noise is not.
     fn damaged(&mut self, text: String, is_reply: bool, now: Moment, outbox: &mut Outbox) -> Option<Outcome> {
-        self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
-        if self.bad_in_a_row == BAD_IN_A_ROW {
-            let said = format!(
-                "{BAD_IN_A_ROW} lines in a row cannot be read ({text}): check baud rate, line ending and that GeoCOM is switched on"
-            );
+        let check = "baud rate, line ending and that GeoCOM is switched on";
+        if let Some(said) = self.unreadable.one_more("lines", &text, check) {
             outbox.say(Severity::Warning, said);
         }
         if !is_reply {

@@ -12,6 +12,7 @@ use super::super::Severity;
 use super::super::Shot;
 use super::super::outbox::Outbox;
 use super::super::text::shown;
+use super::super::unreadable::Unreadable;
 use super::codes::BAD_CRC;
 use super::codes::failure_of_error;
 use super::options::NdiOptions;
@@ -43,9 +44,6 @@ const MAX_RESENDS: u32 = 2;
 /// So many unanswered commands in a row, with nobody asking for a shot, are the end of the link.
 const MAX_UNANSWERED: u32 = 5;
 
-/// So many damaged replies in a row are a wrong setting, not noise.
-const BAD_IN_A_ROW: u32 = 3;
-
 /// Most replies that may still come of commands that were given up.
 const MAX_OWED: u32 = 16;
 
@@ -64,7 +62,7 @@ pub struct NdiProtocol {
     /// Replies that commands which were given up may still get.
     owed: u32,
     unanswered: u32,
-    bad_in_a_row: u32,
+    unreadable: Unreadable,
 }
 
 #[derive(Debug)]
@@ -107,7 +105,7 @@ impl NdiProtocol {
             pending: None,
             owed: 0,
             unanswered: 0,
-            bad_in_a_row: 0,
+            unreadable: Unreadable::default(),
         })
     }
 
@@ -147,7 +145,7 @@ impl NdiProtocol {
         if let Frame::Damaged(text) = frame {
             return self.damaged(text, now);
         }
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         if frame == Frame::Text("RESET".to_owned()) && !matches!(self.phase, Phase::Closed) {
             return self.lose(Failure::Disconnected("the instrument was switched off and on, or reset".to_owned()));
         }
@@ -280,11 +278,7 @@ impl NdiProtocol {
     }
 
     fn damaged(&mut self, text: String, now: Moment) {
-        self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
-        if self.bad_in_a_row == BAD_IN_A_ROW {
-            let said = format!(
-                "{BAD_IN_A_ROW} replies in a row cannot be read ({text}): check baud rate and kind of instrument"
-            );
+        if let Some(said) = self.unreadable.one_more("replies", &text, "baud rate and kind of instrument") {
             self.outbox.say(Severity::Warning, said);
         }
         if self.send_again(now) {
@@ -376,7 +370,7 @@ impl Protocol for NdiProtocol {
         self.set_up = SetUp::default();
         self.owed = 0;
         self.unanswered = 0;
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         let first = Step::Initialise;
         let command = first.command();
         self.phase = Phase::SetUp(first);
