@@ -9,10 +9,23 @@ use super::protocol::{JointState, Shot};
 use super::simulator::PointSource;
 use super::transport::Stopwatch;
 use super::{LinkError, SimulatedCell};
+use crate::profile::Profile;
 use crate::session::reading::MeasureRequest;
 
 /// Joints that a controller tells.
-pub(super) const JOINTS: usize = 6;
+const JOINTS: usize = 6;
+
+/// Whether a controller can tell the joints of this arm.
+///
+/// # Errors
+/// [`LinkError::SetUp`]: it has more or fewer.
+pub(super) fn check_joints(profile: &Profile) -> Result<(), LinkError> {
+    let joints = profile.chain().dof();
+    if joints == JOINTS {
+        return Ok(());
+    }
+    Err(LinkError::SetUp(format!("'{}' has {joints} joints; RTDE tells {JOINTS}", profile.name())))
+}
 
 /// Who decides when the next shot is another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

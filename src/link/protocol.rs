@@ -5,8 +5,8 @@
 //! list of bytes in a test, and splitting a stream at any byte changes nothing.
 //!
 //! Conversation: `start` runs the whole set-up (identity, units, frame, mode) and ends with [`ProtocolEvent::Ready`];
-//! `trigger` asks for one shot and is answered by exactly one [`ProtocolEvent::Shot`] or [`ProtocolEvent::Failed`]. After
-//! [`ProtocolEvent::Lost`] nothing is valid until the owner has connected again and called `start`. A point is given only on
+//! `trigger` asks for one shot and is answered by exactly one [`ProtocolEvent::Shot`] or [`ProtocolEvent::Failed`], or by the end
+//! of the connection. After [`ProtocolEvent::Lost`] nothing is valid until the owner has connected again and called `start`. A point is given only on
 //! an explicit success of the instrument.
 
 pub mod ascii;
@@ -14,10 +14,13 @@ pub mod crc;
 pub mod emscon;
 pub mod geocom;
 pub mod lines;
-pub mod mailbox;
 pub mod ndi;
 pub mod outbox;
+pub mod patience;
 pub mod rtde;
+pub mod text;
+pub mod unread;
+pub mod unreadable;
 
 use std::fmt::Debug;
 use std::time::Duration;
@@ -29,7 +32,7 @@ pub type Moment = Duration;
 
 /// One conversation with an instrument or a robot.
 pub trait Protocol: Send + Debug {
-    /// A new connection: forgets all that was received and begins the set-up.
+    /// A new connection: forgets all that was received, what still waits to be fetched included, and begins the set-up.
     fn start(&mut self, now: Moment);
 
     /// Bytes as they arrived; any split of the stream gives the same events. A datagram is fed whole.
@@ -232,6 +235,11 @@ impl Failure {
             Self::Disconnected(why) => format!("the connection is lost: {why}"),
             Self::TooEarly(why) => format!("a shot was asked for too early: {why}"),
         }
+    }
+
+    /// A point came that is the one before again: no real instrument measures the same twice, a stuck one does.
+    pub fn repeated() -> Self {
+        Self::Unusable("it is equal to the point before to the last digit, so it was not measured anew".to_owned())
     }
 
     /// What the operator can do.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::cell_view::{Advance, CellView, JOINTS, SharedView};
+use super::cell_view::{Advance, CellView, SharedView, check_joints};
 use super::serve::{Pace, Place, serve};
 use super::{Link, LinkError, LinkNews, RawLog, SimulatedCell, Wired, build};
 use crate::profile::Profile;
@@ -40,19 +40,15 @@ impl Rehearsal {
         let mut choice = LinkChoice::default();
         let mut has_robot = false;
         let start = |protocol: WireProtocol, is_serial: bool| {
-            let simulator = build::simulator(protocol, &[]).map_err(LinkError::SetUp)?;
             let place = if is_serial { Place::PseudoTerminal } else { Place::Loopback };
             // The controller's own clock says when the robot stood where: it is not hurried.
             let pace = if protocol.is_robot() { Pace(1) } else { PACE };
-            serve(&place, simulator, view.clone(), pace, Arc::clone(&stop))
-                .map(|rest| format!("{protocol}:{rest}"))
-                .map_err(|error| LinkError::SetUp(format!("the simulated {protocol} cannot listen: {error}")))
+            serve(protocol, &[], &place, view.clone(), pace, &stop)
         };
         for wire in &simulation.wires {
             let protocol = wire.protocol();
-            if protocol.is_robot() && profile.chain().dof() != JOINTS {
-                let message = format!("'{}' has {} joints; RTDE tells {JOINTS}", profile.name(), profile.chain().dof());
-                return Err(LinkError::SetUp(message));
+            if protocol.is_robot() {
+                check_joints(profile)?;
             }
             if wire.is_serial() && matches!(protocol, WireProtocol::Emscon | WireProtocol::Rtde) {
                 return Err(LinkError::SetUp(format!("{protocol} is not spoken on serial lines; use tcp")));

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use serialport::SerialPort as _;
 
-use super::cell_view::{Advance, CellView, JOINTS, SharedView};
+use super::cell_view::{Advance, CellView, SharedView, check_joints};
 use super::simulator::{Output, PointSource, Simulator};
 use super::transport::{Stopwatch, loopback};
 use super::{Link as _, LinkError, SimulatedCell, build};
@@ -57,11 +57,27 @@ impl PacedClock {
     }
 }
 
-/// Serves a simulator until `stop`; returns the address without its protocol, such as `tcp:127.0.0.1:40123`.
+/// Lets the other end of a protocol listen until `stop`; returns its address, such as `emscon:tcp:127.0.0.1:40123`. `faults`: by
+/// their names.
 ///
 /// # Errors
-/// The system refuses the port, the pseudo-terminal or a thread.
+/// [`LinkError::SetUp`]: an unknown fault; the system refuses the port, the pseudo-terminal or a thread.
 pub(super) fn serve(
+    protocol: WireProtocol,
+    faults: &[String],
+    place: &Place,
+    source: impl PointSource + 'static,
+    pace: Pace,
+    stop: &Arc<AtomicBool>,
+) -> Result<String, LinkError> {
+    let simulator = build::simulator(protocol, faults).map_err(LinkError::SetUp)?;
+    listen(place, simulator, source, pace, Arc::clone(stop))
+        .map(|rest| format!("{protocol}:{rest}"))
+        .map_err(|error| LinkError::SetUp(format!("the simulated {protocol} cannot listen: {error}")))
+}
+
+/// The same for a simulator; returns the address without its protocol.
+fn listen(
     place: &Place,
     simulator: Box<dyn Simulator>,
     source: impl PointSource + 'static,
@@ -197,15 +213,6 @@ fn serve_serial(
     }
 }
 
-/// RTDE tells six joints.
-fn check_robot(profile: &Profile) -> Result<(), LinkError> {
-    let joints = profile.chain().dof();
-    if joints == JOINTS {
-        return Ok(());
-    }
-    Err(LinkError::SetUp(format!("'{}' has {joints} joints; RTDE tells {JOINTS}", profile.name())))
-}
-
 /// A simulated instrument or robot that listens until this is dropped, for another program or another window.
 #[derive(Debug)]
 pub struct Served {
@@ -231,7 +238,7 @@ impl Served {
         faults: &[String],
     ) -> Result<Self, LinkError> {
         if protocol.is_robot() {
-            check_robot(profile)?;
+            check_joints(profile)?;
         }
         if listen.is_none() && matches!(protocol, WireProtocol::Emscon | WireProtocol::Rtde) {
             return Err(LinkError::SetUp(format!("{protocol} is not spoken on serial lines; give it '--listen'")));
@@ -240,18 +247,9 @@ impl Served {
         let robot_title = cell.connect()?;
         let view = SharedView::new(CellView::new(cell, Advance::EveryShot));
         let stop = Arc::new(AtomicBool::new(false));
-        let simulator = build::simulator(protocol, faults).map_err(LinkError::SetUp)?;
         let place = listen.map_or(Place::PseudoTerminal, |address| Place::Tcp(address.to_owned()));
-        let rest = serve(&place, simulator, view.clone(), Pace(1), Arc::clone(&stop))
-            .map_err(|error| LinkError::SetUp(format!("the simulated {protocol} cannot listen: {error}")))?;
-        Ok(Self {
-            view,
-            address: format!("{protocol}:{rest}"),
-            options: build::rehearsal_options(protocol),
-            robot_title,
-            number: 0,
-            stop,
-        })
+        let address = serve(protocol, faults, &place, view.clone(), Pace(1), &stop)?;
+        Ok(Self { view, address, options: build::rehearsal_options(protocol), robot_title, number: 0, stop })
     }
 
     /// The controller of the same robot listens as well, at this TCP address; returns where.
@@ -259,11 +257,9 @@ impl Served {
     /// # Errors
     /// [`LinkError::SetUp`]: a robot that RTDE cannot tell, or a port that the system refuses.
     pub fn listen_for_robot(&self, profile: &Profile, listen: &str) -> Result<String, LinkError> {
-        check_robot(profile)?;
-        let simulator = build::simulator(WireProtocol::Rtde, &[]).map_err(LinkError::SetUp)?;
-        serve(&Place::Tcp(listen.to_owned()), simulator, self.view.clone(), Pace(1), Arc::clone(&self.stop))
-            .map(|rest| format!("{}:{rest}", WireProtocol::Rtde))
-            .map_err(|error| LinkError::SetUp(format!("the simulated controller cannot listen: {error}")))
+        check_joints(profile)?;
+        let place = Place::Tcp(listen.to_owned());
+        serve(WireProtocol::Rtde, &[], &place, self.view.clone(), Pace(1), &self.stop)
     }
 
     /// The address to give to whoever connects.

@@ -6,14 +6,13 @@
 pub mod ascii;
 #[cfg(test)]
 pub mod bench;
-#[cfg(test)]
-mod bench2;
 pub mod emscon;
 pub mod fault;
 pub mod geocom;
 pub mod ndi;
-mod outbox;
 pub mod rtde;
+mod schedule;
+mod writes;
 
 use std::fmt::Debug;
 

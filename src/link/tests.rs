@@ -2,6 +2,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "deadlines of tests")]
 
+mod contract;
 mod robots;
 mod wires;
 
@@ -155,9 +156,8 @@ impl Bench {
         let stage = Stage::new();
         let stop = Arc::new(AtomicBool::new(false));
         let wire = |protocol: WireProtocol, place: &Place, names: &[&str], pace| {
-            let simulator = build::simulator(protocol, &faults(names)).unwrap();
-            let rest = serve(place, simulator, stage.clone(), Pace(pace), Arc::clone(&stop)).unwrap();
-            let address: WireAddress = format!("{protocol}:{rest}").parse().unwrap();
+            let address = serve(protocol, &faults(names), place, stage.clone(), Pace(pace), &stop).unwrap();
+            let address: WireAddress = address.parse().unwrap();
             Wire::start(address, quick(protocol), log.cloned()).unwrap()
         };
         let instrument = wire(protocol, place, of_instrument, 20);

@@ -305,9 +305,7 @@ impl Wired {
             () if !(RANGE.0..=RANGE.1).contains(&distance) => {
                 format!("it is {distance:.3} m away; {} to {} m can be", RANGE.0, RANGE.1)
             }
-            () if self.before == Some(point) => {
-                "it is the same to the last digit as the one before: the instrument has not measured again".to_owned()
-            }
+            () if self.before == Some(point) => return Err(Failure::repeated()),
             () => {
                 self.before = Some(point);
                 self.sigmas.extend(sigma);

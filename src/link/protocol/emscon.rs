@@ -112,11 +112,11 @@ impl Protocol for Emscon {
     }
 
     fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.session.mailbox.next_output()
+        self.session.outbox.next_output()
     }
 
     fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.session.mailbox.next_event()
+        self.session.outbox.next_event()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
@@ -126,8 +126,8 @@ impl Protocol for Emscon {
 
 #[cfg(test)]
 impl Emscon {
-    /// Bytes that wait for the rest of a packet; outputs and events that wait to be fetched.
-    pub fn buffered(&self) -> (usize, usize, usize) {
-        self.session.buffered()
+    /// Bytes that wait for the rest of a packet.
+    pub(in crate::link) fn pending(&self) -> usize {
+        self.session.pending()
     }
 }

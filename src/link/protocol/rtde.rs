@@ -15,7 +15,8 @@ use std::time::Duration;
 pub use stillness::Stillness;
 
 use self::packet::{Framer, Packet, Record, TextMessage, encode, packet_type, request_version, set_up_outputs};
-use super::mailbox::{Mailbox, printable};
+use super::outbox::Outbox;
+use super::text::shown;
 use super::{Failure, Identity, JointState, Moment, Protocol, ProtocolEvent, Severity};
 
 /// TCP port of the interface.
@@ -59,7 +60,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub struct Rtde {
     options: RtdeOptions,
-    mailbox: Mailbox,
+    outbox: Outbox,
     framer: Framer,
     phase: Phase,
     name: String,
@@ -77,7 +78,7 @@ impl Rtde {
         let frequency = if is_number { options.frequency } else { MIN_FREQUENCY }.clamp(MIN_FREQUENCY, MAX_FREQUENCY);
         Self {
             options: RtdeOptions { frequency, ..options },
-            mailbox: Mailbox::default(),
+            outbox: Outbox::default(),
             framer: Framer::default(),
             phase: Phase::Off,
             name: String::new(),
@@ -97,7 +98,7 @@ impl Rtde {
     fn ask(&mut self, phase: Phase, request: Vec<u8>, now: Moment) {
         self.phase = phase;
         self.since = now;
-        self.mailbox.send(request);
+        self.outbox.send(request);
     }
 
     fn take(&mut self, packet: Packet, now: Moment) {
@@ -122,7 +123,7 @@ impl Rtde {
                 self.since = now;
                 let checked = vec![format!("joint values: rad, {} Hz", self.options.frequency)];
                 let identity = Identity { name: self.name.clone(), checked, ..Identity::default() };
-                self.mailbox.report(ProtocolEvent::Ready(identity));
+                self.outbox.push(ProtocolEvent::Ready(identity));
             }
             (Phase::Start, Packet::Started(false)) => {
                 self.lose(Failure::Refused("the controller does not start the stream".to_owned()));
@@ -130,7 +131,7 @@ impl Rtde {
             (Phase::Data, Packet::Data { recipe, values }) if recipe == self.recipe => self.take_data(&values, now),
             (Phase::Data, Packet::Data { recipe, .. }) => {
                 let text = format!("skipped data of recipe {recipe}; recipe {} was asked for", self.recipe);
-                self.mailbox.say(Severity::Warning, text);
+                self.outbox.say(Severity::Warning, text);
             }
             _ => {}
         }
@@ -138,7 +139,7 @@ impl Rtde {
 
     fn take_text(&mut self, message: &TextMessage) {
         let severity = if message.level >= 3 { Severity::Info } else { Severity::Warning };
-        self.mailbox.say(severity, format!("{}: {}", message.source, message.text));
+        self.outbox.say(severity, format!("{}: {}", message.source, message.text));
     }
 
     /// Every value has to be there, with the type that it is read as.
@@ -150,7 +151,7 @@ impl Rtde {
         } else if !not_found.is_empty() {
             self.lose(Failure::Refused(format!("the controller does not know {}", not_found.join(", "))));
         } else if types.iter().ne(Record::FIELDS.iter().map(|(_, kind)| kind)) {
-            let types = printable(&types.join(","));
+            let types = shown(&types.join(","));
             self.lose(Failure::Garbled(format!("the controller announced values of other types: {types}")));
         } else {
             self.recipe = recipe;
@@ -167,11 +168,11 @@ impl Rtde {
         self.since = now;
         self.watch_modes(&record);
         if !record.is_finite() {
-            self.mailbox.say(Severity::Warning, "the controller reported a joint value that is no finite number");
+            self.outbox.say(Severity::Warning, "the controller reported a joint value that is no finite number");
             return;
         }
         let is_normal = record.safety_status == mode::SAFETY_NORMAL;
-        self.mailbox.report(ProtocolEvent::Joints(JointState {
+        self.outbox.push(ProtocolEvent::Joints(JointState {
             positions: record.actual_q.to_vec(),
             speeds: Some(record.actual_qd.to_vec()),
             controller_time: record.timestamp,
@@ -185,20 +186,19 @@ impl Rtde {
         let (robot_mode, safety_status) =
             self.modes.replace((record.robot_mode, record.safety_status)).unwrap_or(usual);
         if robot_mode != record.robot_mode {
-            self.mailbox.say(Severity::Info, format!("robot mode: {}", mode::robot_mode(record.robot_mode)));
+            self.outbox.say(Severity::Info, format!("robot mode: {}", mode::robot_mode(record.robot_mode)));
         }
         if safety_status != record.safety_status {
             let is_normal = record.safety_status == mode::SAFETY_NORMAL;
             let severity = if is_normal { Severity::Info } else { Severity::Warning };
-            self.mailbox.say(severity, format!("safety status: {}", mode::safety_status(record.safety_status)));
+            self.outbox.say(severity, format!("safety status: {}", mode::safety_status(record.safety_status)));
         }
     }
 
     fn lose(&mut self, failure: Failure) {
         self.phase = Phase::Off;
         self.framer.clear();
-        self.mailbox.drop_outputs();
-        self.mailbox.report(ProtocolEvent::Lost(failure));
+        self.outbox.lose(failure);
     }
 }
 
@@ -252,17 +252,17 @@ impl Protocol for Rtde {
 
     fn trigger(&mut self, _now: Moment) {
         let text = "a robot controller has joint values and no shots".to_owned();
-        self.mailbox.report(ProtocolEvent::Failed(Failure::Refused(text)));
+        self.outbox.fail(Failure::Refused(text));
     }
 
     fn cancel(&mut self, _now: Moment) {}
 
     fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.mailbox.next_output()
+        self.outbox.next_output()
     }
 
     fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.mailbox.next_event()
+        self.outbox.next_event()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
@@ -272,9 +272,8 @@ impl Protocol for Rtde {
 
 #[cfg(test)]
 impl Rtde {
-    /// Bytes that wait for the rest of a packet; outputs and events that wait to be fetched.
-    pub fn buffered(&self) -> (usize, usize, usize) {
-        let (outputs, events) = self.mailbox.waiting();
-        (self.framer.pending(), outputs, events)
+    /// Bytes that wait for the rest of a packet.
+    pub(in crate::link) fn pending(&self) -> usize {
+        self.framer.pending()
     }
 }

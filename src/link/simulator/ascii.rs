@@ -7,6 +7,7 @@ use super::Output;
 use super::PointSource;
 use super::Simulator;
 use super::fault::{FaultPlan, Planned, faults};
+use super::schedule::{Schedule, halves};
 use crate::link::protocol::Moment;
 use crate::link::protocol::Shot;
 use crate::link::protocol::ascii::AsciiOptions;
@@ -32,14 +33,11 @@ const MEASURING: Duration = Duration::from_millis(300);
 /// How late a late answer is: later than any driver waits.
 const LATE: Duration = Duration::from_secs(40);
 
-/// Pause in the middle of a halved line.
-const PAUSE: Duration = Duration::from_millis(700);
-
 /// Bytes kept of a trigger that is not complete.
 const MAX_RECEIVED: usize = 4096;
 
-/// Most lines that wait to be sent.
-const MAX_WAITING: usize = 256;
+/// Most triggers that wait for their line.
+const MAX_MEASURING: usize = 256;
 
 faults! {
     /// What can go wrong with a line.
@@ -75,8 +73,7 @@ pub struct AsciiSimulator {
     received: Vec<u8>,
     measuring: VecDeque<Moment>,
     next_line: Option<Moment>,
-    scheduled: VecDeque<(Moment, Output)>,
-    outputs: VecDeque<Output>,
+    schedule: Schedule,
     last_body: Option<String>,
     printed: u32,
 }
@@ -96,8 +93,7 @@ impl AsciiSimulator {
             received: Vec::new(),
             measuring: VecDeque::new(),
             next_line: None,
-            scheduled: VecDeque::new(),
-            outputs: VecDeque::new(),
+            schedule: Schedule::default(),
             last_body: None,
             printed: 0,
         })
@@ -113,7 +109,8 @@ impl AsciiSimulator {
         let fault = self.faults.occasion(|_| true);
         self.printed = self.printed.saturating_add(1);
         let Some(shot) = source.shot() else {
-            return self.send(now, self.line(ERROR_TEXT).into_bytes());
+            let line = self.line(ERROR_TEXT);
+            return self.schedule.send(now, line.into_bytes());
         };
         let body = self.body(&shot, fault, now);
         self.send_body(&body, fault, now);
@@ -123,33 +120,31 @@ impl AsciiSimulator {
     fn send_body(&mut self, body: &str, fault: Option<AsciiFault>, now: Moment) {
         let line = self.line(body);
         let bytes = line.clone().into_bytes();
-        let half = bytes.len() / 2;
-        let (first, rest) = bytes.split_at_checked(half).unwrap_or((&bytes, &[]));
         match fault {
-            Some(AsciiFault::Halves) => {
-                self.send(now, first.to_vec());
-                self.send(now + PAUSE, rest.to_vec());
+            Some(AsciiFault::Halves) => self.schedule.send_halves(now, &bytes),
+            Some(AsciiFault::Cut) => self.schedule.send(now, [halves(&bytes).0, b"\r\n"].concat()),
+            Some(AsciiFault::TwoInOne) => self.schedule.send(now, line.repeat(2).into_bytes()),
+            Some(AsciiFault::Joined) => self.schedule.send(now, [line.trim_end().as_bytes(), &bytes].concat()),
+            Some(AsciiFault::CarriageReturnOnly) => {
+                self.schedule.send(now, format!("{}\r", line.trim_end()).into_bytes());
             }
-            Some(AsciiFault::Cut) => self.send(now, [first, b"\r\n"].concat()),
-            Some(AsciiFault::TwoInOne) => self.send(now, line.repeat(2).into_bytes()),
-            Some(AsciiFault::Joined) => self.send(now, [line.trim_end().as_bytes(), &bytes].concat()),
-            Some(AsciiFault::CarriageReturnOnly) => self.send(now, format!("{}\r", line.trim_end()).into_bytes()),
-            Some(AsciiFault::EmptyLines) => self.send(now, format!("\r\n\n\r{line}").into_bytes()),
-            Some(AsciiFault::LongLine) => self.send(now, format!("{}\r\n{line}", "x".repeat(10_000)).into_bytes()),
-            Some(AsciiFault::ErrorText) => self.send(now, self.line(ERROR_TEXT).into_bytes()),
+            Some(AsciiFault::EmptyLines) => self.schedule.send(now, format!("\r\n\n\r{line}").into_bytes()),
+            Some(AsciiFault::LongLine) => {
+                self.schedule.send(now, format!("{}\r\n{line}", "x".repeat(10_000)).into_bytes());
+            }
+            Some(AsciiFault::ErrorText) => self.schedule.send(now, self.line(ERROR_TEXT).into_bytes()),
             Some(AsciiFault::StaleRepeat) => {
                 let stale = self.last_body.as_ref().map_or(line, |last| self.line(last));
-                self.send(now, stale.into_bytes());
+                self.schedule.send(now, stale.into_bytes());
             }
-            Some(AsciiFault::DisconnectMidLine) => {
-                self.send(now, first.to_vec());
-                self.schedule(now, Output::Close);
+            Some(AsciiFault::DisconnectMidLine) => self.schedule.break_off(now, &bytes),
+            Some(AsciiFault::BitError) => self.schedule.send(now, with_digit_changed(bytes)),
+            Some(AsciiFault::Noise) => {
+                self.schedule.send(now, [b"\xF8\x80\x78\xFE\x98\r".as_slice(), b"\x06\xE6\n"].concat());
             }
-            Some(AsciiFault::BitError) => self.send(now, with_digit_changed(bytes)),
-            Some(AsciiFault::Noise) => self.send(now, [b"\xF8\x80\x78\xFE\x98\r".as_slice(), b"\x06\xE6\n"].concat()),
             Some(AsciiFault::Silent) => {}
-            Some(AsciiFault::Late) => self.send(now + LATE, bytes),
-            _ => self.send(now, bytes),
+            Some(AsciiFault::Late) => self.schedule.send(now + LATE, bytes),
+            _ => self.schedule.send(now, bytes),
         }
     }
 
@@ -218,25 +213,6 @@ impl AsciiSimulator {
             Checksum::Crc16 => format!("{body}{:04X}\r\n", crc16_arc(body.as_bytes())),
         }
     }
-
-    fn send(&mut self, at: Moment, bytes: Vec<u8>) {
-        self.schedule(at, Output::Bytes(bytes));
-    }
-
-    fn schedule(&mut self, at: Moment, output: Output) {
-        if self.scheduled.len() < MAX_WAITING {
-            let place = self.scheduled.partition_point(|(other, _)| *other <= at);
-            self.scheduled.insert(place, (at, output));
-        }
-    }
-
-    fn release(&mut self, now: Moment) {
-        while let Some((_, output)) = self.scheduled.pop_front_if(|(at, _)| *at <= now) {
-            if self.outputs.len() < MAX_WAITING {
-                self.outputs.push_back(output);
-            }
-        }
-    }
 }
 
 /// The last digit plus one: still a number, but another.
@@ -251,8 +227,7 @@ impl Simulator for AsciiSimulator {
     fn accept(&mut self, now: Moment) {
         self.received.clear();
         self.measuring.clear();
-        self.scheduled.clear();
-        self.outputs.clear();
+        self.schedule.clear();
         self.next_line = self.trigger.is_empty().then_some(now + PERIOD);
     }
 
@@ -267,7 +242,7 @@ impl Simulator for AsciiSimulator {
             self.received.push(byte);
             if byte == end && self.received.ends_with(&self.trigger) {
                 self.received.clear();
-                if self.measuring.len() < MAX_WAITING {
+                if self.measuring.len() < MAX_MEASURING {
                     self.measuring.push_back(now + MEASURING);
                 }
             }
@@ -282,16 +257,16 @@ impl Simulator for AsciiSimulator {
             self.next_line = Some(now + PERIOD);
             self.print(source, now);
         }
-        self.release(now);
+        self.schedule.tick(now);
     }
 
     fn next_output(&mut self) -> Option<Output> {
-        self.outputs.pop_front()
+        self.schedule.next_output()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
-        let scheduled = self.scheduled.front().map(|(at, _)| *at);
-        [self.measuring.front().copied(), self.next_line, scheduled].into_iter().flatten().min()
+        let own = [self.measuring.front().copied(), self.next_line];
+        own.into_iter().flatten().chain(self.schedule.next_deadline()).min()
     }
 }
 

@@ -1,59 +1,29 @@
 //! A protocol and a simulator face to face, with virtual time: what one sends the other gets, and when nothing moves any more
 //! the time goes on to the next deadline.
+//!
+//! What the protocol was given is on a [`Tape`], to be given again in other pieces or damaged: see [`streams`] and [`fuzz`].
 
+mod cell;
 pub mod fuzz;
+pub mod streams;
+mod tests;
 
-use nalgebra::Point3;
+use std::time::Duration;
 
-use super::{Output, PointSource, Simulator};
-use crate::link::protocol::{Failure, JointState, Moment, Protocol, ProtocolEvent, Shot};
+pub use cell::Cell;
+pub use streams::{Input, Tape};
 
-/// Exchanges at one moment, above which the two talk for ever.
-const MAX_EXCHANGES: usize = 100_000;
+use super::{Output, Simulator};
+use crate::link::protocol::{Failure, Moment, Protocol, ProtocolEvent};
 
-/// A reflector in front of the tracker; every shot is at another place.
-#[derive(Clone, Debug)]
-pub struct Cell {
-    /// Shots so far.
-    pub shots: u32,
-    /// The beam reaches the reflector.
-    pub has_beam: bool,
-    /// What the robot reports.
-    pub joints: JointState,
-}
+/// Virtual time at the beginning: not zero, for only differences matter.
+pub const START: Moment = Duration::from_secs(100);
 
-impl Cell {
-    /// The point of the shot with this number (m).
-    pub fn point(shot: u32) -> Point3<f64> {
-        Point3::new(1.2345 + f64::from(shot), -0.67825, 0.090_125)
-    }
-}
+/// Exchanges and deadlines at one moment, above which the two go on for ever.
+const MAX_EXCHANGES: u32 = 100_000;
 
-impl Default for Cell {
-    fn default() -> Self {
-        let positions = vec![0.1, -1.2, 1.3, -0.4, 0.5, -0.6];
-        let joints = JointState { positions, speeds: Some(vec![0.0; 6]), controller_time: 0.0, stopped: None };
-        Self { shots: 0, has_beam: true, joints }
-    }
-}
-
-impl PointSource for Cell {
-    fn shot(&mut self) -> Option<Shot> {
-        let point = Self::point(self.shots);
-        self.has_beam.then(|| {
-            self.shots += 1;
-            Shot { sigma: Some([4e-6, 5e-6, 6e-6]), ..Shot::bare(point) }
-        })
-    }
-
-    fn look(&mut self) -> Option<Shot> {
-        self.has_beam.then(|| Shot::bare(Self::point(self.shots)))
-    }
-
-    fn joints(&mut self) -> JointState {
-        self.joints.clone()
-    }
-}
+/// An event is waited for so long.
+const PATIENCE: Duration = Duration::from_mins(10);
 
 /// Both ends of a wire.
 #[derive(Debug)]
@@ -68,9 +38,11 @@ pub struct Bench<P, S> {
     pub now: Moment,
     /// Everything that the protocol sent.
     pub sent: Vec<Vec<u8>>,
-    /// Everything that it was sent.
-    pub received: Vec<u8>,
+    /// Everything that the protocol was given.
+    pub tape: Tape,
     is_connected: bool,
+    /// Exchanges and deadlines since the time went on.
+    exchanges: u32,
 }
 
 impl<P: Protocol, S: Simulator> Bench<P, S> {
@@ -80,35 +52,51 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
             protocol,
             simulator,
             cell: Cell::default(),
-            now: Moment::ZERO,
+            now: START,
             sent: Vec::new(),
-            received: Vec::new(),
+            tape: Tape::default(),
             is_connected: false,
+            exchanges: 0,
         }
+    }
+
+    /// Virtual time that has passed.
+    pub fn elapsed(&self) -> Duration {
+        self.now.saturating_sub(START)
     }
 
     /// Connects, or connects again.
     pub fn connect(&mut self) {
         self.is_connected = true;
         self.simulator.accept(self.now);
-        self.protocol.start(self.now);
+        self.give(Input::Start(self.now));
     }
 
     /// Connects and waits until the link is ready or lost; what was said on the way.
     pub fn settle(&mut self) -> Vec<ProtocolEvent> {
         self.connect();
-        self.run_until(is_settled)
+        self.run_until(|event| matches!(event, ProtocolEvent::Ready(_) | ProtocolEvent::Lost(_)))
     }
 
-    /// Asks for a shot and waits until it is there, has failed or the link is lost; what was said on the way.
+    /// Asks for a shot, and does not wait.
+    pub fn trigger(&mut self) {
+        self.give(Input::Trigger(self.now));
+    }
+
+    /// Gives up the shot under way.
+    pub fn cancel(&mut self) {
+        self.give(Input::Cancel(self.now));
+    }
+
+    /// Asks for a shot and waits until it is there, has failed or the link is lost: what was said on the way, the answer last.
     pub fn shoot(&mut self) -> Vec<ProtocolEvent> {
-        self.protocol.trigger(self.now);
-        self.run_until(is_answer)
+        self.trigger();
+        self.run_until(|event| is_answer(event) || matches!(event, ProtocolEvent::Lost(_)))
     }
 
     /// Goes on until an event is as asked for, for ten minutes at most.
     pub fn run_until(&mut self, is_last: impl Fn(&ProtocolEvent) -> bool) -> Vec<ProtocolEvent> {
-        let end = self.now + Moment::from_mins(10);
+        let end = self.now + PATIENCE;
         let mut events = Vec::new();
         loop {
             if self.drain(&mut events, &is_last) || !self.advance(end) {
@@ -118,7 +106,7 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
     }
 
     /// Goes on for a time.
-    pub fn run_for(&mut self, duration: Moment) -> Vec<ProtocolEvent> {
+    pub fn run_for(&mut self, duration: Duration) -> Vec<ProtocolEvent> {
         let end = self.now + duration;
         let mut events = Vec::new();
         loop {
@@ -142,17 +130,23 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
     /// One write goes to the simulator, and what it answers comes back.
     pub fn step(&mut self) {
         if let Some(bytes) = self.protocol.next_output() {
-            self.simulator.feed(&bytes, &mut self.cell, self.now);
+            self.simulator_gets(&bytes);
         }
         while let Some(Output::Bytes(bytes)) = self.simulator.next_output() {
-            self.protocol.feed(&bytes, self.now);
+            self.give(Input::Feed(bytes, self.now));
         }
+    }
+
+    fn give(&mut self, input: Input) {
+        input.give_to(&mut self.protocol);
+        self.tape.0.push(input);
     }
 
     /// Moves bytes until there are none; true once an event is as asked for.
     fn drain(&mut self, events: &mut Vec<ProtocolEvent>, is_last: &impl Fn(&ProtocolEvent) -> bool) -> bool {
-        for _ in 0..MAX_EXCHANGES {
-            let mut has_moved = false;
+        let mut has_moved = true;
+        while has_moved {
+            has_moved = false;
             while let Some(event) = self.protocol.next_event() {
                 events.push(event);
                 if events.last().is_some_and(is_last) {
@@ -162,36 +156,38 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
             while let Some(bytes) = self.protocol.next_output() {
                 has_moved = true;
                 if self.is_connected {
-                    self.simulator.feed(&bytes, &mut self.cell, self.now);
+                    self.simulator_gets(&bytes);
                 }
                 self.sent.push(bytes);
             }
             if let Some(output) = self.simulator.next_output() {
                 has_moved = true;
-                self.deliver(&output, events);
-                if events.last().is_some_and(is_last) {
-                    return true;
+                if let Some(event) = self.deliver(output) {
+                    events.push(event);
+                    if events.last().is_some_and(is_last) {
+                        return true;
+                    }
                 }
             }
-            if !has_moved {
-                return false;
-            }
+            self.count_exchange();
         }
-        panic!("the two ends talk for ever at {:?}", self.now);
+        false
     }
 
-    fn deliver(&mut self, output: &Output, events: &mut Vec<ProtocolEvent>) {
+    /// What the simulator does reaches the protocol; what the owner of a socket says when the other side hangs up.
+    fn deliver(&mut self, output: Output) -> Option<ProtocolEvent> {
+        if !self.is_connected {
+            return None;
+        }
         match output {
-            Output::Bytes(bytes) if self.is_connected => {
-                self.received.extend(bytes);
-                self.protocol.feed(bytes, self.now);
+            Output::Bytes(bytes) => {
+                self.give(Input::Feed(bytes, self.now));
+                None
             }
-            Output::Close if self.is_connected => {
+            Output::Close => {
                 self.is_connected = false;
-                // What the owner of a socket says when the other side hangs up.
-                events.push(ProtocolEvent::Lost(Failure::Disconnected("closed by the other side".to_owned())));
+                Some(ProtocolEvent::Lost(Failure::Disconnected("closed by the other side".to_owned())))
             }
-            Output::Bytes(_) | Output::Close => {}
         }
     }
 
@@ -199,19 +195,34 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
     fn advance(&mut self, end: Moment) -> bool {
         let deadlines = [self.protocol.next_deadline(), self.simulator.next_deadline()];
         let next = deadlines.into_iter().flatten().min().filter(|next| *next <= end);
-        self.now = next.map_or(end, |next| next.max(self.now));
-        self.protocol.tick(self.now);
-        self.simulator.tick(&mut self.cell, self.now);
+        let then = next.map_or(end, |next| next.max(self.now));
+        if then > self.now {
+            self.exchanges = 0;
+        }
+        self.count_exchange();
+        self.now = then;
+        self.give(Input::Tick(then));
+        self.simulator.tick(&mut self.cell, then);
         next.is_some()
+    }
+
+    fn count_exchange(&mut self) {
+        self.exchanges += 1;
+        assert!(self.exchanges < MAX_EXCHANGES, "the two ends go on for ever at {:?}", self.now);
     }
 }
 
-/// The set-up has ended.
-pub fn is_settled(event: &ProtocolEvent) -> bool {
-    matches!(event, ProtocolEvent::Ready(_) | ProtocolEvent::Lost(_))
+/// A trigger was answered.
+pub const fn is_answer(event: &ProtocolEvent) -> bool {
+    matches!(event, ProtocolEvent::Shot(_) | ProtocolEvent::Failed(_))
 }
 
-/// A trigger was answered, or the link is lost.
-pub fn is_answer(event: &ProtocolEvent) -> bool {
-    matches!(event, ProtocolEvent::Shot(_) | ProtocolEvent::Failed(_) | ProtocolEvent::Lost(_))
+/// Bytes of a text of hexadecimal digits.
+///
+/// # Panics
+/// It is none.
+pub fn hex(text: &str) -> Vec<u8> {
+    let digits: String = text.split_whitespace().collect();
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    digits.as_bytes().chunks(2).map(byte).collect()
 }

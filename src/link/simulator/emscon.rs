@@ -18,7 +18,7 @@ pub use fault::EmsconFault;
 use self::tracker::Tracker;
 use self::wire::PacketWriter;
 use super::fault::{FaultPlan, Planned};
-use super::outbox::Outbox;
+use super::writes::Writes;
 use super::{Output, PointSource, Simulator};
 use crate::link::protocol::Moment;
 use crate::link::protocol::emscon::{
@@ -44,7 +44,7 @@ pub struct EmsconSimulator {
     faults: FaultPlan<EmsconFault>,
     tracker: Tracker,
     framer: Framer,
-    outbox: Outbox,
+    writes: Writes,
     work: Option<(Work, Moment)>,
     next_position: Moment,
     is_connected: bool,
@@ -59,7 +59,7 @@ impl EmsconSimulator {
             faults: FaultPlan::new(faults),
             tracker: Tracker::default(),
             framer: Framer::default(),
-            outbox: Outbox::default(),
+            writes: Writes::default(),
             work: None,
             next_position: Moment::ZERO,
             is_connected: false,
@@ -69,7 +69,7 @@ impl EmsconSimulator {
     }
 
     fn send(&mut self, packet: Vec<u8>) {
-        self.outbox.send(packet);
+        self.writes.send(packet);
     }
 
     /// Says that something happened, if it was told to talk.
@@ -83,7 +83,7 @@ impl EmsconSimulator {
         self.is_connected = false;
         self.work = None;
         self.framer.clear();
-        self.outbox.close();
+        self.writes.close();
     }
 
     fn obey(&mut self, request: &[u8], source: &mut dyn PointSource, now: Moment) {
@@ -227,14 +227,14 @@ impl EmsconSimulator {
 impl Simulator for EmsconSimulator {
     fn accept(&mut self, now: Moment) {
         self.framer.clear();
-        self.outbox = Outbox::default();
+        self.writes = Writes::default();
         self.work = None;
         self.is_connected = true;
         self.is_mute = false;
         self.next_position = now;
-        self.outbox.is_dripping = self.faults.strikes(EmsconFault::Drip);
+        self.writes.is_dripping = self.faults.strikes(EmsconFault::Drip);
         self.is_instant = self.faults.strikes(EmsconFault::Joined);
-        self.outbox.is_joining = self.is_instant;
+        self.writes.is_joining = self.is_instant;
         if self.faults.strikes(EmsconFault::Scaled) {
             self.tracker.transformation[6] = 1.0001;
             self.tracker.settings[1] = 1;
@@ -258,11 +258,11 @@ impl Simulator for EmsconSimulator {
                 Ok(None) => break,
                 Err(_) => self.hang_up(),
             }
-            if self.outbox.is_overfull() {
+            if self.writes.is_overfull() {
                 self.hang_up();
             }
         }
-        self.outbox.flush();
+        self.writes.flush();
     }
 
     fn tick(&mut self, source: &mut dyn PointSource, now: Moment) {
@@ -275,14 +275,14 @@ impl Simulator for EmsconSimulator {
             self.next_position = now + POSITION_INTERVAL;
             self.send_position(source);
         }
-        if self.outbox.is_overfull() {
+        if self.is_connected && self.writes.is_overfull() {
             self.hang_up();
         }
-        self.outbox.flush();
+        self.writes.flush();
     }
 
     fn next_output(&mut self) -> Option<Output> {
-        self.outbox.next()
+        self.writes.next()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
@@ -294,8 +294,8 @@ impl Simulator for EmsconSimulator {
 
 #[cfg(test)]
 impl EmsconSimulator {
-    /// Bytes that wait for the rest of a request, and bytes that wait to be fetched.
-    pub fn buffered(&self) -> (usize, usize) {
-        (self.framer.pending(), self.outbox.waiting())
+    /// Bytes that wait for the rest of a request.
+    pub(in crate::link) fn pending(&self) -> usize {
+        self.framer.pending()
     }
 }

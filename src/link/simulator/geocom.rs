@@ -1,6 +1,5 @@
 //! A total station that speaks GeoCOM.
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::time::Duration;
 
@@ -8,6 +7,7 @@ use super::Output;
 use super::PointSource;
 use super::Simulator;
 use super::fault::{FaultPlan, Planned, faults};
+use super::schedule::Schedule;
 use crate::link::protocol::Moment;
 use crate::link::protocol::Shot;
 use crate::link::protocol::geocom::Request;
@@ -20,14 +20,8 @@ const MEASURING: Duration = Duration::from_millis(1500);
 /// Time of everything else.
 const ANSWERING: Duration = Duration::from_millis(30);
 
-/// Pause in the middle of a halved line.
-const PAUSE: Duration = Duration::from_millis(700);
-
 /// Longest request that is kept (bytes).
 const MAX_RECEIVED: usize = 4096;
-
-/// Most answers that wait to be sent.
-const MAX_WAITING: usize = 256;
 
 faults! {
     /// What can go wrong.
@@ -83,8 +77,7 @@ pub struct GeocomSimulator {
     prism_constant: String,
     last_polar: String,
     late: Option<Vec<u8>>,
-    scheduled: VecDeque<(Moment, Output)>,
-    outputs: VecDeque<Output>,
+    schedule: Schedule,
 }
 
 impl GeocomSimulator {
@@ -98,8 +91,7 @@ impl GeocomSimulator {
             prism_constant: "-0.0344".to_owned(),
             last_polar: "0.1,1.5,2.5".to_owned(),
             late: None,
-            scheduled: VecDeque::new(),
-            outputs: VecDeque::new(),
+            schedule: Schedule::default(),
         }
     }
 
@@ -187,7 +179,6 @@ impl GeocomSimulator {
 
     fn answer(&mut self, answer: &str, fault: Option<GeocomFault>, request: &Request, at: Moment) {
         let bytes = ended(answer);
-        let (first, rest) = bytes.split_at_checked(bytes.len() / 2).unwrap_or((&bytes, &[]));
         match fault {
             Some(GeocomFault::Silent) => {}
             Some(GeocomFault::LateReply) => self.late = Some(bytes),
@@ -196,30 +187,28 @@ impl GeocomSimulator {
                 self.send(at, ended(&format!("%R1P,0,{},1:{body}", request.transaction)));
             }
             Some(GeocomFault::HalfLine) => {
-                self.send(at, first.to_vec());
-                self.send(at + PAUSE, rest.to_vec());
+                self.send_late(at);
+                self.schedule.send_halves(at, &bytes);
             }
             Some(GeocomFault::CarriageReturnOnly) => self.send(at, format!("{answer}\r").into_bytes()),
             Some(GeocomFault::Noise) => self.send(at, b"\xF8\x80\x78\xFE\x98\r\n\x06\xE6\n\xFF\r".to_vec()),
             Some(GeocomFault::DisconnectMidLine) => {
-                self.send(at, first.to_vec());
-                self.schedule(at, Output::Close);
+                self.send_late(at);
+                self.schedule.break_off(at, &bytes);
             }
             _ => self.send(at, bytes),
         }
     }
 
     fn send(&mut self, at: Moment, bytes: Vec<u8>) {
-        if let Some(late) = self.late.take_if(|late| *late != bytes) {
-            self.schedule(at, Output::Bytes(late));
-        }
-        self.schedule(at, Output::Bytes(bytes));
+        self.send_late(at);
+        self.schedule.send(at, bytes);
     }
 
-    fn schedule(&mut self, at: Moment, output: Output) {
-        if self.scheduled.len() < MAX_WAITING {
-            let place = self.scheduled.partition_point(|(other, _)| *other <= at);
-            self.scheduled.insert(place, (at, output));
+    /// An answer that was held back comes just before the next one.
+    fn send_late(&mut self, at: Moment) {
+        if let Some(late) = self.late.take() {
+            self.schedule.send(at, late);
         }
     }
 }
@@ -244,8 +233,7 @@ fn polar(shot: &Shot) -> String {
 impl Simulator for GeocomSimulator {
     fn accept(&mut self, _now: Moment) {
         self.received.clear();
-        self.scheduled.clear();
-        self.outputs.clear();
+        self.schedule.clear();
         self.late = None;
         let fault = self.faults.occasion(|fault| fault.occasion() == Occasion::Connection);
         self.is_asleep = fault == Some(GeocomFault::Asleep);
@@ -269,19 +257,15 @@ impl Simulator for GeocomSimulator {
     }
 
     fn tick(&mut self, _source: &mut dyn PointSource, now: Moment) {
-        while let Some((_, output)) = self.scheduled.pop_front_if(|(at, _)| *at <= now) {
-            if self.outputs.len() < MAX_WAITING {
-                self.outputs.push_back(output);
-            }
-        }
+        self.schedule.tick(now);
     }
 
     fn next_output(&mut self) -> Option<Output> {
-        self.outputs.pop_front()
+        self.schedule.next_output()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
-        self.scheduled.front().map(|(at, _)| *at)
+        self.schedule.next_deadline()
     }
 }
 

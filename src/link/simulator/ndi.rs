@@ -1,6 +1,5 @@
 //! A tracker that speaks the combined API of NDI, with one tool.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use nalgebra::UnitQuaternion;
@@ -10,6 +9,7 @@ use super::Output;
 use super::PointSource;
 use super::Simulator;
 use super::fault::{FaultPlan, Planned, faults};
+use super::schedule::{Schedule, halves};
 use crate::link::protocol::Moment;
 use crate::link::protocol::ndi::Frame;
 use crate::link::protocol::ndi::FrameDecoder;
@@ -22,17 +22,11 @@ const FRAMES_PER_SECOND: f64 = 60.0;
 /// Time from a command to its reply.
 const ANSWERING: Duration = Duration::from_millis(4);
 
-/// Pause in the middle of a halved packet.
-const PAUSE: Duration = Duration::from_millis(700);
-
 /// How late a late reply is: later than the driver waits.
 const LATE: Duration = Duration::from_millis(2500);
 
 /// Fit error of the markers (mm).
 const FIT_MM: f64 = 0.025;
-
-/// Most replies that wait to be sent.
-const MAX_WAITING: usize = 256;
 
 /// Port handle of the tool.
 const HANDLE: u8 = 0x0A;
@@ -82,8 +76,7 @@ pub struct NdiSimulator {
     is_tracking: bool,
     /// The frame that was last asked for, and what was seen in it.
     last: Option<(u32, Option<Pose>)>,
-    scheduled: VecDeque<(Moment, Output)>,
-    outputs: VecDeque<Output>,
+    schedule: Schedule,
 }
 
 impl NdiSimulator {
@@ -98,8 +91,7 @@ impl NdiSimulator {
             is_enabled: false,
             is_tracking: false,
             last: None,
-            scheduled: VecDeque::new(),
-            outputs: VecDeque::new(),
+            schedule: Schedule::default(),
         }
     }
 
@@ -136,7 +128,7 @@ impl NdiSimulator {
             "TX:0001" | "BX:0001" => "ERROR0C".to_owned(),
             _ => "ERROR01".to_owned(),
         };
-        self.send(now + ANSWERING, encode_text(&reply));
+        self.schedule.send(now + ANSWERING, encode_text(&reply));
     }
 
     fn initialise(&mut self) -> String {
@@ -175,36 +167,18 @@ impl NdiSimulator {
     }
 
     fn reply(&mut self, bytes: Vec<u8>, fault: Option<NdiFault>, at: Moment) {
-        let (first, rest) = bytes.split_at_checked(bytes.len() / 2).unwrap_or((&bytes, &[]));
         match fault {
             Some(NdiFault::Silent) => {}
-            Some(NdiFault::BadCrc) => self.send(at, with_bad_crc(bytes)),
-            Some(NdiFault::WrongMode) => self.send(at, encode_text("ERROR0C")),
-            Some(NdiFault::CommandDamaged) => self.send(at, encode_text("ERROR04")),
-            Some(NdiFault::CommandTimeout) => self.send(at, encode_text("ERROR05")),
-            Some(NdiFault::LateReply) => self.send(at + LATE, bytes),
-            Some(NdiFault::Halves) => {
-                self.send(at, first.to_vec());
-                self.send(at + PAUSE, rest.to_vec());
-            }
-            Some(NdiFault::Cut) => self.send(at, first.to_vec()),
-            Some(NdiFault::Reset) => self.send(at, encode_text("RESET")),
-            Some(NdiFault::DisconnectMidPacket) => {
-                self.send(at, first.to_vec());
-                self.schedule(at, Output::Close);
-            }
-            _ => self.send(at, bytes),
-        }
-    }
-
-    fn send(&mut self, at: Moment, bytes: Vec<u8>) {
-        self.schedule(at, Output::Bytes(bytes));
-    }
-
-    fn schedule(&mut self, at: Moment, output: Output) {
-        if self.scheduled.len() < MAX_WAITING {
-            let place = self.scheduled.partition_point(|(other, _)| *other <= at);
-            self.scheduled.insert(place, (at, output));
+            Some(NdiFault::BadCrc) => self.schedule.send(at, with_bad_crc(bytes)),
+            Some(NdiFault::WrongMode) => self.schedule.send(at, encode_text("ERROR0C")),
+            Some(NdiFault::CommandDamaged) => self.schedule.send(at, encode_text("ERROR04")),
+            Some(NdiFault::CommandTimeout) => self.schedule.send(at, encode_text("ERROR05")),
+            Some(NdiFault::LateReply) => self.schedule.send(at + LATE, bytes),
+            Some(NdiFault::Halves) => self.schedule.send_halves(at, &bytes),
+            Some(NdiFault::Cut) => self.schedule.send(at, halves(&bytes).0.to_vec()),
+            Some(NdiFault::Reset) => self.schedule.send(at, encode_text("RESET")),
+            Some(NdiFault::DisconnectMidPacket) => self.schedule.break_off(at, &bytes),
+            _ => self.schedule.send(at, bytes),
         }
     }
 }
@@ -282,8 +256,7 @@ fn binary_reply(pose: Option<Pose>, frame: u32, fault: Option<NdiFault>) -> Vec<
 impl Simulator for NdiSimulator {
     fn accept(&mut self, _now: Moment) {
         self.decoder.resync();
-        self.scheduled.clear();
-        self.outputs.clear();
+        self.schedule.clear();
     }
 
     fn feed(&mut self, bytes: &[u8], source: &mut dyn PointSource, now: Moment) {
@@ -292,7 +265,7 @@ impl Simulator for NdiSimulator {
                 Some(Frame::Text(command)) => self.command(&command, source, now),
                 Some(Frame::Damaged(_)) => {
                     self.decoder.resync();
-                    self.send(now + ANSWERING, encode_text("ERROR04"));
+                    self.schedule.send(now + ANSWERING, encode_text("ERROR04"));
                 }
                 Some(Frame::Binary(_)) | None => {}
             }
@@ -300,19 +273,15 @@ impl Simulator for NdiSimulator {
     }
 
     fn tick(&mut self, _source: &mut dyn PointSource, now: Moment) {
-        while let Some((_, output)) = self.scheduled.pop_front_if(|(at, _)| *at <= now) {
-            if self.outputs.len() < MAX_WAITING {
-                self.outputs.push_back(output);
-            }
-        }
+        self.schedule.tick(now);
     }
 
     fn next_output(&mut self) -> Option<Output> {
-        self.outputs.pop_front()
+        self.schedule.next_output()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
-        self.scheduled.front().map(|(at, _)| *at)
+        self.schedule.next_deadline()
     }
 }
 

@@ -10,7 +10,7 @@ mod tests;
 use std::time::Duration;
 
 use super::fault::{FaultPlan, Planned, faults};
-use super::outbox::Outbox;
+use super::writes::Writes;
 use super::{Output, PointSource, Simulator};
 use crate::link::protocol::Moment;
 use crate::link::protocol::rtde::mode::{MODE_RUNNING, SAFETY_NORMAL};
@@ -106,7 +106,7 @@ impl Report {
 pub struct RtdeSimulator {
     faults: FaultPlan<RtdeFault>,
     framer: Framer,
-    outbox: Outbox,
+    writes: Writes,
     fields: Vec<Field>,
     interval: Duration,
     next_data: Option<Moment>,
@@ -121,7 +121,7 @@ impl RtdeSimulator {
         Self {
             faults: FaultPlan::new(faults),
             framer: Framer::default(),
-            outbox: Outbox::default(),
+            writes: Writes::default(),
             fields: Vec::new(),
             interval: Duration::from_millis(40),
             next_data: None,
@@ -131,14 +131,14 @@ impl RtdeSimulator {
     }
 
     fn answer(&mut self, kind: u8, content: &[u8]) {
-        self.outbox.send(encode(kind, content));
+        self.writes.send(encode(kind, content));
     }
 
     fn hang_up(&mut self) {
         self.is_connected = false;
         self.next_data = None;
         self.framer.clear();
-        self.outbox.close();
+        self.writes.close();
     }
 
     fn obey(&mut self, kind: u8, content: &[u8], now: Moment) {
@@ -243,10 +243,10 @@ impl RtdeSimulator {
             self.next_data = None;
         } else if self.faults.strikes(RtdeFault::Cut) {
             packet.truncate(packet.len() / 2);
-            self.outbox.send(packet);
+            self.writes.send(packet);
             self.hang_up();
         } else {
-            self.outbox.send(packet);
+            self.writes.send(packet);
         }
     }
 
@@ -262,8 +262,8 @@ impl RtdeSimulator {
 impl Simulator for RtdeSimulator {
     fn accept(&mut self, _now: Moment) {
         self.framer.clear();
-        self.outbox = Outbox::default();
-        self.outbox.is_dripping = self.faults.strikes(RtdeFault::Drip);
+        self.writes = Writes::default();
+        self.writes.is_dripping = self.faults.strikes(RtdeFault::Drip);
         self.fields.clear();
         self.next_data = None;
         self.is_connected = true;
@@ -279,7 +279,7 @@ impl Simulator for RtdeSimulator {
                 Ok(None) => return,
                 Err(_) => self.hang_up(),
             }
-            if self.outbox.is_overfull() {
+            if self.writes.is_overfull() {
                 self.hang_up();
             }
         }
@@ -290,13 +290,13 @@ impl Simulator for RtdeSimulator {
             self.next_data = Some(now + self.interval);
             self.send_data(source, now);
         }
-        if self.is_connected && self.outbox.is_overfull() {
+        if self.is_connected && self.writes.is_overfull() {
             self.hang_up();
         }
     }
 
     fn next_output(&mut self) -> Option<Output> {
-        self.outbox.next()
+        self.writes.next()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
@@ -306,8 +306,8 @@ impl Simulator for RtdeSimulator {
 
 #[cfg(test)]
 impl RtdeSimulator {
-    /// Bytes that wait for the rest of a request, and bytes that wait to be fetched.
-    pub fn buffered(&self) -> (usize, usize) {
-        (self.framer.pending(), self.outbox.waiting())
+    /// Bytes that wait for the rest of a request.
+    pub(in crate::link) fn pending(&self) -> usize {
+        self.framer.pending()
     }
 }

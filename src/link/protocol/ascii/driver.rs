@@ -16,6 +16,7 @@ use super::super::Shot;
 use super::super::lines::LineSplitter;
 use super::super::lines::Piece;
 use super::super::outbox::Outbox;
+use super::super::unreadable::Unreadable;
 use super::escape::unescape;
 use super::options::AsciiOptions;
 use super::options::Checksum;
@@ -33,8 +34,8 @@ const FORGET: Duration = Duration::from_mins(1);
 /// Most triggers without an answer that are remembered.
 const MAX_OWED: usize = 16;
 
-/// So many unreadable lines in a row are a wrong setting, not noise.
-const BAD_IN_A_ROW: u32 = 3;
+/// So many lines in a row with an old time are a clock that was set back, not late lines.
+const OLD_IN_A_ROW: u32 = 3;
 
 /// So often an average is begun again after an unreadable line.
 const MAX_RESTARTS: u32 = 3;
@@ -60,7 +61,7 @@ pub struct AsciiProtocol {
     silence_said: bool,
     last_time: Option<f64>,
     previous: Option<Point3<f64>>,
-    bad_in_a_row: u32,
+    unreadable: Unreadable,
     old_in_a_row: u32,
 }
 
@@ -99,7 +100,7 @@ impl AsciiProtocol {
             silence_said: false,
             last_time: None,
             previous: None,
-            bad_in_a_row: 0,
+            unreadable: Unreadable::default(),
             old_in_a_row: 0,
         })
     }
@@ -150,7 +151,7 @@ impl AsciiProtocol {
 
     /// A line that can be read.
     fn accept(&mut self, shot: Shot, now: Moment) {
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         self.last_line = Some(now);
         self.silence_said = false;
         let is_old = matches!((shot.instrument_time, self.last_time), (Some(time), Some(last)) if time <= last);
@@ -169,9 +170,9 @@ impl AsciiProtocol {
     /// A line whose time is not after that of an earlier line: a repeat or a late one.
     fn pass_over_old(&mut self) {
         self.old_in_a_row = self.old_in_a_row.saturating_add(1);
-        if self.old_in_a_row == BAD_IN_A_ROW {
+        if self.old_in_a_row == OLD_IN_A_ROW {
             let text = "the times in the lines do not advance: if the instrument's clock was set back, connect again";
-            self.outbox.status(Severity::Warning, text);
+            self.outbox.say(Severity::Warning, text);
         }
         self.owed.pop_front();
         if let Some(Capture::Waiting { unsure, old, .. }) = &mut self.capture {
@@ -193,7 +194,7 @@ impl AsciiProtocol {
                 self.finish(shot);
             }
             _ if was_owed || self.is_repeat(&shot) => {}
-            _ if self.started => self.outbox.offered(shot),
+            _ if self.started => self.outbox.push(ProtocolEvent::Offered(shot)),
             _ => {}
         }
     }
@@ -209,7 +210,7 @@ impl AsciiProtocol {
                     self.finish(mean);
                 }
             }
-            _ if self.started => self.outbox.live(shot),
+            _ if self.started => self.outbox.push(ProtocolEvent::Live(shot)),
             _ => {}
         }
     }
@@ -222,8 +223,7 @@ impl AsciiProtocol {
     fn finish(&mut self, shot: Shot) {
         self.capture = None;
         if self.is_repeat(&shot) {
-            let text = "it is equal to the point before to the last digit, so it was not measured anew";
-            return self.outbox.push(ProtocolEvent::Failed(Failure::Unusable(text.to_owned())));
+            return self.outbox.fail(Failure::repeated());
         }
         self.previous = Some(shot.point);
         self.outbox.push(ProtocolEvent::Shot(shot));
@@ -237,7 +237,7 @@ impl AsciiProtocol {
         if let Rejection::Garbled(text) = &rejection {
             self.count_bad(text);
         } else {
-            self.bad_in_a_row = 0;
+            self.unreadable.clear();
             self.last_line = Some(now);
             self.silence_said = false;
         }
@@ -250,7 +250,7 @@ impl AsciiProtocol {
             None => {
                 let was_owed = self.owed.pop_front().is_some();
                 if !was_owed && let Rejection::Instrument(text) = rejection {
-                    self.outbox.status(Severity::Warning, format!("the instrument says: {text}"));
+                    self.outbox.say(Severity::Warning, format!("the instrument says: {text}"));
                 }
             }
         }
@@ -279,18 +279,15 @@ impl AsciiProtocol {
     }
 
     fn count_bad(&mut self, text: &str) {
-        self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
-        if self.bad_in_a_row == BAD_IN_A_ROW {
-            let said = format!(
-                "{BAD_IN_A_ROW} lines in a row cannot be read ({text}): check baud rate, line ending, separator and decimal sign"
-            );
-            self.outbox.status(Severity::Warning, said);
+        let check = "baud rate, line ending, separator and decimal sign";
+        if let Some(said) = self.unreadable.one_more("lines", text, check) {
+            self.outbox.say(Severity::Warning, said);
         }
     }
 
     fn fail(&mut self, failure: Failure) {
         self.capture = None;
-        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
     }
 
     fn send_trigger(&mut self, unsure: usize, now: Moment) {
@@ -329,7 +326,7 @@ impl AsciiProtocol {
             }
             _ => Failure::Silent { what: "waiting for a line".to_owned(), seconds },
         };
-        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
     }
 
     /// When a stream that stopped is to be noticed.
@@ -342,10 +339,10 @@ impl AsciiProtocol {
 impl Protocol for AsciiProtocol {
     fn start(&mut self, now: Moment) {
         self.splitter.clear();
-        self.outbox.clear_output();
+        self.outbox.clear();
         self.capture = None;
         self.owed.clear();
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         self.old_in_a_row = 0;
         self.last_byte = None;
         self.last_time = None;
@@ -353,7 +350,7 @@ impl Protocol for AsciiProtocol {
         self.silence_said = false;
         self.started = true;
         let identity = self.identity();
-        self.outbox.ready(identity);
+        self.outbox.push(ProtocolEvent::Ready(identity));
     }
 
     fn feed(&mut self, bytes: &[u8], now: Moment) {
@@ -390,7 +387,7 @@ impl Protocol for AsciiProtocol {
         if self.silence_deadline().is_some_and(|deadline| deadline <= now) {
             self.silence_said = true;
             let text = format!("no readable line for {:.1} s", self.timeout.as_secs_f64());
-            self.outbox.status(Severity::Warning, text);
+            self.outbox.say(Severity::Warning, text);
         }
     }
 
@@ -401,7 +398,7 @@ impl Protocol for AsciiProtocol {
             (true, None) => None,
         };
         if let Some(text) = refused {
-            return self.outbox.push(ProtocolEvent::Failed(Failure::TooEarly(text.to_owned())));
+            return self.outbox.fail(Failure::TooEarly(text.to_owned()));
         }
         if self.lines().is_none() {
             return self.begin_polled(now);

@@ -1,5 +1,6 @@
 //! Numbers and times as instruments write them; strict, so that nothing is read in two ways.
 
+use super::super::text::shown;
 use super::options::DecimalSign;
 
 /// A finite decimal number with the given decimal sign, an optional sign and exponent; no digit grouping, no `NaN`.
@@ -23,15 +24,6 @@ pub(super) fn number(text: &str, sign: DecimalSign) -> Result<f64, String> {
         Ok(value) if value.is_finite() => Ok(value),
         _ => refused("is not a number"),
     }
-}
-
-/// A text for messages: short, and nothing that a terminal would act on.
-pub(super) fn shown(text: &str) -> String {
-    let mut short: String = text.chars().take(60).map(|c| if c.is_control() { '?' } else { c }).collect();
-    if text.chars().nth(60).is_some() {
-        short.push_str("...");
-    }
-    short
 }
 
 /// A time (s): a plain number of seconds, `2026-05-04T12:30:05.25Z` (zone optional) or `05/04/2026 12:30:05`. Only differences

@@ -11,7 +11,7 @@ use super::super::Failure;
 use super::super::Protocol as _;
 use super::super::ProtocolEvent;
 use super::super::outbox::MAX_OFFERED;
-use super::super::outbox::MAX_STATUS;
+use super::super::outbox::MAX_STATUSES;
 use super::AsciiOptions;
 use super::AsciiProtocol;
 use super::Checksum;
@@ -297,7 +297,7 @@ fn a_flood_of_lines_keeps_the_queues_short() {
         let mut protocol = started(options);
         protocol.feed(flood.as_bytes(), Duration::ZERO);
         let events: Vec<ProtocolEvent> = std::iter::from_fn(|| protocol.next_event()).collect();
-        assert!(events.len() <= MAX_OFFERED + MAX_STATUS + 1, "{}", events.len());
+        assert!(events.len() <= MAX_OFFERED + MAX_STATUSES.0 + MAX_STATUSES.1 + 1, "{}", events.len());
         let last = events.iter().rev().find_map(|event| match event {
             ProtocolEvent::Live(shot) | ProtocolEvent::Offered(shot) => Some(shot.raw.clone()),
             _ => None,

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::super::Moment;
+use super::super::patience::Patience;
 use super::command::Command;
 use super::status::CommandId;
 
@@ -12,15 +13,6 @@ pub(super) const ORDINARY: Duration = Duration::from_secs(30);
 /// The initialisation is answered within this: the head of the tracker turns.
 pub(super) const INITIALIZE: Duration = Duration::from_secs(90);
 
-/// A busy tracker is asked again after this, then after twice as long, and so on.
-pub(super) const FIRST_PAUSE: Duration = Duration::from_millis(200);
-
-/// The longest pause between two attempts at a busy tracker.
-pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-
-/// A tracker that is busy for longer than this is not asked any more.
-pub(super) const BUSY_LIMIT: Duration = Duration::from_secs(15);
-
 /// A command whose answer is not complete.
 #[derive(Clone, Debug)]
 pub(super) struct Exchange {
@@ -28,8 +20,7 @@ pub(super) struct Exchange {
     pub command: Command,
     /// When it was sent, or is to be sent again.
     state: State,
-    busy_since: Option<Moment>,
-    pause: Duration,
+    patience: Patience,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +44,7 @@ impl Exchange {
     /// A command that is being sent now.
     pub(super) fn new(command: Command, now: Moment) -> Self {
         let state = State::Sent { until: now + patience(command.id) };
-        Self { command, state, busy_since: None, pause: FIRST_PAUSE }
+        Self { command, state, patience: Patience::default() }
     }
 
     /// True where an answer to this command is the answer to this exchange.
@@ -75,13 +66,11 @@ impl Exchange {
 
     /// The tracker is busy: asks again after a growing pause. False once that has gone on for too long.
     pub(super) fn retry(&mut self, now: Moment) -> bool {
-        let since = *self.busy_since.get_or_insert(now);
-        if now.saturating_sub(since) + self.pause > BUSY_LIMIT {
-            return false;
+        let again = self.patience.again_at(now);
+        if let Some(until) = again {
+            self.state = State::Paused { until };
         }
-        self.repeat_after(self.pause, now);
-        self.pause = (self.pause * 2).min(LONGEST_PAUSE);
-        true
+        again.is_some()
     }
 
     /// What is to be done now.

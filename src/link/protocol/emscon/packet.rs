@@ -6,8 +6,9 @@
 
 use thiserror::Error;
 
-use super::super::mailbox::printable;
+use super::super::unread::Unread;
 use super::status::{CommandId, MeasurementMode, PacketType, ResultStatus, SystemEvent};
+use crate::session::printable;
 
 /// The smallest packet that exists (bytes).
 pub const MIN_PACKET: usize = 12;
@@ -33,24 +34,21 @@ pub enum PacketError {
     },
 }
 
-/// Cuts a stream into packets. Holds at most the beginning of one packet between calls.
+/// Cuts a stream into packets. Never waits for more than the rest of one packet.
 #[derive(Clone, Debug, Default)]
 pub struct Framer {
-    buffer: Vec<u8>,
-    /// Bytes of `buffer` that were given out.
-    taken: usize,
+    unread: Unread,
 }
 
 impl Framer {
     /// Forgets what is there.
     pub fn clear(&mut self) {
-        self.buffer.clear();
-        self.taken = 0;
+        self.unread.clear();
     }
 
     /// Adds bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
-        self.buffer.extend_from_slice(bytes);
+        self.unread.feed(bytes);
     }
 
     /// The next whole packet.
@@ -58,32 +56,22 @@ impl Framer {
     /// # Errors
     /// [`PacketError::Size`]: nothing behind it can be trusted.
     pub fn next_packet(&mut self) -> Result<Option<Vec<u8>>, PacketError> {
-        let rest = self.buffer.get(self.taken..).unwrap_or_default();
-        let Some(size) = i32_at(rest, 0) else {
-            self.compact();
-            return Ok(None);
-        };
+        let rest = self.unread.bytes();
+        let Some(size) = i32_at(rest, 0) else { return Ok(None) };
         let length = usize::try_from(size).unwrap_or(0);
         if !(MIN_PACKET..=MAX_PACKET).contains(&length) {
             return Err(PacketError::Size(size));
         }
         let packet = rest.get(..length).map(<[u8]>::to_vec);
-        match &packet {
-            Some(_) => self.taken += length,
-            None => self.compact(),
+        if packet.is_some() {
+            self.unread.skip(length);
         }
         Ok(packet)
     }
 
     /// Bytes that wait for the rest of their packet.
     pub fn pending(&self) -> usize {
-        self.buffer.len() - self.taken
-    }
-
-    /// Drops what was given out. Done once per feed and not once per packet, so that a large feed stays linear.
-    fn compact(&mut self) {
-        self.buffer.drain(..self.taken);
-        self.taken = 0;
+        self.unread.bytes().len()
     }
 }
 
@@ -208,7 +196,7 @@ impl Fields<'_> {
         let field = self.bytes.get(offset..offset + 64).unwrap_or_default();
         let units = field.chunks_exact(2).map(|unit| unit.try_into().map_or(0, u16::from_le_bytes));
         let text: Vec<u16> = units.take_while(|unit| *unit != 0).collect();
-        printable(&String::from_utf16_lossy(&text))
+        printable(String::from_utf16_lossy(&text).trim())
     }
 }
 

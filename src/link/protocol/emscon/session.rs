@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::super::mailbox::Mailbox;
+use super::super::outbox::Outbox;
 use super::super::{Failure, Moment, ProtocolEvent, Severity};
 use super::EmsconOptions;
 use super::command::Command;
@@ -45,7 +45,7 @@ enum Phase {
 pub(super) struct Session {
     options: EmsconOptions,
     /// What is to be sent and told.
-    pub mailbox: Mailbox,
+    pub outbox: Outbox,
     framer: Framer,
     phase: Phase,
     exchange: Option<Exchange>,
@@ -65,7 +65,7 @@ impl Session {
     pub(super) fn new(options: EmsconOptions) -> Self {
         Self {
             options,
-            mailbox: Mailbox::default(),
+            outbox: Outbox::default(),
             framer: Framer::default(),
             phase: Phase::Off,
             exchange: None,
@@ -113,7 +113,7 @@ impl Session {
             self.stop(now);
         }
         match self.exchange.as_mut().map(|exchange| exchange.due(now)) {
-            Some(Due::Again(bytes)) => self.mailbox.send(bytes),
+            Some(Due::Again(bytes)) => self.outbox.send(bytes),
             Some(Due::TimedOut) => self.timed_out(now),
             None if self.phase == Phase::Idle && now >= self.keep_alive_at() => {
                 self.send(Command::bare(CommandId::GetTrackerStatus), now);
@@ -124,22 +124,22 @@ impl Session {
 
     /// Asks for a shot.
     pub(super) fn trigger(&mut self, now: Moment) {
-        let too_early = |text: &str| ProtocolEvent::Failed(Failure::TooEarly(text.to_owned()));
+        let too_early = |text: &str| Failure::TooEarly(text.to_owned());
         match self.phase {
             Phase::Idle => {
                 self.phase = Phase::Asking;
                 self.send(Command::bare(CommandId::GetTrackerStatus), now);
             }
-            Phase::Off => self.mailbox.report(too_early("the tracker is not connected")),
+            Phase::Off => self.fail(too_early("the tracker is not connected")),
             Phase::Settling if self.is_announced => {
                 let text = "its settings were changed and are being checked again".to_owned();
-                self.mailbox.report(ProtocolEvent::Failed(Failure::NotReady(text)));
+                self.fail(Failure::NotReady(text));
             }
-            Phase::Settling => self.mailbox.report(too_early("the set-up is not complete")),
+            Phase::Settling => self.fail(too_early("the set-up is not complete")),
             Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {
-                self.mailbox.report(too_early("a measurement is under way"));
+                self.fail(too_early("a measurement is under way"));
             }
-            Phase::Stopping => self.mailbox.report(too_early("the measurement before is being stopped")),
+            Phase::Stopping => self.fail(too_early("the measurement before is being stopped")),
         }
     }
 
@@ -175,14 +175,14 @@ impl Session {
             Ok(Packet::ReflectorPosition { values, raw }) => self.take_position(values, raw),
             Ok(Packet::Event(event)) => self.take_event(event, now),
             Ok(Packet::Skipped(PacketType::Other(number))) => {
-                self.mailbox.say(Severity::Info, format!("skipped a packet of unknown type {number}"));
+                self.outbox.say(Severity::Info, format!("skipped a packet of unknown type {number}"));
             }
             Ok(Packet::Skipped(_)) => {}
             Err(error) if matches!(self.phase, Phase::Waiting { .. }) => {
                 self.fail(Failure::Garbled(error.to_string()));
                 self.stop(now);
             }
-            Err(error) => self.mailbox.say(Severity::Warning, error.to_string()),
+            Err(error) => self.outbox.say(Severity::Warning, error.to_string()),
         }
     }
 
@@ -196,7 +196,7 @@ impl Session {
             self.fail(status.measurement_failure());
             if command == CommandId::StartMeasurement { self.settle_or_idle(now) } else { self.stop(now) }
         } else if self.phase != Phase::Stopping {
-            self.mailbox.say(Severity::Warning, format!("{command}: {}", status.described()));
+            self.outbox.say(Severity::Warning, format!("{command}: {}", status.described()));
         }
     }
 
@@ -239,7 +239,7 @@ impl Session {
             Ok(Outcome::Done) => self.next_step(now),
             Ok(Outcome::More) => {}
             Ok(Outcome::Wait(text)) => {
-                self.mailbox.say(Severity::Warning, text);
+                self.outbox.say(Severity::Warning, text);
                 if let Some(exchange) = &mut self.exchange {
                     exchange.repeat_after(WARM_UP_PAUSE, now);
                 }
@@ -276,7 +276,7 @@ impl Session {
         match self.phase {
             Phase::Off | Phase::Stopping => return,
             Phase::Settling => {
-                self.mailbox
+                self.outbox
                     .say(Severity::Warning, "a point came while the settings were being checked; it is not used");
                 return;
             }
@@ -286,11 +286,11 @@ impl Session {
         let judged = shot_of(result, &self.options, self.face);
         self.is_dirty |= matches!(judged, Err(Failure::Settings(_) | Failure::Unusable(_)));
         match (judged, is_ours) {
-            (Ok(shot), true) => self.mailbox.report(ProtocolEvent::Shot(shot)),
+            (Ok(shot), true) => self.outbox.push(ProtocolEvent::Shot(shot)),
             (Err(failure), true) => self.fail(failure),
-            (Ok(shot), false) => self.mailbox.report(ProtocolEvent::Offered(shot)),
+            (Ok(shot), false) => self.outbox.push(ProtocolEvent::Offered(shot)),
             (Err(failure), false) => {
-                self.mailbox.say(Severity::Warning, format!("a point that nobody asked for is not used: {failure}"));
+                self.outbox.say(Severity::Warning, format!("a point that nobody asked for is not used: {failure}"));
             }
         }
         if is_ours || (self.is_dirty && self.phase == Phase::Idle) {
@@ -302,7 +302,7 @@ impl Session {
     fn take_position(&mut self, values: [f64; 3], raw: Vec<u8>) {
         let is_certain = !self.is_dirty && !matches!(self.phase, Phase::Off | Phase::Settling);
         if let Some(shot) = position_of(values, raw, self.face).filter(|_| is_certain) {
-            self.mailbox.report(ProtocolEvent::Live(shot));
+            self.outbox.push(ProtocolEvent::Live(shot));
         }
     }
 
@@ -316,15 +316,15 @@ impl Session {
             SystemEvent::MeasStatusNotReady => self.take_not_ready(now),
             SystemEvent::MeasStatusReady if self.was_not_ready => {
                 self.was_not_ready = false;
-                self.mailbox.say(Severity::Info, "the tracker is ready again");
+                self.outbox.say(Severity::Info, "the tracker is ready again");
             }
             SystemEvent::LaserWarmedUp
             | SystemEvent::CompensationChanged
             | SystemEvent::InitializationStatusChanged => {
-                self.mailbox.say(Severity::Info, event.words());
+                self.outbox.say(Severity::Info, event.words());
             }
             SystemEvent::SensorDisconnected | SystemEvent::BatteryStatus | SystemEvent::ExternalControlActive => {
-                self.mailbox.say(Severity::Warning, event.words());
+                self.outbox.say(Severity::Warning, event.words());
             }
             _ if reading_of(event).is_some() => self.take_change(event, now),
             _ => {}
@@ -341,7 +341,7 @@ impl Session {
                 self.stop(now);
             }
             Phase::Idle | Phase::Asking if !self.was_not_ready => {
-                self.mailbox.say(Severity::Warning, "the tracker is not ready: the beam may be broken");
+                self.outbox.say(Severity::Warning, "the tracker is not ready: the beam may be broken");
             }
             _ => {}
         }
@@ -398,13 +398,12 @@ impl Session {
         let identity = self.set_up.identity();
         if self.is_announced {
             for warning in identity.warnings {
-                self.mailbox.say(Severity::Warning, warning);
+                self.outbox.say(Severity::Warning, warning);
             }
-            self.mailbox
-                .say(Severity::Info, "the settings of the tracker were checked again and are as they should be");
+            self.outbox.say(Severity::Info, "the settings of the tracker were checked again and are as they should be");
         } else {
             self.is_announced = true;
-            self.mailbox.report(ProtocolEvent::Ready(identity));
+            self.outbox.push(ProtocolEvent::Ready(identity));
         }
     }
 
@@ -432,13 +431,13 @@ impl Session {
     }
 
     fn send(&mut self, command: Command, now: Moment) {
-        self.mailbox.send(command.encode());
+        self.outbox.send(command.encode());
         self.exchange = Some(Exchange::new(command, now));
     }
 
     /// Answers the trigger.
     fn fail(&mut self, failure: Failure) {
-        self.mailbox.report(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
     }
 
     fn lose(&mut self, failure: Failure) {
@@ -448,15 +447,13 @@ impl Session {
         self.phase = Phase::Off;
         self.exchange = None;
         self.framer.clear();
-        self.mailbox.drop_outputs();
-        self.mailbox.report(ProtocolEvent::Lost(failure));
+        self.outbox.lose(failure);
     }
 }
 
 #[cfg(test)]
 impl Session {
-    pub(super) fn buffered(&self) -> (usize, usize, usize) {
-        let (outputs, events) = self.mailbox.waiting();
-        (self.framer.pending(), outputs, events)
+    pub(super) fn pending(&self) -> usize {
+        self.framer.pending()
     }
 }

@@ -15,6 +15,7 @@ use super::super::Reflector;
 use super::super::Severity;
 use super::super::Shot;
 use super::super::outbox::Outbox;
+use super::super::text::shown;
 use super::codes::ACCURACY_NOT_GUARANTEED;
 use super::codes::NO_FULL_CORRECTION;
 use super::codes::OK;
@@ -151,7 +152,7 @@ impl GeocomProtocol {
                 self.make_step(now);
             }
             (Outcome::Reply(..), Then::Idle) => {
-                self.outbox.status(Severity::Info, "the instrument answers again");
+                self.outbox.say(Severity::Info, "the instrument answers again");
                 self.phase = Phase::Idle { since: now };
             }
             _ if now >= until => self.lose(failure_of_outcome(outcome, CALLING)),
@@ -172,7 +173,7 @@ impl GeocomProtocol {
             return;
         }
         if is_wanted {
-            self.outbox.push(ProtocolEvent::Failed(failure_of_outcome(outcome, KEEP_ALIVE)));
+            self.outbox.fail(failure_of_outcome(outcome, KEEP_ALIVE));
         }
         self.call_it(now, CALLING, Then::Idle);
     }
@@ -189,7 +190,7 @@ impl GeocomProtocol {
         if steps.is_empty() {
             self.phase = Phase::Idle { since: now };
             let identity = std::mem::take(&mut self.known).identity();
-            return self.outbox.ready(identity);
+            return self.outbox.push(ProtocolEvent::Ready(identity));
         }
         self.phase = Phase::SetUp { steps };
         self.make_step(now);
@@ -206,10 +207,10 @@ impl GeocomProtocol {
             Outcome::Reply(_, reply) => reply,
             Outcome::Busy(_) => {
                 self.phase = Phase::Idle { since: now };
-                return self.outbox.push(ProtocolEvent::Failed(failure_of_outcome(&outcome, limit)));
+                return self.outbox.fail(failure_of_outcome(&outcome, limit));
             }
             other => {
-                self.outbox.push(ProtocolEvent::Failed(failure_of_outcome(&other, limit)));
+                self.outbox.fail(failure_of_outcome(&other, limit));
                 return self.call_it(now, CALLING, Then::Idle);
             }
         };
@@ -232,8 +233,7 @@ impl GeocomProtocol {
         };
         let (point, face) = point_from_polar(&reply.parameters)?;
         if self.previous == Some(point) {
-            let text = "it is equal to the point before to the last digit, so it was not measured anew";
-            return Err(Failure::Unusable(text.to_owned()));
+            return Err(Failure::repeated());
         }
         self.previous = Some(point);
         let raw = format!("{},{}", reply.code, reply.parameters.join(",")).into_bytes();
@@ -243,7 +243,7 @@ impl GeocomProtocol {
     fn lose(&mut self, failure: Failure) {
         self.exchange.abandon();
         self.phase = Phase::Closed;
-        self.outbox.push(ProtocolEvent::Lost(failure));
+        self.outbox.lose(failure);
     }
 }
 
@@ -251,7 +251,7 @@ impl GeocomProtocol {
 fn point_from_polar(parameters: &[String]) -> Result<(Point3<f64>, u8), Failure> {
     let value = |index: usize| parameters.get(index).and_then(|text: &String| text.trim().parse::<f64>().ok());
     let (Some(horizontal), Some(zenith), Some(distance)) = (value(0), value(1), value(2)) else {
-        return Err(Failure::Garbled(format!("`{}` is not two angles and a distance", parameters.join(","))));
+        return Err(Failure::Garbled(format!("`{}` is not two angles and a distance", shown(&parameters.join(",")))));
     };
     let is_angle = |angle: f64| (-TAU..=2.0 * TAU).contains(&angle);
     if !is_angle(horizontal) || !is_angle(zenith) {
@@ -335,16 +335,16 @@ impl Known {
             self.warnings.push(text);
             return self.unread(call, options);
         }
-        let first = reply.parameters.first().map_or(UNKNOWN, |text| text.trim());
+        let first = reply.parameters.first().map_or_else(|| UNKNOWN.to_owned(), |text| shown(text));
         match call.rpc {
-            5003 => self.serial = Some(first.to_owned()),
-            5004 => self.name = Some(first.to_owned()),
-            110 => self.release = Some(reply.parameters.join(".")),
+            5003 => self.serial = Some(first),
+            5004 => self.name = Some(first),
+            110 => self.release = Some(shown(&reply.parameters.join("."))),
             18005 => {
                 self.checked.push(format!("target recognition: {}", if call.parameters == "1" { "on" } else { "off" }));
             }
-            2021 => return self.learn_edm_mode(first, options),
-            2023 => return self.learn_prism(first, options),
+            2021 => return self.learn_edm_mode(&first, options),
+            2023 => return self.learn_prism(&first, options),
             2026 => self.checked.push(format!("face: {}", if first == "1" { 2 } else { 1 })),
             _ => {}
         }
@@ -404,7 +404,7 @@ impl Known {
 impl Protocol for GeocomProtocol {
     fn start(&mut self, now: Moment) {
         self.exchange.restart();
-        self.outbox.clear_output();
+        self.outbox.clear();
         self.known = Known::default();
         self.call_it(now, CALLING, Then::SetUp);
     }
@@ -446,7 +446,7 @@ impl Protocol for GeocomProtocol {
                 Failure::TooEarly("another shot is under way".to_owned())
             }
         };
-        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
     }
 
     fn cancel(&mut self, now: Moment) {

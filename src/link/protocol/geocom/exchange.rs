@@ -7,6 +7,8 @@ use super::super::Severity;
 use super::super::lines::LineSplitter;
 use super::super::lines::Piece;
 use super::super::outbox::Outbox;
+use super::super::patience::Patience;
+use super::super::unreadable::Unreadable;
 use super::codes::SLEEPING;
 use super::codes::is_busy;
 use super::wire::Reply;
@@ -14,20 +16,11 @@ use super::wire::Request;
 use super::wire::decode_reply;
 use super::wire::encode_request;
 
-/// First pause before a busy instrument is asked again; doubled each time.
-const FIRST_DELAY: Duration = Duration::from_millis(200);
-
-/// Longest pause.
-const LAST_DELAY: Duration = Duration::from_secs(2);
-
-/// Patience with a busy instrument in all.
-const PATIENCE: Duration = Duration::from_secs(15);
+/// Pause before a request is sent again that was damaged on its way.
+const RESEND_DELAY: Duration = Duration::from_millis(200);
 
 /// How often a request is sent again that was damaged on its way.
 const MAX_RESENDS: u32 = 2;
-
-/// So many unreadable lines in a row are a wrong setting, not noise.
-const BAD_IN_A_ROW: u32 = 3;
 
 /// Largest transaction number.
 const LAST_TRANSACTION: u16 = 32_767;
@@ -72,8 +65,7 @@ struct Pending {
     transaction: Option<u16>,
     deadline: Moment,
     retry_at: Option<Moment>,
-    busy_since: Option<Moment>,
-    delay: Duration,
+    patience: Patience,
     resends: u32,
 }
 
@@ -86,7 +78,7 @@ pub(super) struct Exchange {
     pending: Option<Pending>,
     /// The instrument may have half a request in its buffer: a line feed clears it.
     is_dirty: bool,
-    bad_in_a_row: u32,
+    unreadable: Unreadable,
 }
 
 impl Exchange {
@@ -97,7 +89,7 @@ impl Exchange {
             last_transaction: 0,
             pending: None,
             is_dirty: true,
-            bad_in_a_row: 0,
+            unreadable: Unreadable::default(),
         }
     }
 
@@ -106,7 +98,7 @@ impl Exchange {
         self.splitter.clear();
         self.pending = None;
         self.is_dirty = true;
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
     }
 
     pub(super) const fn pending_bytes(&self) -> usize {
@@ -121,8 +113,7 @@ impl Exchange {
             call,
             transaction: None,
             retry_at: None,
-            busy_since: None,
-            delay: FIRST_DELAY,
+            patience: Patience::default(),
             resends: 0,
         });
         self.send(now, outbox);
@@ -166,7 +157,7 @@ impl Exchange {
                 self.damaged("it carries no CRC".to_owned(), is_reply, now, outbox)
             }
             Ok(reply) => {
-                self.bad_in_a_row = 0;
+                self.unreadable.clear();
                 self.reply(reply, now, outbox)
             }
             Err(text) => self.damaged(text, is_reply, now, outbox),
@@ -179,7 +170,7 @@ impl Exchange {
         let is_unread = reply.transport != 0 && reply.transaction == 0;
         let is_mine = pending.transaction.is_some_and(|own| own == reply.transaction || is_unread);
         if !is_mine {
-            outbox.status(
+            outbox.say(
                 Severity::Info,
                 format!("a late or foreign answer was thrown away (number {})", reply.transaction),
             );
@@ -201,15 +192,12 @@ impl Exchange {
 
     fn be_patient(&mut self, code: u32, now: Moment) -> Option<Outcome> {
         let pending = self.pending.as_mut()?;
-        let since = *pending.busy_since.get_or_insert(now);
-        let at = now + pending.delay;
-        if at > since + PATIENCE {
-            self.pending = None;
-            return Some(Outcome::Busy(code));
+        pending.retry_at = pending.patience.again_at(now);
+        if pending.retry_at.is_some() {
+            return None;
         }
-        pending.retry_at = Some(at);
-        pending.delay = (pending.delay * 2).min(LAST_DELAY);
-        None
+        self.pending = None;
+        Some(Outcome::Busy(code))
     }
 
     fn send_again(&mut self, damage: Damage, now: Moment) -> Option<Outcome> {
@@ -220,19 +208,16 @@ impl Exchange {
         }
         if pending.retry_at.is_none() {
             pending.resends += 1;
-            pending.retry_at = Some(now + FIRST_DELAY);
+            pending.retry_at = Some(now + RESEND_DELAY);
         }
         None
     }
 
     /// A line that cannot be read. A damaged reply is asked for again; noise is not.
     fn damaged(&mut self, text: String, is_reply: bool, now: Moment, outbox: &mut Outbox) -> Option<Outcome> {
-        self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
-        if self.bad_in_a_row == BAD_IN_A_ROW {
-            let said = format!(
-                "{BAD_IN_A_ROW} lines in a row cannot be read ({text}): check baud rate, line ending and that GeoCOM is switched on"
-            );
-            outbox.status(Severity::Warning, said);
+        let check = "baud rate, line ending and that GeoCOM is switched on";
+        if let Some(said) = self.unreadable.one_more("lines", &text, check) {
+            outbox.say(Severity::Warning, said);
         }
         if !is_reply {
             return None;

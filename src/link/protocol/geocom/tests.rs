@@ -9,7 +9,7 @@ use serde::de::value::MapDeserializer;
 use super::super::Failure;
 use super::super::Protocol as _;
 use super::super::ProtocolEvent;
-use super::super::outbox::MAX_STATUS;
+use super::super::outbox::MAX_STATUSES;
 use super::GeocomOptions;
 use super::GeocomProtocol;
 use super::Reply;
@@ -151,11 +151,33 @@ fn numbers_beside_an_error_are_never_a_point() {
 }
 
 #[test]
+fn what_the_instrument_says_is_shown_without_control_characters_and_short() {
+    let mut protocol = GeocomProtocol::new(GeocomOptions::default()).unwrap();
+    protocol.start(Duration::ZERO);
+    let nasty = format!("0,\"TS\u{1b}[31m\u{202e}{}\"", "x".repeat(1000));
+    while let Some(bytes) = protocol.next_output() {
+        let is_name = ["%R1Q,5003,", "%R1Q,5004,", "%R1Q,110,", "%R1Q,2021,"]
+            .iter()
+            .any(|name| bytes.windows(name.len()).any(|window| window == name.as_bytes()));
+        answer(&mut protocol, &bytes, if is_name { &nasty } else { "0,0.0" });
+    }
+    let Some(ProtocolEvent::Ready(identity)) = protocol.next_event() else { panic!("not ready") };
+    let Some(ProtocolEvent::Failed(failure)) = measured(&format!("0,\u{1b}[2J,{},1,2", "9".repeat(1000))) else {
+        panic!("no failure")
+    };
+    let is_plain = |text: &str| !text.chars().any(|c| c.is_control() || c == '\u{202e}');
+    for text in identity.checked.iter().chain([&identity.name, &failure.to_string()]) {
+        assert!(is_plain(text) && text.len() < 300, "{text:?}");
+    }
+    assert!(identity.name.contains("TS\u{fffd}[31m"), "{}", identity.name);
+}
+
+#[test]
 fn a_flood_of_lines_keeps_the_queues_short() {
     let mut protocol = ready(&GeocomOptions::default());
     protocol.trigger(Duration::ZERO);
     protocol.feed("%R1P,0,30000:0\r\nnoise\r\n".repeat(10_000).as_bytes(), Duration::ZERO);
-    assert!(std::iter::from_fn(|| protocol.next_event()).count() <= MAX_STATUS);
+    assert!(std::iter::from_fn(|| protocol.next_event()).count() <= 2 * (MAX_STATUSES.0 + MAX_STATUSES.1));
 }
 
 #[test]

@@ -11,6 +11,8 @@ use super::super::ProtocolEvent;
 use super::super::Severity;
 use super::super::Shot;
 use super::super::outbox::Outbox;
+use super::super::text::shown;
+use super::super::unreadable::Unreadable;
 use super::codes::BAD_CRC;
 use super::codes::failure_of_error;
 use super::options::NdiOptions;
@@ -42,9 +44,6 @@ const MAX_RESENDS: u32 = 2;
 /// So many unanswered commands in a row, with nobody asking for a shot, are the end of the link.
 const MAX_UNANSWERED: u32 = 5;
 
-/// So many damaged replies in a row are a wrong setting, not noise.
-const BAD_IN_A_ROW: u32 = 3;
-
 /// Most replies that may still come of commands that were given up.
 const MAX_OWED: u32 = 16;
 
@@ -63,7 +62,7 @@ pub struct NdiProtocol {
     /// Replies that commands which were given up may still get.
     owed: u32,
     unanswered: u32,
-    bad_in_a_row: u32,
+    unreadable: Unreadable,
 }
 
 #[derive(Debug)]
@@ -106,7 +105,7 @@ impl NdiProtocol {
             pending: None,
             owed: 0,
             unanswered: 0,
-            bad_in_a_row: 0,
+            unreadable: Unreadable::default(),
         })
     }
 
@@ -146,7 +145,7 @@ impl NdiProtocol {
         if let Frame::Damaged(text) = frame {
             return self.damaged(text, now);
         }
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         if frame == Frame::Text("RESET".to_owned()) && !matches!(self.phase, Phase::Closed) {
             return self.lose(Failure::Disconnected("the instrument was switched off and on, or reset".to_owned()));
         }
@@ -165,7 +164,7 @@ impl NdiProtocol {
         if let Frame::Text(text) = frame
             && text.starts_with("WARNING")
         {
-            self.outbox.status(Severity::Warning, format!("the instrument says: {}", text.escape_default()));
+            self.outbox.say(Severity::Warning, format!("the instrument says: {}", shown(text)));
         }
         match (std::mem::replace(&mut self.phase, Phase::Closed), error) {
             (Phase::Closed, _) => {}
@@ -199,7 +198,7 @@ impl NdiProtocol {
             Ok(Next::Ready(handle)) => {
                 self.handle = handle;
                 let identity = std::mem::take(&mut self.set_up).identity(handle, &self.options);
-                self.outbox.ready(identity);
+                self.outbox.push(ProtocolEvent::Ready(identity));
                 self.rest(now);
             }
         }
@@ -215,7 +214,7 @@ impl NdiProtocol {
         if let Ok(tool) = self.tool(frame)
             && let Ok(shot) = self.shot(&tool, frame)
         {
-            self.outbox.live(shot);
+            self.outbox.push(ProtocolEvent::Live(shot));
         }
     }
 
@@ -279,12 +278,8 @@ impl NdiProtocol {
     }
 
     fn damaged(&mut self, text: String, now: Moment) {
-        self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
-        if self.bad_in_a_row == BAD_IN_A_ROW {
-            let said = format!(
-                "{BAD_IN_A_ROW} replies in a row cannot be read ({text}): check baud rate and kind of instrument"
-            );
-            self.outbox.status(Severity::Warning, said);
+        if let Some(said) = self.unreadable.one_more("replies", &text, "baud rate and kind of instrument") {
+            self.outbox.say(Severity::Warning, said);
         }
         if self.send_again(now) {
             return;
@@ -339,14 +334,14 @@ impl NdiProtocol {
     }
 
     fn fail(&mut self, failure: Failure, now: Moment) {
-        self.outbox.push(ProtocolEvent::Failed(failure));
+        self.outbox.fail(failure);
         self.rest(now);
     }
 
     fn lose(&mut self, failure: Failure) {
         self.phase = Phase::Closed;
         self.pending = None;
-        self.outbox.push(ProtocolEvent::Lost(failure));
+        self.outbox.lose(failure);
     }
 
     fn time_out(&mut self, now: Moment) {
@@ -371,11 +366,11 @@ fn error_of(frame: &Frame) -> Option<u8> {
 impl Protocol for NdiProtocol {
     fn start(&mut self, now: Moment) {
         self.decoder.resync();
-        self.outbox.clear_output();
+        self.outbox.clear();
         self.set_up = SetUp::default();
         self.owed = 0;
         self.unanswered = 0;
-        self.bad_in_a_row = 0;
+        self.unreadable.clear();
         let first = Step::Initialise;
         let command = first.command();
         self.phase = Phase::SetUp(first);
@@ -402,7 +397,7 @@ impl Protocol for NdiProtocol {
         if !matches!(self.phase, Phase::Idle) {
             let is_set_up = matches!(self.phase, Phase::Shot { .. });
             let text = if is_set_up { "another shot is under way" } else { "the set-up is not complete" };
-            return self.outbox.push(ProtocolEvent::Failed(Failure::TooEarly(text.to_owned())));
+            return self.outbox.fail(Failure::TooEarly(text.to_owned()));
         }
         // A live position that is on its way belongs to a frame before the trigger: it is not looked at.
         let is_asked = self.pending.as_ref().is_some_and(|pending| pending.is_sent);

@@ -2,6 +2,7 @@
 
 use super::super::Failure;
 use super::super::Identity;
+use super::super::text::shown;
 use super::options::NdiOptions;
 use super::options::ReplyFormat;
 
@@ -60,7 +61,7 @@ impl SetUp {
                 Step::Version
             }
             Step::Version => {
-                self.version = (!reply.is_empty()).then(|| reply.escape_default().to_string());
+                self.version = (!reply.is_empty()).then(|| shown(reply));
                 Step::FindTools
             }
             Step::FindTools => initialise_next(handles(reply)?),
@@ -135,13 +136,13 @@ fn okay(reply: &str) -> Result<(), Failure> {
     match reply {
         "OKAY" => Ok(()),
         warning if warning.starts_with("WARNING") => Ok(()),
-        other => Err(Failure::Garbled(format!("`{}` instead of OKAY", other.escape_default()))),
+        other => Err(Failure::Garbled(format!("`{}` instead of OKAY", shown(other)))),
     }
 }
 
 /// Handles of a `PHSR` reply: their number, then two digits of handle and three of status each.
 fn handles(reply: &str) -> Result<Vec<u8>, Failure> {
-    let garbled = || Failure::Garbled(format!("`{}` is not a list of port handles", reply.escape_default()));
+    let garbled = || Failure::Garbled(format!("`{}` is not a list of port handles", shown(reply)));
     let byte = |text: &str| u8::from_str_radix(text, 16).map_err(|_not_hexadecimal| garbled());
     let (count, mut rest) = reply.split_at_checked(2).ok_or_else(garbled)?;
     let mut handles = Vec::new();

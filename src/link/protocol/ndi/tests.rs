@@ -9,8 +9,8 @@ use serde::de::value::Error;
 use serde::de::value::MapDeserializer;
 
 use super::super::Protocol as _;
-use super::super::outbox::MAX_OUTPUT;
-use super::super::outbox::MAX_STATUS;
+use super::super::outbox::MAX_OUTPUTS;
+use super::super::outbox::MAX_STATUSES;
 use super::Frame;
 use super::FrameDecoder;
 use super::MAX_BINARY;
@@ -159,8 +159,8 @@ fn a_flood_of_replies_keeps_the_queues_short() {
     protocol.start(Duration::ZERO);
     let texts = ["OKAY", "WARNING", "G.003", "010A001", "ERROR0C"].map(encode_text).concat();
     protocol.feed(&texts.repeat(10_000), Duration::ZERO);
-    assert!(std::iter::from_fn(|| protocol.next_event()).count() <= MAX_STATUS + 1);
-    assert!(std::iter::from_fn(|| protocol.next_output()).count() <= MAX_OUTPUT);
+    assert!(std::iter::from_fn(|| protocol.next_event()).count() <= MAX_STATUSES.0 + MAX_STATUSES.1 + 1);
+    assert!(std::iter::from_fn(|| protocol.next_output()).count() <= MAX_OUTPUTS);
 }
 
 #[test]

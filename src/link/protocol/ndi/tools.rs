@@ -5,6 +5,8 @@ use nalgebra::Quaternion;
 use nalgebra::UnitQuaternion;
 use nalgebra::Vector3;
 
+use super::super::text::shown;
+
 /// How far the norm of a quaternion may be from one: `TX` rounds each part to 0.0001.
 const NORM_TOLERANCE: f64 = 0.01;
 
@@ -125,7 +127,7 @@ impl<'text> Cursor<'text> {
         let field = self.take(width)?;
         let is_plain = field.bytes().all(|digit| digit.is_ascii_hexdigit());
         let value = u32::from_str_radix(field, 16).ok().filter(|_| is_plain);
-        value.ok_or_else(|| format!("`{}` is not hexadecimal", field.escape_default()))
+        value.ok_or_else(|| format!("`{}` is not hexadecimal", shown(field)))
     }
 
     /// Sign and digits.
@@ -133,7 +135,7 @@ impl<'text> Cursor<'text> {
         let field = self.take(width)?;
         let is_signed = field.starts_with(['+', '-']);
         let value = field.parse::<i32>().ok().filter(|_| is_signed);
-        value.map(f64::from).ok_or_else(|| format!("`{}` is not a signed number", field.escape_default()))
+        value.map(f64::from).ok_or_else(|| format!("`{}` is not a signed number", shown(field)))
     }
 }
 

@@ -3,7 +3,8 @@
 
 use thiserror::Error;
 
-use super::super::mailbox::printable;
+use super::super::unread::Unread;
+use crate::session::printable;
 
 /// The smallest packet: nothing but its header (bytes).
 pub const MIN_PACKET: usize = 3;
@@ -49,23 +50,21 @@ pub enum PacketError {
     },
 }
 
-/// Cuts a stream into packets. Holds at most the beginning of one packet between calls, so never more than 64 KiB.
+/// Cuts a stream into packets. Never waits for more than the rest of one packet, so for no more than 64 KiB.
 #[derive(Clone, Debug, Default)]
 pub struct Framer {
-    buffer: Vec<u8>,
-    taken: usize,
+    unread: Unread,
 }
 
 impl Framer {
     /// Forgets what is there.
     pub fn clear(&mut self) {
-        self.buffer.clear();
-        self.taken = 0;
+        self.unread.clear();
     }
 
     /// Adds bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
-        self.buffer.extend_from_slice(bytes);
+        self.unread.feed(bytes);
     }
 
     /// Type and content of the next whole packet.
@@ -73,32 +72,21 @@ impl Framer {
     /// # Errors
     /// [`PacketError::Size`]: nothing behind it can be trusted.
     pub fn next_packet(&mut self) -> Result<Option<(u8, Vec<u8>)>, PacketError> {
-        let rest = self.buffer.get(self.taken..).unwrap_or_default();
-        let Some(size) = rest.first_chunk::<2>().map(|field| u16::from_be_bytes(*field)) else {
-            self.compact();
-            return Ok(None);
-        };
+        let rest = self.unread.bytes();
+        let Some(size) = rest.first_chunk::<2>().map(|field| u16::from_be_bytes(*field)) else { return Ok(None) };
         let length = usize::from(size);
         if length < MIN_PACKET {
             return Err(PacketError::Size(size));
         }
-        let Some([kind, content @ ..]) = rest.get(2..length) else {
-            self.compact();
-            return Ok(None);
-        };
+        let Some([kind, content @ ..]) = rest.get(2..length) else { return Ok(None) };
         let packet = (*kind, content.to_vec());
-        self.taken += length;
+        self.unread.skip(length);
         Ok(Some(packet))
     }
 
     /// Bytes that wait for the rest of their packet.
     pub fn pending(&self) -> usize {
-        self.buffer.len() - self.taken
-    }
-
-    fn compact(&mut self) {
-        self.buffer.drain(..self.taken);
-        self.taken = 0;
+        self.unread.bytes().len()
     }
 }
 
@@ -203,7 +191,7 @@ impl TextMessage {
 fn counted(bytes: &[u8]) -> Option<(String, &[u8])> {
     let (length, rest) = bytes.split_first()?;
     let (text, rest) = rest.split_at_checked(usize::from(*length))?;
-    Some((printable(&String::from_utf8_lossy(text)), rest))
+    Some((printable(String::from_utf8_lossy(text).trim()), rest))
 }
 
 /// The values that are asked for, in their order.

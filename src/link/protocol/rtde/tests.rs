@@ -2,20 +2,17 @@
 
 use std::time::Duration;
 
-use proptest::prelude::*;
-
 use super::packet::{
     Framer, Packet, PacketError, Record, TextMessage, encode, packet_type, request_version, set_up_outputs,
 };
 use super::{Rtde, RtdeOptions, Stillness};
-use crate::link::protocol::{Failure, JointState, Moment, Protocol as _, ProtocolEvent};
-use crate::link::simulator::Simulator as _;
-use crate::link::simulator::bench::fuzz::{
-    assert_same_at_every_cut, assert_same_in_pieces, fuzz_protocol, fuzz_simulator,
-};
-use crate::link::simulator::bench::{Bench, Cell};
+use crate::link::protocol::{Failure, JointState, Protocol as _, ProtocolEvent};
+use crate::link::simulator::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use crate::link::simulator::bench::streams::assert_splits_change_nothing;
+use crate::link::simulator::bench::{Bench, Cell, START, Tape};
 use crate::link::simulator::fault::Planned;
 use crate::link::simulator::rtde::{RtdeFault, RtdeSimulator};
+use crate::link::simulator::{Output, Simulator as _};
 
 type RtdeBench = Bench<Rtde, RtdeSimulator>;
 
@@ -271,67 +268,76 @@ fn nobody_says_rest_without_speeds_across_a_gap_or_in_a_stop() {
     assert_eq!(bad(|state| state.stopped = Some("stop".to_owned())), [false; 3]);
 }
 
-/// A link that has started, and bytes from its beginning to some data.
-fn stream() -> (Rtde, Vec<u8>) {
-    let mut rtde = Rtde::default();
-    rtde.start(Moment::ZERO);
+/// A set-up, some data, and a trigger that is refused.
+fn tape() -> Tape {
     let mut bench = ready(&[Planned::from(RtdeFault::ProtectiveStop, 2, 1)]);
     bench.run_for(Duration::from_millis(130));
-    (rtde, bench.received)
+    bench.shoot();
+    bench.tape
 }
 
 #[test]
-fn every_cut_gives_the_same() {
-    let (rtde, stream) = stream();
-    let events = assert_same_at_every_cut(&rtde, &stream);
-    assert!(matches!(events.first(), Some(ProtocolEvent::Ready(_))));
-    assert!(matches!(events.last(), Some(ProtocolEvent::Joints(_))));
-}
-
-proptest! {
-    #[test]
-    fn any_pieces_give_the_same(sizes in prop::collection::vec(1_usize..200, 1..20)) {
-        let (rtde, stream) = stream();
-        assert_same_in_pieces(&rtde, &stream, &sizes);
+fn splits_change_nothing() {
+    for tape in [tape().joined(), tape()] {
+        let events = assert_splits_change_nothing(Rtde::default, &tape);
+        assert!(matches!(events.first(), Some(ProtocolEvent::Ready(_))));
+        assert!(!joints(&events).is_empty(), "{events:?}");
+        assert!(matches!(events.last(), Some(ProtocolEvent::Failed(_))));
     }
 }
 
 #[test]
-fn ten_thousand_packets_in_one_feed_leave_the_newest() {
-    let (mut rtde, stream) = stream();
-    rtde.feed(&stream, Moment::ZERO);
-    let data = stream[stream.len() - 116..].repeat(10_000);
-    rtde.feed(&data, Moment::ZERO);
-    let (pending, _, events) = rtde.buffered();
-    assert!(pending == 0 && events <= 5, "{pending} {events}");
+fn splits_change_nothing_of_faults() {
+    let faults = [
+        RtdeFault::ProtectiveStop,
+        RtdeFault::PowerOff,
+        RtdeFault::Moving,
+        RtdeFault::NotFinite,
+        RtdeFault::WrongRecipe,
+        RtdeFault::TextFlood,
+        RtdeFault::ShortData,
+    ];
+    let mut bench = ready(&faults.into_iter().zip(2..).map(|(fault, at)| Planned::at(fault, at)).collect::<Vec<_>>());
+    bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
+    let events = assert_splits_change_nothing(Rtde::default, &bench.tape);
+    assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Garbled(_)))), "{events:?}");
 }
 
 #[test]
-fn a_simulated_controller_hangs_up_on_who_does_not_read() {
+fn ten_thousand_packets_in_one_feed_leave_the_newest() {
+    let stream = tape().bytes();
+    let mut rtde = Rtde::default();
+    rtde.start(START);
+    rtde.feed(&stream, START);
+    let data = stream[stream.len() - 116..].repeat(10_000);
+    rtde.feed(&data, START);
+    let events = std::iter::from_fn(|| rtde.next_event()).count();
+    assert!(rtde.pending() == 0 && events <= 5, "{} {events}", rtde.pending());
+}
+
+#[test]
+fn a_simulated_controller_hangs_up_once_on_who_does_not_read() {
     let mut simulator = RtdeSimulator::new(Vec::new());
-    simulator.accept(Moment::ZERO);
-    simulator.feed(&request_version().repeat(1_000_000), &mut Cell::default(), Moment::ZERO);
-    let (pending, waiting) = simulator.buffered();
-    assert!(pending == 0 && waiting < 2 << 20, "{pending} {waiting}");
+    simulator.accept(START);
+    simulator.feed(&request_version().repeat(1_000_000), &mut Cell::default(), START);
+    (0..10).for_each(|_| simulator.tick(&mut Cell::default(), START));
+    assert_eq!(simulator.pending(), 0);
+    let outputs: Vec<Output> = std::iter::from_fn(|| simulator.next_output()).collect();
+    let bytes: usize =
+        outputs.iter().map(|output| if let Output::Bytes(bytes) = output { bytes.len() } else { 0 }).sum();
+    assert!(bytes < 2 << 20, "{bytes}");
+    let closes = outputs.iter().filter(|output| **output == Output::Close).count();
+    assert_eq!((closes, outputs.last()), (1, Some(&Output::Close)));
 }
 
 #[test]
 fn no_bytes_make_the_link_panic_or_hoard() {
-    fuzz_protocol(Rtde::default, &stream().1, |rtde| {
-        let (pending, outputs, events) = rtde.buffered();
-        assert!(pending < 1 << 16 && outputs <= 10 && events <= 200, "{pending} {outputs} {events}");
-    });
+    fuzz_protocol(Rtde::default, &tape(), Rtde::pending, Bounds { pending: (1 << 16) - 1, outputs: 10 });
 }
 
 #[test]
 fn no_bytes_make_the_simulated_controller_panic_or_hoard() {
-    let valid = ready(&[]).sent.concat();
-    fuzz_simulator(
-        || RtdeSimulator::new(RtdeFault::ALL.iter().map(|fault| Planned::from(*fault, 2, 1)).collect()),
-        &valid,
-        |simulator| {
-            let (pending, waiting) = simulator.buffered();
-            assert!(pending < 1 << 16 && waiting < 2 << 20, "{pending} {waiting}");
-        },
-    );
+    let all = || RtdeSimulator::new(RtdeFault::ALL.iter().map(|fault| Planned::from(*fault, 2, 1)).collect());
+    let bounds = Bounds { pending: (1 << 16) - 1, outputs: 200_000 };
+    fuzz_simulator(all, &ready(&[]).sent, RtdeSimulator::pending, bounds);
 }

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::super::bench2::Bench;
-use super::super::bench2::Helix;
-use super::super::bench2::streams;
+use super::super::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use super::super::bench::streams::assert_splits_change_nothing;
+use super::super::bench::{Bench, Cell};
 use super::super::fault::Planned;
 use super::AsciiFault;
 use super::AsciiSimulator;
@@ -26,7 +26,7 @@ type AsciiBench = Bench<AsciiProtocol, AsciiSimulator>;
 fn bench(options: &AsciiOptions, faults: impl IntoIterator<Item = Planned<AsciiFault>>) -> AsciiBench {
     let protocol = AsciiProtocol::new(options.clone()).unwrap();
     let mut bench = Bench::new(protocol, AsciiSimulator::new(options.clone(), faults).unwrap());
-    bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+    bench.settle();
     bench
 }
 
@@ -47,22 +47,22 @@ fn streamed(lines: u32) -> AsciiOptions {
 /// The source's newest point, within a nanometre.
 #[track_caller]
 fn assert_newest(shot: &Shot, bench: &AsciiBench) {
-    let error = (shot.point - Helix::point(bench.source.taken())).norm();
+    let error = (shot.point - bench.cell.newest()).norm();
     assert!(error < 1e-9, "{error} m from the newest point");
 }
 
 #[track_caller]
 fn shot(bench: &mut AsciiBench) -> Shot {
-    match bench.shoot() {
-        (Some(ProtocolEvent::Shot(shot)), _) => shot,
+    match bench.shoot().pop() {
+        Some(ProtocolEvent::Shot(shot)) => shot,
         other => panic!("no shot: {other:?}"),
     }
 }
 
 #[track_caller]
 fn failure(bench: &mut AsciiBench) -> Failure {
-    match bench.shoot() {
-        (Some(ProtocolEvent::Failed(failure)), _) => failure,
+    match bench.shoot().pop() {
+        Some(ProtocolEvent::Failed(failure)) => failure,
         other => panic!("no failure: {other:?}"),
     }
 }
@@ -102,13 +102,23 @@ fn every_preset_but_the_gauge_gives_points() {
 }
 
 #[test]
+fn standard_deviations_are_those_of_the_source_or_none() {
+    let mut bench = bench(&Preset::Bridge.options(), []);
+    let stated = bench.cell.sigma.unwrap();
+    let sigma = shot(&mut bench).sigma.unwrap();
+    assert!(sigma.iter().zip(stated).all(|(found, stated)| (found - stated).abs() < 1e-12), "{sigma:?}");
+    bench.cell.sigma = None;
+    assert_eq!(shot(&mut bench).sigma, None);
+}
+
+#[test]
 fn a_stream_is_averaged_over_lines_after_the_trigger() {
     let mut bench = bench(&streamed(4), []);
-    let live = bench.run(Duration::from_secs(1));
+    let live = bench.run_for(Duration::from_secs(1));
     assert!(live.iter().any(|event| matches!(event, ProtocolEvent::Live(_))));
-    let before = bench.source.taken();
+    let before = bench.cell.shots;
     let shot = shot(&mut bench);
-    let mean = (1..=4).map(|n| Helix::point(before + n).coords).sum::<nalgebra::Vector3<f64>>() / 4.0;
+    let mean = (0..4).map(|n| Cell::point(before + n).coords).sum::<nalgebra::Vector3<f64>>() / 4.0;
     assert!((shot.point.coords - mean).norm() < 1e-9);
     assert!(shot.remark.is_some_and(|remark| remark.starts_with("mean of 4 lines")));
 }
@@ -137,12 +147,9 @@ fn every_fault_of_a_polled_source_is_said_and_passes() {
     for &fault in AsciiFault::ALL {
         let mut bench = bench(&polled(), [Planned::at(fault, 2)]);
         shot(&mut bench);
-        let (answer, _) = bench.shoot();
-        match (expected(fault), answer) {
-            (Some(""), None) => {
-                assert!(bench.is_closed, "{fault}");
-                bench.connect();
-                bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+        match (expected(fault), bench.shoot().pop()) {
+            (Some(""), Some(ProtocolEvent::Lost(Failure::Disconnected(_)))) => {
+                bench.settle();
             }
             (None, Some(ProtocolEvent::Shot(shot))) => assert_newest(&shot, &bench),
             (Some(text), Some(ProtocolEvent::Failed(failure))) => {
@@ -167,18 +174,14 @@ fn every_fault_of_a_stream_gives_no_wrong_point() {
         for at in 1..6 {
             let mut bench = bench(&streamed(1), [Planned::at(fault, at)]);
             for _ in 0..8 {
-                match bench.shoot().0 {
+                match bench.shoot().pop() {
                     Some(ProtocolEvent::Shot(shot)) => {
-                        let nearest = (1..=bench.source.taken())
-                            .map(|n| (shot.point - Helix::point(n)).norm())
-                            .fold(f64::MAX, f64::min);
-                        assert!(nearest < 1e-9, "{fault}: {nearest} m from every point");
+                        let error = bench.cell.error(&shot.point, 0);
+                        assert!(error < 1e-9, "{fault}: {error} m from every point");
                     }
                     Some(ProtocolEvent::Failed(_)) => assert_ne!(expected(fault), None, "{fault}"),
-                    other => {
-                        assert_eq!((other, fault), (None, AsciiFault::DisconnectMidLine));
-                        bench.connect();
-                    }
+                    Some(ProtocolEvent::Lost(_)) if fault == AsciiFault::DisconnectMidLine => bench.connect(),
+                    other => panic!("{fault}: {other:?}"),
                 }
             }
         }
@@ -191,10 +194,10 @@ fn a_late_answer_is_never_taken_for_the_next_one() {
     assert!(matches!(failure(&mut bench), Failure::Silent { .. }));
     // Shots before, around and after the time at which the late line comes.
     for _ in 0..12 {
-        let before = bench.source.taken();
+        let before = bench.cell.shots;
         let shot = shot(&mut bench);
-        assert!((before + 1..=bench.source.taken()).any(|n| (shot.point - Helix::point(n)).norm() < 1e-9));
-        bench.run(Duration::from_secs(4));
+        assert!(bench.cell.error(&shot.point, before) < 1e-9);
+        bench.run_for(Duration::from_secs(4));
     }
 }
 
@@ -202,9 +205,9 @@ fn a_late_answer_is_never_taken_for_the_next_one() {
 fn a_cancelled_shot_is_swallowed() {
     let mut bench = bench(&polled(), []);
     bench.trigger();
-    bench.run(Duration::from_millis(100));
+    bench.run_for(Duration::from_millis(100));
     bench.cancel();
-    assert_eq!(bench.run(Duration::from_secs(3)), []);
+    assert_eq!(bench.run_for(Duration::from_secs(3)), []);
     let shot = shot(&mut bench);
     assert_newest(&shot, &bench);
 }
@@ -212,7 +215,7 @@ fn a_cancelled_shot_is_swallowed() {
 #[test]
 fn a_broken_beam_is_the_instruments_own_words() {
     let mut bench = bench(&Preset::T2sa.options(), []);
-    bench.source.is_blocked = true;
+    bench.cell.has_beam = false;
     let failure = failure(&mut bench);
     assert_eq!(failure, Failure::Refused("ERR-305 point measurement failed".to_owned()));
 }
@@ -220,7 +223,7 @@ fn a_broken_beam_is_the_instruments_own_words() {
 #[test]
 fn a_wrong_baud_rate_is_said_after_three_lines() {
     let mut bench = bench(&streamed(1), [Planned::from(AsciiFault::Noise, 1, 100)]);
-    let events = bench.run(Duration::from_secs(1));
+    let events = bench.run_for(Duration::from_secs(1));
     let hints: Vec<_> = events.iter().filter(|event| matches!(event, ProtocolEvent::Status(_))).collect();
     assert!(format!("{hints:?}").contains("check baud rate, line ending"));
     assert_eq!(hints.len(), 1, "{hints:?}");
@@ -230,7 +233,7 @@ fn a_wrong_baud_rate_is_said_after_three_lines() {
 fn a_stream_that_stops_is_said_once() {
     let options = AsciiOptions { timeout_s: 2.0, ..streamed(1) };
     let mut bench = bench(&options, [Planned::from(AsciiFault::Silent, 5, 1000)]);
-    let events = bench.run(Duration::from_secs(20));
+    let events = bench.run_for(Duration::from_secs(20));
     let said = events.iter().filter(|event| matches!(event, ProtocolEvent::Status(_))).count();
     assert_eq!(said, 1, "{events:?}");
     assert!(matches!(failure(&mut bench), Failure::Silent { seconds: 2.0, .. }));
@@ -251,18 +254,21 @@ fn splits_change_nothing() {
     for options in [polled(), streamed(2), Preset::T2sa.options(), Preset::Bridge.options()] {
         let mut tape = conversation(&options).tape;
         // 10 kB cut at every byte would take long and show nothing more than 20 bytes do.
-        tape.retain(|input| !matches!(input, super::super::bench2::Input::Feed(bytes, _) if bytes.len() > MAX_LINE));
-        streams::assert_splits_change_nothing(|| AsciiProtocol::new(options.clone()).unwrap(), &tape);
+        tape.0.retain(|input| input.bytes().len() <= MAX_LINE);
+        for tape in [tape.joined(), tape] {
+            let events = assert_splits_change_nothing(|| AsciiProtocol::new(options.clone()).unwrap(), &tape);
+            assert!(events.iter().any(|event| matches!(event, ProtocolEvent::Shot(_))), "{events:?}");
+        }
     }
 }
 
 #[test]
 fn noise_breaks_nothing() {
-    for options in [polled(), streamed(2), Preset::T2sa.options()] {
+    for options in [polled(), streamed(2), Preset::T2sa.options(), Preset::UdpXyzTime.options()] {
         let bench = conversation(&options);
         let make = || AsciiProtocol::new(options.clone()).unwrap();
-        streams::fuzz_protocol(make, &bench.tape, AsciiProtocol::pending, MAX_LINE);
+        fuzz_protocol(make, &bench.tape, AsciiProtocol::pending, Bounds::of_protocol(MAX_LINE));
         let make = || AsciiSimulator::new(options.clone(), []).unwrap();
-        streams::fuzz_simulator(make, &bench.sent, AsciiSimulator::pending, MAX_LINE);
+        fuzz_simulator(make, &bench.sent, AsciiSimulator::pending, Bounds { pending: MAX_LINE, outputs: 512 });
     }
 }

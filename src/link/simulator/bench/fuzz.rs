@@ -1,160 +1,283 @@
-//! Bytes that nobody means: random ones, and streams that were right before some bytes were changed, lost or doubled. Fixed
-//! seeds; for about a second, or as long as `TRUPOSE_FUZZ_SECONDS` says.
+//! Bytes that nobody means: random ones, and conversations that were right before some bytes were changed, lost or doubled. No
+//! panic, bounded memory, no more than one answer to a trigger. Fixed seeds; for half a second, or as long as
+//! `TRUPOSE_FUZZ_SECONDS` says.
 
 use std::time::{Duration, Instant};
 
+use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-use super::Cell;
-use crate::link::protocol::{Moment, Protocol, ProtocolEvent};
-use crate::link::simulator::Simulator;
+use super::{Cell, Input, START, Tape, is_answer};
+use crate::link::protocol::outbox::{MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES};
+use crate::link::protocol::{Protocol, ProtocolEvent};
+use crate::link::simulator::{Output, Simulator};
 
-/// Outputs and events that one feed and one tick of fuzz may leave.
-const MAX_WAITING: usize = 200_000;
+/// Rounds of each kind at least.
+const ROUNDS: u64 = 50;
 
-/// Random bytes, a damaged copy of `valid`, or `valid` itself, so that the states behind it are reached too.
-fn stream(rng: &mut ChaCha8Rng, valid: &[u8]) -> Vec<u8> {
-    let mut bytes = valid.to_vec();
-    match rng.next_u32() % 4 {
-        0 => {
-            let length = rng.next_u32() as usize % 600;
-            return (0..length).map(|_| rng.next_u32().to_le_bytes()[0]).collect();
-        }
-        1 => return bytes,
-        _ => {}
+/// Inputs of a round that does not follow a tape.
+const INPUTS: u32 = 20;
+
+/// Most events that wait beside answers and ends: statuses of both severities, offered points, a live point and joints.
+const MAX_EVENTS: usize = 2 * (MAX_STATUSES.0 + MAX_STATUSES.1) + MAX_OFFERED + 2;
+
+/// Most bytes that a simulator may leave for whoever does not read.
+const MAX_BYTES: usize = 2 << 20;
+
+/// What may wait after one input.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// Bytes of a message that is not complete.
+    pub pending: usize,
+    /// Writes.
+    pub outputs: usize,
+}
+
+impl Bounds {
+    /// The bound of every protocol, with this one for its messages (bytes).
+    pub const fn of_protocol(pending: usize) -> Self {
+        Self { pending, outputs: MAX_OUTPUTS }
     }
-    for _ in 0..=rng.next_u32() % 4 {
-        let place = rng.next_u32() as usize % bytes.len().max(1);
-        let value = [0, 1, 0x7f, 0x80, 0xff, rng.next_u32().to_le_bytes()[0]][rng.next_u32() as usize % 6];
-        match rng.next_u32() % 4 {
+}
+
+/// Runs rounds with seeds 0, 1, ... for the time that is set.
+fn rounds(mut round: impl FnMut(&mut ChaCha8Rng)) {
+    #[expect(clippy::disallowed_methods, reason = "how long to fuzz is the only thing that depends on the clock")]
+    let (seconds, start) = (std::env::var("TRUPOSE_FUZZ_SECONDS").ok(), Instant::now());
+    let limit = Duration::from_secs_f64(seconds.and_then(|text| text.parse().ok()).unwrap_or(0.5));
+    let mut seed = 0;
+    while seed < ROUNDS || start.elapsed() < limit {
+        round(&mut ChaCha8Rng::seed_from_u64(seed));
+        seed += 1;
+    }
+}
+
+/// Bytes of any kind, or such as stand in lines, now and then with ends.
+fn noise(random: &mut ChaCha8Rng) -> Vec<u8> {
+    let alphabet = b"0123456789.,;:+-%R1QP\r\n \tNaNeE*$\xC4\xA5\x00\xFF";
+    let length = random.random_range(0..6000);
+    let is_any = random.random_bool(0.5);
+    (0..length)
+        .map(|_| if is_any { random.random() } else { alphabet[random.random_range(0..alphabet.len())] })
+        .collect()
+}
+
+/// Changes, drops, doubles and inserts bytes here and there.
+fn sprinkled(bytes: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
+    let mut spoilt = Vec::new();
+    for &byte in bytes {
+        match random.random_range(0..60) {
+            0 => spoilt.push(random.random()),
+            1 => {}
+            2 => spoilt.extend([byte, byte]),
+            3 => spoilt.extend([byte, random.random()]),
+            4 => spoilt.push(byte ^ (1 << random.random_range(0..8))),
+            _ => spoilt.push(byte),
+        }
+    }
+    spoilt
+}
+
+/// Cuts off the end, doubles it, inserts or changes a byte: a few times, so that most stays right.
+fn damaged(mut bytes: Vec<u8>, random: &mut ChaCha8Rng) -> Vec<u8> {
+    for _ in 0..random.random_range(1..=4) {
+        let place = random.random_range(0..bytes.len().max(1)).min(bytes.len());
+        let value = [0, 1, 0x7f, 0x80, 0xff, random.random()][random.random_range(0..6)];
+        match random.random_range(0..4) {
             0 => bytes.truncate(place),
-            1 => bytes.insert(place.min(bytes.len()), value),
-            2 => bytes.extend_from_within(place.min(bytes.len())..),
-            _ => {
-                if let Some(byte) = bytes.get_mut(place) {
-                    *byte = value;
-                }
-            }
+            1 => bytes.insert(place, value),
+            2 => bytes.extend_from_within(place..),
+            _ => bytes.iter_mut().skip(place).take(1).for_each(|byte| *byte = value),
         }
     }
     bytes
 }
 
-/// Runs rounds with numbers 0, 1, ... for the time that is set, at least 50 of them.
-fn rounds(mut round: impl FnMut(&mut ChaCha8Rng)) {
-    #[expect(clippy::disallowed_methods, reason = "how long to fuzz is the only thing that depends on the clock")]
-    let (seconds, start) = (std::env::var("TRUPOSE_FUZZ_SECONDS").ok(), Instant::now());
-    let limit = Duration::from_secs_f64(seconds.and_then(|text| text.parse().ok()).unwrap_or(0.5));
-    let mut number = 0;
-    while number < 50 || start.elapsed() < limit {
-        round(&mut ChaCha8Rng::seed_from_u64(number));
-        number += 1;
+/// Noise, or bytes that were right, damaged in one way or the other, or not at all, so that the states behind them are reached.
+fn stream(valid: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
+    match random.random_range(0..5) {
+        0 => noise(random),
+        1 => valid.to_vec(),
+        2 => sprinkled(valid, random),
+        _ => damaged(valid.to_vec(), random),
     }
 }
 
-/// Feeds fuzz in pieces, with triggers, cancels and deadlines in between. `check` looks at the buffers; no more than one answer
-/// comes for a trigger.
+/// A protocol under fuzz, with what it was asked for.
+struct Watched<'a, P> {
+    protocol: P,
+    pending: &'a dyn Fn(&P) -> usize,
+    bounds: Bounds,
+    triggers: usize,
+    answers: usize,
+    starts: usize,
+    /// Ends of a set-up, and of a connection.
+    ends: [usize; 2],
+}
+
+impl<P: Protocol> Watched<'_, P> {
+    fn give(&mut self, input: &Input) {
+        self.triggers += usize::from(matches!(input, Input::Trigger(_)));
+        self.starts += usize::from(matches!(input, Input::Start(_)));
+        input.give_to(&mut self.protocol);
+        let pending = (self.pending)(&self.protocol);
+        assert!(pending <= self.bounds.pending, "{pending} bytes are kept");
+    }
+
+    /// Takes all that waits.
+    fn fetch(&mut self) {
+        let (mut outputs, mut others) = (0, 0);
+        while self.protocol.next_output().is_some() {
+            outputs += 1;
+            assert!(outputs <= self.bounds.outputs, "more than {} writes wait", self.bounds.outputs);
+        }
+        while let Some(event) = self.protocol.next_event() {
+            match event {
+                event if is_answer(&event) => self.answers += 1,
+                ProtocolEvent::Ready(_) => self.ends[0] += 1,
+                ProtocolEvent::Lost(_) => self.ends[1] += 1,
+                _ => others += 1,
+            }
+            assert!(self.ends.iter().all(|ends| *ends <= self.starts), "{:?} of {} starts", self.ends, self.starts);
+            assert!(self.answers <= self.triggers, "{} answers to {} triggers", self.answers, self.triggers);
+            assert!(others <= MAX_EVENTS, "more than {MAX_EVENTS} events wait");
+        }
+    }
+}
+
+/// Plays a tape with its bytes spoilt, pauses here and there and shots given up; and apart from it feeds in pieces what was on
+/// it, with starts, triggers, cancels and deadlines in between. `pending` is what waits for the rest of its message (bytes).
 ///
 /// # Panics
 /// The test fails.
-pub fn fuzz_protocol<P: Protocol>(make: impl Fn() -> P, valid: &[u8], check: impl Fn(&P)) {
-    rounds(|rng| {
-        let (mut protocol, mut now) = (make(), Moment::ZERO);
-        let (mut triggers, mut answers) = (0, 0);
-        protocol.start(now);
-        for _ in 0..20 {
-            let bytes = stream(rng, valid);
-            let piece = 1 + rng.next_u32() as usize % 100;
-            bytes.chunks(piece).for_each(|piece| protocol.feed(piece, now));
-            check(&protocol);
-            match rng.next_u32() % 8 {
-                0 => protocol.start(now),
-                1 => protocol.cancel(now),
-                2 => {
-                    triggers += 1;
-                    protocol.trigger(now);
-                }
-                _ => {}
-            }
-            now = protocol.next_deadline().map_or(now, |deadline| deadline.max(now));
-            protocol.tick(now);
-            let outputs = std::iter::from_fn(|| protocol.next_output()).take(MAX_WAITING).count();
-            let events: Vec<_> = std::iter::from_fn(|| protocol.next_event()).take(MAX_WAITING).collect();
-            assert!(outputs < MAX_WAITING && events.len() < MAX_WAITING);
-            let is_answer = |event: &&ProtocolEvent| matches!(event, ProtocolEvent::Shot(_) | ProtocolEvent::Failed(_));
-            answers += events.iter().filter(is_answer).count();
-            assert!(answers <= triggers, "{answers} answers to {triggers} triggers");
-        }
+pub fn fuzz_protocol<P: Protocol>(make: impl Fn() -> P, tape: &Tape, pending: impl Fn(&P) -> usize, bounds: Bounds) {
+    let watched = || {
+        let protocol = make();
+        Watched { protocol, pending: &pending, bounds, triggers: 0, answers: 0, starts: 0, ends: [0; 2] }
+    };
+    let valid = tape.bytes();
+    rounds(|random| {
+        play_spoilt(watched(), tape, random);
+        play_freely(watched(), &valid, random);
     });
 }
 
-/// Feeds fuzz to a simulator.
+fn play_spoilt<P: Protocol>(mut watched: Watched<'_, P>, tape: &Tape, random: &mut ChaCha8Rng) {
+    let mut late = Duration::ZERO;
+    // Where every feed is damaged, few states are reached.
+    let share = [1.0, 0.2, 0.02][random.random_range(0..3)];
+    for input in &tape.0 {
+        let now = input.time() + late;
+        watched.give(&match input {
+            Input::Start(_) => Input::Start(now),
+            Input::Tick(_) => Input::Tick(now),
+            Input::Trigger(_) => Input::Trigger(now),
+            Input::Cancel(_) => Input::Cancel(now),
+            Input::Feed(bytes, _) if !random.random_bool(share) => Input::Feed(bytes.clone(), now),
+            Input::Feed(_, _) if random.random_bool(0.1) => Input::Feed(noise(random), now),
+            Input::Feed(bytes, _) => Input::Feed(sprinkled(bytes, random), now),
+        });
+        if random.random_bool(0.05) {
+            late += Duration::from_millis(random.random_range(0..20_000));
+        }
+        if random.random_bool(0.02) {
+            watched.give(&Input::Cancel(input.time() + late));
+        }
+        watched.fetch();
+    }
+}
+
+fn play_freely<P: Protocol>(mut watched: Watched<'_, P>, valid: &[u8], random: &mut ChaCha8Rng) {
+    let mut now = START;
+    watched.give(&Input::Start(now));
+    for _ in 0..INPUTS {
+        let piece = random.random_range(1..=100);
+        for piece in stream(valid, random).chunks(piece) {
+            watched.give(&Input::Feed(piece.to_vec(), now));
+        }
+        match random.random_range(0..8) {
+            0 => watched.give(&Input::Start(now)),
+            1 => watched.give(&Input::Cancel(now)),
+            2 => watched.give(&Input::Trigger(now)),
+            _ => {}
+        }
+        now = watched.protocol.next_deadline().map_or(now, |deadline| deadline.max(now));
+        watched.give(&Input::Tick(now));
+        // Only now: an owner may be slow.
+        watched.fetch();
+    }
+}
+
+/// A simulator under fuzz.
+struct Teased<'a, S> {
+    simulator: S,
+    pending: &'a dyn Fn(&S) -> usize,
+    bounds: Bounds,
+    cell: Cell,
+}
+
+impl<S: Simulator> Teased<'_, S> {
+    fn feed(&mut self, bytes: &[u8], now: Duration) {
+        self.simulator.feed(bytes, &mut self.cell, now);
+        let pending = (self.pending)(&self.simulator);
+        assert!(pending <= self.bounds.pending, "{pending} bytes are kept");
+    }
+
+    fn tick(&mut self, now: Duration) {
+        self.simulator.tick(&mut self.cell, now);
+        let (mut outputs, mut bytes) = (0, 0);
+        while let Some(output) = self.simulator.next_output() {
+            outputs += 1;
+            if let Output::Bytes(written) = output {
+                bytes += written.len();
+            }
+            assert!(outputs <= self.bounds.outputs && bytes < MAX_BYTES, "{outputs} writes, {bytes} bytes");
+        }
+    }
+}
+
+/// Feeds a simulator what a protocol sent: spoilt request by request, and in pieces with new connections and broken beams in
+/// between. `pending` is what waits for the rest of its request (bytes).
 ///
 /// # Panics
 /// The test fails.
-pub fn fuzz_simulator<S: Simulator>(make: impl Fn() -> S, valid: &[u8], check: impl Fn(&S)) {
-    rounds(|rng| {
-        let (mut simulator, mut cell, mut now) = (make(), Cell::default(), Moment::ZERO);
-        for _ in 0..20 {
-            if rng.next_u32().is_multiple_of(3) {
-                simulator.accept(now);
-            }
-            let bytes = stream(rng, valid);
-            let piece = 1 + rng.next_u32() as usize % 100;
-            bytes.chunks(piece).for_each(|piece| simulator.feed(piece, &mut cell, now));
-            check(&simulator);
-            cell.has_beam = rng.next_u32().is_multiple_of(2);
-            now = simulator.next_deadline().map_or(now, |deadline| deadline.max(now));
-            simulator.tick(&mut cell, now);
-            let outputs = std::iter::from_fn(|| simulator.next_output()).take(MAX_WAITING).count();
-            assert!(outputs < MAX_WAITING);
-        }
+pub fn fuzz_simulator<S: Simulator>(
+    make: impl Fn() -> S,
+    sent: &[Vec<u8>],
+    pending: impl Fn(&S) -> usize,
+    bounds: Bounds,
+) {
+    let teased = || Teased { simulator: make(), pending: &pending, bounds, cell: Cell::default() };
+    let valid = sent.concat();
+    rounds(|random| {
+        tease_with_requests(teased(), sent, random);
+        tease_freely(teased(), &valid, random);
     });
 }
 
-/// What the protocol makes of a stream: its outputs and events.
-fn outcome<P: Protocol>(protocol: &mut P) -> (Vec<Vec<u8>>, Vec<ProtocolEvent>) {
-    (std::iter::from_fn(|| protocol.next_output()).collect(), std::iter::from_fn(|| protocol.next_event()).collect())
-}
-
-/// What a stream gives that is fed in pieces.
-fn fed<P: Protocol + Clone>(protocol: &P, pieces: &[&[u8]]) -> (Vec<Vec<u8>>, Vec<ProtocolEvent>) {
-    let mut protocol = protocol.clone();
-    for piece in pieces {
-        protocol.feed(piece, Moment::ZERO);
+fn tease_with_requests<S: Simulator>(mut teased: Teased<'_, S>, sent: &[Vec<u8>], random: &mut ChaCha8Rng) {
+    let mut now = START;
+    teased.simulator.accept(now);
+    for bytes in sent {
+        let bytes = if random.random_bool(0.1) { noise(random) } else { sprinkled(bytes, random) };
+        teased.feed(&bytes, now);
+        now += Duration::from_millis(random.random_range(0..3000));
+        teased.tick(now);
     }
-    outcome(&mut protocol)
 }
 
-/// Cuts a stream in two at every byte, and into single bytes. Returns what the whole stream gives.
-///
-/// # Panics
-/// The test fails.
-pub fn assert_same_at_every_cut<P: Protocol + Clone>(protocol: &P, stream: &[u8]) -> Vec<ProtocolEvent> {
-    let whole = fed(protocol, &[stream]);
-    for cut in 0..=stream.len() {
-        let (head, tail) = stream.split_at(cut);
-        assert_eq!(fed(protocol, &[head, tail]), whole, "cut at byte {cut}");
-    }
-    let single: Vec<&[u8]> = stream.chunks(1).collect();
-    assert_eq!(fed(protocol, &single), whole);
-    whole.1
-}
-
-/// Cuts a stream into pieces with these sizes, again and again.
-///
-/// # Panics
-/// The test fails.
-pub fn assert_same_in_pieces<P: Protocol + Clone>(protocol: &P, stream: &[u8], sizes: &[usize]) {
-    let (mut rest, mut pieces) = (stream, Vec::new());
-    for size in sizes.iter().cycle() {
-        if rest.is_empty() {
-            break;
+fn tease_freely<S: Simulator>(mut teased: Teased<'_, S>, valid: &[u8], random: &mut ChaCha8Rng) {
+    let mut now = START;
+    for _ in 0..INPUTS {
+        if random.random_bool(1.0 / 3.0) {
+            teased.simulator.accept(now);
         }
-        let (head, tail) = rest.split_at((*size).min(rest.len()));
-        pieces.push(head);
-        rest = tail;
+        let piece = random.random_range(1..=100);
+        for piece in stream(valid, random).chunks(piece) {
+            teased.feed(piece, now);
+        }
+        teased.cell.has_beam = random.random();
+        now = teased.simulator.next_deadline().map_or(now, |deadline| deadline.max(now));
+        teased.tick(now);
     }
-    assert_eq!(fed(protocol, &pieces), fed(protocol, &[stream]));
 }

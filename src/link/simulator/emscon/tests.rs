@@ -1,14 +1,7 @@
 //! Literal bytes of the simulated tracker, so that it does not only agree with the link that it was written for.
 
-use super::super::bench::Cell;
+use super::super::bench::{Cell, hex};
 use super::*;
-
-/// Bytes of a text of hexadecimal digits.
-fn hex(text: &str) -> Vec<u8> {
-    let digits: String = text.split_whitespace().collect();
-    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
-    digits.as_bytes().chunks(2).map(byte).collect()
-}
 
 /// A tracker to which somebody is connected.
 fn connected(faults: &[Planned<EmsconFault>]) -> EmsconSimulator {

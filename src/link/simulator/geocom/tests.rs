@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::super::bench2::Bench;
-use super::super::bench2::Helix;
-use super::super::bench2::streams;
+use super::super::bench::Bench;
+use super::super::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use super::super::bench::streams::assert_splits_change_nothing;
 use super::super::fault::Planned;
 use super::GeocomFault;
 use super::GeocomSimulator;
@@ -20,29 +20,29 @@ use crate::link::protocol::lines::MAX_LINE;
 
 type GeocomBench = Bench<GeocomProtocol, GeocomSimulator>;
 
-fn connected(options: &GeocomOptions, faults: impl IntoIterator<Item = Planned<GeocomFault>>) -> GeocomBench {
+fn unconnected(options: &GeocomOptions, faults: impl IntoIterator<Item = Planned<GeocomFault>>) -> GeocomBench {
     Bench::new(GeocomProtocol::new(options.clone()).unwrap(), GeocomSimulator::new(faults))
 }
 
 #[track_caller]
 fn identity(bench: &mut GeocomBench) -> Identity {
-    match bench.until(|event| matches!(event, ProtocolEvent::Ready(_) | ProtocolEvent::Lost(_))).pop() {
+    match bench.settle().pop() {
         Some(ProtocolEvent::Ready(identity)) => identity,
         other => panic!("not ready: {other:?}"),
     }
 }
 
 fn bench(faults: impl IntoIterator<Item = Planned<GeocomFault>>) -> GeocomBench {
-    let mut bench = connected(&GeocomOptions::default(), faults);
+    let mut bench = unconnected(&GeocomOptions::default(), faults);
     identity(&mut bench);
     bench
 }
 
 #[track_caller]
 fn shot(bench: &mut GeocomBench) -> Shot {
-    match bench.shoot() {
-        (Some(ProtocolEvent::Shot(shot)), _) => {
-            let error = (shot.point - Helix::point(bench.source.taken())).norm();
+    match bench.shoot().pop() {
+        Some(ProtocolEvent::Shot(shot)) => {
+            let error = (shot.point - bench.cell.newest()).norm();
             assert!(error < 1e-9, "{error} m from the newest point");
             shot
         }
@@ -54,7 +54,7 @@ fn shot(bench: &mut GeocomBench) -> Shot {
 fn a_point_comes_back_by_every_way_of_measuring() {
     for measurement in [Measurement::FineAdjust, Measurement::DistanceAngle, Measurement::Simple] {
         for checksum in [false, true] {
-            let mut bench = connected(&GeocomOptions { measurement, checksum, ..GeocomOptions::default() }, []);
+            let mut bench = unconnected(&GeocomOptions { measurement, checksum, ..GeocomOptions::default() }, []);
             identity(&mut bench);
             for _ in 0..10 {
                 assert_eq!(shot(&mut bench).face, Some(1));
@@ -65,7 +65,7 @@ fn a_point_comes_back_by_every_way_of_measuring() {
 
 #[test]
 fn the_set_up_says_who_answers_and_what_it_cannot_do() {
-    let identity = identity(&mut connected(&GeocomOptions::default(), []));
+    let identity = identity(&mut unconnected(&GeocomOptions::default(), []));
     assert_eq!(identity.name, "TS30, simulated, serial number 362541, GeoCOM 1.50.3");
     assert!(identity.notes.iter().any(|text| text.contains("0.5 to 1 mm")));
     assert!(identity.checked.iter().any(|text| text == "prism constant: -34.40 mm (read back)"), "{identity:?}");
@@ -80,7 +80,7 @@ fn what_is_set_is_read_back() {
         prism_constant_mm: Some(-17.5),
         ..GeocomOptions::default()
     };
-    let identity = identity(&mut connected(&options, []));
+    let identity = identity(&mut unconnected(&options, []));
     assert_eq!(
         identity.checked.get(2..),
         Some(
@@ -121,11 +121,10 @@ fn every_fault_is_said_and_passes() {
         let from = if fault == GeocomFault::Asleep { 1 } else { 2 };
         let mut bench = bench([Planned::at(fault, from)]);
         shot(&mut bench);
-        let (answer, _) = bench.shoot();
-        match (expected(fault), answer) {
-            (Some(""), None) => bench.connect(),
+        match (expected(fault), bench.shoot().pop()) {
+            (Some(""), Some(ProtocolEvent::Lost(Failure::Disconnected(_)))) => bench.connect(),
             (None, Some(ProtocolEvent::Shot(shot))) => {
-                assert!((shot.point - Helix::point(bench.source.taken())).norm() < 1e-9, "{fault}");
+                assert!((shot.point - bench.cell.newest()).norm() < 1e-9, "{fault}");
                 let is_doubtful = matches!(fault, GeocomFault::AccuracyNotGuaranteed | GeocomFault::NoFullCorrection);
                 assert_eq!(shot.remark.is_some(), is_doubtful, "{fault}");
             }
@@ -134,7 +133,7 @@ fn every_fault_is_said_and_passes() {
             }
             (_, answer) => panic!("{fault}: {answer:?}"),
         }
-        bench.run(Duration::from_secs(3));
+        bench.run_for(Duration::from_secs(3));
         shot(&mut bench);
         shot(&mut bench);
     }
@@ -151,52 +150,52 @@ fn three_times_busy_costs_patience_only() {
 #[test]
 fn busy_for_ever_is_said_and_the_link_stays() {
     let mut bench = bench([Planned::from(GeocomFault::Busy, 1, 40)]);
-    match bench.shoot().0 {
+    match bench.shoot().pop() {
         Some(ProtocolEvent::Failed(Failure::NotReady(text))) => assert_eq!(text, "code 1293: a measurement is busy"),
         other => panic!("{other:?}"),
     }
-    assert_eq!(bench.run(Duration::from_secs(30)), []);
+    assert_eq!(bench.run_for(Duration::from_secs(30)), []);
 }
 
 #[test]
 fn a_damaged_link_is_said_after_three_attempts() {
     let mut bench = bench([Planned::from(GeocomFault::CrcError, 1, 3)]);
-    let (answer, said) = bench.shoot();
+    let mut said = bench.shoot();
+    let answer = said.pop();
     assert!(matches!(answer, Some(ProtocolEvent::Failed(Failure::Garbled(_)))), "{answer:?}");
     assert!(format!("{said:?}").contains("check baud rate"), "{said:?}");
-    bench.run(Duration::from_secs(3));
+    bench.run_for(Duration::from_secs(3));
     shot(&mut bench);
 }
 
 #[test]
 fn a_late_answer_is_thrown_away_and_said() {
     let mut bench = bench([Planned::at(GeocomFault::LateReply, 1)]);
-    assert!(matches!(bench.shoot().0, Some(ProtocolEvent::Failed(Failure::Silent { .. }))));
-    let said = format!("{:?}", bench.run(Duration::from_secs(3)));
+    assert!(matches!(bench.shoot().pop(), Some(ProtocolEvent::Failed(Failure::Silent { .. }))));
+    let said = format!("{:?}", bench.run_for(Duration::from_secs(3)));
     assert!(said.contains("late or foreign answer") && said.contains("answers again"), "{said}");
     shot(&mut bench);
 }
 
 #[test]
 fn a_dead_instrument_is_given_up_and_found_again() {
-    let mut bench = connected(&GeocomOptions::default(), [Planned::from(GeocomFault::Dead, 1, 16)]);
-    let events = bench.until(|event| matches!(event, ProtocolEvent::Lost(_)));
+    let mut bench = unconnected(&GeocomOptions::default(), [Planned::from(GeocomFault::Dead, 1, 16)]);
+    let events = bench.settle();
     assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
-    bench.connect();
     identity(&mut bench);
 }
 
 #[test]
 fn a_pulled_cable_is_noticed_when_idle() {
     let mut bench = bench([Planned::from(GeocomFault::Dead, 12, 1000)]);
-    let events = bench.run(Duration::from_mins(1));
+    let events = bench.run_for(Duration::from_mins(1));
     assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
 }
 
 #[test]
 fn a_shot_asked_for_during_the_keep_alive_is_taken_after_it() {
     let mut bench = bench([]);
-    bench.run(Duration::from_millis(5010));
+    bench.run_for(Duration::from_millis(5010));
     shot(&mut bench);
 }
 
@@ -204,9 +203,9 @@ fn a_shot_asked_for_during_the_keep_alive_is_taken_after_it() {
 fn a_cancelled_shot_is_swallowed() {
     let mut bench = bench([]);
     bench.trigger();
-    bench.run(Duration::from_millis(500));
+    bench.run_for(Duration::from_millis(500));
     bench.cancel();
-    let events = bench.run(Duration::from_secs(4));
+    let events = bench.run_for(Duration::from_secs(4));
     assert!(events.iter().all(|event| matches!(event, ProtocolEvent::Status(_))), "{events:?}");
     shot(&mut bench);
 }
@@ -215,9 +214,9 @@ fn a_cancelled_shot_is_swallowed() {
 fn a_broken_beam_gives_no_point() {
     let mut bench = bench([]);
     shot(&mut bench);
-    bench.source.is_blocked = true;
-    assert!(matches!(bench.shoot().0, Some(ProtocolEvent::Failed(Failure::NoTarget(_)))));
-    bench.source.is_blocked = false;
+    bench.cell.has_beam = false;
+    assert!(matches!(bench.shoot().pop(), Some(ProtocolEvent::Failed(Failure::NoTarget(_)))));
+    bench.cell.has_beam = true;
     shot(&mut bench);
 }
 
@@ -225,11 +224,11 @@ fn conversation(checksum: bool) -> GeocomBench {
     let faults =
         GeocomFault::ALL.iter().filter(|fault| !matches!(fault, GeocomFault::DisconnectMidLine | GeocomFault::Dead));
     let faults = faults.zip(2..).map(|(&fault, at)| Planned::at(fault, at));
-    let mut bench = connected(&GeocomOptions { checksum, ..GeocomOptions::default() }, faults);
+    let mut bench = unconnected(&GeocomOptions { checksum, ..GeocomOptions::default() }, faults);
     identity(&mut bench);
     for _ in 0..24 {
         bench.shoot();
-        bench.run(Duration::from_secs(2));
+        bench.run_for(Duration::from_secs(2));
     }
     bench
 }
@@ -238,8 +237,14 @@ fn conversation(checksum: bool) -> GeocomBench {
 fn splits_change_nothing() {
     for checksum in [false, true] {
         let options = GeocomOptions { checksum, ..GeocomOptions::default() };
-        let tape = conversation(checksum).tape;
-        streams::assert_splits_change_nothing(|| GeocomProtocol::new(options.clone()).unwrap(), &tape);
+        let make = || GeocomProtocol::new(options.clone()).unwrap();
+        let mut plain = unconnected(&options, []);
+        identity(&mut plain);
+        shot(&mut plain);
+        for tape in [conversation(checksum).tape, plain.tape.joined()] {
+            let events = assert_splits_change_nothing(make, &tape);
+            assert!(events.iter().any(|event| matches!(event, ProtocolEvent::Shot(_))), "{events:?}");
+        }
     }
 }
 
@@ -249,7 +254,8 @@ fn noise_breaks_nothing() {
         let options = GeocomOptions { checksum, ..GeocomOptions::default() };
         let bench = conversation(checksum);
         let make = || GeocomProtocol::new(options.clone()).unwrap();
-        streams::fuzz_protocol(make, &bench.tape, GeocomProtocol::pending, MAX_LINE);
-        streams::fuzz_simulator(|| GeocomSimulator::new([]), &bench.sent, GeocomSimulator::pending, MAX_RECEIVED);
+        fuzz_protocol(make, &bench.tape, GeocomProtocol::pending, Bounds::of_protocol(MAX_LINE));
+        let bounds = Bounds { pending: MAX_RECEIVED, outputs: 512 };
+        fuzz_simulator(|| GeocomSimulator::new([]), &bench.sent, GeocomSimulator::pending, bounds);
     }
 }

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::super::bench2::Bench;
-use super::super::bench2::Helix;
-use super::super::bench2::streams;
+use super::super::bench::Bench;
+use super::super::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use super::super::bench::streams::assert_splits_change_nothing;
 use super::super::fault::Planned;
 use super::NdiFault;
 use super::NdiSimulator;
@@ -35,7 +35,7 @@ fn options(reply: ReplyFormat) -> NdiOptions {
 
 fn bench(reply: ReplyFormat, faults: impl IntoIterator<Item = Planned<NdiFault>>) -> NdiBench {
     let mut bench = Bench::new(NdiProtocol::new(options(reply)).unwrap(), NdiSimulator::new(TIP_MM, faults));
-    let events = bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+    let events = bench.settle();
     assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))), "{events:?}");
     bench
 }
@@ -43,16 +43,15 @@ fn bench(reply: ReplyFormat, faults: impl IntoIterator<Item = Planned<NdiFault>>
 /// A shot must show the point of a frame after the trigger: one that the source gave after it.
 #[track_caller]
 fn assert_fresh(shot: &Shot, before: u32, bench: &NdiBench, reply: ReplyFormat) {
-    let nearest =
-        (before + 1..=bench.source.taken()).map(|n| (shot.point - Helix::point(n)).norm()).fold(f64::MAX, f64::min);
-    assert!(nearest < resolution(reply), "{nearest} m from every fresh point");
+    let error = bench.cell.error(&shot.point, before);
+    assert!(error < resolution(reply), "{error} m from every fresh point");
 }
 
 #[track_caller]
 fn shoot(bench: &mut NdiBench, reply: ReplyFormat) {
-    let before = bench.source.taken();
-    match bench.shoot() {
-        (Some(ProtocolEvent::Shot(shot)), _) => assert_fresh(&shot, before, bench, reply),
+    let before = bench.cell.shots;
+    match bench.shoot().pop() {
+        Some(ProtocolEvent::Shot(shot)) => assert_fresh(&shot, before, bench, reply),
         other => panic!("no shot: {other:?}"),
     }
 }
@@ -73,10 +72,7 @@ fn the_tip_comes_back_in_both_formats() {
 fn the_identity_says_what_text_cannot() {
     for reply in BOTH {
         let mut bench = Bench::new(NdiProtocol::new(options(reply)).unwrap(), NdiSimulator::new(TIP_MM, []));
-        let Some(ProtocolEvent::Ready(identity)) = bench.until(|event| matches!(event, ProtocolEvent::Ready(_))).pop()
-        else {
-            panic!("not ready");
-        };
+        let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!("not ready") };
         assert_eq!(identity.name, "NDI tracker, version G.003.001");
         assert_eq!(identity.notes.iter().any(|text| text.contains("0.01 mm")), reply == ReplyFormat::Text);
     }
@@ -86,7 +82,7 @@ fn the_identity_says_what_text_cannot() {
 fn a_handle_that_is_not_there_ends_the_set_up() {
     let options = NdiOptions { handle: Some(3), ..options(ReplyFormat::Binary) };
     let mut bench = Bench::new(NdiProtocol::new(options).unwrap(), NdiSimulator::new(TIP_MM, []));
-    let lost = bench.until(|event| matches!(event, ProtocolEvent::Lost(_))).pop();
+    let lost = bench.settle().pop();
     assert_eq!(lost, Some(ProtocolEvent::Lost(Failure::Settings("there is no tool 03; there are: 0A".to_owned()))));
 }
 
@@ -95,11 +91,10 @@ fn a_failed_initialisation_is_said() {
     let fault = Planned::at(NdiFault::InitialisationFails, 1);
     let mut bench =
         Bench::new(NdiProtocol::new(options(ReplyFormat::Text)).unwrap(), NdiSimulator::new(TIP_MM, [fault]));
-    let lost = bench.until(|event| matches!(event, ProtocolEvent::Lost(_))).pop();
+    let lost = bench.settle().pop();
     let text = "ERROR15: the instrument cannot be initialised".to_owned();
     assert_eq!(lost, Some(ProtocolEvent::Lost(Failure::Refused(text))));
-    bench.connect();
-    bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+    bench.settle();
     shoot(&mut bench, ReplyFormat::Text);
 }
 
@@ -132,28 +127,27 @@ const fn expected(fault: NdiFault, reply: ReplyFormat) -> &'static str {
 fn faulty_shot(fault: NdiFault, reply: ReplyFormat, times: u32) {
     let mut bench = bench(reply, [Planned::from(fault, 3, times)]);
     shoot(&mut bench, reply);
-    let before = bench.source.taken();
-    match bench.shoot().0 {
+    let before = bench.cell.shots;
+    match bench.shoot().pop() {
         Some(ProtocolEvent::Shot(shot)) => assert_fresh(&shot, before, &bench, reply),
         Some(ProtocolEvent::Failed(failure)) => {
             let text = expected(fault, reply);
             assert!(!text.is_empty() && failure.to_string().contains(text), "{fault} {reply:?}: {failure}");
         }
-        None | Some(ProtocolEvent::Lost(_)) if expected(fault, reply) == "lost" => {
-            bench.connect();
-            bench.until(|event| matches!(event, ProtocolEvent::Ready(_)));
+        Some(ProtocolEvent::Lost(_)) if expected(fault, reply) == "lost" => {
+            bench.settle();
         }
         other => panic!("{fault} {reply:?}: {other:?}"),
     }
     for _ in 0..20 {
-        let before = bench.source.taken();
-        match bench.shoot().0 {
+        let before = bench.cell.shots;
+        match bench.shoot().pop() {
             Some(ProtocolEvent::Shot(shot)) => assert_fresh(&shot, before, &bench, reply),
             Some(ProtocolEvent::Failed(_)) => {}
-            None | Some(ProtocolEvent::Lost(_)) if expected(fault, reply) == "lost" => bench.connect(),
+            Some(ProtocolEvent::Lost(_)) if expected(fault, reply) == "lost" => bench.connect(),
             other => panic!("{fault} {reply:?}: {other:?}"),
         }
-        bench.run(Duration::from_millis(300));
+        bench.run_for(Duration::from_millis(300));
     }
     shoot(&mut bench, reply);
 }
@@ -177,7 +171,7 @@ fn a_lasting_fault_is_said_in_its_words() {
                 continue;
             }
             let mut bench = bench(reply, [Planned::from(fault, 2, 1000)]);
-            match bench.shoot().0 {
+            match bench.shoot().pop() {
                 Some(ProtocolEvent::Failed(failure)) => {
                     assert!(failure.to_string().contains(expected(fault, reply)), "{fault} {reply:?}: {failure}");
                 }
@@ -190,7 +184,7 @@ fn a_lasting_fault_is_said_in_its_words() {
 #[test]
 fn a_silent_instrument_is_lost_when_idle() {
     let mut bench = bench(ReplyFormat::Binary, [Planned::from(NdiFault::Silent, 2, 1000)]);
-    let events = bench.run(Duration::from_secs(30));
+    let events = bench.run_for(Duration::from_secs(30));
     assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
 }
 
@@ -200,7 +194,7 @@ fn a_cancelled_shot_is_swallowed() {
         let mut bench = bench(reply, []);
         bench.trigger();
         bench.cancel();
-        let events = bench.run(Duration::from_secs(3));
+        let events = bench.run_for(Duration::from_secs(3));
         assert!(events.iter().all(|event| matches!(event, ProtocolEvent::Live(_))), "{events:?}");
         shoot(&mut bench, reply);
     }
@@ -221,8 +215,14 @@ fn conversation(reply: ReplyFormat) -> NdiBench {
 #[test]
 fn splits_change_nothing() {
     for reply in BOTH {
-        let tape = conversation(reply).tape;
-        streams::assert_splits_change_nothing(|| NdiProtocol::new(options(reply)).unwrap(), &tape);
+        let make = || NdiProtocol::new(options(reply)).unwrap();
+        let events = assert_splits_change_nothing(make, &conversation(reply).tape);
+        assert!(events.iter().any(|event| matches!(event, ProtocolEvent::Shot(_))), "{events:?}");
+        let mut plain = bench(reply, []);
+        shoot(&mut plain, reply);
+        // Without pauses nothing is asked for after the set-up.
+        let events = assert_splits_change_nothing(make, &plain.tape.joined());
+        assert!(matches!(events.as_slice(), [ProtocolEvent::Ready(_)]), "{events:?}");
     }
 }
 
@@ -231,7 +231,8 @@ fn noise_breaks_nothing() {
     for reply in BOTH {
         let bench = conversation(reply);
         let make = || NdiProtocol::new(options(reply)).unwrap();
-        streams::fuzz_protocol(make, &bench.tape, NdiProtocol::pending, MAX_TEXT);
-        streams::fuzz_simulator(|| NdiSimulator::new(TIP_MM, []), &bench.sent, NdiSimulator::pending, MAX_TEXT);
+        fuzz_protocol(make, &bench.tape, NdiProtocol::pending, Bounds::of_protocol(MAX_TEXT));
+        let bounds = Bounds { pending: MAX_TEXT, outputs: 512 };
+        fuzz_simulator(|| NdiSimulator::new(TIP_MM, []), &bench.sent, NdiSimulator::pending, bounds);
     }
 }

@@ -72,7 +72,7 @@ fn the_initialisation_has_its_own_patience() {
     let mut bench = bench_with(EmsconOptions { initialize: true, ..EmsconOptions::default() }, &[]);
     let events = bench.settle();
     assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))), "{events:?}");
-    assert_eq!(bench.now, Duration::from_secs(20));
+    assert_eq!(bench.elapsed(), Duration::from_secs(20));
     assert!(commands(&bench).contains(&CommandId::Initialize.number()));
 }
 
@@ -99,10 +99,10 @@ fn an_idle_link_asks_for_the_status_every_five_seconds() {
 #[test]
 fn a_cancelled_shot_is_swallowed_and_the_next_one_is_right() {
     let mut bench = ready(&[]);
-    bench.protocol.trigger(bench.now);
+    bench.trigger();
     assert_eq!(bench.run_for(Duration::from_millis(500)), []);
-    bench.protocol.cancel(bench.now);
-    bench.protocol.trigger(bench.now);
+    bench.cancel();
+    bench.trigger();
     let too_early = bench.run_until(|_| true);
     assert!(matches!(failure(&too_early), Failure::TooEarly(_)));
     assert_eq!(bench.run_for(Duration::from_millis(400)), []);
@@ -114,9 +114,9 @@ fn a_cancelled_shot_is_swallowed_and_the_next_one_is_right() {
 #[test]
 fn a_result_that_overtakes_the_answer_to_the_stop_is_swallowed() {
     let mut bench = ready(&[]);
-    bench.protocol.trigger(bench.now);
+    bench.trigger();
     bench.run_for(Duration::from_millis(500));
-    bench.protocol.cancel(bench.now);
+    bench.cancel();
     // The stop is on the way while the result comes.
     let stop = bench.protocol.next_output().unwrap();
     assert_eq!(stop, Command::bare(CommandId::StopMeasurement).encode());
@@ -136,7 +136,7 @@ fn a_shot_before_the_set_up_or_beside_another_is_too_early() {
     bench.connect();
     assert!(matches!(failure(&bench.shoot()), Failure::TooEarly(_)));
     bench.run_until(|event| matches!(event, ProtocolEvent::Ready(_)));
-    bench.protocol.trigger(bench.now);
+    bench.trigger();
     assert!(matches!(failure(&bench.shoot()), Failure::TooEarly(_)));
     let events = bench.run_until(|_| true);
     let [ProtocolEvent::Shot(shot)] = events.as_slice() else { panic!("{events:?}") };
@@ -149,7 +149,7 @@ fn a_broken_beam_is_no_target_and_the_next_shot_may_succeed() {
     bench.cell.has_beam = false;
     assert!(matches!(failure(&bench.shoot()), Failure::NoTarget(_)));
     bench.cell.has_beam = true;
-    bench.protocol.trigger(bench.now);
+    bench.trigger();
     bench.run_for(Duration::from_millis(300));
     bench.cell.has_beam = false;
     let events = bench.run_until(|event| matches!(event, ProtocolEvent::Failed(_)));
@@ -162,7 +162,7 @@ fn a_broken_beam_is_no_target_and_the_next_shot_may_succeed() {
 #[test]
 fn a_new_start_forgets_everything_of_the_connection_before() {
     let mut bench = ready(&[]);
-    bench.protocol.trigger(bench.now);
+    bench.trigger();
     bench.protocol.feed(&[0x9c, 0, 0], bench.now);
     let events = bench.settle();
     assert!(matches!(events.as_slice(), [ProtocolEvent::Ready(_)]), "{events:?}");

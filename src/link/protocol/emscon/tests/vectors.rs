@@ -5,13 +5,7 @@ use nalgebra::Point3;
 use super::super::shot::shot_of;
 use super::super::*;
 use crate::link::protocol::Failure;
-
-/// Bytes of a text of hexadecimal digits.
-fn hex(text: &str) -> Vec<u8> {
-    let digits: String = text.split_whitespace().collect();
-    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
-    digits.as_bytes().chunks(2).map(byte).collect()
-}
+use crate::link::simulator::bench::hex;
 
 /// A result with 1234.5, -678.25, 90.125 and zeros behind.
 fn result(kind: &str, size: usize) -> Vec<u8> {

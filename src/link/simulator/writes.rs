@@ -9,7 +9,7 @@ const MAX_BYTES: usize = 1 << 20;
 
 /// Writes that wait.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Outbox {
+pub(super) struct Writes {
     /// Packets that are to go out in one write.
     joined: Vec<u8>,
     outputs: VecDeque<Output>,
@@ -20,7 +20,7 @@ pub(super) struct Outbox {
     pub(super) is_joining: bool,
 }
 
-impl Outbox {
+impl Writes {
     /// Queues a packet.
     pub(super) fn send(&mut self, packet: Vec<u8>) {
         self.bytes += packet.len();
@@ -49,12 +49,6 @@ impl Outbox {
     /// True where the other side does not read.
     pub(super) const fn is_overfull(&self) -> bool {
         self.bytes > MAX_BYTES
-    }
-
-    /// Bytes that wait.
-    #[cfg(test)]
-    pub(super) const fn waiting(&self) -> usize {
-        self.bytes
     }
 
     /// The next write.
