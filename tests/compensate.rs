@@ -352,7 +352,7 @@ fn models_are_exported_and_a_urdf_is_imported() {
     for piece in pieces {
         let (numbers, rest) = piece.split_once('"').unwrap();
         let larger = numbers.split_whitespace().map(|number| (1e3 * number.parse::<f64>().unwrap()).to_string());
-        text += &format!("xyz=\"{}\"{rest}", larger.collect::<Vec<_>>().join(" "));
+        text.extend(["xyz=\"", &larger.collect::<Vec<_>>().join(" "), "\"", rest]);
     }
     fs::write(path("mm.urdf"), text).unwrap();
     for (file, is_long) in [("c.urdf", false), ("mm.urdf", true)] {

@@ -1,9 +1,11 @@
 //! A session goes on from whatever its journal holds.
 
-use super::bench::{Bench, FOLDER, fold, offers, simulated, start, texts};
-use crate::session::set_up::Step;
+use super::bench::{Bench, FOLDER, fold, offers, simulated, start, started, texts};
+use crate::session::journal::Entry;
+use crate::session::set_up::{InstrumentChoice, Step};
+use crate::session::wire::LinkChoice;
 use crate::wizard::view::{Content, ViewModel};
-use crate::wizard::{Intent, Wizard};
+use crate::wizard::{Answer, Intent, Request, Wizard};
 
 /// A session with everything in it, up to the end.
 fn full_run() -> Bench {
@@ -123,4 +125,29 @@ fn a_session_without_a_robot_asks_for_one() {
     assert!(texts(&effects)[0].starts_with("append 3 profile 'soochow'"));
     bench.settle(effects);
     assert_eq!(bench.step(), Step::Instrument);
+}
+
+#[test]
+fn who_the_instrument_said_it_is_is_noted_once_and_again_when_it_is_another() {
+    let choice = LinkChoice { address: "emscon:192.168.0.2".to_owned(), ..LinkChoice::default() };
+    let bench = Bench::with(&InstrumentChoice::Linked(choice), Step::Capture);
+    let noted = |bench: &Bench| {
+        let entries = bench.journal.iter().map(|line| line.entry.clone());
+        entries.filter(|entry| matches!(entry, Entry::Connected { .. })).collect::<Vec<_>>()
+    };
+    let named = |identity: &str| Entry::Connected { identity: identity.to_owned() };
+    assert_eq!(noted(&bench), [named("bench instrument")]);
+    // The same one again, and another in its place.
+    let (mut same, effects) = bench.resumed(bench.journal.len());
+    same.settle(effects);
+    assert_eq!(noted(&same), [named("bench instrument")]);
+    let (mut other, effects) = bench.resumed(bench.journal.len());
+    let written = effects.into_iter().flat_map(|effect| other.perform(effect)).collect::<Vec<_>>();
+    let (id, request) = started(&written);
+    assert!(matches!(request, Request::Connect { .. }));
+    let identity = "a SIMULATED instrument".to_owned();
+    let effects = other.answer(id, Answer::Connected { identity: identity.clone(), recorded: Vec::new() });
+    other.settle(effects);
+    assert_eq!(noted(&other), [named("bench instrument"), named(&identity)]);
+    assert_eq!((bench.wizard.session().is_simulated(), other.wizard.session().is_simulated()), (false, true));
 }
