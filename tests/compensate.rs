@@ -247,6 +247,12 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
     assert!(code == 0 && err.contains("theta6 (0."), "{err}");
     let (code, _, err) = run(joints, &["--target", "smr"]);
     assert!(code == 0 && !err.contains("theta6 (0."), "{err}");
+    // Of many the first are named.
+    let beyond: Vec<String> = (0..50).map(|row| format!("p{row},0,0,0,0,400,0")).collect();
+    let table = format!("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n{}\n", beyond.join("\n"));
+    let (code, _, err) = run(&table, &[]);
+    assert!(code == 1 && err.contains("pose p19 ") && !err.contains("pose p20 "), "{err}");
+    assert!(err.contains("and 30 more;") && err.contains("0 of 50 targets reached"), "{err}");
     // What is corrected is not corrected once more.
     let (code, out, err) = run(&commands, &[]);
     assert_eq!((code, out.as_str()), (2, ""), "{err}");

@@ -20,6 +20,9 @@ use crate::session::targets::{TargetGoal, decimal, quoted, read_bytes};
 use crate::store;
 use crate::units::{to_deg, to_mm};
 
+/// Places that are named one by one.
+const SHOWN: usize = 20;
+
 pub(super) fn run<O: Write, E: Write>(
     args: &CompensateArgs,
     console: &mut Console<O, E>,
@@ -76,14 +79,16 @@ fn table<O: Write, E: Write>(
     let mut orientation_left = 0;
     for row in &rows {
         let done = compensator.solve(&goal(&row.goal));
-        if !done.status.is_usable() {
-            failed += 1;
-            console.remark(&format!("pose {} (line {}): {}", row.pose, row.line, reason(&done, joints)));
-        } else if done.status == Status::PositionOnly {
-            orientation_left += 1;
+        failed += usize::from(!done.status.is_usable());
+        orientation_left += usize::from(done.status == Status::PositionOnly);
+        if done.status != Status::Reached && failed + orientation_left <= SHOWN {
             console.remark(&format!("pose {} (line {}): {}", row.pose, row.line, reason(&done, joints)));
         }
         lines.push(line(&row.pose, &done, joints));
+    }
+    if failed + orientation_left > SHOWN {
+        let more = failed + orientation_left - SHOWN;
+        console.remark(&format!("and {more} more; the column 'status' has all of them"));
     }
     let text = lines.join("\n") + "\n";
     match &args.out {

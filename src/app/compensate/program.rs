@@ -3,16 +3,13 @@
 use std::io::Write;
 
 use super::super::Console;
-use super::{reason, tool_arms};
+use super::{SHOWN, reason, tool_arms};
 use crate::cli::compensate::CompensateArgs;
 use crate::compensation::{Compensator, Goal, Settings, Status};
 use crate::error::{ExitStatus, Failure};
 use crate::model::CalibratedArm;
 use crate::program::{Dialect, ProgramError, Robot, rewrite};
 use crate::store;
-
-/// Places that are named one by one.
-const SHOWN: usize = 20;
 
 pub(super) fn run<O: Write, E: Write>(
     args: &CompensateArgs,
