@@ -352,6 +352,74 @@ fn compare_with_journal(folder: &Path) {
     assert_eq!(solved.last().unwrap().1.len(), 3 * profile.bodies().len());
 }
 
+/// Where the tracker is drawn at last, and its label.
+fn tracker(path: &Path) -> (Point3<f64>, String) {
+    let of = |component: &str| {
+        let mut rows = rows(path, false).into_iter();
+        rows.find_map(|(entity, _, mut values)| (entity == "/world/tracker/body").then(|| values.remove(component))?)
+            .unwrap()
+    };
+    let centre: Vec<f64> = of("Boxes3D:centers")
+        .trim_matches(['[', ']'])
+        .split(',')
+        .map(|number| number.trim().parse().unwrap())
+        .collect();
+    (Point3::new(centre[0], centre[1], centre[2]), of("Boxes3D:labels"))
+}
+
+#[test]
+fn the_tracker_is_drawn_as_planned_until_points_tell_where_it_stands() {
+    let place = recorded(&format!("{} Capture(3, Fail)", begun("")));
+    let (_, session) = session_of(&place.session());
+    let profile = session.mounted_profile().unwrap();
+    let planned = profile.tracker().position_in_base;
+    let truth = trupose::link::SimulatedCell::new(
+        &profile,
+        &trupose::session::simulation::Simulation { seed: 1, ..Default::default() },
+    )
+    .unwrap();
+    let stands = Point3::from(truth.truth().base_from_tracker.translation.vector);
+    assert!((stands - planned).norm() > 0.05, "the test needs one that stands elsewhere: {stands} {planned}");
+    let beams = |from: &Point3<f64>, count: usize| {
+        let beams = numbers(&place.recording(), "/world/tracker/beam", "pose", "LineStrips3D:strips");
+        // Also that before the first measurement.
+        assert_eq!(beams.len(), 1 + count);
+        for (pose, beam) in beams {
+            assert_points(&beam[..3], std::iter::once(*from), SINGLE, &format!("beam at {pose}"));
+        }
+    };
+    let (drawn, label) = tracker(&place.recording());
+    assert_eq!(label, "[tracker (as planned)]");
+    assert_points(&[drawn.x, drawn.y, drawn.z], std::iter::once(planned), SINGLE, "planned");
+    beams(&drawn, 3);
+    // The fourth point tells.
+    let rest = place.write_script("rest.script.ron", "Capture(1, Fail)");
+    succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
+    let (drawn, label) = tracker(&place.recording());
+    assert_eq!(label, "[tracker]");
+    assert!((drawn - stands).norm() < 0.04, "{drawn} instead of {stands}");
+    beams(&drawn, 4);
+    let rest = place.write_script("rest.script.ron", &format!("CaptureAll(Fail), {RESULT}"));
+    succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
+    let (drawn, label) = tracker(&place.recording());
+    assert_eq!(label, "[tracker]");
+    assert!((drawn - stands).norm() < 0.021, "{drawn} instead of {stands}");
+    let (_, session) = session_of(&place.session());
+    beams(&drawn, session.samples.len());
+    compare_with_rebuilt(&place);
+    // Measurements and poses of the plan are counted apart: the name is at the point.
+    let names: BTreeMap<i64, String> = rows(&place.recording(), false)
+        .into_iter()
+        .filter(|(entity, times, _)| entity == "/world/measured" && !times.is_empty())
+        .map(|(_, times, values)| (times["pose"], values["Points3D:labels"].clone()))
+        .collect();
+    assert_eq!(names.len(), session.samples.len());
+    for sample in &session.samples {
+        let number = i64::try_from(sample.noted.number).unwrap();
+        assert_eq!(names[&number], format!("[pose {}]", session.pose_of(sample)));
+    }
+}
+
 /// What the journal says about results.
 trait Runs {
     fn runs_in(&self, journal: &Journal) -> usize;

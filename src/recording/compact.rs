@@ -1,7 +1,5 @@
 //! Files with an index: many small pieces become few large ones, and what was replaced is dropped.
 
-use std::fs::File;
-use std::io::Write as _;
 use std::path::Path;
 
 use rerun::external::re_build_info::CrateVersion;
@@ -12,7 +10,7 @@ use rerun::rrd::{OptimizationProfile, optimize};
 
 use super::{Recording, RecordingError, names, read, segments};
 use crate::session::journal::Entry;
-use crate::store;
+use crate::store::{self, StoreError};
 
 /// Writes messages as one compact file at `path`, which is replaced only when all is on disk. Of several layouts the last stays.
 pub(super) fn write(messages: &[LogMsg], path: &Path) -> Result<(), RecordingError> {
@@ -39,18 +37,15 @@ pub(super) fn write(messages: &[LogMsg], path: &Path) -> Result<(), RecordingErr
     }
     encoder.finish().map_err(|error| failed(&error))?;
     let whole = encoder.into_inner().map_err(|error| failed(&error))?;
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let failed_to_write = |source| RecordingError::file("cannot write the recording", path, source);
-    let mut file =
-        store::temporary().prefix(TEMPORARY.0).suffix(TEMPORARY.1).tempfile_in(folder).map_err(failed_to_write)?;
     let mut compacted = Vec::new();
     read::guarded(|| optimize(whole.as_slice(), &mut compacted, &OptimizationProfile::LIVE))
         .ok_or_else(|| failed(&"the data are damaged"))?
         .map_err(|error| failed(&format!("{error:#}")))?;
-    file.write_all(&compacted).and_then(|()| file.as_file().sync_all()).map_err(failed_to_write)?;
-    file.persist(path).map_err(|error| failed_to_write(error.error))?;
-    // The rename itself must survive a power cut.
-    File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed_to_write)
+    store::replace_through(path, TEMPORARY, &compacted).map_err(|error| match error {
+        StoreError::Read { path, source } | StoreError::Write { path, source } | StoreError::Into { path, source } => {
+            RecordingError::file("cannot write the recording", &path, source)
+        }
+    })
 }
 
 /// How the names of files begin and end that will be recordings.
