@@ -392,17 +392,18 @@ fn the_tracker_is_drawn_as_planned_until_points_tell_where_it_stands() {
     assert_eq!(label, "[tracker (as planned)]");
     assert_points(&[drawn.x, drawn.y, drawn.z], std::iter::once(planned), SINGLE, "planned");
     beams(&drawn, 3);
-    // The fourth point tells.
+    // The fourth point tells; the nominal arm is off by centimetres.
     let rest = place.write_script("rest.script.ron", "Capture(1, Fail)");
     succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
     let (drawn, label) = tracker(&place.recording());
     assert_eq!(label, "[tracker]");
-    assert!((drawn - stands).norm() < 0.04, "{drawn} instead of {stands}");
+    assert!((drawn - stands).norm() < 0.1 && (drawn - planned).norm() > 0.02, "{drawn} instead of {stands}");
     beams(&drawn, 4);
     let rest = place.write_script("rest.script.ron", &format!("CaptureAll(Fail), {RESULT}"));
     succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
     let (drawn, label) = tracker(&place.recording());
     assert_eq!(label, "[tracker]");
+    // The identified arm tells it to a millimetre; what is less than 20 mm off is not drawn anew.
     assert!((drawn - stands).norm() < 0.021, "{drawn} instead of {stands}");
     let (_, session) = session_of(&place.session());
     beams(&drawn, session.samples.len());

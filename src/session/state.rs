@@ -59,6 +59,8 @@ pub struct Session {
     pub refused: Vec<Refused>,
     /// Number of the last measurement.
     pub measurements: u64,
+    /// No sample has ever belonged to this row of the plan or to a later one.
+    rows_measured: usize,
     /// From which measurement on noted coordinates have to be multiplied by what.
     pub scales: Vec<(u64, f64)>,
     /// What was set right, oldest first.
@@ -345,7 +347,9 @@ impl Session {
 
     /// The sample of a measurement.
     pub fn sample(&self, number: u64) -> Option<&Sample> {
-        self.samples.iter().find(|sample| sample.noted.number == number)
+        // Numbers rise from sample to sample.
+        let index = self.samples.binary_search_by_key(&number, |sample| sample.noted.number).ok()?;
+        self.samples.get(index)
     }
 
     /// The sample of a row that counts.
@@ -448,11 +452,14 @@ impl Session {
         }
         self.measurements = noted.number;
         self.shown = Some(noted.row);
-        for sample in self.samples.iter_mut().filter(|sample| sample.row == noted.row) {
+        // Most rows are measured once: of a large table not every sample need be looked through for every one.
+        let again = if noted.row < self.rows_measured { self.samples.as_mut_slice() } else { &mut [] };
+        for sample in again.iter_mut().filter(|sample| sample.row == noted.row) {
             if matches!(sample.state, SampleState::Counts | SampleState::LeftOut) {
                 sample.state = SampleState::Superseded;
             }
         }
+        self.rows_measured = self.rows_measured.max(noted.row + 1);
         self.samples.push(Sample {
             row: noted.row,
             joints: noted.reported_joints.clone().unwrap_or_else(|| noted.joints.clone()),
@@ -524,6 +531,7 @@ impl Session {
                 }
                 let sample = self.sample_mut(moved)?;
                 (sample.row, sample.joints) = (*row, joints);
+                self.rows_measured = self.rows_measured.max(*row + 1);
                 self.settle(|number| number == moved);
                 self.keep_latest(*row);
             }
