@@ -4,6 +4,8 @@
 //! seen. What was measured stays as it was noted; corrections are applied when samples are used ([`Session::point_of`] and the
 //! configuration).
 
+use std::collections::BTreeSet;
+
 use jiff::Timestamp;
 use nalgebra::Point3;
 use thiserror::Error;
@@ -107,6 +109,13 @@ pub struct Row {
     pub active: bool,
     /// The operator does not want to measure it.
     pub skipped: bool,
+}
+
+impl Row {
+    /// Whether it is to be measured, if it was not.
+    const fn is_planned(&self) -> bool {
+        self.active && !self.skipped && self.planned.kind.is_measured()
+    }
 }
 
 /// What has become of a sample.
@@ -359,7 +368,7 @@ impl Session {
 
     /// Whether a row still waits to be measured.
     pub fn is_open(&self, index: usize) -> bool {
-        self.rows.get(index).is_some_and(|row| row.active && !row.skipped && row.planned.kind.is_measured())
+        self.rows.get(index).is_some_and(Row::is_planned)
             && !self
                 .samples
                 .iter()
@@ -368,7 +377,11 @@ impl Session {
 
     /// Rows that still wait to be measured, in order.
     pub fn open_rows(&self) -> impl Iterator<Item = usize> {
-        (0..self.rows.len()).filter(|&row| self.is_open(row))
+        let is_measured = |sample: &&Sample| matches!(sample.state, SampleState::Counts | SampleState::LeftOut);
+        // Once for all rows: large tables have as many of them as samples.
+        let measured: BTreeSet<usize> = self.samples.iter().filter(is_measured).map(|sample| sample.row).collect();
+        let rows = self.rows.iter().enumerate();
+        rows.filter(|(_, row)| row.is_planned()).map(|(index, _)| index).filter(move |index| !measured.contains(index))
     }
 
     /// Where the SMR of a sample was seen, in the tracker frame (m), corrections applied.

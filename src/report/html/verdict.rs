@@ -32,8 +32,20 @@ pub(super) fn section(document: &Document) -> String {
         reasons.join("; ")
     );
     html.push_str(&limits(&result.verdict.checks));
-    html.push_str(&result.warnings.iter().map(warning).collect::<String>());
+    html.push_str(&warnings(&result.warnings));
     html
+}
+
+/// The warnings; of very many those that block the acceptance come first, and not all are shown.
+fn warnings(all: &[Warning]) -> String {
+    let mut shown: Vec<&Warning> = all.iter().collect();
+    if all.len() <= MOST {
+        return shown.into_iter().map(warning).collect();
+    }
+    shown.sort_by_key(|warning| !warning.blocks_acceptance);
+    shown.truncate(MOST);
+    let more = paragraph(&format!("And {} more; all are in report.json.", all.len() - MOST));
+    shown.into_iter().map(warning).collect::<String>() + &more
 }
 
 fn limits(checks: &[LimitCheck]) -> String {
