@@ -29,10 +29,10 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-pub use compact::{Check, check, compact_file};
+pub use compact::{Check, Compaction, check, compact_file};
 pub use read::{Recording, read};
 pub use recorder::{Live, Recorder, RecordingEvent};
-pub use segments::{FILE_NAME, compact_folder, files, rebuild, write};
+pub use segments::{FILE_NAME, compact_folder, files, foreign_lines, rebuild, write};
 
 /// Why a recording cannot be written or read. The session goes on without it.
 #[derive(Debug, Error)]

@@ -20,6 +20,7 @@ pub mod reading;
 pub mod set_up;
 pub mod simulation;
 pub mod state;
+pub mod station;
 pub mod summary;
 mod table;
 pub mod targets;

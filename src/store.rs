@@ -2,7 +2,7 @@
 
 pub mod session;
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -27,6 +27,14 @@ pub enum StoreError {
     #[error("cannot write '{}' (what was there before is unchanged)", path.display())]
     Write {
         /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Writing to what is no file failed.
+    #[error("cannot write to '{}'", path.display())]
+    Into {
+        /// What it is.
         path: PathBuf,
         /// What the system says.
         source: io::Error,
@@ -61,7 +69,8 @@ pub fn create_folder(path: &Path) -> Result<(), StoreError> {
     fs::create_dir_all(path).map_err(|source| StoreError::Write { path: path.to_owned(), source })
 }
 
-/// Replaces a file as a whole: the new text is written beside it, forced to disk, and renamed over it.
+/// Replaces a file as a whole: the new text is written beside it, forced to disk, and renamed over it. Of a symbolic link the
+/// file that it stands for is replaced. What is no file (a device, a pipe, `/dev/stdout`) is written to as it is.
 ///
 /// # Errors
 /// Any step failed; the old file is then still there.
@@ -74,20 +83,93 @@ pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
 /// # Errors
 /// Any step failed; the old file is then still there.
 pub fn replace_bytes(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    let written = || -> io::Result<()> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-        let mut file = temporary().prefix(TEMPORARY).tempfile_in(folder)?;
-        file.write_all(bytes)?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|failed| failed.error)?;
-        // The rename itself must survive a power cut.
-        File::open(folder)?.sync_all()
-    };
-    written().map_err(|source| StoreError::Write { path: path.to_owned(), source })
+    replace_through(path, (TEMPORARY, ""), bytes)
+}
+
+/// As [`replace_bytes`], through a file beside it whose name begins and ends so.
+///
+/// # Errors
+/// Any step failed; the old file is then still there.
+pub(crate) fn replace_through(path: &Path, temporary: (&str, &str), bytes: &[u8]) -> Result<(), StoreError> {
+    let failed = |source| StoreError::Write { path: path.to_owned(), source };
+    let into = |written: io::Result<()>| written.map_err(|source| StoreError::Into { path: path.to_owned(), source });
+    match destination(path).map_err(failed)? {
+        Destination::File(file) => replace_file(&file, temporary, bytes).map_err(failed),
+        Destination::Other(place) => {
+            into(OpenOptions::new().append(true).open(place).and_then(|mut file| file.write_all(bytes)))
+        }
+        Destination::Out => into(write_out(io::stdout().lock(), bytes)),
+        Destination::Err => into(write_out(io::stderr().lock(), bytes)),
+    }
+}
+
+fn write_out(mut out: impl io::Write, bytes: &[u8]) -> io::Result<()> {
+    out.write_all(bytes).and_then(|()| out.flush())
+}
+
+fn replace_file(path: &Path, (prefix, suffix): (&str, &str), bytes: &[u8]) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    let mut file = temporary().prefix(prefix).suffix(suffix).tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|failed| failed.error)?;
+    // The rename itself must survive a power cut.
+    File::open(folder)?.sync_all()
+}
+
+/// What a path stands for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Destination {
+    /// A file that is there or will be; not a link.
+    File(PathBuf),
+    /// A device, a pipe, an open file of this process: replaced by a file it would be destroyed.
+    Other(PathBuf),
+    /// The output of this process: who opens it anew writes over what is there.
+    Out,
+    /// Where this process tells errors.
+    Err,
+}
+
+/// Symbolic links that are followed one after the other; the system has the same limit.
+const MOST_LINKS: usize = 40;
+
+/// Finds what `path` stands for, link by link: one may lead to a file that is not there yet.
+fn destination(path: &Path) -> io::Result<Destination> {
+    let mut place = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if let Some(open) = open_file(&place) {
+            return Ok(open);
+        }
+        match fs::symlink_metadata(&place) {
+            Ok(found) if found.is_symlink() => {
+                let folder = place.parent().map_or_else(PathBuf::new, Path::to_owned);
+                place = folder.join(fs::read_link(&place)?);
+            }
+            Ok(found) if found.is_file() || found.is_dir() => return Ok(Destination::File(place)),
+            Ok(_) => return Ok(Destination::Other(place)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Destination::File(place)),
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::Error::other("too many symbolic links, or they lead in a circle"))
+}
+
+/// `/dev/fd/1`, `/proc/self/fd/1`: what a process has open, under a name.
+fn open_file(path: &Path) -> Option<Destination> {
+    let (folder, name) = (path.parent()?, path.file_name()?.to_str()?);
+    let own = format!("/proc/{}/fd", std::process::id());
+    let is_of_this =
+        ["/dev/fd", "/proc/self/fd", "/proc/thread-self/fd", &own].iter().any(|own| folder == Path::new(own));
+    match name {
+        _ if !is_of_this || !name.bytes().all(|byte| byte.is_ascii_digit()) => None,
+        "1" => Some(Destination::Out),
+        "2" => Some(Destination::Err),
+        _ => Some(Destination::Other(path.to_owned())),
+    }
 }
 
 /// Temporary files that will be results: not private as the library's are, but for whom the process allows it.
-pub(crate) fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
+fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
     #[cfg_attr(not(unix), expect(unused_mut, reason = "only Unix has modes"))]
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
@@ -110,6 +192,69 @@ mod tests {
         replace(&path, "two").unwrap();
         assert_eq!(read(&path).unwrap(), b"two");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_and_the_files_behind_them_are_replaced() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        create_folder(&at("elsewhere")).unwrap();
+        replace(&at("elsewhere/real"), "old").unwrap();
+        symlink("elsewhere/real", at("near")).unwrap();
+        symlink(at("near"), at("far")).unwrap();
+        symlink("elsewhere/new", at("dangling")).unwrap();
+        symlink("circle", at("circle")).unwrap();
+        for (link, file) in [("near", "elsewhere/real"), ("far", "elsewhere/real"), ("dangling", "elsewhere/new")] {
+            replace(&at(link), link).unwrap();
+            assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
+            assert!(fs::symlink_metadata(at(file)).unwrap().is_file(), "{file}");
+            assert_eq!(read(&at(file)).unwrap(), link.as_bytes());
+        }
+        assert_eq!(fs::read_dir(at("elsewhere")).unwrap().count(), 2);
+        let error = replace(&at("circle"), "text").unwrap_err();
+        assert!(std::error::Error::source(&error).unwrap().to_string().contains("in a circle"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn devices_and_pipes_stay_what_they_are_and_tell_errors() {
+        use std::os::unix::fs::FileTypeExt as _;
+        let is_device = |path: &str| fs::metadata(path).unwrap().file_type().is_char_device();
+        replace(Path::new("/dev/null"), "text").unwrap();
+        let error = replace(Path::new("/dev/full"), "text").unwrap_err();
+        assert_eq!(error.to_string(), "cannot write to '/dev/full'");
+        assert!(std::error::Error::source(&error).unwrap().to_string().contains("No space left"));
+        assert!(is_device("/dev/null") && is_device("/dev/full"));
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let reader = {
+            let pipe = pipe.clone();
+            std::thread::Builder::new().spawn(move || read(&pipe).unwrap()).unwrap()
+        };
+        replace(&pipe, "through a pipe").unwrap();
+        assert_eq!(reader.join().unwrap(), b"through a pipe");
+        assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
+    }
+
+    #[test]
+    fn open_files_of_this_process_are_not_replaced() {
+        let own = format!("/proc/{}/fd/2", std::process::id());
+        for (path, expected) in [
+            ("/dev/fd/1", Some(Destination::Out)),
+            ("/proc/self/fd/1", Some(Destination::Out)),
+            (own.as_str(), Some(Destination::Err)),
+            ("/dev/fd/7", Some(Destination::Other("/dev/fd/7".into()))),
+            ("/dev/fd/x", None),
+            ("/tmp/fd/1", None),
+            ("1", None),
+        ] {
+            assert_eq!(open_file(Path::new(path)), expected, "{path}");
+        }
+        #[cfg(target_os = "linux")]
+        assert_eq!(destination(Path::new("/dev/stdout")).unwrap(), Destination::Out);
     }
 
     #[test]

@@ -58,7 +58,11 @@ impl Place {
     }
 
     fn check(&self) -> (Option<i32>, String) {
-        let output = self.run(&["record", "check", "sessions/s"]);
+        self.check_file("sessions/s")
+    }
+
+    fn check_file(&self, path: &str) -> (Option<i32>, String) {
+        let output = self.run(&["record", "check", path]);
         (output.status.code(), text(&output.stdout))
     }
 }
@@ -348,6 +352,75 @@ fn compare_with_journal(folder: &Path) {
     assert_eq!(solved.last().unwrap().1.len(), 3 * profile.bodies().len());
 }
 
+/// Where the tracker is drawn at last, and its label.
+fn tracker(path: &Path) -> (Point3<f64>, String) {
+    let of = |component: &str| {
+        let mut rows = rows(path, false).into_iter();
+        rows.find_map(|(entity, _, mut values)| (entity == "/world/tracker/body").then(|| values.remove(component))?)
+            .unwrap()
+    };
+    let centre: Vec<f64> = of("Boxes3D:centers")
+        .trim_matches(['[', ']'])
+        .split(',')
+        .map(|number| number.trim().parse().unwrap())
+        .collect();
+    (Point3::new(centre[0], centre[1], centre[2]), of("Boxes3D:labels"))
+}
+
+#[test]
+fn the_tracker_is_drawn_as_planned_until_points_tell_where_it_stands() {
+    let place = recorded(&format!("{} Capture(3, Fail)", begun("")));
+    let (_, session) = session_of(&place.session());
+    let profile = session.mounted_profile().unwrap();
+    let planned = profile.tracker().position_in_base;
+    let truth = trupose::link::SimulatedCell::new(
+        &profile,
+        &trupose::session::simulation::Simulation { seed: 1, ..Default::default() },
+    )
+    .unwrap();
+    let stands = Point3::from(truth.truth().base_from_tracker.translation.vector);
+    assert!((stands - planned).norm() > 0.05, "the test needs one that stands elsewhere: {stands} {planned}");
+    let beams = |from: &Point3<f64>, count: usize| {
+        let beams = numbers(&place.recording(), "/world/tracker/beam", "pose", "LineStrips3D:strips");
+        // Also that before the first measurement.
+        assert_eq!(beams.len(), 1 + count);
+        for (pose, beam) in beams {
+            assert_points(&beam[..3], std::iter::once(*from), SINGLE, &format!("beam at {pose}"));
+        }
+    };
+    let (drawn, label) = tracker(&place.recording());
+    assert_eq!(label, "[tracker (as planned)]");
+    assert_points(&[drawn.x, drawn.y, drawn.z], std::iter::once(planned), SINGLE, "planned");
+    beams(&drawn, 3);
+    // The fourth point tells; the nominal arm is off by centimetres.
+    let rest = place.write_script("rest.script.ron", "Capture(1, Fail)");
+    succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
+    let (drawn, label) = tracker(&place.recording());
+    assert_eq!(label, "[tracker]");
+    assert!((drawn - stands).norm() < 0.1 && (drawn - planned).norm() > 0.02, "{drawn} instead of {stands}");
+    beams(&drawn, 4);
+    let rest = place.write_script("rest.script.ron", &format!("CaptureAll(Fail), {RESULT}"));
+    succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
+    let (drawn, label) = tracker(&place.recording());
+    assert_eq!(label, "[tracker]");
+    // The identified arm tells it to a millimetre; what is less than 20 mm off is not drawn anew.
+    assert!((drawn - stands).norm() < 0.021, "{drawn} instead of {stands}");
+    let (_, session) = session_of(&place.session());
+    beams(&drawn, session.samples.len());
+    compare_with_rebuilt(&place);
+    // Measurements and poses of the plan are counted apart: the name is at the point.
+    let names: BTreeMap<i64, String> = rows(&place.recording(), false)
+        .into_iter()
+        .filter(|(entity, times, _)| entity == "/world/measured" && !times.is_empty())
+        .map(|(_, times, values)| (times["pose"], values["Points3D:labels"].clone()))
+        .collect();
+    assert_eq!(names.len(), session.samples.len());
+    for sample in &session.samples {
+        let number = i64::try_from(sample.noted.number).unwrap();
+        assert_eq!(names[&number], format!("[pose {}]", session.pose_of(sample)));
+    }
+}
+
 /// What the journal says about results.
 trait Runs {
     fn runs_in(&self, journal: &Journal) -> usize;
@@ -493,6 +566,22 @@ impl Running {
     }
 }
 
+/// What a program leaves that runs `script` and is killed once samples are in its recording.
+fn torn_part(place: &Place, script: &str) -> PathBuf {
+    let mut running = Running::start(place.command(&["--script", script, "--json"]));
+    running.hear(3);
+    // The recording comes a little later than the journal.
+    let begun = Instant::now();
+    let has_samples = |file: &PathBuf| recording::check(file).is_ok_and(|check| check.samples > 0);
+    loop {
+        if let Some(part) = recording::files(&place.session()).into_iter().find(has_samples) {
+            assert!(running.kill());
+            return part;
+        }
+        assert!(begun.elapsed() < Duration::from_mins(1));
+    }
+}
+
 /// More than a pipe holds: the program waits until it is read.
 const LONG: usize = 100_000;
 
@@ -607,6 +696,116 @@ fn torn_and_damaged_files_are_named_and_never_stop_the_program() {
         assert_eq!(output.status.code(), Some(5));
         assert!(text(&output.stderr).contains(said), "{}", text(&output.stderr));
     }
+}
+
+#[test]
+fn what_is_damaged_is_not_made_compact() {
+    let place = Place::new();
+    let whole = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/example/recording.rrd")).unwrap();
+    let cut = whole[..whole.len() * 3 / 5].to_vec();
+    assert!(cut.len() > 200_000, "it has lines of the journal");
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 3] ^= 0x55;
+    let mut lengthened = whole;
+    lengthened.extend_from_slice(b"more");
+    for (name, bytes) in [("cut.rrd", cut), ("flipped.rrd", flipped), ("lengthened.rrd", lengthened)] {
+        fs::write(place.path(name), &bytes).unwrap();
+        let (status, said) = place.check_file(name);
+        assert_eq!(status, Some(1), "{name}: {said}");
+        let output = place.run(&["record", "compact", name]);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{name}: {error}");
+        assert!(error.contains("is not whole and stays as it is"), "{name}: {error}");
+        assert!(error.contains("trupose record rebuild DIR"), "{name}: {error}");
+        assert_eq!(fs::read(place.path(name)).unwrap(), bytes, "{name}");
+        assert_eq!(place.check_file(name), (status, said), "{name}");
+    }
+    // Beside the journal there is no need for what is damaged.
+    let session = place.session();
+    fs::create_dir_all(&session).unwrap();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/example");
+    fs::copy(example.join("journal.ron"), session.join("journal.ron")).unwrap();
+    fs::copy(place.path("cut.rrd"), place.recording()).unwrap();
+    assert_eq!(place.check().0, Some(1));
+    succeeded(&place.run(&["record", "compact", "sessions/s"]));
+    compare_with_journal(&session);
+}
+
+#[test]
+fn what_a_crash_left_alone_is_made_compact_and_is_said_to_be_torn() {
+    let place = Place::new();
+    let script = place.write_script("run.script.ron", &format!("{} {}", begun(""), one_by_one(6)));
+    let bytes = fs::read(torn_part(&place, &script)).unwrap();
+    // Wherever it is torn: also within the picture of the last entry.
+    for (name, length) in
+        [("one.rrd", bytes.len()), ("two.rrd", bytes.len() - 1000), ("three.rrd", bytes.len() * 4 / 5)]
+    {
+        fs::write(place.path(name), &bytes[..length]).unwrap();
+        let found = recording::check(&place.path(name)).unwrap();
+        assert!(found.is_unfinished() && found.lines > 2, "{name}: {found:?}");
+        let output = place.run(&["record", "compact", name]);
+        succeeded(&output);
+        let said = text(&output.stdout);
+        assert!(said.contains(&format!("its end was torn: all {} entries", found.lines)), "{said}");
+        let (status, said) = place.check_file(name);
+        assert_eq!(status, Some(0), "{said}");
+        // Everything is drawn, as if the journal had these lines only.
+        let then = place.path("then");
+        fs::create_dir_all(&then).unwrap();
+        let journal = fs::read(place.session().join("journal.ron")).unwrap();
+        let lines: Vec<u8> =
+            journal.split_inclusive(|byte| *byte == b'\n').take(found.lines).flatten().copied().collect();
+        fs::write(then.join("journal.ron"), lines).unwrap();
+        succeeded(&place.run(&["record", "rebuild", "then"]));
+        assert_eq!(content(&place.path(name)), content(&then.join(recording::FILE_NAME)));
+        // It is a whole now: where its end is missing again, anything may be missing.
+        let compact = fs::read(place.path(name)).unwrap();
+        fs::write(place.path(name), &compact[..compact.len() - 1000]).unwrap();
+        assert_eq!(place.run(&["record", "compact", name]).status.code(), Some(1));
+    }
+}
+
+#[test]
+fn the_recording_of_another_session_is_noticed_and_not_gone_on_with() {
+    let place = recorded(&format!("{} Capture(3, Fail)", begun("")));
+    let own = fs::read(place.recording()).unwrap();
+    // As many lines, other points.
+    let other = recorded(&format!("{} Capture(3, Fail)", begun("\"outlier@2:9mm\"")));
+    let lines = |place: &Place| read_journal(&place.session()).unwrap().lines.len();
+    assert_eq!(lines(&place), lines(&other));
+    let differs = read_journal(&place.session())
+        .unwrap()
+        .lines
+        .iter()
+        .zip(&read_journal(&other.session()).unwrap().lines)
+        .position(|(one, other)| one != other)
+        .unwrap();
+    fs::copy(other.recording(), place.recording()).unwrap();
+    let (status, said) = place.check();
+    assert_eq!(status, Some(1), "{said}");
+    assert!(said.contains(&format!("entry {} of it differs from the journal", differs + 1)), "{said}");
+    assert!(said.contains("trupose record rebuild"), "{said}");
+    succeeded(&place.run(&["record", "compact", "sessions/s"]));
+    assert_eq!(place.check().0, Some(0));
+    // A session that goes on draws it anew.
+    fs::copy(other.recording(), place.recording()).unwrap();
+    let rest = place.write_script("rest.script.ron", "Capture(1, Fail)");
+    succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
+    compare_with_journal(&place.session());
+    compare_with_rebuilt(&place);
+    // Another name, another session.
+    let mut named = begun("");
+    named = named.replacen("NameSession(\"s\")", "NameSession(\"t\")", 1);
+    succeeded(&other.script(&format!("{named} Capture(3, Fail)"), &[]));
+    fs::copy(other.path("sessions/t").join(recording::FILE_NAME), place.recording()).unwrap();
+    let (status, said) = place.check();
+    assert_eq!(status, Some(1), "{said}");
+    assert!(said.contains("it is the recording of another session"), "{said}");
+    // An older one of the same session lacks something, and is not another's.
+    fs::write(place.recording(), own).unwrap();
+    let (status, said) = place.check();
+    assert_eq!(status, Some(1), "{said}");
+    assert!(said.contains("missing of") && !said.contains("differs"), "{said}");
 }
 
 /// Runs the rest of a session over what is in the way of its recording, and returns the transcript.
@@ -812,20 +1011,7 @@ fn an_identification_from_files_is_recorded() {
 fn a_recording_is_replayed_like_its_session_also_when_it_is_half_written() {
     let place = Place::new();
     let script = place.write_script("run.script.ron", &format!("{} {}", begun(""), one_by_one(6)));
-    let mut running = Running::start(place.command(&["--script", &script, "--json"]));
-    running.hear(3);
-    // The recording comes a little later than the journal.
-    let begun = Instant::now();
-    let half = loop {
-        let files = recording::files(&place.session());
-        let has_samples = |file: &PathBuf| recording::check(file).is_ok_and(|check| check.samples > 0);
-        if let Some(half) = files.into_iter().find(has_samples) {
-            break half;
-        }
-        assert!(begun.elapsed() < Duration::from_mins(1));
-    };
-    let half = &half;
-    assert!(running.kill());
+    let half = &torn_part(&place, &script);
     assert!(!recording::check(half).unwrap().has_index);
     let last = recording::read(half).unwrap().numbers.last().unwrap().to_string();
     let rest = place.write_script("rest.script.ron", "CaptureAll(Fail)");

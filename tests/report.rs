@@ -22,7 +22,7 @@ use trupose::session::journal::{Entry, IdentifiedText, Journal, Line, PointError
 use trupose::session::set_up::About;
 use trupose::session::sha256;
 use trupose::session::state::Session;
-use trupose::session::summary::{StatisticsSummary, VerdictStatus};
+use trupose::session::summary::{RejectedSummary, StatisticsSummary, VerdictStatus, Warning};
 use trupose::store::session::read_journal;
 
 /// A short calibration in which something goes wrong and is decided about.
@@ -299,6 +299,56 @@ fn the_tables_are_those_of_the_points() {
         assert!((absolute.fold(0.0, f64::max) - expected.max[axis]).abs() < 2e-6, "axis {axis}");
         assert!((mean - expected.mean[axis]).abs() < 2e-6, "axis {axis}");
     }
+}
+
+#[test]
+fn of_many_samples_the_worst_are_listed_and_some_are_drawn() {
+    let times = 300;
+    let (small, small_page) = report(&calibrated());
+    let session = with_result(|identified| {
+        let one = (identified.samples.clone(), identified.points.clone());
+        for time in 1..times {
+            identified.samples.extend(&one.0);
+            // Every time a little worse.
+            identified.points.extend(one.1.iter().map(|point| {
+                let (x, y, z) = point.identified_mm;
+                let worse = 1e-4 * f64::from(time);
+                PointErrorText { identified_mm: (x + worse * x.signum(), y, z), ..point.clone() }
+            }));
+        }
+        let warning =
+            Warning { code: "tested".to_owned(), message: "a remark of a row".to_owned(), blocks_acceptance: false };
+        identified.summary.warnings = vec![warning.clone(); 700];
+        identified.summary.warnings.push(Warning {
+            message: "what blocks".to_owned(),
+            blocks_acceptance: true,
+            ..warning
+        });
+        let rejected = [RejectedSummary {
+            pose: "1".to_owned(),
+            line: 1,
+            reason: "far off".to_owned(),
+            residual_mm: 1.0,
+            ratio: 9.0,
+        }];
+        identified.summary.rejected = rejected.iter().cycle().take(700).cloned().collect();
+        identified.summary.rejected[699].residual_mm = 987.654;
+    });
+    let (json, page) = report(&session);
+    let all = |json: &Value| json["report"]["points"].as_array().unwrap().len();
+    assert_eq!(all(&json), 300 * all(&small));
+    let tested = json["report"]["points"].as_array().unwrap().iter().filter(|point| point["verification"] == true);
+    let count = tested.count();
+    let shown = text(&page);
+    assert!(shown.contains(&format!("The 500 worst of {count}; all are in report.json")), "{count}");
+    assert!(shown.contains(&format!("of {count} samples one in ")) && shown.contains("the 100 worst"));
+    assert!(shown.contains(&format!("{count} verification poses; largest")), "all are counted");
+    assert!(shown.contains("Rejected by the identification: 700 of"));
+    assert!(shown.contains("the 500 that are farthest off are listed") && shown.contains("987.654"));
+    assert_eq!(shown.matches("a remark of a row").count(), 499);
+    assert!(shown.contains("what blocks") && shown.contains("And 201 more; all are in report.json."));
+    assert!(page.len() < 1_500_000, "{} bytes, of a small one {}", page.len(), small_page.len());
+    assert!(!small_page.contains("all are in report.json") && !small_page.contains("one in"));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! `trupose record rebuild | compact | check`, and the recordings of commands without a session.
 
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
@@ -14,7 +15,7 @@ use crate::procedure::identify::{Identified, IdentifyRequest, NamedSample};
 use crate::procedure::joint_types;
 use crate::procedure::points::point_errors;
 use crate::profile::Profile;
-use crate::recording::{self, Check, RecordingError};
+use crate::recording::{self, Check, Compaction, RecordingError};
 use crate::session::calibration::Calibration;
 use crate::session::journal::{
     Entry, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText, SCHEMA, to_edge, to_xyz_mm,
@@ -50,6 +51,7 @@ pub(super) fn run<O: Write, E: Write>(
     }
 }
 
+/// Makes one compact file of a folder's parts, or of a file. What is damaged is not touched: compact it would look whole.
 fn compact<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let before;
     let file = if path.is_dir() {
@@ -62,14 +64,38 @@ fn compact<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Resu
         }
         recording::compact_folder(path, &journal.lines).map_err(|error| failure(&error))?
     } else {
-        before = Some(check(path)?.bytes);
-        recording::compact_file(path).map_err(|error| failure(&error))?;
+        let found = check(path)?;
+        match recording::compact_file(path).map_err(|error| failure(&error))? {
+            Compaction::AsItWas => {}
+            Compaction::DrawnAnew => {
+                console
+                    .print(&format!("its end was torn: all {} entries that it has are drawn anew\n", found.lines))?;
+            }
+            Compaction::Refused => return Err(refused(path, &found)),
+        }
+        before = Some(found.bytes);
         path.to_owned()
     };
     let after = check(&file)?;
     let change = before.map_or_else(String::new, |before| format!(", {before} bytes before"));
     console.print(&format!("written: {}\n{}{change}\n", file.display(), described(&after)))?;
     Ok(ExitStatus::Accepted)
+}
+
+/// Why a file is not made compact.
+fn refused(path: &Path, found: &Check) -> Failure {
+    let message = format!(
+        "'{}' is not whole and stays as it is: {}; compact it would look whole",
+        path.display(),
+        described(found)
+    );
+    let failure = Failure::new(ExitStatus::NotAccepted, message)
+        .hint("'trupose record rebuild DIR' makes the recording anew from the journal of its session");
+    if found.lines == 0 {
+        return failure;
+    }
+    let shown = format!("'trupose replay {} --print' prints the entries that it has from the first", path.display());
+    failure.hint(shown)
 }
 
 /// Whether a recording is whole, and says so.
@@ -79,7 +105,7 @@ fn check_one<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Re
         console.print(&format!("{}: {}\n", path.display(), described(&found)))?;
         return Ok(found.is_whole());
     }
-    let journal = read_journal(path).map_err(|error| session_failure(&error))?;
+    let mut journal = read_journal(path).map_err(|error| session_failure(&error))?;
     let files = recording::files(path);
     if files.is_empty() {
         console.print(&format!(
@@ -89,13 +115,21 @@ fn check_one<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Re
         ))?;
         return Ok(false);
     }
-    let mut is_whole = files.len() == 1;
-    let mut lines = std::collections::BTreeSet::new();
+    let (mut is_whole, mut is_foreign) = (files.len() == 1, false);
+    let mut lines: BTreeSet<u64> = BTreeSet::new();
     for file in &files {
         let found = check(file)?;
         is_whole &= found.has_index && found.damaged == 0;
-        lines.extend(recording::read(file).map_err(|error| failure(&error))?.numbers);
+        let recorded = recording::read(file).map_err(|error| failure(&error))?.numbers;
+        // The journal is ahead of the recording, also where a program goes on with both.
+        journal = read_journal(path).map_err(|error| session_failure(&error))?;
+        let foreign = recording::foreign_lines(file, &journal.lines).map_err(|error| failure(&error))?;
+        lines.extend(recorded);
         console.print(&format!("{}: {}\n", file.display(), described(&found)))?;
+        if let Some(first) = foreign.first() {
+            is_foreign = true;
+            console.print(&format!("{}\n", described_foreign(*first, foreign.len(), journal.lines.len())))?;
+        }
     }
     let missing: Vec<String> = journal
         .lines
@@ -103,7 +137,12 @@ fn check_one<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Re
         .filter(|line| !lines.contains(&line.number))
         .map(|line| format!("{:>5} {}", line.number, crate::session::printable(&line.entry.describe())))
         .collect();
-    if !missing.is_empty() {
+    if is_foreign {
+        console.print(&format!(
+            "'trupose record rebuild {}' makes the recording anew from the journal, in the place of what is there\n",
+            path.display()
+        ))?;
+    } else if !missing.is_empty() {
         console.print(&format!(
             "missing of {} journal entries:\n{}\n'trupose record rebuild {}' makes the recording anew\n",
             journal.lines.len(),
@@ -115,7 +154,20 @@ fn check_one<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Re
     } else {
         console.print(&format!("'trupose record compact {}' makes one file with an index\n", path.display()))?;
     }
-    Ok(is_whole && missing.is_empty())
+    Ok(is_whole && !is_foreign && missing.is_empty())
+}
+
+/// What entries of a recording mean that are not in the journal with `entries` entries; `first` is the number of the first of them.
+fn described_foreign(first: i64, count: usize, entries: usize) -> String {
+    if first == 1 {
+        return "it is the recording of another session: its first entry is not that of the journal".to_owned();
+    }
+    let more = if count > 1 { format!(", and {} more", count - 1) } else { String::new() };
+    if usize::try_from(first).is_ok_and(|first| first <= entries) {
+        format!("entry {first} of it differs from the journal{more}")
+    } else {
+        format!("entry {first} of it is not in the journal, which ends with entry {entries}{more}")
+    }
 }
 
 fn check(path: &Path) -> Result<Check, Failure> {
@@ -125,7 +177,8 @@ fn check(path: &Path) -> Result<Check, Failure> {
 fn described(check: &Check) -> String {
     let mut parts = vec![format!("{} bytes, {} journal entries, {} samples", check.bytes, check.lines, check.samples)];
     if !check.has_index {
-        parts.push("no index (still being written, or ended by a crash)".to_owned());
+        let why = if check.is_part { "still being written, or ended by a crash" } else { "its end is missing" };
+        parts.push(format!("no index ({why})"));
     }
     if !check.missing.is_empty() {
         parts.push(format!("entries missing: {:?}", check.missing));

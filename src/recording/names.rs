@@ -3,6 +3,10 @@
 /// Application id of all recordings: layouts belong to it.
 pub(super) const APPLICATION: &str = "trupose";
 
+/// What says that a file is a part, written while a session was measured: it may end anywhere. Files that were made in one go
+/// do not say so: where their end is missing, anything may be missing.
+pub(super) const PART: &str = "trupose, while measuring";
+
 /// Number of the measurement; 0 before the first.
 pub(super) const POSE: &str = "pose";
 /// Sweep of the pose search.

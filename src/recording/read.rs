@@ -8,8 +8,9 @@ use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 use std::sync::Once;
 
-use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_log_encoding::rrd::DecodeError;
+use rerun::external::re_log_encoding::{Decodable as _, DecoderApp, StreamFooter};
+use rerun::external::re_log_types::{StoreInfo, StoreSource};
 use rerun::log::{Chunk, LogMsg};
 use rerun::{TextDocument, TimelineName};
 
@@ -20,8 +21,10 @@ use crate::session::journal::{self, Journal};
 const STREAM_HEADER: u64 = 12;
 /// Bytes that say kind and length of a piece.
 const PIECE_HEADER: u64 = 16;
-/// Kind of the last piece, before the index.
+/// Kind of the last piece, before the place of the index.
 const LAST_PIECE: u64 = 0;
+/// Largest kind of a piece.
+const LARGEST_KIND: u64 = 3;
 /// By so many bytes a piece may be longer than the file before it is taken for damaged.
 const ROOM: u64 = 64 << 20;
 
@@ -36,6 +39,8 @@ pub struct Recording {
     pub damaged: usize,
     /// Journal lines that are missing between others.
     pub missing: Vec<i64>,
+    /// Whether it was written while a session was measured, line by line: it may end anywhere.
+    pub is_part: bool,
 }
 
 impl Recording {
@@ -54,8 +59,9 @@ impl Recording {
 /// The file cannot be read or is not a recording of this program.
 pub fn read(path: &Path) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
-    let (lines, damaged) = journal_lines(path)?;
-    recording.damaged = damaged;
+    let (lines, seen) = journal_lines(path)?;
+    recording.damaged = seen.damaged;
+    recording.is_part = seen.is_part;
     if let Some((last, _)) = lines.last_key_value() {
         recording.missing = (1..=*last).filter(|number| !lines.contains_key(number)).collect();
     }
@@ -66,15 +72,19 @@ pub fn read(path: &Path) -> Result<Recording, RecordingError> {
     Ok(recording)
 }
 
-/// Numbers of the journal lines in the recording at `path`, and how many messages could not be read.
-pub(super) fn line_numbers(path: &Path) -> Result<(Vec<i64>, usize), RecordingError> {
-    let (lines, damaged) = journal_lines(path)?;
-    Ok((lines.into_keys().collect(), damaged))
+/// What was seen of a file while its data were read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Seen {
+    /// Messages that could not be read.
+    pub(super) damaged: usize,
+    /// It was written while a session was measured.
+    pub(super) is_part: bool,
 }
 
-fn journal_lines(path: &Path) -> Result<(BTreeMap<i64, String>, usize), RecordingError> {
+/// The journal lines in the recording at `path` by their numbers, line breaks included.
+pub(super) fn journal_lines(path: &Path) -> Result<(BTreeMap<i64, String>, Seen), RecordingError> {
     let mut lines: BTreeMap<i64, String> = BTreeMap::new();
-    let damaged = chunks(path, |chunk| {
+    let seen = chunks(path, |chunk| {
         if chunk.entity_path().to_string().trim_start_matches('/') != names::JOURNAL {
             return;
         }
@@ -87,12 +97,12 @@ fn journal_lines(path: &Path) -> Result<(BTreeMap<i64, String>, usize), Recordin
             }
         }
     })?;
-    Ok((lines, damaged))
+    Ok((lines, seen))
 }
 
-/// Gives all chunks of data of the recording at `path` to `take`; returns how many messages could not be read.
-pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize, RecordingError> {
-    let (mut damaged, mut known) = (0, false);
+/// Gives all chunks of data of the recording at `path` to `take`.
+fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<Seen, RecordingError> {
+    let (mut seen, mut known) = (Seen::default(), false);
     messages(path, |message| {
         match message {
             Ok(LogMsg::SetStoreInfo(info)) => {
@@ -102,28 +112,56 @@ pub(super) fn chunks(path: &Path, mut take: impl FnMut(&Chunk)) -> Result<usize,
                     return Err(RecordingError::Foreign { path: path.to_owned(), message });
                 }
                 known = true;
+                seen.is_part |= is_part(&info.info);
             }
             Ok(LogMsg::ArrowMsg(store, arrow)) if store.is_recording() => {
                 // Damaged data may fit together and still break what looks at them.
                 let taken = guarded(|| Chunk::from_arrow_msg(&arrow).map(|chunk| take(&chunk)).is_ok());
-                damaged += usize::from(taken != Some(true));
+                seen.damaged += usize::from(taken != Some(true));
             }
             Ok(_) => {}
             Err(message) if !known => return Err(RecordingError::Foreign { path: path.to_owned(), message }),
-            Err(_damage) => damaged += 1,
+            Err(_damage) => seen.damaged += 1,
         }
         Ok(())
     })?;
     if known {
-        Ok(damaged)
+        Ok(seen)
     } else {
         Err(RecordingError::Foreign { path: path.to_owned(), message: "there is nothing in it".to_owned() })
     }
 }
 
-/// Bytes before the first piece that says that it is far longer than the file of `size` bytes; `size` if there is none. The
-/// library takes memory for as much as a piece says, and the program ends where there is not so much.
-fn sound_length(file: &mut File, size: u64) -> io::Result<u64> {
+/// Whether a recording says that it is written while a session is measured.
+fn is_part(info: &StoreInfo) -> bool {
+    matches!(&info.store_source, StoreSource::Other(source) if source == names::PART)
+}
+
+/// How a file ends, piece by piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// With the place of an index.
+    Index,
+    /// Within a piece or between two: it is still being written, or its end is missing.
+    Torn,
+    /// What stands behind so many bytes is no piece: nothing there can be told from garbage.
+    Damaged(u64, &'static str),
+}
+
+/// Looks how the recording at `path` ends.
+pub(super) fn end(path: &Path) -> Result<End, RecordingError> {
+    let found = || -> io::Result<End> {
+        let mut file = File::open(path)?;
+        let size = file.metadata()?.len();
+        end_of(&mut file, size)
+    };
+    found().map_err(|source| RecordingError::file("cannot read the recording", path, source))
+}
+
+/// How `file` of `size` bytes ends. The library takes memory for as much as a piece says, and the program ends where there is
+/// not so much; and it says nothing about pieces of a kind that there is not.
+fn end_of(file: &mut File, size: u64) -> io::Result<End> {
+    let footer = StreamFooter::ENCODED_SIZE_BYTES as u64;
     let mut at = STREAM_HEADER;
     while at + PIECE_HEADER <= size {
         file.seek(SeekFrom::Start(at))?;
@@ -132,16 +170,29 @@ fn sound_length(file: &mut File, size: u64) -> io::Result<u64> {
             file.read_exact(&mut bytes).map(|()| u64::from_le_bytes(bytes))
         };
         let (kind, length) = (number()?, number()?);
-        if kind == LAST_PIECE {
-            break;
+        if kind > LARGEST_KIND {
+            return Ok(End::Damaged(at, "a piece of it is of no known kind"));
         }
         // The last piece of a file that is being written may be cut.
         if length > size.saturating_add(ROOM) {
-            return Ok(at);
+            return Ok(End::Damaged(at, "a piece of it says that it is longer than the file"));
         }
         at += PIECE_HEADER + length;
+        if kind == LAST_PIECE {
+            if at + footer == size {
+                file.seek(SeekFrom::Start(at))?;
+                let mut bytes = Vec::new();
+                file.read_to_end(&mut bytes)?;
+                if StreamFooter::from_rrd_bytes(&bytes).is_ok() {
+                    return Ok(End::Index);
+                }
+                return Ok(End::Damaged(at, "the place of its index is damaged"));
+            }
+            // Files may be joined end to end.
+            at += footer + STREAM_HEADER;
+        }
     }
-    Ok(size)
+    Ok(End::Torn)
 }
 
 /// Gives all messages of the file at `path` to `take`, and what is wrong with those that are damaged.
@@ -155,7 +206,10 @@ pub(super) fn messages(
     let failed = |source| RecordingError::file("cannot read the recording", path, source);
     let mut file = File::open(path).map_err(failed)?;
     let size = file.metadata().map_err(failed)?.len();
-    let sound = sound_length(&mut file, size).map_err(failed)?;
+    let (sound, damage) = match end_of(&mut file, size).map_err(failed)? {
+        End::Damaged(sound, damage) => (sound, Some(damage)),
+        End::Index | End::Torn => (size, None),
+    };
     file.rewind().map_err(failed)?;
     let mut messages = DecoderApp::decode_lazy(BufReader::new(file.take(sound)));
     loop {
@@ -168,8 +222,7 @@ pub(super) fn messages(
             // It would be tried again for ever.
             Some(Err(DecodeError::Read(source))) => return Err(failed(source)),
             Some(Err(error)) => take(Err(plain(&error.to_string())))?,
-            None if sound < size => return take(Err("a piece of it says that it is longer than the file".to_owned())),
-            None => return Ok(()),
+            None => return damage.map_or(Ok(()), |damage| take(Err(damage.to_owned()))),
         }
     }
 }
@@ -228,6 +281,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_piece_of_no_kind_ends_what_is_read_and_is_told() {
+        let mut bytes = include_bytes!("../../sessions/example/recording.rrd").to_vec();
+        let at = usize::try_from(STREAM_HEADER).unwrap();
+        bytes[at + 3] ^= 1;
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(&bytes).unwrap();
+        let mut told = Vec::new();
+        messages(file.path(), |message| {
+            told.push(message.map(drop));
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(told, [Err("a piece of it is of no known kind".to_owned())]);
+    }
+
+    #[test]
     fn a_piece_longer_than_the_file_ends_what_is_read_and_is_told() {
         let whole = include_bytes!("../../sessions/example/recording.rrd");
         let mut file = tempfile::NamedTempFile::new().unwrap();
@@ -238,13 +307,14 @@ mod tests {
         bytes[usize::try_from(second).unwrap() + 14] ^= 1;
         file.write_all(&bytes).unwrap();
         let size = bytes.len() as u64;
-        assert_eq!(sound_length(file.as_file_mut(), size).unwrap(), second);
+        let damage = "a piece of it says that it is longer than the file";
+        assert_eq!(end_of(file.as_file_mut(), size).unwrap(), End::Damaged(second, damage));
         let mut told = Vec::new();
         messages(file.path(), |message| {
             told.push(message.map(drop));
             Ok(())
         })
         .unwrap();
-        assert_eq!(told, [Ok(()), Err("a piece of it says that it is longer than the file".to_owned())]);
+        assert_eq!(told, [Ok(()), Err(damage.to_owned())]);
     }
 }

@@ -204,7 +204,7 @@ impl<T: Fn(RecordingEvent)> Work<T> {
     /// A part that goes on where the files of the folder end. What a crash left is drawn anew, and removed once that is on disk.
     fn part(&mut self, identity: &Identity, before: &[Line]) -> Result<Scribe, RecordingError> {
         segments::clean(&self.folder);
-        let earlier = segments::earlier(&self.folder, before.len());
+        let earlier = segments::earlier(&self.folder, before);
         let (drawn, missing) = before.split_at(earlier.lines.min(before.len()));
         let path = segments::next_part(&self.folder);
         let stream = identity.file(self.path.insert(path))?;

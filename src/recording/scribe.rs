@@ -5,6 +5,7 @@ mod document;
 mod measured;
 mod plan;
 mod result;
+mod tracker;
 
 use jiff::Timestamp;
 use rerun::{RecordingStream, TextDocument, TextLog};
@@ -17,6 +18,7 @@ use crate::profile::Profile;
 use crate::session::journal::{Entry, Line, Sum, encode};
 use crate::session::state::Session;
 use nalgebra::{Isometry3, Point3};
+use tracker::Station;
 
 /// Draws a session.
 #[derive(Debug)]
@@ -24,6 +26,9 @@ pub(super) struct Scribe {
     canvas: Canvas,
     purpose: Purpose,
     session: Session,
+    station: Station,
+    /// The tracker has to be drawn anew.
+    has_moved: bool,
     sum: Sum,
     /// Results so far.
     runs: usize,
@@ -40,6 +45,8 @@ impl Scribe {
             canvas: Canvas::new(stream),
             purpose,
             session: Session::default(),
+            station: Station::default(),
+            has_moved: false,
             sum: Sum::default(),
             runs: 0,
             has_temperatures: false,
@@ -70,6 +77,10 @@ impl Scribe {
         if !follows {
             return;
         }
+        if std::mem::take(&mut self.has_moved) {
+            let taken = if let Entry::Sample(noted) = &line.entry { Some(noted.number) } else { None };
+            self.station.draw_all(&self.canvas, &self.session, taken);
+        }
         match &line.entry {
             Entry::Opened { program, name, .. } => document::opening(&self.canvas, program, name, line.time),
             Entry::Profile { .. } => {
@@ -82,7 +93,7 @@ impl Scribe {
                 self.points();
             }
             Entry::Sample(noted) => {
-                measured::sample(&self.canvas, &self.session, noted, line.time);
+                measured::sample(&self.canvas, &self.session, &self.station, noted, line.time);
                 plan::points(&self.canvas, &self.session, false);
                 if self.has_temperatures != had_temperatures {
                     self.layout();
@@ -91,7 +102,7 @@ impl Scribe {
             Entry::Correction(_) => {
                 // It may have changed where the robot stood, or the unit, at any of them.
                 for sample in &self.session.samples {
-                    measured::sample(&self.canvas, &self.session, &sample.noted, sample.time);
+                    measured::sample(&self.canvas, &self.session, &self.station, &sample.noted, sample.time);
                 }
                 self.points();
             }
@@ -100,7 +111,7 @@ impl Scribe {
                 if self.runs == 1 {
                     self.layout();
                 }
-                result::draw(&self.canvas, &self.session, identified, self.runs, line.time);
+                result::draw(&self.canvas, &self.session, &self.station, identified, self.runs, line.time);
             }
             _ => {}
         }
@@ -117,13 +128,14 @@ impl Scribe {
             _ => {}
         }
         self.is_lost = self.is_lost || self.session.apply(line).is_err();
+        self.has_moved = !self.is_lost && self.station.follow(&self.session, &line.entry);
         !self.is_lost
     }
 
     /// The cell as soon as the robot is known.
     fn cell(&self) {
         if let Some(profile) = self.session.mounted_profile() {
-            cell::draw(&self.canvas, &profile);
+            cell::draw(&self.canvas, &profile, &self.station);
         }
     }
 

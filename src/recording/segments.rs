@@ -1,16 +1,19 @@
 //! The files of a recording in the folder of its session.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
+use rerun::external::re_log_types::StoreSource;
 use rerun::sink::LogSink;
 use rerun::{RecordingStream, RecordingStreamBuilder};
 
 use super::blueprint::Purpose;
+use super::compact::Compaction;
 use super::scribe::Scribe;
 use super::sink::DurableSink;
 use super::{RecordingError, compact, names, read};
-use crate::session::journal::{Entry, Line};
+use crate::session::journal::{Entry, Line, says};
 use crate::session::sha256;
 
 /// Name of the recording in a session's folder.
@@ -57,6 +60,7 @@ impl Identity {
     /// A stream into `sink`.
     pub(super) fn stream(&self, sink: DurableSink) -> Result<RecordingStream, RecordingError> {
         self.builder()
+            .store_source(StoreSource::Other(names::PART.to_owned()))
             .set_sinks(vec![Box::new(sink) as Box<dyn LogSink>])
             .map_err(|error| RecordingError::library("beginning the recording", error))
     }
@@ -98,24 +102,39 @@ pub(super) struct Earlier {
     pub(super) void: Vec<PathBuf>,
 }
 
-/// Looks through the files in `folder`, whose journal has `count` lines.
-pub(super) fn earlier(folder: &Path, count: usize) -> Earlier {
+/// Looks through the files in `folder`, whose journal has these lines.
+pub(super) fn earlier(folder: &Path, lines: &[Line]) -> Earlier {
     let mut earlier = Earlier::default();
     for file in files(folder) {
         let first = i64::try_from(earlier.lines + 1).unwrap_or(i64::MAX);
-        let found = match read::line_numbers(&file) {
-            Ok((numbers, 0)) if compact::has_index(&file).unwrap_or(false) => numbers,
-            _ => Vec::new(),
+        let found = match read::journal_lines(&file) {
+            Ok((texts, seen)) if seen.damaged == 0 && compact::has_index(&file).unwrap_or(false) => texts,
+            _ => BTreeMap::new(),
         };
         // One that goes on where the others end, and has nothing that the journal has not.
-        let follows = !found.is_empty() && found.iter().copied().eq((first..).take(found.len()));
-        if follows && earlier.void.is_empty() && earlier.lines + found.len() <= count {
+        let follows = !found.is_empty() && found.keys().copied().eq((first..).take(found.len()));
+        if follows && earlier.void.is_empty() && found.iter().all(|(number, text)| is_of(lines, *number, text)) {
             earlier.lines += found.len();
         } else {
             earlier.void.push(file);
         }
     }
     earlier
+}
+
+/// Whether the line `number` of the journal says this.
+fn is_of(lines: &[Line], number: i64, text: &str) -> bool {
+    let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
+    index.and_then(|index| lines.get(index)).is_some_and(|line| says(text, line))
+}
+
+/// Numbers of the lines in the recording at `path` that the journal with these lines has not, or that say something else there.
+///
+/// # Errors
+/// The file cannot be read or is not a recording of this program.
+pub fn foreign_lines(path: &Path, lines: &[Line]) -> Result<Vec<i64>, RecordingError> {
+    let (texts, _seen) = read::journal_lines(path)?;
+    Ok(texts.into_iter().filter(|(number, text)| !is_of(lines, *number, text)).map(|(number, _)| number).collect())
 }
 
 /// Removes files.
@@ -140,12 +159,12 @@ pub(super) fn clean(folder: &Path) {
 /// # Errors
 /// A file cannot be read or written; nothing is lost then.
 pub fn compact_folder(folder: &Path, lines: &[Line]) -> Result<PathBuf, RecordingError> {
-    let found = earlier(folder, lines.len());
+    let found = earlier(folder, lines);
     if found.void.is_empty()
         && found.lines == lines.len()
         && let Some(path) = merge(folder)?
+        && compact::compact_file(&path)? == Compaction::AsItWas
     {
-        compact::compact_file(&path)?;
         return Ok(path);
     }
     rebuild(folder, lines)

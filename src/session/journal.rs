@@ -178,16 +178,44 @@ const fn damaged(line: usize, what: String) -> JournalError {
     JournalError::Damaged { line, what }
 }
 
-fn decode(bytes: &[u8], before: &Sum) -> Result<(Line, Sum), LineError> {
-    let text = std::str::from_utf8(bytes).map_err(|_error| LineError::Text("it is not UTF-8 text"))?;
-    let parts = || {
+/// Whether `text`, a line of a journal with its break, says what `line` says: the same number, time and entry. Check sums are not
+/// looked at, and fields that a program of another version leaves out count as it means them.
+pub fn says(text: &str, line: &Line) -> bool {
+    let Some(Parts { number, time, entry, .. }) = Parts::of(text.trim_end_matches('\n')) else { return false };
+    let same = || ron::to_string(&line.entry).is_ok_and(|own| own == entry || own_again(entry) == Some(own));
+    number == line.number && time == line.time && same()
+}
+
+/// An entry as this program writes it.
+fn own_again(entry: &str) -> Option<String> {
+    ron::to_string(&ron::from_str::<Entry>(entry).ok()?).ok()
+}
+
+/// A line taken to pieces.
+struct Parts<'a> {
+    sum: &'a str,
+    /// What the check sum is of.
+    rest: &'a str,
+    number: u64,
+    time: Timestamp,
+    entry: &'a str,
+}
+
+impl<'a> Parts<'a> {
+    /// `text` is without a line break.
+    fn of(text: &'a str) -> Option<Self> {
         let (sum, rest) = text.strip_prefix("(\"")?.split_once("\", ")?;
         let (number, after) = rest.split_once(", \"")?;
         let (time, entry) = after.split_once("\", ")?;
-        Some((sum, rest, number.parse().ok()?, Timestamp::from_str(time).ok()?, entry.strip_suffix(')')?))
-    };
-    let (sum, rest, number, time, entry) =
-        parts().ok_or(LineError::Text("it does not read like a line of a journal"))?;
+        let (number, time) = (number.parse().ok()?, Timestamp::from_str(time).ok()?);
+        Some(Self { sum, rest, number, time, entry: entry.strip_suffix(')')? })
+    }
+}
+
+fn decode(bytes: &[u8], before: &Sum) -> Result<(Line, Sum), LineError> {
+    let text = std::str::from_utf8(bytes).map_err(|_error| LineError::Text("it is not UTF-8 text"))?;
+    let Parts { sum, rest, number, time, entry } =
+        Parts::of(text).ok_or(LineError::Text("it does not read like a line of a journal"))?;
     let expected = before.next(rest);
     if sum != expected.0 {
         return Err(LineError::Text("its check sum does not fit"));

@@ -4,6 +4,8 @@
 //! seen. What was measured stays as it was noted; corrections are applied when samples are used ([`Session::point_of`] and the
 //! configuration).
 
+use std::collections::BTreeSet;
+
 use jiff::Timestamp;
 use nalgebra::Point3;
 use thiserror::Error;
@@ -61,6 +63,8 @@ pub struct Session {
     pub identities: Vec<String>,
     /// Number of the last measurement.
     pub measurements: u64,
+    /// No sample has ever belonged to this row of the plan or to a later one.
+    rows_measured: usize,
     /// From which measurement on noted coordinates have to be multiplied by what.
     pub scales: Vec<(u64, f64)>,
     /// What was set right, oldest first.
@@ -107,6 +111,13 @@ pub struct Row {
     pub active: bool,
     /// The operator does not want to measure it.
     pub skipped: bool,
+}
+
+impl Row {
+    /// Whether it is to be measured, if it was not.
+    const fn is_planned(&self) -> bool {
+        self.active && !self.skipped && self.planned.kind.is_measured()
+    }
 }
 
 /// What has become of a sample.
@@ -358,7 +369,9 @@ impl Session {
 
     /// The sample of a measurement.
     pub fn sample(&self, number: u64) -> Option<&Sample> {
-        self.samples.iter().find(|sample| sample.noted.number == number)
+        // Numbers rise from sample to sample.
+        let index = self.samples.binary_search_by_key(&number, |sample| sample.noted.number).ok()?;
+        self.samples.get(index)
     }
 
     /// The sample of a row that counts.
@@ -368,7 +381,7 @@ impl Session {
 
     /// Whether a row still waits to be measured.
     pub fn is_open(&self, index: usize) -> bool {
-        self.rows.get(index).is_some_and(|row| row.active && !row.skipped && row.planned.kind.is_measured())
+        self.rows.get(index).is_some_and(Row::is_planned)
             && !self
                 .samples
                 .iter()
@@ -377,7 +390,11 @@ impl Session {
 
     /// Rows that still wait to be measured, in order.
     pub fn open_rows(&self) -> impl Iterator<Item = usize> {
-        (0..self.rows.len()).filter(|&row| self.is_open(row))
+        let is_measured = |sample: &&Sample| matches!(sample.state, SampleState::Counts | SampleState::LeftOut);
+        // Once for all rows: large tables have as many of them as samples.
+        let measured: BTreeSet<usize> = self.samples.iter().filter(is_measured).map(|sample| sample.row).collect();
+        let rows = self.rows.iter().enumerate();
+        rows.filter(|(_, row)| row.is_planned()).map(|(index, _)| index).filter(move |index| !measured.contains(index))
     }
 
     /// Where the SMR of a sample was seen, in the tracker frame (m), corrections applied.
@@ -461,11 +478,14 @@ impl Session {
         }
         self.measurements = noted.number;
         self.shown = Some(noted.row);
-        for sample in self.samples.iter_mut().filter(|sample| sample.row == noted.row) {
+        // Most rows are measured once: of a large table not every sample need be looked through for every one.
+        let again = if noted.row < self.rows_measured { self.samples.as_mut_slice() } else { &mut [] };
+        for sample in again.iter_mut().filter(|sample| sample.row == noted.row) {
             if matches!(sample.state, SampleState::Counts | SampleState::LeftOut) {
                 sample.state = SampleState::Superseded;
             }
         }
+        self.rows_measured = self.rows_measured.max(noted.row + 1);
         self.samples.push(Sample {
             row: noted.row,
             joints: noted.reported_joints.clone().unwrap_or_else(|| noted.joints.clone()),
@@ -537,6 +557,7 @@ impl Session {
                 }
                 let sample = self.sample_mut(moved)?;
                 (sample.row, sample.joints) = (*row, joints);
+                self.rows_measured = self.rows_measured.max(*row + 1);
                 self.settle(|number| number == moved);
                 self.keep_latest(*row);
             }

@@ -16,6 +16,14 @@ use crate::session::journal::{self, FILE_NAME, Journal, JournalError, Line, Sum}
 /// Name of the file whose lock says that a program works in the folder.
 const LOCK_NAME: &str = ".lock";
 
+/// What is said where the journal does not end as this program has left it.
+const FOREIGN: &str = "another program has written to this session; nothing is written here any more: end both programs, and \
+                       look with 'trupose session show' what the journal has";
+
+/// What is said where the journal is not the file any more that was opened.
+const GONE: &str =
+    "the journal was removed or replaced while the session is open; nothing is written to what is left of it";
+
 /// Incomplete ends of the journal are kept as `journal.torn-1`, `journal.torn-2`, …
 const TORN_NAME: &str = "journal.torn";
 
@@ -71,6 +79,12 @@ pub trait Medium {
     /// It may not be there.
     fn sync(&mut self) -> io::Result<()>;
 
+    /// Bytes that are there.
+    ///
+    /// # Errors
+    /// It cannot be told.
+    fn length(&mut self) -> io::Result<u64>;
+
     /// Cuts everything behind the first `length` bytes off.
     ///
     /// # Errors
@@ -88,6 +102,10 @@ impl Medium for File {
         self.sync_data()
     }
 
+    fn length(&mut self) -> io::Result<u64> {
+        self.metadata().map(|found| found.len())
+    }
+
     fn cut(&mut self, length: u64) -> io::Result<()> {
         self.set_len(length)
     }
@@ -101,19 +119,21 @@ pub struct JournalWriter<M> {
     length: u64,
     /// Bytes behind `length` may be there from a write that failed.
     torn: bool,
+    /// Where the medium ends as this writer has left it; `None`: it could not be told.
+    end: Option<u64>,
 }
 
 impl<M: Medium> JournalWriter<M> {
     /// Goes on after the complete lines of `journal`, which `medium` holds.
     pub fn after(medium: M, journal: &Journal) -> Self {
-        let torn = journal.torn_bytes > 0;
-        Self { medium, sum: journal.sum.clone(), length: journal.good_bytes as u64, torn }
+        let (length, torn) = (journal.good_bytes as u64, journal.torn_bytes as u64);
+        Self { medium, sum: journal.sum.clone(), length, torn: torn > 0, end: Some(length + torn) }
     }
 
     /// Writes lines and forces them to disk: all of them count, or none.
     ///
     /// # Errors
-    /// None of the lines counts; a later try may succeed.
+    /// None of the lines counts; a later try may succeed. Where another program has written, nothing is written or cut off.
     pub fn append(&mut self, lines: &[Line]) -> io::Result<()> {
         let mut text = String::new();
         let mut sum = self.sum.clone();
@@ -121,6 +141,10 @@ impl<M: Medium> JournalWriter<M> {
             let (encoded, next) = journal::encode(line, &sum).map_err(io::Error::other)?;
             text.push_str(&encoded);
             sum = next;
+        }
+        let end = self.medium.length()?;
+        if self.end.is_some_and(|own| own != end) {
+            return Err(io::Error::other(FOREIGN));
         }
         if self.torn {
             self.medium.cut(self.length)?;
@@ -130,10 +154,12 @@ impl<M: Medium> JournalWriter<M> {
             Ok(()) => {
                 self.sum = sum;
                 self.length += text.len() as u64;
+                self.end = Some(self.length);
                 Ok(())
             }
             Err(error) => {
                 self.torn = self.medium.cut(self.length).and_then(|()| self.medium.sync()).is_err();
+                self.end = self.medium.length().ok();
                 Err(error)
             }
         }
@@ -186,6 +212,7 @@ impl SessionFolder {
         let path = folder.join(FILE_NAME);
         let failed = |source| StoreError::Write { path: path.clone(), source };
         let file = OpenOptions::new().read(true).write(true).create_new(true).open(&path).map_err(failed)?;
+        lock_journal(&file, folder, &path)?;
         // The new names themselves must survive a power cut.
         for place in [folder, root] {
             File::open(place).and_then(|place| place.sync_all()).map_err(failed)?;
@@ -203,16 +230,17 @@ impl SessionFolder {
             return Err(SessionError::NotASession { folder: folder.to_owned() });
         }
         let lock = lock(folder)?;
-        let bytes = read(&path)?;
-        let journal = journal::read(&bytes).map_err(|source| SessionError::Journal { path: path.clone(), source })?;
-        if journal.torn_bytes > 0 {
-            set_aside(folder, bytes.get(journal.good_bytes..).unwrap_or_default());
-        }
         let file = OpenOptions::new()
             .read(true)
             .write(true)
             .open(&path)
             .map_err(|source| StoreError::Write { path: path.clone(), source })?;
+        lock_journal(&file, folder, &path)?;
+        let bytes = read(&path)?;
+        let journal = journal::read(&bytes).map_err(|source| SessionError::Journal { path: path.clone(), source })?;
+        if journal.torn_bytes > 0 {
+            set_aside(folder, bytes.get(journal.good_bytes..).unwrap_or_default());
+        }
         remove_leftovers(folder);
         let writer = JournalWriter::after(file, &journal);
         Ok((Self { folder: folder.to_owned(), writer, _lock: lock }, journal))
@@ -228,7 +256,13 @@ impl SessionFolder {
     /// # Errors
     /// None of the lines counts.
     pub fn append(&mut self, lines: &[Line]) -> Result<(), StoreError> {
-        self.writer.append(lines).map_err(|source| StoreError::Write { path: self.folder.join(FILE_NAME), source })
+        let path = self.folder.join(FILE_NAME);
+        let written = match is_same(self.writer.medium(), &path) {
+            Ok(true) => self.writer.append(lines),
+            Ok(false) => Err(io::Error::other(GONE)),
+            Err(error) => Err(error),
+        };
+        written.map_err(|source| StoreError::Write { path, source })
     }
 
     /// Replaces a result file.
@@ -307,6 +341,36 @@ fn lock(folder: &Path) -> Result<File, SessionError> {
     // Who holds it is a help for people only: a full disk must not keep anybody from resuming.
     drop(file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())));
     Ok(file)
+}
+
+/// Takes the lock of the journal itself: that of the folder is gone where somebody removes its file.
+fn lock_journal(file: &File, folder: &Path, path: &Path) -> Result<(), SessionError> {
+    if !cfg!(unix) {
+        // Elsewhere who locks a file keeps others from reading it.
+        return Ok(());
+    }
+    match file.try_lock() {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => Err(SessionError::Locked { folder: folder.to_owned(), process: None }),
+        Err(TryLockError::Error(source)) => Err(StoreError::Write { path: path.to_owned(), source }.into()),
+    }
+}
+
+/// Whether `path` still is the file that was opened.
+fn is_same(file: &File, path: &Path) -> io::Result<bool> {
+    let found = match fs::metadata(path) {
+        Ok(found) => found,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        Err(error) => return Err(error),
+    };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt as _;
+        let own = file.metadata()?;
+        Ok((own.dev(), own.ino()) == (found.dev(), found.ino()))
+    }
+    #[cfg(not(unix))]
+    Ok(file.metadata()?.len() == found.len())
 }
 
 #[cfg(test)]

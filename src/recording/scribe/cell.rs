@@ -6,28 +6,27 @@ use rerun::{
     ViewCoordinates,
 };
 
+use super::tracker::Station;
 use super::{Posture, reach};
 use crate::kinematics::Convention;
 use crate::profile::{Capsule, Profile};
 use crate::recording::canvas::{Canvas, Moment};
 use crate::recording::{layout, names};
 
-/// Size of the tracker (m).
-const TRACKER_SIZE: [f32; 3] = [0.11, 0.11, 0.16];
 /// Lines of the floor are this far apart (m).
 const FLOOR_STEP: f64 = 0.5;
 
 /// Draws the cell of `profile` and its arm in the middle of its ranges.
-pub(super) fn draw(canvas: &Canvas, profile: &Profile) {
+pub(super) fn draw(canvas: &Canvas, profile: &Profile, station: &Station) {
     canvas.fix(names::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP());
     floor(canvas, profile);
-    tracker(canvas, profile);
+    station.draw(canvas, profile);
     keep_out(canvas, profile);
     styles(canvas, profile);
     arm(canvas, profile);
-    pose(canvas, profile, &rest(profile), Moment::pose(0));
+    pose(canvas, profile, station, &rest(profile), Moment::pose(0));
     // The timelines of the computations show the arm too.
-    pose(canvas, profile, &rest(profile), Moment::search(0));
+    pose(canvas, profile, station, &rest(profile), Moment::search(0));
 }
 
 /// Looks that never change are said once: every row is smaller without them.
@@ -36,7 +35,9 @@ fn styles(canvas: &Canvas, profile: &Profile) {
     canvas.fix(names::BEAM, &beam);
     let points =
         |size: f32, color| Points3D::update_fields().with_radii([Radius::new_ui_points(size)]).with_colors([color]);
-    canvas.fix(names::MEASURED, &Points3D::update_fields().with_radii([Radius::new_ui_points(4.0)]));
+    // Names of dozens of points would cover the picture: they are shown of the one that is pointed at.
+    let measured = Points3D::update_fields().with_radii([Radius::new_ui_points(4.0)]).with_show_labels(false);
+    canvas.fix(names::MEASURED, &measured);
     canvas.fix(names::NEXT, &points(7.0, layout::ATTENTION));
     canvas.fix(names::UNUSED, &points(5.0, layout::OUT));
     if profile.bodies().is_empty() {
@@ -64,7 +65,7 @@ pub(super) fn rest(profile: &Profile) -> Vec<f64> {
 }
 
 /// The nominal arm at the pendant configuration `q` ((rad) or (m)), with the beam to its reflector.
-pub(super) fn pose(canvas: &Canvas, profile: &Profile, q: &[f64], moment: Moment) {
+pub(super) fn pose(canvas: &Canvas, profile: &Profile, station: &Station, q: &[f64], moment: Moment) {
     let posture = Posture::nominal(profile, q);
     for (index, frame) in posture.frames.iter().enumerate() {
         canvas.draw(moment, names::NOMINAL_FRAMES, &layout::frame(frame, &names::frame("nominal", index)));
@@ -74,8 +75,7 @@ pub(super) fn pose(canvas: &Canvas, profile: &Profile, q: &[f64], moment: Moment
     if profile.bodies().is_empty() {
         canvas.draw(lines, names::NOMINAL_SKELETON, &skeleton(&posture));
     }
-    let beam = [layout::at(&profile.tracker().position_in_base), layout::at(&posture.reflector)];
-    canvas.draw(lines, names::BEAM, &LineStrips3D::update_fields().with_strips([beam]));
+    station.beam(canvas, profile, &posture, lines);
 }
 
 fn floor(canvas: &Canvas, profile: &Profile) {
@@ -104,15 +104,6 @@ fn floor(canvas: &Canvas, profile: &Profile) {
     .with_colors([layout::CELL])
     .with_fill_mode(FillMode::Solid);
     canvas.fix(names::BASE, &base);
-}
-
-fn tracker(canvas: &Canvas, profile: &Profile) {
-    let tracker =
-        Boxes3D::from_centers_and_half_sizes([layout::at(&profile.tracker().position_in_base)], [TRACKER_SIZE])
-            .with_colors([layout::TRACKER])
-            .with_fill_mode(FillMode::Solid)
-            .with_labels(["tracker"]);
-    canvas.fix(names::TRACKER, &tracker);
 }
 
 fn keep_out(canvas: &Canvas, profile: &Profile) {

@@ -14,7 +14,8 @@ use crate::session::summary::{ModelSummary, StatisticsSummary, VerdictStatus};
 const GUIDE: &str = "\
 # How to read this recording
 
-Drag the time cursor along **pose**: the arm goes from measurement to measurement.
+Drag the time cursor along **pose**: the arm goes from measurement to measurement. The timeline counts measurements: a pose that
+is measured again has several. Which pose of the plan it was says the log, and the name of the measured point.
 
 | in the picture | what it is |
 |---|---|
@@ -26,7 +27,7 @@ Drag the time cursor along **pose**: the arm goes from measurement to measuremen
 | yellow points | next pose, or a sample in doubt |
 | small grey points | poses of the plan that wait |
 | brown points | skipped, or left out |
-| violet | tracker and beam |
+| violet | tracker and beam: as planned until four points are measured, then where the points say that it stands |
 
 How much is enlarged stands above the robot. Errors are measured less predicted, in the robot base, after the tracker was
 registered to each arm.

@@ -4,32 +4,32 @@ use jiff::Timestamp;
 use nalgebra::Point3;
 use rerun::{Points3D, Scalars};
 
+use super::tracker::Station;
 use super::{Posture, cell, pose_moment};
-use crate::geometry::register;
 use crate::profile::Profile;
 use crate::recording::canvas::Canvas;
+use crate::recording::read::plain;
 use crate::recording::{layout, names};
 use crate::session::journal::MeasuredText;
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, Session};
 use crate::units::to_mm;
 
-/// Fewer points than this do not tell where the tracker is.
-const FEWEST: usize = 4;
-
 /// Draws a sample that `session` has taken already.
-pub(super) fn sample(canvas: &Canvas, session: &Session, noted: &MeasuredText, time: Timestamp) {
+pub(super) fn sample(canvas: &Canvas, session: &Session, station: &Station, noted: &MeasuredText, time: Timestamp) {
     let (Some(profile), Some(sample)) = (session.mounted_profile(), session.sample(noted.number)) else { return };
     let moment = pose_moment(noted.number, time);
     let q = session.configuration_of(sample);
-    cell::pose(canvas, &profile, &q, moment);
+    cell::pose(canvas, &profile, station, &q, moment);
     let color = match session.kind_of(sample) {
         _ if !noted.findings.is_empty() => layout::ATTENTION,
         PoseKind::Verification => layout::VERIFICATION,
         _ => layout::DONE,
     };
-    let dot =
-        Points3D::update_fields().with_positions([layout::at(&place(session, &profile, sample))]).with_colors([color]);
+    let dot = Points3D::update_fields()
+        .with_positions([layout::at(&place(session, &profile, station, sample))])
+        .with_colors([color])
+        .with_labels([plain(&format!("pose {}", session.pose_of(sample)))]);
     canvas.draw(moment, names::MEASURED, &dot);
     let (x, y, z) = noted.xyz_mm;
     canvas.draw(moment, names::READING, &Scalars::new([x, y, z]));
@@ -51,15 +51,12 @@ pub(super) fn sample(canvas: &Canvas, session: &Session, noted: &MeasuredText, t
 
 /// Where the point is in the base: the tracker is registered to the nominal arm by the samples so far; before there are
 /// enough of them, where the nominal arm has it.
-fn place(session: &Session, profile: &Profile, sample: &Sample) -> Point3<f64> {
-    let predicted = |sample: &Sample| Posture::nominal(profile, &session.configuration_of(sample)).reflector;
-    let pairs: Vec<(Point3<f64>, Point3<f64>)> =
-        session.counted().map(|sample| (session.point_of(sample), predicted(sample))).collect();
-    let registered = (pairs.len() >= FEWEST)
-        .then(|| register(pairs.iter().map(|(from, to)| (1.0, *from, *to))))
-        .flatten()
-        .map(|found| found.to_from_from * session.point_of(sample));
-    registered.filter(|point| point.coords.iter().all(|value| value.is_finite())).unwrap_or_else(|| predicted(sample))
+fn place(session: &Session, profile: &Profile, station: &Station, sample: &Sample) -> Point3<f64> {
+    let registered = station.base_from_tracker().map(|base_from_tracker| base_from_tracker * session.point_of(sample));
+    let is_finite = |point: &Point3<f64>| point.coords.iter().all(|value| value.is_finite());
+    registered
+        .filter(is_finite)
+        .unwrap_or_else(|| Posture::nominal(profile, &session.configuration_of(sample)).reflector)
 }
 
 /// How far a repeated pose is from its first measurement (mm).

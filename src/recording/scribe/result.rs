@@ -9,6 +9,7 @@ use rerun::{
     SeriesPoints, Tensor, TensorData,
 };
 
+use super::tracker::Station;
 use super::{Posture, cell, document, reach};
 use crate::geometry::{enlargement, register};
 use crate::profile::Profile;
@@ -46,7 +47,14 @@ struct Judged<'a> {
 }
 
 /// Draws result number `run` of `session`.
-pub(super) fn draw(canvas: &Canvas, session: &Session, identified: &IdentifiedText, run: usize, time: Timestamp) {
+pub(super) fn draw(
+    canvas: &Canvas,
+    session: &Session,
+    station: &Station,
+    identified: &IdentifiedText,
+    run: usize,
+    time: Timestamp,
+) {
     let Some(profile) = session.mounted_profile() else { return };
     document::report(canvas, session, identified, time);
     parameters(canvas, identified);
@@ -63,6 +71,7 @@ pub(super) fn draw(canvas: &Canvas, session: &Session, identified: &IdentifiedTe
     series(canvas, session, &judged, run);
     pairs(canvas, &judged);
     ellipsoids(canvas, &judged, scales.ellipsoid);
+    cell::pose(canvas, &profile, station, &cell::rest(&profile), Moment::solver(0));
     solver(canvas, &profile, identified, calibration, &judged, &scales);
     note(canvas, &profile, &scales);
 }
@@ -325,7 +334,6 @@ fn solver(
 ) {
     let rest = cell::rest(profile);
     let nothing = vec![0.0; calibration.parameters.len()];
-    cell::pose(canvas, profile, &rest, Moment::solver(0));
     canvas.fix(names::ERRORS_SOLVING, &arrow_style(layout::NOMINAL_ERROR));
     canvas.fix(names::COST_AND_STEP, &SeriesLines::new().with_names(["cost", "largest step"]));
     let steps = identified.summary.iterations.iter().map(|step| (Some(step), &step.deviations));

@@ -1,5 +1,7 @@
 //! The report of a session.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Point3;
 
 use super::decisions::{findings, not_counted};
@@ -164,18 +166,15 @@ fn counts(session: &Session) -> Counts {
         .into_iter()
         .flat_map(|kind| session.counted_of(kind))
         .collect();
-    let is_repeat = |(index, sample): (usize, &&Sample)| {
-        judged
-            .iter()
-            .take(index)
-            .any(|other| other.joints == sample.joints && other.noted.target == sample.noted.target)
-    };
+    // Minus zero is zero.
+    let joints = |sample: &Sample| sample.joints.iter().map(|value| (value + 0.0).to_bits()).collect::<Vec<u64>>();
+    let different: BTreeSet<_> = judged.iter().map(|sample| (joints(sample), sample.noted.target)).collect();
     let shots = || judged.iter().map(|sample| sample.noted.shots);
     Counts {
         identification: count(PoseKind::Identification),
         verification: count(PoseKind::Verification),
         drift: count(PoseKind::Drift),
-        repeats: judged.iter().enumerate().filter(|one| is_repeat(*one)).count(),
+        repeats: judged.len() - different.len(),
         fewest_shots: shots().min().unwrap_or(0),
         most_shots: shots().max().unwrap_or(0),
         open: session.open_rows().count(),

@@ -1,5 +1,7 @@
 //! The drawings of a report: errors per pose, their spread, against each joint, the search, the prediction, the drift.
 
+use std::collections::BTreeSet;
+
 use super::markup::{counted, number};
 use super::plot::{Mark, Plot, Scale, WIDTH};
 use crate::report::document::{Details, DriftPart, PointPart, PredictionPart, RobotPart};
@@ -9,6 +11,39 @@ use crate::session::plan_summary::SearchStepSummary;
 const BINS: usize = 12;
 /// Size of a drawing in one of three columns.
 const SMALL: (f64, f64) = (236.0, 150.0);
+
+/// Most points of a drawing and rows of a table; with more a page could not be opened.
+pub(super) const MOST: usize = 500;
+/// So many of the points of a thinned drawing are the worst.
+const WORST: usize = 100;
+
+/// The points of a drawing with their places in `points`: all, or the worst and some evenly chosen.
+pub(super) fn shown<'a>(points: &[&'a PointPart]) -> Vec<(usize, &'a PointPart)> {
+    if points.len() <= MOST {
+        return points.iter().copied().enumerate().collect();
+    }
+    let step = points.len().div_ceil(MOST - WORST);
+    let mut chosen: BTreeSet<usize> = worst(points).into_iter().take(WORST).collect();
+    chosen.extend((0..points.len()).step_by(step));
+    chosen.into_iter().filter_map(|index| Some((index, *points.get(index)?))).collect()
+}
+
+/// The places of all points, the worst first: by the error of the identified arm.
+pub(super) fn worst(points: &[&PointPart]) -> Vec<usize> {
+    let error = |index: &usize| points.get(*index).map_or(0.0, |point| norm(point.identified_mm));
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|one, other| error(other).total_cmp(&error(one)));
+    order
+}
+
+/// What is said where not all of `count` points are drawn; empty where all are.
+pub(super) fn thinned(count: usize) -> String {
+    if count <= MOST {
+        return String::new();
+    }
+    let step = count.div_ceil(MOST - WORST);
+    format!("; of {count} samples one in {step} is drawn, and the {WORST} worst")
+}
 
 /// Length of an error.
 pub(super) fn norm([x, y, z]: [f64; 3]) -> f64 {
@@ -20,7 +55,7 @@ pub(super) fn per_pose(points: &[&PointPart], title: &str, caption: &str) -> Str
     let all = points.iter().flat_map(|point| [norm(point.nominal_mm), norm(point.identified_mm)]);
     let x = Scale::linear(0.0, points.len() as f64 + 1.0);
     let mut plot = Plot::new((WIDTH, 210.0), (x, "pose, in the order of measuring"), (Scale::log(all), "mm"));
-    for (index, point) in points.iter().enumerate() {
+    for (index, point) in shown(points) {
         let x = (index + 1) as f64;
         let (before, after) = (plot.at(x, norm(point.nominal_mm)), plot.at(x, norm(point.identified_mm)));
         if let (Some(before), Some(after)) = (before, after) {
@@ -34,7 +69,7 @@ pub(super) fn per_pose(points: &[&PointPart], title: &str, caption: &str) -> Str
         legend.push((Mark::Rejected, "rejected"));
     }
     plot.legend(&legend);
-    plot.figure(title, caption)
+    plot.figure(title, &format!("{caption}{}", thinned(points.len())))
 }
 
 /// How the errors of one model are spread.
@@ -69,6 +104,9 @@ pub(super) fn histogram(errors: &[f64], is_identified: bool) -> String {
 /// Errors of the identified arm against every joint.
 pub(super) fn against_joints(robot: &RobotPart, points: &[PointPart]) -> String {
     let used: Vec<&PointPart> = points.iter().filter(|point| !point.rejected).collect();
+    let caption = thinned(used.len());
+    let caption = caption.trim_start_matches("; ");
+    let used: Vec<&PointPart> = shown(&used).into_iter().map(|(_, point)| point).collect();
     let largest = Scale::from_zero(used.iter().map(|point| norm(point.identified_mm)));
     let joints = robot.joints.iter().zip(&robot.joint_units).enumerate();
     joints
@@ -85,7 +123,7 @@ pub(super) fn against_joints(robot: &RobotPart, points: &[PointPart]) -> String 
                     }
                 }
             }
-            plot.figure(name, "")
+            plot.figure(name, caption)
         })
         .collect()
 }

@@ -1,10 +1,10 @@
 //! How it was planned, measured and fitted; what was left out and why; what was found and how it was decided.
 
-use super::charts::{drift, norm, prediction, search};
+use super::charts::{MOST, drift, norm, prediction, search};
 use super::markup::{Column, add, counted, escape, facts, number, optional, paragraph, table, time};
 use crate::report::document::{Details, Document, PlanPart};
 use crate::report::text::{gap, sigma_origin, termination};
-use crate::session::summary::{EstimatorName, IdentificationSummary};
+use crate::session::summary::{EstimatorName, IdentificationSummary, RejectedSummary};
 
 /// Plan, fit and drift.
 pub(super) fn section(document: &Document) -> String {
@@ -194,11 +194,18 @@ fn rejected(document: &Document) -> String {
         ("times the scatter", Column::Number),
         ("why", Column::Text),
     ];
-    let rows: Vec<Vec<String>> = result
-        .rejected
+    let mut listed: Vec<&RejectedSummary> = result.rejected.iter().collect();
+    let mut some = String::new();
+    if listed.len() > MOST {
+        listed.sort_by(|one, other| other.residual_mm.total_cmp(&one.residual_mm));
+        listed.truncate(MOST);
+        some = format!("; the {MOST} that are farthest off are listed, all are in report.json");
+    }
+    let rows: Vec<Vec<String>> = listed
         .iter()
         .map(|one| vec![escape(&one.pose), number(one.residual_mm, 3), number(one.ratio, 0), escape(&one.reason)])
         .collect();
-    let caption = format!("Rejected by the identification: {} of {} samples", result.rejected.len(), result.samples);
+    let caption =
+        format!("Rejected by the identification: {} of {} samples{some}", result.rejected.len(), result.samples);
     table(&caption, &columns, &rows, false)
 }

@@ -1,6 +1,6 @@
 //! The verdict, and the accuracy on poses that the identification did not see.
 
-use super::charts::{against_joints, histogram, norm, of_kind, per_pose};
+use super::charts::{MOST, against_joints, histogram, norm, of_kind, per_pose, worst};
 use super::markup::{Column, NONE, add, counted, escape, list, number, optional, paragraph, table};
 use super::views::views;
 use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
@@ -32,8 +32,20 @@ pub(super) fn section(document: &Document) -> String {
         reasons.join("; ")
     );
     html.push_str(&limits(&result.verdict.checks));
-    html.push_str(&result.warnings.iter().map(warning).collect::<String>());
+    html.push_str(&warnings(&result.warnings));
     html
+}
+
+/// The warnings; of very many those that block the acceptance come first, and not all are shown.
+fn warnings(all: &[Warning]) -> String {
+    let mut shown: Vec<&Warning> = all.iter().collect();
+    if all.len() <= MOST {
+        return shown.into_iter().map(warning).collect();
+    }
+    shown.sort_by_key(|warning| !warning.blocks_acceptance);
+    shown.truncate(MOST);
+    let more = paragraph(&format!("And {} more; all are in report.json.", all.len() - MOST));
+    shown.into_iter().map(warning).collect::<String>() + &more
 }
 
 fn limits(checks: &[LimitCheck]) -> String {
@@ -259,8 +271,11 @@ fn poses(points: &[&PointPart]) -> String {
         ("ΔY", Column::Number),
         ("ΔZ", Column::Number),
     ];
-    let rows: Vec<Vec<String>> = points
+    let mut listed: Vec<usize> = worst(points).into_iter().take(MOST).collect();
+    listed.sort_unstable();
+    let rows: Vec<Vec<String>> = listed
         .iter()
+        .filter_map(|index| points.get(*index))
         .map(|point| {
             let pose = if point.pose.is_empty() { NONE.to_owned() } else { escape(&point.pose) };
             let lengths = [norm(point.nominal_mm), norm(point.identified_mm)].map(|value| number(value, 4));
@@ -268,5 +283,9 @@ fn poses(points: &[&PointPart]) -> String {
             [point.number.to_string(), pose].into_iter().chain(lengths).chain(axes).collect()
         })
         .collect();
-    table("Verification poses one by one; Δ of the identified arm (mm)", &columns, &rows, false)
+    let some = match points.len() {
+        count if count > MOST => format!(". The {MOST} worst of {count}; all are in report.json"),
+        _ => String::new(),
+    };
+    table(&format!("Verification poses one by one; Δ of the identified arm (mm){some}"), &columns, &rows, false)
 }

@@ -1,6 +1,6 @@
 //! The poses in space: two projections, with the errors drawn larger than they are by a factor that is stated.
 
-use super::charts::norm;
+use super::charts::{norm, shown, thinned};
 use super::markup::{add, counted};
 use super::plot::{Mark, figure, nice_above};
 use crate::geometry::enlargement;
@@ -47,6 +47,8 @@ fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pi
         .iter()
         .filter(|point| !point.rejected && point.at_mm.iter().chain(&error(point)).all(|value| value.is_finite()))
         .collect();
+    let all = points.len();
+    let points: Vec<&PointPart> = shown(&points).into_iter().map(|(_, point)| point).collect();
     let pick = |place: [f64; 3]| (place[view.axes.0], place[view.axes.1]);
     let arm: Vec<(f64, f64)> = report
         .arm_mm
@@ -91,8 +93,11 @@ fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pi
     }
     body.push_str(&bar(wide, scale));
     body.push_str(&cross(view.labels));
-    let caption =
-        format!("{}: errors drawn {exaggeration:.0} times as long as they are", counted(points.len(), "pose", "poses"));
+    let caption = format!(
+        "{}: errors drawn {exaggeration:.0} times as long as they are{}",
+        counted(all, "pose", "poses"),
+        thinned(all)
+    );
     figure(&format!("{name}, {}", view.name), &caption, (WIDTH, HEIGHT), &body)
 }
 

@@ -41,6 +41,10 @@ impl Medium for Faulty {
         if state.sync_fails { Err(io::Error::other("medium error")) } else { Ok(()) }
     }
 
+    fn length(&mut self) -> io::Result<u64> {
+        Ok(self.0.borrow().bytes.len() as u64)
+    }
+
     fn cut(&mut self, length: u64) -> io::Result<()> {
         let mut state = self.0.borrow_mut();
         if state.cut_fails {
@@ -314,6 +318,65 @@ fn a_session_is_held_by_one_at_a_time() {
     assert_eq!(error.to_string(), format!("session '{}' is open in another program", path.display()));
     drop(held);
     SessionFolder::open(&path).unwrap();
+}
+
+#[test]
+fn nothing_is_written_behind_what_another_program_has_written() {
+    let medium = Faulty::default();
+    medium.set(|state| state.room = 1 << 20);
+    let mut writer = JournalWriter::after(medium.clone(), &Journal::default());
+    writer.append(&[line(1)]).unwrap();
+    let own = medium.bytes();
+    medium.set(|state| state.bytes.extend_from_slice(b"foreign"));
+    let error = writer.append(&[line(2)]).unwrap_err();
+    assert!(error.to_string().contains("another program has written to this session"), "{error}");
+    assert_eq!(medium.bytes(), [own.as_slice(), b"foreign"].concat());
+    // Also behind what a write that failed has left, which is cut off otherwise.
+    medium.set(|state| state.bytes.truncate(own.len()));
+    medium.set(|state| (state.room, state.cut_fails) = (5, true));
+    writer.append(&[line(2)]).unwrap_err();
+    medium.set(|state| (state.room, state.cut_fails) = (1 << 20, false));
+    assert_eq!(medium.bytes().len(), own.len() + 5);
+    medium.set(|state| state.bytes.extend_from_slice(b"foreign"));
+    writer.append(&[line(2)]).unwrap_err();
+    assert!(medium.bytes().ends_with(b"foreign"));
+    medium.set(|state| state.bytes.truncate(own.len() + 5));
+    writer.append(&[line(2)]).unwrap();
+    assert_eq!(journal::read(&medium.bytes()).unwrap().lines, [line(1), line(2)]);
+}
+
+#[cfg(unix)]
+#[test]
+fn without_its_lock_file_a_session_is_still_held_by_one() {
+    let root = tempfile::tempdir().unwrap();
+    let mut held = SessionFolder::create(root.path(), "s").unwrap();
+    held.append(&[line(1)]).unwrap();
+    let folder = held.path().to_owned();
+    let is_locked = || matches!(SessionFolder::open(&folder), Err(SessionError::Locked { .. }));
+    fs::remove_file(folder.join(LOCK_NAME)).unwrap();
+    assert!(is_locked());
+    held.append(&[line(2)]).unwrap();
+    drop(held);
+    let (mut held, journal) = SessionFolder::open(&folder).unwrap();
+    assert_eq!(journal.lines, [line(1), line(2)]);
+    fs::remove_file(folder.join(LOCK_NAME)).unwrap();
+    assert!(is_locked());
+    // Who asks for no lock.
+    let path = folder.join(FILE_NAME);
+    let mut before = fs::read(&path).unwrap();
+    OpenOptions::new().append(true).open(&path).unwrap().write_all(b"foreign").unwrap();
+    before.extend_from_slice(b"foreign");
+    let error = SessionError::from(held.append(&[line(3)]).unwrap_err());
+    let cause = std::error::Error::source(&error).unwrap().to_string();
+    assert!(cause.contains("another program has written to this session"), "{cause}");
+    assert_eq!(fs::read(&path).unwrap(), before);
+    // Nor is it written where nobody will find it.
+    fs::rename(&path, folder.join("moved")).unwrap();
+    for _ in 0..2 {
+        let cause = std::error::Error::source(&held.append(&[line(3)]).unwrap_err()).unwrap().to_string();
+        assert!(cause.contains("was removed or replaced"), "{cause}");
+        fs::write(&path, &before).unwrap();
+    }
 }
 
 #[test]

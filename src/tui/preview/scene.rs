@@ -8,6 +8,7 @@ use crate::profile::{KeepOut, Profile};
 use crate::session::journal::from_xyz_mm;
 use crate::session::plan::PoseKind;
 use crate::session::state::Session;
+use crate::session::station;
 use crate::units::from_mm;
 
 /// Thickness of an arm whose profile has no bodies, as a part of its length.
@@ -208,6 +209,7 @@ impl Scene {
         let shown = row.and_then(|row| session.rows.get(row));
         let mut scene =
             shown.map_or_else(|| Self::at_rest(profile), |row| Self::of(profile, &row.planned.configuration));
+        scene.place_tracker(session);
         let target = profile.targets().first()?;
         let forward = ForwardKinematics::new(profile.chain());
         let doubts: Vec<usize> = session.doubts().map(|(sample, _)| sample.row).collect();
@@ -229,6 +231,7 @@ impl Scene {
     pub fn of_identified(session: &Session, with_errors: bool) -> Option<Self> {
         let profile = session.mounted_profile()?;
         let mut scene = Self::at_rest(&profile);
+        scene.place_tracker(session);
         let Some(result) = session.identified.as_deref() else { return Some(scene) };
         let chain = result.calibration.as_ref().and_then(|calibration| calibration.identified_chain(&profile));
         if let (Some(chain), false) = (&chain, with_errors) {
@@ -252,6 +255,16 @@ impl Scene {
             scene.show_errors(true);
         }
         Some(scene)
+    }
+
+    /// Puts the tracker where the measured points say that it stands; it stays as planned where they do not.
+    fn place_tracker(&mut self, session: &Session) {
+        let Some(found) = station::base_from_tracker(session) else { return };
+        let place = Point3::from(found.translation.vector);
+        self.tracker = Some(place);
+        if let Some(beam) = &mut self.beam {
+            beam.from = place;
+        }
     }
 
     /// Shows the errors of the identified or of the nominal arm, each so much longer that the largest is well seen.

@@ -3,6 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::profile::{Profile, builtin};
+use crate::session::state::Session;
 use crate::tui::glyphs::Glyphs;
 
 fn profile(name: &str) -> Profile {
@@ -47,6 +48,35 @@ fn the_paper_robot_at_80x24() {
     insta::assert_snapshot!("soochow_small", paint::snapshot(&drawn(&soochow(), &camera, Glyphs::Unicode, 40, 15)));
     insta::assert_snapshot!("soochow_ascii", paint::snapshot(&drawn(&soochow(), &camera, Glyphs::Ascii, 80, 24)));
     insta::assert_snapshot!("soochow_blocks", paint::snapshot(&drawn(&soochow(), &camera, Glyphs::Blocks, 80, 24)));
+}
+
+#[test]
+fn the_tracker_of_a_session_stands_where_its_readings_say() {
+    let text = include_bytes!("../../../sessions/example/journal.ron");
+    let mut journal = crate::session::journal::read(text).unwrap();
+    let session = Session::of(&journal).unwrap();
+    let scene = Scene::of_identified(&session, false).unwrap();
+    let tracker = scene.tracker.unwrap();
+    assert_eq!(Some(tracker), Scene::of_session(&session, None).unwrap().tracker);
+    assert_eq!(scene.beam.unwrap().from, tracker);
+    let planned = session.robot.as_ref().unwrap().profile.tracker().position_in_base;
+    assert!((planned - tracker).norm() > 0.02, "the test needs one that stands elsewhere: {tracker}");
+    // A tracker measures how far away a point is.
+    let result = session.identified.as_deref().unwrap();
+    assert!(result.samples.len() > 20);
+    for (number, point) in result.samples.iter().zip(&result.points).filter(|(_, point)| !point.rejected) {
+        let (x, y, z) = point.at_mm;
+        let away = (Point3::new(x, y, z) * 1e-3 - tracker).norm();
+        let measured = session.point_of(session.sample(*number).unwrap()).coords.norm();
+        assert!((away - measured).abs() < 0.02, "sample {number}: {away} m instead of {measured} m");
+    }
+    // Before four points are measured it stands as planned.
+    let is_sample =
+        |line: &&crate::session::journal::Line| matches!(line.entry, crate::session::journal::Entry::Sample(_));
+    let fourth = journal.lines.iter().filter(is_sample).nth(3).unwrap().number;
+    journal.lines.retain(|line| line.number < fourth);
+    let scene = Scene::of_session(&Session::of(&journal).unwrap(), None).unwrap();
+    assert_eq!(scene.tracker, Some(planned));
 }
 
 #[test]

@@ -1,0 +1,115 @@
+//! Where the tracker is drawn: as planned, until the measured points tell where it stands.
+
+use nalgebra::{Isometry3, Point3};
+use rerun::{Boxes3D, FillMode, LineStrips3D};
+
+use super::{Posture, cell};
+use crate::profile::Profile;
+use crate::recording::canvas::{Canvas, Moment};
+use crate::recording::{layout, names};
+use crate::session::journal::{Entry, IdentifiedText, from_xyz_mm};
+use crate::session::state::Session;
+use crate::session::station;
+use crate::units::MILLIMETRE;
+
+/// Size of the tracker (m).
+const TRACKER_SIZE: [f32; 3] = [0.11, 0.11, 0.16];
+/// It is drawn anew where it stands farther than this from where it is drawn (m): every time brings a row for every pose.
+const MOVED: f64 = 20.0 * MILLIMETRE;
+
+/// Where the tracker stands, as far as the lines of the journal tell.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Station {
+    /// The samples so far, registered to the nominal arm.
+    base_from_tracker: Option<Isometry3<f64>>,
+    /// Where it is drawn in the base; `None`: as planned.
+    drawn: Option<Point3<f64>>,
+    /// A result has said where it stands.
+    is_identified: bool,
+}
+
+impl Station {
+    /// Takes note of an entry that `session` has taken; `true` if the tracker has to be drawn anew.
+    pub(super) fn follow(&mut self, session: &Session, entry: &Entry) -> bool {
+        match entry {
+            Entry::Profile { .. } => *self = Self::default(),
+            Entry::Sample(_) | Entry::Correction(_) | Entry::Decision { .. } => {
+                self.base_from_tracker = station::base_from_tracker(session);
+                if let (Some(found), false) = (self.base_from_tracker, self.is_identified) {
+                    return self.stands_at(&found);
+                }
+            }
+            Entry::Identified(identified) => {
+                if let Some(found) = of_result(session, identified) {
+                    self.is_identified = true;
+                    return self.stands_at(&found);
+                }
+            }
+            _ => {}
+        }
+        false
+    }
+
+    fn stands_at(&mut self, base_from_tracker: &Isometry3<f64>) -> bool {
+        let place = Point3::from(base_from_tracker.translation.vector);
+        let is_new = self.drawn.is_none_or(|drawn| (drawn - place).norm() > MOVED);
+        if is_new {
+            self.drawn = Some(place);
+        }
+        is_new
+    }
+
+    /// The transform from measured coordinates into the base of the nominal arm, once it is known.
+    pub(super) const fn base_from_tracker(&self) -> Option<Isometry3<f64>> {
+        self.base_from_tracker
+    }
+
+    fn place(&self, profile: &Profile) -> Point3<f64> {
+        self.drawn.unwrap_or(profile.tracker().position_in_base)
+    }
+
+    /// Draws the tracker.
+    pub(super) fn draw(&self, canvas: &Canvas, profile: &Profile) {
+        let label = if self.drawn.is_some() { "tracker" } else { "tracker (as planned)" };
+        let body = Boxes3D::from_centers_and_half_sizes([layout::at(&self.place(profile))], [TRACKER_SIZE])
+            .with_colors([layout::TRACKER])
+            .with_fill_mode(FillMode::Solid)
+            .with_labels([label]);
+        canvas.fix(names::TRACKER, &body);
+    }
+
+    /// Draws the beam to the reflector of the nominal arm.
+    pub(super) fn beam(&self, canvas: &Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
+        let beam = [layout::at(&self.place(profile)), layout::at(&posture.reflector)];
+        canvas.draw(moment, names::BEAM, &LineStrips3D::update_fields().with_strips([beam]));
+    }
+
+    /// Draws the tracker and all beams of `session` anew, but that of the sample number `but`.
+    pub(super) fn draw_all(&self, canvas: &Canvas, session: &Session, but: Option<u64>) {
+        let Some(profile) = session.mounted_profile() else { return };
+        self.draw(canvas, &profile);
+        let rest = Posture::nominal(&profile, &cell::rest(&profile));
+        for moment in [Moment::pose(0), Moment::search(0)] {
+            self.beam(canvas, &profile, &rest, moment);
+        }
+        if session.identified.is_some() {
+            self.beam(canvas, &profile, &rest, Moment::solver(0));
+        }
+        for sample in session.samples.iter().filter(|sample| Some(sample.noted.number) != but) {
+            let posture = Posture::nominal(&profile, &session.configuration_of(sample));
+            self.beam(canvas, &profile, &posture, Moment::pose(sample.noted.number));
+        }
+    }
+}
+
+/// The transform from measured coordinates into the base of the identified arm.
+fn of_result(session: &Session, identified: &IdentifiedText) -> Option<Isometry3<f64>> {
+    let samples = identified.samples.iter().zip(&identified.points).filter(|(_, point)| !point.rejected);
+    let pairs: Vec<(Point3<f64>, Point3<f64>)> = samples
+        .filter_map(|(number, point)| {
+            let measured = session.point_of(session.sample(*number)?);
+            Some((measured, from_xyz_mm(point.at_mm) + from_xyz_mm(point.identified_mm).coords))
+        })
+        .collect();
+    station::registered(&pairs)
+}
