@@ -27,7 +27,7 @@ is measured again has several. Which pose of the plan it was says the log, and t
 | yellow points | next pose, or a sample in doubt |
 | small grey points | poses of the plan that wait |
 | brown points | skipped, or left out |
-| violet | tracker and beam: as planned until four points are measured, then where the points say that it stands |
+| violet | tracker and beam: as planned, from the fourth point on as measured |
 
 How much is enlarged stands above the robot. Errors are measured less predicted, in the robot base, after the tracker was
 registered to each arm.
