@@ -313,7 +313,7 @@ fn of_many_samples_the_worst_are_listed_and_some_are_drawn() {
             identified.points.extend(one.1.iter().map(|point| {
                 let (x, y, z) = point.identified_mm;
                 let worse = 1e-4 * f64::from(time);
-                PointErrorText { identified_mm: (x + worse * x.signum(), y, z), ..point.clone() }
+                PointErrorText { identified_mm: (x + worse * x.signum(), y, z), ..*point }
             }));
         }
         let warning =

@@ -65,7 +65,7 @@ impl Station {
     }
 
     fn place(&self, profile: &Profile) -> Point3<f64> {
-        self.drawn.unwrap_or(profile.tracker().position_in_base)
+        self.drawn.unwrap_or_else(|| profile.tracker().position_in_base)
     }
 
     /// Draws the tracker.
