@@ -89,6 +89,9 @@ pub enum LinkError {
     /// The robot is not ready for a measurement.
     #[error("the robot: {0}")]
     Robot(String),
+    /// The robot's controller cannot be asked.
+    #[error("the robot: {}", .0.words(protocol::CONTROLLER))]
+    Controller(protocol::Failure),
     /// The set-up cannot be simulated or played.
     #[error("{0}")]
     SetUp(String),

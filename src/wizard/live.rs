@@ -69,6 +69,11 @@ impl Live {
         self.latest = Some(reading);
     }
 
+    /// Why the link cannot be asked now.
+    pub(super) fn down(&self) -> Option<&str> {
+        self.latest.as_ref()?.down.as_deref()
+    }
+
     /// Nothing is seen any more.
     pub(super) fn clear(&mut self) {
         *self = Self::default();

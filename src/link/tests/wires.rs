@@ -338,3 +338,27 @@ fn the_raw_log_holds_what_came_and_went() {
     });
     assert!(bytes("in").contains(&hex), "{text}");
 }
+
+#[test]
+fn whatever_a_simulator_can_say_of_itself_says_that_it_is_simulated() {
+    for (protocol, says_so) in [
+        (WireProtocol::Emscon, true),
+        (WireProtocol::Geocom, true),
+        (WireProtocol::Ndi, true),
+        // Lines of points carry no name.
+        (WireProtocol::Ascii, false),
+    ] {
+        let identity = Bench::tcp(protocol, &[]).wired.connect().unwrap();
+        assert_eq!(identity.to_lowercase().contains("simulated"), says_so, "{protocol}: {identity}");
+    }
+}
+
+#[test]
+fn a_scale_of_the_tracker_refuses_the_link_and_a_shift_is_warned_of() {
+    let error = Bench::tcp(WireProtocol::Emscon, &["scaled@1x*"]).wired.connect().unwrap_err();
+    assert_eq!(error, LinkError::Instrument(Failure::Scaled(1.0001)));
+    let mut bench = Bench::tcp(WireProtocol::Emscon, &["moved@1x*"]);
+    let identity = bench.wired.connect().unwrap();
+    let warnings = bench.wired.warnings();
+    assert!(matches!(warnings.as_slice(), [text] if text.contains("distances stay right") && identity.contains(text)));
+}
