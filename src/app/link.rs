@@ -187,8 +187,13 @@ fn news_text(news: &LinkNews) -> String {
 }
 
 fn live_text(live: &LiveReading) -> String {
+    let unseen = match live.silent {
+        _ if live.is_blind => "no live view: this instrument shows nothing between shots".to_owned(),
+        Some(seconds) => format!("nothing: the instrument is silent for {seconds:.0} s"),
+        None => "no SMR, or no position between shots so far".to_owned(),
+    };
     let mut parts = vec![live.point.map_or_else(
-        || "no position between shots so far".to_owned(),
+        || unseen,
         |point| format!("x {:.3}  y {:.3}  z {:.3} mm", to_mm(point.x), to_mm(point.y), to_mm(point.z)),
     )];
     parts.extend(joints_text(live));

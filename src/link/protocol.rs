@@ -55,6 +55,11 @@ pub trait Protocol: Send + Debug {
 
     /// When [`Self::tick`] wants to be called at the latest.
     fn next_deadline(&self) -> Option<Moment>;
+
+    /// Whether points are shown between shots: then something is heard from the other end all the time.
+    fn shows_live(&self) -> bool {
+        false
+    }
 }
 
 /// Something that happened on the wire.
@@ -246,7 +251,7 @@ impl Failure {
                     "{who} multiplies its points by the scale {scale} of its transformation: all distances would be wrong"
                 )
             }
-            Self::Foreign(why) => format!("this is not the kind of device that was chosen: {why}"),
+            Self::Foreign(why) => format!("this does not look like what was chosen: {why}"),
             Self::Unusable(why) => format!("the reading is no measurement: {why}"),
             Self::Garbled(why) => format!("cannot read what {who} sends: {why}"),
             Self::InUse(why) => format!("{who} is in use by another program ({why})"),
@@ -271,9 +276,7 @@ impl Failure {
             Self::Refused(_) => "look at the instrument's own display for what it wants",
             Self::Settings(_) => "set the instrument as said, or connect again to let the set-up do it",
             Self::Scaled(_) => "set the scale of the instrument's transformation to 1, then connect again",
-            Self::Foreign(_) => {
-                "is it this kind of instrument, and the right port? choose both anew, then connect again"
-            }
+            Self::Foreign(_) => "is it this kind of instrument, and the right port, and is it on? then connect again",
             Self::Unusable(_) => "measure again; if it stays, check the beam and the settings of the instrument",
             Self::Garbled(_) => "check baud rate, line ending and the kind of instrument that was chosen",
             Self::InUse(_) => "close the other program; then connect again",

@@ -111,4 +111,8 @@ impl Link for Rehearsal {
     fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
         self.wired.watch(wait)
     }
+
+    fn eye(&self) -> Option<super::Look> {
+        self.wired.eye()
+    }
 }

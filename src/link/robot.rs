@@ -106,6 +106,8 @@ impl WiredRobot {
         let live = LiveReading {
             seconds: now.as_secs_f64(),
             point: None,
+            is_blind: true,
+            silent: None,
             is_still: Some(latest.is_still && fresh.is_some()),
             joints: fresh.map(|state| state.positions),
             down: self.down.as_ref().map(|failure| failure.words(CONTROLLER)),

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::cell_view::check_joints;
 use super::protocol::{CONTROLLER, Failure, Identity, JointState, Severity, Shot, known_sigma};
-use super::wire::{Latest, RawLog, Wire, WireEvent};
+use super::wire::{Eye, Latest, RawLog, Wire, WireEvent};
 use super::{Link, LinkError, LinkNews, build};
 use crate::profile::Profile;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
@@ -352,20 +352,40 @@ impl Wired {
 
     /// What there is to see now.
     fn live(&self) -> LiveReading {
-        let Latest { live, .. } = self.instrument.latest();
+        LiveReading { down: self.down.as_ref().map(ToString::to_string), ..self.look().reading() }
+    }
+
+    fn look(&self) -> Look {
+        Look { instrument: self.instrument.eye(), robot: self.robot.as_ref().map(Wire::eye) }
+    }
+}
+
+/// A look at both wires, also while something is measured.
+struct Look {
+    instrument: Eye,
+    robot: Option<Eye>,
+}
+
+impl Look {
+    fn reading(&self) -> LiveReading {
         let now = self.instrument.now();
-        let fresh = |at: Duration| now.saturating_sub(at) <= FRESH;
+        let Latest { live, heard, .. } = self.instrument.latest();
+        let is_fresh = |now: Duration, at: Duration| now.saturating_sub(at) <= FRESH;
         let robot = self.robot.as_ref().map(|robot| (robot.latest(), robot.now()));
         let joints = robot.as_ref().and_then(|(latest, now)| {
             let (at, state) = latest.joints.as_ref()?;
-            (now.saturating_sub(*at) <= FRESH).then(|| state.positions.clone())
+            is_fresh(*now, *at).then(|| state.positions.clone())
         });
         LiveReading {
             seconds: now.as_secs_f64(),
-            point: live.filter(|(at, _)| fresh(*at)).map(|(_, shot)| shot.point),
+            point: live.filter(|(at, _)| is_fresh(now, *at)).map(|(_, shot)| shot.point),
+            is_blind: !self.instrument.shows_live,
+            silent: heard
+                .filter(|at| self.instrument.shows_live && !is_fresh(now, *at))
+                .map(|at| now.saturating_sub(at).as_secs_f64()),
             is_still: robot.as_ref().map(|(latest, _)| latest.is_still && joints.is_some()),
             joints,
-            down: self.down.as_ref().map(ToString::to_string),
+            down: None,
         }
     }
 }
@@ -400,6 +420,11 @@ impl Link for Wired {
         // An answer without a question is one that came too late.
         drop(self.drain(wait));
         Some((self.live(), std::mem::take(&mut self.news)))
+    }
+
+    fn eye(&self) -> Option<super::Look> {
+        let look = self.look();
+        Some(Box::new(move || look.reading()))
     }
 }
 

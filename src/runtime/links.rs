@@ -1,5 +1,6 @@
 //! The thread that talks to the instrument.
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
@@ -78,7 +79,18 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
                 }
             }
             Command::Measure { id, request, cancelled } => {
-                let keep_going = || !cancelled.load(Ordering::Relaxed);
+                let eye = link.as_ref().and_then(|link| link.eye());
+                let shown = Cell::new(f64::NEG_INFINITY);
+                let keep_going = || {
+                    // What is seen meanwhile; a look of before the measurement is not now.
+                    if let Some(live) = eye.as_ref().map(|eye| eye())
+                        && live.seconds >= shown.get() + WATCH.as_secs_f64()
+                    {
+                        shown.set(live.seconds);
+                        events.offer(Event::Live(live));
+                    }
+                    !cancelled.load(Ordering::Relaxed)
+                };
                 let measured = link.as_mut().map(|link| link.measure(&request, &keep_going));
                 let answer = match measured {
                     Some(Ok(reading)) => Answer::Measured(reading),

@@ -86,6 +86,11 @@ impl Session {
         }
     }
 
+    /// Whether positions of the reflector come between shots.
+    pub(super) const fn shows_live(&self) -> bool {
+        self.options.reflector_positions
+    }
+
     /// A new connection.
     pub(super) fn start(&mut self, now: Moment) {
         *self = Self::new(self.options);
