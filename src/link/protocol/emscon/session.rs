@@ -62,8 +62,8 @@ pub(super) struct Session {
     was_not_ready: bool,
     face: Option<u8>,
     last_heard: Moment,
-    /// A packet that only a tracker sends has come since the connection began.
-    is_tracker: bool,
+    /// When a tracker was known by its first packet, if it was over this connection.
+    known_since: Option<Moment>,
 }
 
 impl Session {
@@ -82,7 +82,7 @@ impl Session {
             was_not_ready: false,
             face: None,
             last_heard: Moment::ZERO,
-            is_tracker: false,
+            known_since: None,
         }
     }
 
@@ -107,7 +107,7 @@ impl Session {
         self.last_heard = now;
         self.framer.feed(bytes);
         while self.phase != Phase::Off {
-            if !self.is_tracker && self.framer.announces_unknown() {
+            if self.known_since.is_none() && self.framer.announces_unknown() {
                 // Nothing was understood so far: this never was a tracker.
                 let start = shown(&String::from_utf8_lossy(self.framer.start(SHOWN)));
                 self.lose(Failure::Foreign(format!("no emScon answers there, what comes begins with `{start}`")));
@@ -115,7 +115,7 @@ impl Session {
             }
             match self.framer.next_packet() {
                 Ok(Some(packet)) => {
-                    self.is_tracker = true;
+                    self.known_since.get_or_insert(now);
                     self.take(&packet, now);
                 }
                 Ok(None) => return,
@@ -393,7 +393,7 @@ impl Session {
     /// An answer did not come. Without any answer to a status or a stop the tracker is gone.
     fn timed_out(&mut self, now: Moment) {
         let Some(exchange) = self.exchange.take() else { return };
-        if !self.is_tracker {
+        if self.known_since.is_none() {
             let seconds = FIRST.as_secs();
             let text = format!("it took the connection, but has not answered the first question for {seconds} s");
             return self.lose(Failure::Foreign(text));
@@ -458,7 +458,7 @@ impl Session {
 
     fn send(&mut self, command: Command, now: Moment) {
         self.outbox.send(command.encode());
-        let exchange = if self.is_tracker { Exchange::new } else { Exchange::first };
+        let exchange = if self.known_since.is_some() { Exchange::new } else { Exchange::first };
         self.exchange = Some(exchange(command, now));
     }
 
