@@ -55,7 +55,15 @@ pub trait Link: Send {
     fn watch(&mut self, _wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
         None
     }
+
+    /// A look at the same while something is measured, by whoever is asked whether to go on.
+    fn eye(&self) -> Option<Look> {
+        None
+    }
 }
+
+/// What there is to see now.
+pub type Look = Box<dyn Fn() -> LiveReading>;
 
 /// Something that happened at a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -89,6 +97,9 @@ pub enum LinkError {
     /// The robot is not ready for a measurement.
     #[error("the robot: {0}")]
     Robot(String),
+    /// The robot's controller cannot be asked.
+    #[error("the robot: {}", .0.words(protocol::CONTROLLER))]
+    Controller(protocol::Failure),
     /// The set-up cannot be simulated or played.
     #[error("{0}")]
     SetUp(String),

@@ -248,7 +248,7 @@ impl Wizard {
     }
 
     fn cx(&self) -> Cx<'_> {
-        Cx { session: &self.session, connection: self.connection.as_ref(), now: self.now }
+        Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now }
     }
 
     /// Whether the store has failed and the operator must decide.
@@ -298,7 +298,8 @@ impl Wizard {
         if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo) {
             self.live.stays();
         }
-        let cx = Cx { session: &self.session, connection: self.connection.as_ref(), now: self.now };
+        let cx =
+            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now };
         let actions = self.phase.on_intent(intent, &cx);
         self.actions.extend(actions);
         self.run()
@@ -319,14 +320,22 @@ impl Wizard {
             return Vec::new();
         }
         self.busy = None;
-        if let Answer::Connected { identity, recorded } = &answer {
+        if let Answer::Connected { identity, warnings, recorded } = &answer {
+            if !warnings.is_empty() {
+                // One message: of several only the last would be seen.
+                let notice =
+                    Notice::attention(format!("the instrument is not as it should be: {}", warnings.join("; ")))
+                        .hint("it measures; mend this before the first point, or go on if it is meant so");
+                self.actions.push_back(Action::Say(notice));
+            }
             self.connection = Some(Connection { identity: identity.clone(), recorded: recorded.clone() });
             let is_linked = matches!(self.session.instrument, Some(InstrumentChoice::Linked(_)));
             if is_linked && self.session.identities.last() != Some(identity) {
                 self.actions.push_back(Action::Write(vec![Entry::Connected { identity: identity.clone() }]));
             }
         }
-        let cx = Cx { session: &self.session, connection: self.connection.as_ref(), now: self.now };
+        let cx =
+            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now };
         let actions = self.phase.on_answer(answer, &cx);
         self.actions.extend(actions);
         self.run()
@@ -391,7 +400,12 @@ impl Wizard {
         if let Entry::Step(step) = line.entry {
             self.phase = Phase::enter(step, &self.session);
         } else {
-            let cx = Cx { session: &self.session, connection: self.connection.as_ref(), now: self.now };
+            let cx = Cx {
+                session: &self.session,
+                connection: self.connection.as_ref(),
+                down: self.live.down(),
+                now: self.now,
+            };
             let actions = self.phase.on_applied(&line.entry, &cx);
             if self.ended.is_none() {
                 self.actions.extend(actions);

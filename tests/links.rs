@@ -23,8 +23,10 @@ use std::time::{Duration, Instant};
 
 use pty::{ENTER, Terminal};
 use tempfile::TempDir;
+use trupose::report::{Document, PointOrigin};
 use trupose::session::calibration::Calibration;
 use trupose::session::journal::Entry;
+use trupose::session::state::Session;
 use trupose::store::session::read_journal;
 
 fn trupose(folder: &Path, arguments: &[&str]) -> Output {
@@ -221,7 +223,8 @@ fn the_test_of_a_link_says_what_is_wrong_and_what_to_do() {
         ("emscon", "metres@1x*", "the instrument is set differently: units", "connect again"),
         ("emscon", "in-use@1x*", "in use by another program", "close the other program"),
         ("emscon", "lost-beam@1x*", "sees no reflector", "return the SMR to the nest"),
-        ("emscon", "scaled@1x*", "but not as it should", "mend what the warnings say"),
+        ("emscon", "scaled@1x*", "scale 1.0001 of its transformation", "transformation to 1, then connect again"),
+        ("emscon", "moved@1x*", "but not as it should", "mend what the warnings say"),
         ("geocom", "no-target@1x*", "sees no reflector", "return the SMR to the nest"),
         ("ascii", "wrong-unit@1x*", "farther than the 80.0 m set as the range", "settings of the instrument"),
         ("ndi", "missing@1x*", "sees no reflector", "return the SMR to the nest"),
@@ -253,6 +256,56 @@ fn the_wizard_measures_at_an_instrument_on_a_wire_and_logs_every_byte() {
         "{log}"
     );
     assert!(log.lines().any(|line| line.contains(" emscon in ") && line.contains("3100000000000000")), "{log}");
+}
+
+/// What was rehearsed over a wire like a real instrument's is never taken for measured.
+#[test]
+fn a_session_over_a_simulator_says_in_its_report_that_it_is_simulated() {
+    thread::scope(|scope| {
+        // Lines of points carry no name.
+        for (protocol, origin) in [
+            ("emscon", PointOrigin::Simulated),
+            ("geocom", PointOrigin::Simulated),
+            ("ndi", PointOrigin::Simulated),
+            ("ascii", PointOrigin::Instrument),
+        ] {
+            scope.spawn(move || {
+                let simulator = Simulator::start(&[&[protocol][..], &LISTEN].concat());
+                let folder = folder();
+                let (address, options) = (&simulator.address, &simulator.options);
+                let options =
+                    options.as_ref().map_or_else(String::new, |options| format!(", options: Some({options:?})"));
+                let instrument = format!("Linked((address: {address:?}{options}))");
+                let output = run(folder.path(), &instrument, "Capture(1, Fail)", &[]);
+                assert!(output.status.success(), "{protocol}: {}{}", text(&output.stdout), text(&output.stderr));
+                let session = Session::of(&read_journal(&folder.path().join("sessions/s")).unwrap()).unwrap();
+                assert_eq!(
+                    Document::new(&session, &[]).report.points_from,
+                    origin,
+                    "{protocol}: {:?}",
+                    session.identities
+                );
+            });
+        }
+    });
+}
+
+#[test]
+fn where_the_robot_fails_the_instrument_is_not_blamed_for_it() {
+    let tracker = Simulator::start(&["emscon", "--listen", "127.0.0.1:0"]);
+    let controller = Simulator::start(&["rtde", "--listen", "127.0.0.1:0", "--fault", "old-protocol@1x*"]);
+    let (code, output, errors) = tracker.tested(&["--robot", &controller.address, "--shots", "1", "--seconds", "0"]);
+    assert_eq!(code, Some(3), "{output}{errors}");
+    assert!(output.contains("connected: Leica"), "{output}");
+    assert!(errors.contains("the robot: the controller refused") && errors.contains("PolyScope 3.4"), "{errors}");
+    assert!(!errors.contains("does not connect") && !errors.contains("bring the robot to rest"), "{errors}");
+}
+
+#[test]
+fn a_simulator_that_cannot_tell_shots_from_looks_does_not_go_on_by_itself() {
+    let refused = trupose(Path::new("."), &["simulate", "ndi", "--listen", "127.0.0.1:0", "--shots", "3"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("give 'next'"), "{}", text(&refused.stderr));
 }
 
 #[test]

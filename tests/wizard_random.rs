@@ -231,7 +231,7 @@ impl Cell {
                 let is_recording = matches!(instrument, InstrumentChoice::Replay { .. });
                 let joints = profile.chain().dof();
                 let recorded = if is_recording { self.poses(1, 16, joints) } else { Vec::new() };
-                Answer::Connected { identity: self.text(), recorded }
+                Answer::Connected { identity: self.text(), warnings: Vec::new(), recorded }
             }
             Request::Measure(request) => Answer::Measured(self.reading(request)),
             Request::Plan { profile, request, .. } => {

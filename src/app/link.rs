@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use super::Console;
 use crate::cli::{LinkCommand, LinkTestArgs};
 use crate::error::{ExitStatus, Failure};
+use crate::link::protocol::CONTROLLER;
 use crate::link::{Link as _, LinkError, LinkNews, RawLog, Wired, WiredRobot};
 use crate::runtime::signals;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
@@ -60,9 +61,13 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
     let mut wired = Wired::new(&choice, log.as_ref()).map_err(|error| usage(error.to_string()))?;
     console.print(&format!("connecting to {address}\n"))?;
     let mut told = |news: LinkNews| console.remark(&news_text(&news));
-    wired.connect_while(&keep_going, &mut told).map_err(|error| problem(&error, "it does not connect"))?;
+    let connected = wired.connect_while(&keep_going, &mut told);
+    if let Some(identity) = wired.identity() {
+        // The instrument may answer where the robot does not.
+        console.print(&format!("connected: {}\n", identity.name))?;
+    }
+    connected.map_err(|error| problem(&error, "it does not connect"))?;
     let identity = wired.identity().cloned().unwrap_or_default();
-    console.print(&format!("connected: {}\n", identity.name))?;
     for item in &identity.checked {
         console.print(&format!("checked: {item}\n"))?;
     }
@@ -182,8 +187,13 @@ fn news_text(news: &LinkNews) -> String {
 }
 
 fn live_text(live: &LiveReading) -> String {
+    let unseen = match live.silent {
+        _ if live.is_blind => "no live view: this instrument shows nothing between shots".to_owned(),
+        Some(seconds) => format!("nothing: the instrument is silent for {seconds:.0} s"),
+        None => "no SMR, or no position between shots so far".to_owned(),
+    };
     let mut parts = vec![live.point.map_or_else(
-        || "no position between shots so far".to_owned(),
+        || unseen,
         |point| format!("x {:.3}  y {:.3}  z {:.3} mm", to_mm(point.x), to_mm(point.y), to_mm(point.z)),
     )];
     parts.extend(joints_text(live));
@@ -249,6 +259,11 @@ fn problem(error: &LinkError, what: &str) -> Failure {
     let failure = Failure::new(ExitStatus::Instrument, format!("{what}: {error}"));
     match error {
         LinkError::Instrument(instrument) => failure.hint(instrument.hint()),
+        // The instrument did connect, or there is none: it is the robot's controller that does not.
+        LinkError::Controller(robot) => {
+            let told = robot.words(CONTROLLER);
+            Failure::new(ExitStatus::Instrument, format!("the robot: {told}")).hint(robot.controller_hint())
+        }
         LinkError::Robot(_) => failure.hint("bring the robot to rest and look at its pendant; then test again"),
         LinkError::Cancelled => ended_early(),
         _ => failure,

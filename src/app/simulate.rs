@@ -14,6 +14,7 @@ use crate::profile::Profile;
 use crate::runtime::signals;
 use crate::session::plan::{self, PlannedPose, PoseKind};
 use crate::session::simulation::Simulation;
+use crate::session::wire::WireProtocol;
 use crate::store;
 
 /// How often it is looked whether the robot goes on.
@@ -54,6 +55,12 @@ impl Route {
 }
 
 pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+    if args.protocol == WireProtocol::Ndi && args.shots > 0 {
+        let text = "an NDI tracker is asked for a shot as it is for a look: '--shots' cannot count them";
+        return Err(
+            Failure::new(ExitStatus::Usage, text).hint("leave '--shots' out and give 'next' when a pose is measured")
+        );
+    }
     let loaded = load::profile(&args.profile)?;
     let profile = &loaded.profile;
     let mut route = Route { poses: poses(args, profile)?, at: 0 };

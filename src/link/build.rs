@@ -14,12 +14,16 @@ use super::simulator::ndi::NdiSimulator;
 use super::simulator::rtde::RtdeSimulator;
 use crate::session::wire::{Route, WireAddress, WireProtocol};
 use std::str::FromStr;
+use std::time::Duration;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 /// Shortest and longest stationary measurement (ms).
 const MEASURE_MS: (i32, i32) = (50, 60_000);
+
+/// A tracker that shows no reflector is asked for its status so often: who sees nothing is told from who is not there.
+const KEEP_ALIVE: Duration = Duration::from_millis(700);
 
 /// Options of emScon.
 #[derive(Debug, Deserialize)]
@@ -74,8 +78,15 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
             }
             // Its positions are what the live display shows.
             let reflector_positions = true;
-            let usual = EmsconOptions::default();
-            let options = EmsconOptions { measure_ms, use_adm, reflector, initialize, reflector_positions, ..usual };
+            let options = EmsconOptions {
+                measure_ms,
+                use_adm,
+                reflector,
+                initialize,
+                reflector_positions,
+                keep_alive: KEEP_ALIVE,
+                ..EmsconOptions::default()
+            };
             Ok(Box::new(Emscon::new(options)))
         }
         WireProtocol::Rtde => {

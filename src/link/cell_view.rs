@@ -24,7 +24,11 @@ pub(super) fn check_joints(profile: &Profile) -> Result<(), LinkError> {
     if joints == JOINTS {
         return Ok(());
     }
-    Err(LinkError::SetUp(format!("'{}' has {joints} joints; RTDE tells {JOINTS}", profile.name())))
+    Err(LinkError::SetUp(format!(
+        "'{}' has {joints} joints, but a controller with RTDE tells {JOINTS}: \
+         choose the instrument without the robot, or the profile of this robot",
+        profile.name()
+    )))
 }
 
 /// Who decides when the next shot is another one.

@@ -55,6 +55,11 @@ pub trait Protocol: Send + Debug {
 
     /// When [`Self::tick`] wants to be called at the latest.
     fn next_deadline(&self) -> Option<Moment>;
+
+    /// Whether points are shown between shots: then something is heard from the other end all the time.
+    fn shows_live(&self) -> bool {
+        false
+    }
 }
 
 /// Something that happened on the wire.
@@ -127,6 +132,12 @@ pub struct Shot {
     pub raw: Vec<u8>,
 }
 
+/// Standard deviations (m) as an instrument states them; `None` where they are none: zero, negative or not finite stand for
+/// "unknown".
+pub fn known_sigma(stated: [f64; 3]) -> Option<[f64; 3]> {
+    stated.iter().all(|value| value.is_finite() && *value > 0.0).then_some(stated)
+}
+
 impl Shot {
     /// A point with nothing said beside it.
     pub const fn bare(point: Point3<f64>) -> Self {
@@ -196,6 +207,10 @@ pub enum Failure {
     Refused(String),
     /// It is set in another way than asked for: units, frame, mode, reflector.
     Settings(String),
+    /// It multiplies its points by a scale, so that all distances are wrong.
+    Scaled(f64),
+    /// What answers, or does not, is something else than the instrument that was chosen.
+    Foreign(String),
     /// A point came that cannot be one.
     Unusable(String),
     /// What came cannot be understood.
@@ -209,6 +224,9 @@ pub enum Failure {
     /// The shot was asked for while another was under way, or before the set-up was complete.
     TooEarly(String),
 }
+
+/// Who is at the other end of a robot's wire, in messages.
+pub const CONTROLLER: &str = "the controller";
 
 impl std::error::Error for Failure {}
 
@@ -228,6 +246,12 @@ impl Failure {
             Self::Silent { what, seconds } => format!("{who} said nothing for {seconds:.0} s while {what}"),
             Self::Refused(why) => format!("{who} refused: {why}"),
             Self::Settings(why) => format!("{who} is set differently: {why}"),
+            Self::Scaled(scale) => {
+                format!(
+                    "{who} multiplies its points by the scale {scale} of its transformation: all distances would be wrong"
+                )
+            }
+            Self::Foreign(why) => format!("this does not look like what was chosen: {why}"),
             Self::Unusable(why) => format!("the reading is no measurement: {why}"),
             Self::Garbled(why) => format!("cannot read what {who} sends: {why}"),
             Self::InUse(why) => format!("{who} is in use by another program ({why})"),
@@ -251,6 +275,8 @@ impl Failure {
             Self::Silent { .. } => "look whether the instrument is on and the cable or network is in place",
             Self::Refused(_) => "look at the instrument's own display for what it wants",
             Self::Settings(_) => "set the instrument as said, or connect again to let the set-up do it",
+            Self::Scaled(_) => "set the scale of the instrument's transformation to 1, then connect again",
+            Self::Foreign(_) => "is it this kind of instrument, and the right port, and is it on? then connect again",
             Self::Unusable(_) => "measure again; if it stays, check the beam and the settings of the instrument",
             Self::Garbled(_) => "check baud rate, line ending and the kind of instrument that was chosen",
             Self::InUse(_) => "close the other program; then connect again",
@@ -259,6 +285,31 @@ impl Failure {
             }
             Self::Disconnected(_) => "check the cable or network; the link connects again by itself",
             Self::TooEarly(_) => "wait for the reading under way",
+        }
+    }
+
+    /// What the operator can do where a robot's controller is at the other end.
+    pub const fn controller_hint(&self) -> &'static str {
+        match self {
+            Self::Silent { .. } => {
+                "look whether the controller is on and the network is in place, and whether the port is that of RTDE, 30004"
+            }
+            Self::Refused(_) => "the controller needs PolyScope 3.4 or newer; look at its version on the pendant",
+            Self::Garbled(_) | Self::Foreign(_) => {
+                "is it the controller's address, and the port of RTDE, 30004? correct it, then connect again"
+            }
+            Self::InUse(_) => "end the other program that uses RTDE of this controller; then connect again",
+            Self::Unreachable(_) => {
+                "check address and network, whether the controller is on, and whether its security settings allow RTDE"
+            }
+            Self::Disconnected(_) => "check the network; the link connects again by itself",
+            Self::NoTarget(_)
+            | Self::Unstable(_)
+            | Self::NotReady(_)
+            | Self::Settings(_)
+            | Self::Scaled(_)
+            | Self::Unusable(_)
+            | Self::TooEarly(_) => "look at the pendant for the state of the robot, then try again",
         }
     }
 

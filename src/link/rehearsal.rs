@@ -77,6 +77,13 @@ impl Rehearsal {
     }
 }
 
+impl Rehearsal {
+    /// What the simulated instrument warned of in its set-up.
+    pub fn warnings(&self) -> Vec<String> {
+        self.wired.warnings()
+    }
+}
+
 impl Drop for Rehearsal {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
@@ -103,5 +110,9 @@ impl Link for Rehearsal {
 
     fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
         self.wired.watch(wait)
+    }
+
+    fn eye(&self) -> Option<super::Look> {
+        self.wired.eye()
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
-use super::protocol::{Failure, Identity};
+use super::protocol::{CONTROLLER, Failure, Identity};
 use super::wire::{RawLog, Wire, WireEvent};
 use super::{LinkError, LinkNews, build};
 use crate::session::reading::LiveReading;
@@ -17,8 +17,6 @@ const LOOK: Duration = Duration::from_millis(50);
 const FRESH: Duration = Duration::from_secs(1);
 /// Events taken at once.
 const AT_ONCE: usize = 1024;
-/// Who is at the other end, in messages.
-const CONTROLLER: &str = "the controller";
 
 /// A robot's controller on a wire.
 #[derive(Debug)]
@@ -48,7 +46,7 @@ impl WiredRobot {
     /// Waits until it tells its joints, while it is wanted.
     ///
     /// # Errors
-    /// [`LinkError::Robot`]: it does not, and why; [`LinkError::Cancelled`].
+    /// [`LinkError::Controller`]: it does not, and why; [`LinkError::Cancelled`].
     pub fn connect_while(
         &mut self,
         keep_going: &dyn Fn() -> bool,
@@ -59,7 +57,7 @@ impl WiredRobot {
             let (live, news) = self.watch(LOOK);
             news.into_iter().filter(|one| matches!(one, LinkNews::Status(_))).for_each(&mut *told);
             if let Some(failure) = &self.down {
-                return Err(LinkError::Robot(failure.words(CONTROLLER)));
+                return Err(LinkError::Controller(failure.clone()));
             }
             if let Some(identity) = self.identity.as_ref().filter(|_| live.joints.is_some()) {
                 return Ok(identity.clone());
@@ -68,7 +66,8 @@ impl WiredRobot {
                 return Err(LinkError::Cancelled);
             }
             if self.wire.now() > until {
-                return Err(LinkError::Robot("it tells no joint angles".to_owned()));
+                let what = "joint angles were awaited".to_owned();
+                return Err(LinkError::Controller(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
             }
         }
     }
@@ -107,6 +106,8 @@ impl WiredRobot {
         let live = LiveReading {
             seconds: now.as_secs_f64(),
             point: None,
+            is_blind: true,
+            silent: None,
             is_still: Some(latest.is_still && fresh.is_some()),
             joints: fresh.map(|state| state.positions),
             down: self.down.as_ref().map(|failure| failure.words(CONTROLLER)),

@@ -12,7 +12,7 @@ use std::time::Duration;
 use super::protocol::rtde::Stillness;
 use super::protocol::{Failure, Identity, JointState, Protocol, ProtocolEvent, Shot, Status};
 use super::transport::{self, Stopwatch, Transport};
-use crate::session::wire::{WireAddress, WireProtocol};
+use crate::session::wire::{Route, WireAddress, WireProtocol};
 
 /// A read waits this long at most, so that commands are seen.
 const READ: Duration = Duration::from_millis(20);
@@ -43,6 +43,8 @@ pub(super) enum WireEvent {
 /// What came last, with its time since the start of the wire.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Latest {
+    /// When the other end was heard last, or was connected to.
+    pub(super) heard: Option<Duration>,
     /// Point that nobody asked for.
     pub(super) live: Option<(Duration, Shot)>,
     /// Joints of the robot.
@@ -64,6 +66,28 @@ pub(super) struct Wire {
     latest: Arc<Mutex<Latest>>,
     stop: Arc<AtomicBool>,
     clock: Stopwatch,
+    shows_live: bool,
+}
+
+/// A look at what came last, by whoever wants while the wire is in use.
+#[derive(Clone, Debug)]
+pub(super) struct Eye {
+    latest: Arc<Mutex<Latest>>,
+    clock: Stopwatch,
+    /// Whether points are shown between shots.
+    pub(super) shows_live: bool,
+}
+
+impl Eye {
+    /// What came last.
+    pub(super) fn latest(&self) -> Latest {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Time since the start of the wire.
+    pub(super) fn now(&self) -> Duration {
+        self.clock.now()
+    }
 }
 
 impl Wire {
@@ -78,6 +102,7 @@ impl Wire {
         let stop = Arc::new(AtomicBool::new(false));
         let clock = Stopwatch::start();
         let name = format!("link-{}", address.protocol);
+        let shows_live = protocol.shows_live();
         let mut worker = Worker {
             address,
             protocol,
@@ -88,9 +113,10 @@ impl Wire {
             clock,
             log,
             stillness: Stillness::default(),
+            has_answered: false,
         };
         thread::Builder::new().name(name).spawn(move || worker.run())?;
-        Ok(Self { commands, events, latest, stop, clock })
+        Ok(Self { commands, events, latest, stop, clock, shows_live })
     }
 
     /// Asks for a shot; `false` if the thread is gone or does not listen.
@@ -106,6 +132,11 @@ impl Wire {
     /// What came last.
     pub(super) fn latest(&self) -> Latest {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The same for somebody else.
+    pub(super) fn eye(&self) -> Eye {
+        Eye { latest: Arc::clone(&self.latest), clock: self.clock, shows_live: self.shows_live }
     }
 
     /// Time since the start.
@@ -165,6 +196,8 @@ struct Worker {
     clock: Stopwatch,
     log: Option<RawLog>,
     stillness: Stillness,
+    /// Something has come over this connection.
+    has_answered: bool,
 }
 
 impl Worker {
@@ -178,7 +211,7 @@ impl Worker {
                         if was_ready {
                             back_off = BACK_OFF.0;
                         }
-                        failure
+                        self.ended(failure)
                     }
                 },
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => return,
@@ -206,6 +239,8 @@ impl Worker {
     fn talk(&mut self, transport: &mut dyn Transport) -> (End, bool) {
         let mut buffer = vec![0; CHUNK];
         let mut was_ready = false;
+        self.heard(self.clock.now());
+        self.has_answered = false;
         self.protocol.start(self.clock.now());
         loop {
             if self.is_stopped() {
@@ -240,12 +275,28 @@ impl Worker {
         {
             self.note("in", bytes);
             self.protocol.feed(bytes, now);
+            self.heard(now);
+            self.has_answered = true;
         }
         self.protocol.tick(now);
         while let Some(event) = self.protocol.next_event() {
             self.pass_on(event, was_ready)?;
         }
         read.map(drop)
+    }
+
+    fn heard(&self, now: Duration) {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner).heard = Some(now);
+    }
+
+    /// Who takes a connection and never says a word is perhaps somebody else.
+    fn ended(&self, failure: Failure) -> Failure {
+        match (failure, &self.address.route) {
+            (Failure::Silent { seconds, .. }, Route::Tcp { .. }) if !self.has_answered => {
+                Failure::Foreign(format!("it took the connection, but said nothing for {seconds:.0} s"))
+            }
+            (failure, _) => failure,
+        }
     }
 
     fn pass_on(&mut self, event: ProtocolEvent, was_ready: &mut bool) -> Result<(), End> {

@@ -6,9 +6,11 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 
-use super::protocol::{Failure, Identity, JointState, Severity, Shot};
-use super::wire::{Latest, RawLog, Wire, WireEvent};
+use super::cell_view::check_joints;
+use super::protocol::{CONTROLLER, Failure, Identity, JointState, Severity, Shot, known_sigma};
+use super::wire::{Eye, Latest, RawLog, Wire, WireEvent};
 use super::{Link, LinkError, LinkNews, build};
+use crate::profile::Profile;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::wire::{LinkChoice, WireAddress};
 use crate::units::to_mm;
@@ -61,9 +63,6 @@ pub struct Wired {
     robot_since: f64,
 }
 
-/// Who is at the other end of the robot's wire, in messages.
-const CONTROLLER: &str = "the controller";
-
 /// Told before a shot is asked for.
 type BeforeShot = Box<dyn FnMut() + Send>;
 
@@ -101,6 +100,14 @@ impl Wired {
         Ok(Self::over(shown, instrument, robot.map(|robot| start(robot, None)).transpose()?))
     }
 
+    /// Whether the robot's controller of a choice, if there is one, can tell the joints of this arm.
+    ///
+    /// # Errors
+    /// [`LinkError::SetUp`]: it tells more or fewer.
+    pub fn check_arm(profile: &Profile, choice: &LinkChoice) -> Result<(), LinkError> {
+        if choice.robot.is_some() { check_joints(profile) } else { Ok(()) }
+    }
+
     /// An instrument on a wire that is there already.
     pub(super) const fn over(address: String, instrument: Wire, robot: Option<Wire>) -> Self {
         Self {
@@ -133,6 +140,11 @@ impl Wired {
     /// Who answers, once it does.
     pub const fn identity(&self) -> Option<&Identity> {
         self.identity.as_ref()
+    }
+
+    /// What it warned of in its set-up.
+    pub fn warnings(&self) -> Vec<String> {
+        self.identity.as_ref().map(|identity| identity.warnings.clone()).unwrap_or_default()
     }
 
     /// Takes what has happened; an answer to a trigger is given back.
@@ -169,7 +181,10 @@ impl Wired {
                 WireEvent::Up(identity) => {
                     self.down = None;
                     self.news.push(LinkNews::Up(identity.name.clone()));
-                    self.news.extend(identity.warnings.iter().cloned().map(LinkNews::Status));
+                    if !identity.warnings.is_empty() {
+                        // One message: of several only the last would be seen.
+                        self.news.push(LinkNews::Status(identity.warnings.join("; ")));
+                    }
                     self.identity = Some(identity);
                 }
                 WireEvent::Down(failure) => {
@@ -233,16 +248,24 @@ impl Wired {
                 return Err(LinkError::Cancelled);
             }
             if self.instrument.now() > until {
-                let why = match (fresh, &self.robot_down) {
-                    (_, Some(failure)) => failure.words(CONTROLLER),
-                    (Some(_), None) => format!("it still moves after {} s", rest.as_secs()),
-                    (None, None) => "it tells no joint angles".to_owned(),
-                };
-                return Err(LinkError::Robot(why));
+                return Err(if fresh.is_some() {
+                    LinkError::Robot(format!("it still moves after {} s", rest.as_secs()))
+                } else {
+                    LinkError::Controller(no_joints(rest))
+                });
             }
-            // What happens meanwhile at the instrument is told later.
             drop(self.drain(LOOK_AT_JOINTS));
+            self.is_up()?;
         }
+    }
+
+    /// Whether both ends can be asked. Who waited for a link that is down would measure once it is back, when nobody expects
+    /// it any more.
+    fn is_up(&self) -> Result<(), LinkError> {
+        if let Some(failure) = &self.down {
+            return Err(LinkError::Instrument(failure.clone()));
+        }
+        self.robot_down.clone().map_or(Ok(()), |failure| Err(LinkError::Controller(failure)))
     }
 
     /// One shot that passes the gates; what is not steady is tried again.
@@ -290,6 +313,8 @@ impl Wired {
 
     /// What every point must be, whoever gave it.
     fn gate(&mut self, shot: Shot) -> Result<Shot, Failure> {
+        // Whoever states 0 does not know.
+        let shot = Shot { sigma: shot.sigma.and_then(known_sigma), ..shot };
         let point = shot.point;
         let distance = point.coords.norm();
         let sigma = shot.sigma.map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
@@ -327,20 +352,40 @@ impl Wired {
 
     /// What there is to see now.
     fn live(&self) -> LiveReading {
-        let Latest { live, .. } = self.instrument.latest();
+        LiveReading { down: self.down.as_ref().map(ToString::to_string), ..self.look().reading() }
+    }
+
+    fn look(&self) -> Look {
+        Look { instrument: self.instrument.eye(), robot: self.robot.as_ref().map(Wire::eye) }
+    }
+}
+
+/// A look at both wires, also while something is measured.
+struct Look {
+    instrument: Eye,
+    robot: Option<Eye>,
+}
+
+impl Look {
+    fn reading(&self) -> LiveReading {
         let now = self.instrument.now();
-        let fresh = |at: Duration| now.saturating_sub(at) <= FRESH;
+        let Latest { live, heard, .. } = self.instrument.latest();
+        let is_fresh = |now: Duration, at: Duration| now.saturating_sub(at) <= FRESH;
         let robot = self.robot.as_ref().map(|robot| (robot.latest(), robot.now()));
         let joints = robot.as_ref().and_then(|(latest, now)| {
             let (at, state) = latest.joints.as_ref()?;
-            (now.saturating_sub(*at) <= FRESH).then(|| state.positions.clone())
+            is_fresh(*now, *at).then(|| state.positions.clone())
         });
         LiveReading {
             seconds: now.as_secs_f64(),
-            point: live.filter(|(at, _)| fresh(*at)).map(|(_, shot)| shot.point),
+            point: live.filter(|(at, _)| is_fresh(now, *at)).map(|(_, shot)| shot.point),
+            is_blind: !self.instrument.shows_live,
+            silent: heard
+                .filter(|at| self.instrument.shows_live && !is_fresh(now, *at))
+                .map(|at| now.saturating_sub(at).as_secs_f64()),
             is_still: robot.as_ref().map(|(latest, _)| latest.is_still && joints.is_some()),
             joints,
-            down: self.down.as_ref().map(ToString::to_string),
+            down: None,
         }
     }
 }
@@ -352,6 +397,9 @@ impl Link for Wired {
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
         let began = self.instrument.now();
+        // Nothing that came before this is an answer to it.
+        drop(self.drain(Duration::ZERO));
+        self.is_up()?;
         let joints = self.standing(keep_going)?;
         if self.before_shot.is_none() {
             self.pause(Duration::try_from_secs_f64(request.settle).unwrap_or_default(), keep_going)?;
@@ -372,6 +420,11 @@ impl Link for Wired {
         // An answer without a question is one that came too late.
         drop(self.drain(wait));
         Some((self.live(), std::mem::take(&mut self.news)))
+    }
+
+    fn eye(&self) -> Option<super::Look> {
+        let look = self.look();
+        Some(Box::new(move || look.reading()))
     }
 }
 
@@ -447,16 +500,21 @@ impl Wired {
         loop {
             drop(self.drain(LOOK));
             if let Some(failure) = &self.robot_down {
-                return Err(LinkError::Robot(failure.words(CONTROLLER)));
+                return Err(LinkError::Controller(failure.clone()));
             }
             if self.robot.as_ref().is_none_or(|robot| robot.latest().joints.is_some()) {
                 return Ok(());
             }
             if self.instrument.now() > until {
-                return Err(LinkError::Robot("it tells no joint angles".to_owned()));
+                return Err(LinkError::Controller(no_joints(SET_UP)));
             }
         }
     }
+}
+
+/// The controller answers, but its joint angles do not come.
+fn no_joints(waited: Duration) -> Failure {
+    Failure::Silent { what: "joint angles were awaited".to_owned(), seconds: waited.as_secs_f64() }
 }
 
 /// The mean of shots with its scatter, and its σ where every shot states one.

@@ -1,5 +1,6 @@
 //! The thread that talks to the instrument.
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
@@ -69,16 +70,27 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
                 let keep_going = || !cancelled.load(Ordering::Relaxed);
                 let told = &mut |news| events.offer(Event::Remark(remark(news)));
                 match connect(&instrument, &profile, log, &keep_going, told) {
-                    Ok((connected, identity, recorded)) => {
+                    Ok((connected, answer)) => {
                         link = connected;
-                        (id, Answer::Connected { identity, recorded })
+                        (id, answer)
                     }
                     Err(LinkError::Cancelled) => (id, Answer::Cancelled),
                     Err(error) => (id, failed(&error)),
                 }
             }
             Command::Measure { id, request, cancelled } => {
-                let keep_going = || !cancelled.load(Ordering::Relaxed);
+                let eye = link.as_ref().and_then(|link| link.eye());
+                let shown = Cell::new(f64::NEG_INFINITY);
+                let keep_going = || {
+                    // What is seen meanwhile; a look of before the measurement is not now.
+                    if let Some(live) = eye.as_ref().map(|eye| eye())
+                        && live.seconds >= shown.get() + WATCH.as_secs_f64()
+                    {
+                        shown.set(live.seconds);
+                        events.offer(Event::Live(live));
+                    }
+                    !cancelled.load(Ordering::Relaxed)
+                };
                 let measured = link.as_mut().map(|link| link.measure(&request, &keep_going));
                 let answer = match measured {
                     Some(Ok(reading)) => Answer::Measured(reading),
@@ -131,6 +143,7 @@ fn failed(error: &LinkError) -> Answer {
             vec!["return the SMR to the nest until the tracker has it again, then measure again".to_owned()]
         }
         LinkError::Instrument(failure) => vec![failure.hint().to_owned()],
+        LinkError::Controller(failure) => vec![failure.controller_hint().to_owned()],
         LinkError::Robot(_) => vec!["bring the robot to rest at the pose, then measure again".to_owned()],
         LinkError::NoReading { .. } => vec!["skip the pose, or take the poses of the recording as plan".to_owned()],
         _ => Vec::new(),
@@ -138,7 +151,8 @@ fn failed(error: &LinkError) -> Answer {
     Answer::Failed(Problem { message: error.to_string(), hints })
 }
 
-type Connected = (Option<Box<dyn Link>>, String, Vec<PlannedPose>);
+/// A link with the answer that tells of it.
+type Connected = (Option<Box<dyn Link>>, Answer);
 
 fn connect(
     instrument: &InstrumentChoice,
@@ -147,29 +161,31 @@ fn connect(
     keep_going: &dyn Fn() -> bool,
     told: &mut dyn FnMut(LinkNews),
 ) -> Result<Connected, LinkError> {
+    let plain = |identity| Answer::Connected { identity, warnings: Vec::new(), recorded: Vec::new() };
     match instrument {
-        InstrumentChoice::Manual { unit } => {
-            Ok((None, format!("coordinates typed in, in {}", unit.sign()), Vec::new()))
-        }
+        InstrumentChoice::Manual { unit } => Ok((None, plain(format!("coordinates typed in, in {}", unit.sign())))),
         InstrumentChoice::Simulated(simulation) if !simulation.wires.is_empty() => {
             let mut rehearsal = Rehearsal::new(profile, simulation, log)?;
             let identity = rehearsal.connect()?;
-            Ok((Some(Box::new(rehearsal)), identity, Vec::new()))
+            let answer = Answer::Connected { identity, warnings: rehearsal.warnings(), recorded: Vec::new() };
+            Ok((Some(Box::new(rehearsal)), answer))
         }
         InstrumentChoice::Linked(choice) => {
+            Wired::check_arm(profile, choice)?;
             let mut wired = Wired::new(choice, log)?;
             let identity = wired.connect_while(keep_going, told)?;
-            Ok((Some(Box::new(wired)), identity, Vec::new()))
+            let answer = Answer::Connected { identity, warnings: wired.warnings(), recorded: Vec::new() };
+            Ok((Some(Box::new(wired)), answer))
         }
         InstrumentChoice::Simulated(simulation) => {
             let mut cell = SimulatedCell::new(profile, simulation)?;
             let identity = cell.connect()?;
-            Ok((Some(Box::new(cell)), identity, Vec::new()))
+            Ok((Some(Box::new(cell)), plain(identity)))
         }
         InstrumentChoice::Replay { sets } => {
             let mut recordings = Recordings::new(profile, sets)?;
-            let (identity, poses) = (recordings.connect()?, recordings.poses());
-            Ok((Some(Box::new(recordings)), identity, poses))
+            let (identity, recorded) = (recordings.connect()?, recordings.poses());
+            Ok((Some(Box::new(recordings)), Answer::Connected { identity, warnings: Vec::new(), recorded }))
         }
     }
 }
@@ -264,5 +280,48 @@ impl Link for Recordings {
             .get_mut(of_pose.unwrap_or(0))
             .ok_or_else(|| LinkError::SetUp("no table of recorded measurements is named".to_owned()))?;
         replay.measure(request, keep_going)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::protocol::Failure;
+    use crate::profile::builtin;
+    use crate::session::wire::LinkChoice;
+
+    fn refused(instrument: &InstrumentChoice, profile: &str) -> Problem {
+        let (profile, _) = Profile::parse(builtin(profile).unwrap(), profile).unwrap();
+        let error = connect(instrument, &profile, None, &|| true, &mut |_| ()).map(drop).unwrap_err();
+        let Answer::Failed(problem) = failed(&error) else { panic!("{error}") };
+        problem
+    }
+
+    #[test]
+    fn an_arm_whose_joints_the_controller_cannot_tell_is_refused_before_anything_is_opened() {
+        let instrument = InstrumentChoice::Linked(LinkChoice {
+            address: "emscon:127.0.0.1:1".to_owned(),
+            robot: Some("rtde:127.0.0.1:1".to_owned()),
+            ..LinkChoice::default()
+        });
+        for (profile, joints) in [("kuka_iiwa7", "7 joints"), ("epson_ls3_b401s", "4 joints")] {
+            let problem = refused(&instrument, profile);
+            assert!(problem.message.contains(joints) && problem.message.contains("RTDE tells 6"), "{problem:?}");
+        }
+        // Six joints are asked about, and nobody is there.
+        assert!(refused(&instrument, "soochow").message.contains("there is no connection"));
+    }
+
+    #[test]
+    fn what_helps_is_said_about_the_end_that_has_failed() {
+        let failure = Failure::InUse("another program has actual_q".to_owned());
+        let of_robot = failed(&LinkError::Controller(failure.clone()));
+        let Answer::Failed(problem) = of_robot else { panic!("{of_robot:?}") };
+        assert_eq!(
+            problem.message,
+            "the robot: the controller is in use by another program (another program has actual_q)"
+        );
+        assert_eq!(problem.hints, [failure.controller_hint()]);
+        assert_ne!(failure.controller_hint(), failure.hint());
     }
 }

@@ -47,6 +47,10 @@ pub struct LiveReading {
     pub seconds: f64,
     /// The reflector in the frame of the instrument (m), if it is seen. Never a measurement.
     pub point: Option<Point3<f64>>,
+    /// The instrument shows nothing between shots, whatever it sees.
+    pub is_blind: bool,
+    /// Nothing has been heard from the instrument for so long (s), where something is due all the time.
+    pub silent: Option<f64>,
     /// Joints of the robot: pendant values (rad), if it tells them.
     pub joints: Option<Vec<f64>>,
     /// Whether the robot rests; `None`: it does not tell.

@@ -209,7 +209,16 @@ pub fn meaning(key: Key, offers: &[IntentInfo]) -> Option<Meaning> {
             }
         }
     }
-    blocked
+    blocked.or_else(|| unmeasured(key, offers))
+}
+
+/// Where measuring would be the next thing and cannot be done now, such as while the link is down: the wizard says why. While
+/// something is under way a key waits for nothing.
+fn unmeasured(key: Key, offers: &[IntentInfo]) -> Option<Meaning> {
+    let is_next = BINDINGS.iter().any(|binding| binding.key == key && matches!(binding.does, Does::Default))
+        && !offers.iter().any(|info| info.is_default || info.intent == Intent::Cancel);
+    let is_blocked = |info: &&IntentInfo| matches!(info.intent, Intent::Measure) && !info.is_enabled();
+    offers.iter().filter(|_| is_next).find(is_blocked).map(|info| Meaning::Offer(Box::new(info.clone())))
 }
 
 fn accepts(does: Does, info: &IntentInfo) -> bool {
@@ -253,6 +262,21 @@ pub fn items(offers: &[IntentInfo], glyphs: Glyphs) -> Vec<Item> {
 mod tests {
     use super::*;
     use crate::wizard::PlanSettings;
+
+    #[test]
+    fn enter_is_answered_where_measuring_is_next_and_cannot_be_done() {
+        let down = IntentInfo::new(Intent::Measure, "measure").unless(Some("the link is down".to_owned()));
+        let enter = Key::plain_code(KeyCode::Enter);
+        let meant = |offers: &[IntentInfo]| match meaning(enter, offers) {
+            Some(Meaning::Offer(info)) => Some(info.intent),
+            _ => None,
+        };
+        assert_eq!(meant(std::slice::from_ref(&down)), Some(Intent::Measure));
+        let next = IntentInfo::new(Intent::Next, "go on").default_action();
+        assert_eq!(meant(&[down.clone(), next]), Some(Intent::Next));
+        let cancel = IntentInfo::new(Intent::Cancel, "cancel measuring");
+        assert_eq!(meant(&[down, cancel]), None);
+    }
 
     #[test]
     fn the_first_possible_intent_of_a_key_is_meant() {

@@ -72,10 +72,34 @@ fn short(value: &Value) -> String {
     }
 }
 
+/// A silence shorter than this (s) is not worth a word.
+const SILENT: f64 = 2.0;
+
+/// Where the SMR is, in a line, or why nobody knows.
+pub(super) fn seen(live: &LiveView) -> String {
+    match (live.point_mm, live.silent_s) {
+        (Some([x, y, z]), _) => format!("x {x:.3}  y {y:.3}  z {z:.3} mm"),
+        (None, _) if live.is_blind => "no live view: this instrument shows nothing between measurements".to_owned(),
+        (None, Some(seconds)) => silent(seconds),
+        (None, None) => "no SMR".to_owned(),
+    }
+}
+
+/// For how long nothing was heard.
+fn silent(seconds: f64) -> String {
+    if seconds < SILENT { "...".to_owned() } else { format!("nothing: the instrument is silent for {seconds:.0} s") }
+}
+
 /// What the instrument sees, in a line.
 pub(super) fn live(live: &LiveView) -> Option<String> {
     if live.down.is_some() {
         return Some("the link is down".to_owned());
+    }
+    if live.is_blind {
+        return None;
+    }
+    if let (None, Some(seconds)) = (live.point_mm, live.silent_s) {
+        return (seconds >= SILENT).then(|| format!("the instrument is silent for {seconds:.0} s"));
     }
     live.point_mm?;
     let mut parts = Vec::new();
@@ -83,4 +107,42 @@ pub(super) fn live(live: &LiveView) -> Option<String> {
     parts.extend(live.scatter_mm.map(|scatter| format!("scatter {scatter:.3} mm")));
     parts.extend(live.from_predicted_mm.map(|distance| format!("{distance:.1} mm from predicted")));
     Some(parts.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nothing is seen.
+    fn nothing() -> LiveView {
+        LiveView {
+            point_mm: None,
+            is_blind: false,
+            silent_s: None,
+            rest_s: None,
+            scatter_mm: None,
+            from_predicted_mm: None,
+            joints: None,
+            joint_difference: None,
+            is_still: None,
+            down: None,
+            track: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn why_nothing_is_seen_is_said_as_it_is() {
+        let silent = |seconds| LiveView { silent_s: Some(seconds), ..nothing() };
+        let blind = LiveView { is_blind: true, ..nothing() };
+        for (view, where_it_is, now) in [
+            (nothing(), "no SMR", None),
+            (silent(1.5), "...", None),
+            (silent(3.2), "nothing: the instrument is silent for 3 s", Some("the instrument is silent for 3 s")),
+            (blind, "no live view: this instrument shows nothing between measurements", None),
+        ] {
+            assert_eq!((seen(&view).as_str(), live(&view).as_deref()), (where_it_is, now));
+        }
+        let rests = LiveView { point_mm: Some([1.0, 2.0, 3.0]), rest_s: Some(4.9), ..nothing() };
+        assert_eq!(live(&rests).as_deref(), Some("SMR rests 4.9 s"));
+    }
 }

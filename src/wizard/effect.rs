@@ -94,6 +94,8 @@ pub enum Answer {
     Connected {
         /// Who it says it is.
         identity: String,
+        /// What the operator has to see before measuring, such as a frame that is not the instrument's own.
+        warnings: Vec<String>,
         /// The poses of recorded measurements.
         recorded: Vec<PlannedPose>,
     },

@@ -69,6 +69,11 @@ impl Live {
         self.latest = Some(reading);
     }
 
+    /// Why the link cannot be asked now.
+    pub(super) fn down(&self) -> Option<&str> {
+        self.latest.as_ref()?.down.as_deref()
+    }
+
     /// Nothing is seen any more.
     pub(super) fn clear(&mut self) {
         *self = Self::default();
@@ -132,6 +137,8 @@ impl Live {
         let row_view = |pick: &dyn Fn(usize) -> Option<f64>| row.and_then(pick);
         Some(LiveView {
             point_mm: latest.point.map(|point| point.coords.map(to_mm).into()),
+            is_blind: latest.is_blind,
+            silent_s: latest.silent,
             rest_s: rest.map(|(seconds, _)| seconds),
             scatter_mm: rest.map(|(_, scatter)| to_mm(scatter)),
             from_predicted_mm: row_view(&|row| self.off_predicted(session, row).map(|(distance, _)| to_mm(distance))),

@@ -33,6 +33,8 @@ use crate::session::state::{Robot, Session};
 pub(super) struct Cx<'a> {
     pub(super) session: &'a Session,
     pub(super) connection: Option<&'a Connection>,
+    /// Why the link to the instrument cannot be asked now, while it is being connected again.
+    pub(super) down: Option<&'a str>,
     pub(super) now: Timestamp,
 }
 

@@ -43,6 +43,10 @@ pub struct ViewModel {
 pub struct LiveView {
     /// The SMR in the frame of the instrument, if it is seen.
     pub point_mm: Option<[f64; 3]>,
+    /// The instrument shows nothing between measurements, whatever it sees.
+    pub is_blind: bool,
+    /// Nothing has been heard from the instrument for so long (s), where something is due all the time.
+    pub silent_s: Option<f64>,
     /// How long it has rested where it is.
     pub rest_s: Option<f64>,
     /// How much it scattered meanwhile, root mean square.

@@ -122,6 +122,10 @@ impl Protocol for Emscon {
     fn next_deadline(&self) -> Option<Moment> {
         self.session.next_deadline()
     }
+
+    fn shows_live(&self) -> bool {
+        self.session.shows_live()
+    }
 }
 
 #[cfg(test)]

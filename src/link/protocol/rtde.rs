@@ -225,6 +225,13 @@ impl Protocol for Rtde {
             return;
         }
         self.framer.feed(bytes);
+        if self.phase == Phase::ProtocolVersion
+            && let Err(error) = self.framer.check_header()
+        {
+            // Nothing was understood so far: this never was a controller.
+            self.lose(Failure::Foreign(format!("no RTDE comes: {error}")));
+            return;
+        }
         while self.phase != Phase::Off {
             let packet = match self.framer.next_packet() {
                 Ok(Some((kind, content))) => Packet::decode(kind, &content),

@@ -239,6 +239,10 @@ impl Simulator for EmsconSimulator {
             self.tracker.transformation[6] = 1.0001;
             self.tracker.settings[1] = 1;
         }
+        if self.faults.strikes(EmsconFault::Moved) {
+            self.tracker.transformation[0] = 0.5;
+            self.tracker.settings[1] = 1;
+        }
         if self.faults.strikes(EmsconFault::UnusedScale) {
             self.tracker.transformation[6] = 1.0001;
         }
@@ -294,6 +298,13 @@ impl Simulator for EmsconSimulator {
 
 #[cfg(test)]
 impl EmsconSimulator {
+    /// Another program has the transformation applied; a real tracker announces it to everybody.
+    pub(in crate::link) fn apply_transformation(&mut self) {
+        self.tracker.settings[1] = 1;
+        self.tell(SystemEvent::SystemSettingsChanged);
+        self.writes.flush();
+    }
+
     /// Bytes that wait for the rest of a request.
     pub(in crate::link) fn pending(&self) -> usize {
         self.framer.pending()

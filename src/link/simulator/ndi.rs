@@ -103,7 +103,8 @@ impl NdiSimulator {
     fn command(&mut self, command: &str, source: &mut dyn PointSource, now: Moment) {
         let reply = match command {
             "INIT:" => self.initialise(),
-            "APIREV:" => "G.003.001".to_owned(),
+            // The only text that nobody reads by its format: it says what this is.
+            "APIREV:" => "G.003.001 SIMULATED".to_owned(),
             "PHSR:02" if !self.is_initialised => format!("01{HANDLE:02X}001"),
             "PHSR:03" if self.is_initialised && !self.is_enabled => format!("01{HANDLE:02X}011"),
             "PHSR:02" | "PHSR:03" => "00".to_owned(),

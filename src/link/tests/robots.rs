@@ -3,6 +3,7 @@
 #![expect(clippy::disallowed_methods, reason = "deadlines of tests")]
 
 use super::*;
+use crate::link::protocol::Failure;
 
 fn bench(faults: &[&str]) -> Bench {
     let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(faults), None);
@@ -84,4 +85,33 @@ fn a_controller_that_goes_away_is_told_and_comes_back() {
     bench.until(|news| matches!(news, LinkNews::Down(cause) if cause.starts_with("robot: ")));
     bench.until(|news| matches!(news, LinkNews::Up(name) if name.starts_with("robot: ")));
     bench.measure().unwrap();
+}
+
+/// What came before is not an order to measure later.
+#[test]
+fn a_shot_that_is_asked_for_while_the_controller_is_away_is_refused_at_once() {
+    let mut bench = bench(&["cut@20"]);
+    bench.until(|news| matches!(news, LinkNews::Down(cause) if cause.starts_with("robot: ")));
+    let (before, start) = (bench.stage.shots(), Instant::now());
+    let error = bench.measure().unwrap_err();
+    assert!(matches!(&error, LinkError::Controller(Failure::Disconnected(_))), "{error:?}");
+    assert!(start.elapsed() < Duration::from_millis(300), "{:?}", start.elapsed());
+    bench.until(|news| matches!(news, LinkNews::Up(name) if name.starts_with("robot: ")));
+    assert_eq!(bench.stage.shots(), before, "nothing is measured by itself");
+}
+
+#[test]
+fn what_is_wrong_with_the_controller_is_told_with_what_helps() {
+    for (fault, part, hint) in [
+        ("old-protocol@1x*", "version 2 of the interface", "PolyScope 3.4"),
+        ("in-use@1x*", "another program", "end the other program"),
+        ("not-found@1x*", "does not know", "PolyScope 3.4"),
+    ] {
+        let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(&[fault]), None);
+        let error = bench.wired.connect().unwrap_err();
+        let LinkError::Controller(failure) = &error else { panic!("{fault}: {error:?}") };
+        assert!(error.to_string().starts_with("the robot: ") && error.to_string().contains(part), "{fault}: {error}");
+        assert!(failure.controller_hint().contains(hint), "{fault}: {}", failure.controller_hint());
+        assert!(bench.wired.identity().is_some(), "{fault}: the instrument answers");
+    }
 }

@@ -8,6 +8,7 @@ use std::thread;
 
 use super::*;
 use crate::link::protocol::Failure;
+use crate::session::reading::LiveReading;
 use crate::session::wire::LinkChoice;
 
 /// Every fault of a protocol over a real socket at its second occasion, with a good shot before it: whatever comes out is a shot that
@@ -337,4 +338,106 @@ fn the_raw_log_holds_what_came_and_went() {
         hex
     });
     assert!(bytes("in").contains(&hex), "{text}");
+}
+
+#[test]
+fn whatever_a_simulator_can_say_of_itself_says_that_it_is_simulated() {
+    for (protocol, says_so) in [
+        (WireProtocol::Emscon, true),
+        (WireProtocol::Geocom, true),
+        (WireProtocol::Ndi, true),
+        // Lines of points carry no name.
+        (WireProtocol::Ascii, false),
+    ] {
+        let identity = Bench::tcp(protocol, &[]).wired.connect().unwrap();
+        assert_eq!(identity.to_lowercase().contains("simulated"), says_so, "{protocol}: {identity}");
+    }
+}
+
+#[test]
+fn a_scale_of_the_tracker_refuses_the_link_and_a_shift_is_warned_of() {
+    let error = Bench::tcp(WireProtocol::Emscon, &["scaled@1x*"]).wired.connect().unwrap_err();
+    assert_eq!(error, LinkError::Instrument(Failure::Scaled(1.0001)));
+    let mut bench = Bench::tcp(WireProtocol::Emscon, &["moved@1x*"]);
+    let identity = bench.wired.connect().unwrap();
+    let warnings = bench.wired.warnings();
+    assert!(matches!(warnings.as_slice(), [text] if text.contains("distances stay right") && identity.contains(text)));
+}
+
+/// A peer that prints lines until it is told to be silent; the connection stays.
+fn printing(stop: &Arc<AtomicBool>) -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let stop = Arc::clone(stop);
+    thread::spawn(move || {
+        let Ok((mut stream, _)) = listener.accept() else { return };
+        let mut number = 0_u32;
+        while !stop.load(Ordering::Relaxed) {
+            number += 1;
+            let line = format!("{:.4},-678.25,90.125\n", 1000.0 + 1e-4 * f64::from(number));
+            if stream.write_all(line.as_bytes()).is_err() {
+                return;
+            }
+            thread::park_timeout(Duration::from_millis(20));
+        }
+        // Ends with the other side.
+        drop(stream.read(&mut [0; 1]));
+    });
+    port
+}
+
+/// Looks until it is seen.
+fn until_seen(wired: &mut Wired, what: impl Fn(&LiveReading) -> bool) {
+    let end = Instant::now() + DEADLINE;
+    loop {
+        let (live, _) = wired.watch(Duration::from_millis(20)).unwrap();
+        if what(&live) {
+            return;
+        }
+        assert!(Instant::now() < end, "{live:?}");
+    }
+}
+
+#[test]
+fn an_instrument_that_falls_silent_is_said_to_be_and_nothing_old_is_shown_as_now() {
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut wired = Wired::new(&choice(&format!("ascii:127.0.0.1:{}", printing(&stop))), None).unwrap();
+    wired.connect().unwrap();
+    until_seen(&mut wired, |live| live.point.is_some() && live.silent.is_none() && !live.is_blind);
+    stop.store(true, Ordering::Relaxed);
+    until_seen(&mut wired, |live| {
+        assert!(live.silent.is_none() || live.point.is_none(), "{live:?}");
+        live.silent.is_some_and(|seconds| seconds >= 2.0)
+    });
+    // The same is seen while a measurement waits for it.
+    let look = wired.eye().unwrap();
+    let end = Instant::now() + DEADLINE;
+    let silent = || look().silent.is_some_and(|seconds| seconds >= 2.5) && look().point.is_none();
+    let result = wired.measure(&request(1), &|| !silent() && Instant::now() < end);
+    assert_eq!(result, Err(LinkError::Cancelled));
+    assert!(silent());
+}
+
+#[test]
+fn an_instrument_without_a_live_view_is_not_said_to_see_nothing() {
+    for (protocol, is_blind) in [(WireProtocol::Geocom, true), (WireProtocol::Ascii, true), (WireProtocol::Ndi, false)]
+    {
+        let mut bench = Bench::tcp(protocol, &[]);
+        bench.wired.connect().unwrap();
+        until_seen(&mut bench.wired, |live| {
+            live.is_blind == is_blind && live.silent.is_none() && live.point.is_none() == is_blind
+        });
+    }
+}
+
+#[test]
+fn who_takes_the_connection_and_says_nothing_is_perhaps_another_device() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let mut wired = Wired::new(&choice(&format!("ndi:127.0.0.1:{port}")), None).unwrap();
+    let error = wired.connect().unwrap_err();
+    let LinkError::Instrument(failure @ Failure::Foreign(why)) = &error else { panic!("{error:?}") };
+    assert!(why.contains("said nothing for 2 s"), "{why}");
+    assert!(failure.hint().contains("the right port"), "{}", failure.hint());
+    drop(listener);
 }

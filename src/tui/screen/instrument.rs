@@ -101,10 +101,10 @@ fn state(content: &InstrumentView, cx: &ScreenCx<'_>, page: &mut Page) {
         (None, None) => page.pair_as("answers", "NO ANSWER: press r to try again, or choose another", Role::Warn),
     }
     if let Some(live) = &cx.view.live {
-        let seen =
-            live.point_mm.map_or_else(|| "no SMR".to_owned(), |[x, y, z]| format!("x {x:.3}  y {y:.3}  z {z:.3} mm"));
-        page.pair("sees", &seen);
-        if let Some(text) = values::live(live) {
+        if live.down.is_none() {
+            page.pair("sees", &values::seen(live));
+        }
+        if let Some(text) = values::live(live).filter(|_| live.point_mm.is_some() || live.down.is_some()) {
             page.pair("", &text);
         }
     }

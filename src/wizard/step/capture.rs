@@ -255,6 +255,8 @@ impl StepMachine for CaptureStep {
             .connection
             .is_none()
             .then(|| "the instrument does not answer; go back to the instrument step".to_owned());
+        // A key that is pressed now must not measure later, when nobody expects it any more.
+        let is_down = cx.down.map(|cause| format!("the link is down: {cause}; it is being connected again"));
         let asked = self.asked(session);
         let no_question = asked.is_none().then(|| "no sample is in question".to_owned());
         let question = asked
@@ -270,12 +272,13 @@ impl StepMachine for CaptureStep {
         let pose =
             self.row.and_then(|row| session.rows.get(row)).map_or_else(String::new, |row| row.planned.pose.clone());
         let has_more = session.open_rows().next().is_some();
-        let measure = IntentInfo::new(Intent::Measure, "measure")
-            .unless(blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()));
+        let measure = IntentInfo::new(Intent::Measure, "measure").unless(
+            blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()).or_else(|| is_down.clone()),
+        );
         let skip_blocked = no_row.clone().or_else(|| question.clone());
         let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
             .unless(not_by_hand.or_else(|| if asked.is_some() { no_instrument.clone() } else { blocked.clone() }));
-        let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone());
+        let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone()).or(is_down);
         let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session));
         let mut intents = vec![
             if has_more && !manual { measure.default_action() } else { measure },

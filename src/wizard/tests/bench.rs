@@ -126,7 +126,7 @@ pub(super) fn answer(request: &Request) -> Answer {
         Request::Connect { instrument, .. } => {
             let is_recording = matches!(instrument, InstrumentChoice::Replay { .. });
             let recorded = plan().into_iter().filter(|row| is_recording && row.kind.is_measured()).collect();
-            Answer::Connected { identity: "bench instrument".to_owned(), recorded }
+            Answer::Connected { identity: "bench instrument".to_owned(), warnings: Vec::new(), recorded }
         }
         Request::Measure(request) => Answer::Measured(reading(request)),
         Request::Plan { request, .. } if request.included.is_empty() => {

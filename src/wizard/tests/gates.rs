@@ -2,13 +2,14 @@
 
 use nalgebra::Point3;
 
-use super::bench::{Bench, appended, blocked, failure, offers, reading, seen_at, started, texts};
+use super::bench::{Bench, MANUAL, appended, blocked, failure, offers, reading, seen_at, started, texts};
 use crate::session::journal::{Entry, FindingText};
-use crate::session::reading::Reading;
+use crate::session::reading::{LiveReading, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
 use crate::session::state::SampleState;
+use crate::session::wire::LinkChoice;
 use crate::units::MILLIMETRE;
-use crate::wizard::{Answer, Effect, Intent, Request, Severity};
+use crate::wizard::{Answer, Effect, Event, Intent, Request, Severity};
 
 /// Measures the pose shown; the instrument gives what `change` makes of a good reading.
 fn measure(bench: &mut Bench, change: impl FnOnce(&mut Reading)) -> Vec<Effect> {
@@ -283,4 +284,44 @@ fn a_question_about_the_last_sample_comes_before_going_on() {
     assert_eq!(defaults(&bench), ["MeasureAgain*"]);
     bench.does(Intent::Keep);
     assert_eq!(defaults(&bench), ["Next*"]);
+}
+
+#[test]
+fn what_an_instrument_warns_of_is_told_apart_from_its_name() {
+    let mut bench = Bench::new();
+    bench.pass(&MANUAL);
+    let effects = bench.intend(Intent::ChooseInstrument(linked()));
+    let (id, lines) = appended(&effects);
+    let (request, _) = started(&bench.written(id, lines));
+    let warnings = vec!["no weather monitor".to_owned(), "points are not in its own frame".to_owned()];
+    let identity = format!("tracker; {}", warnings.join("; "));
+    let effects = bench.answer(request, Answer::Connected { identity, warnings, recorded: Vec::new() });
+    bench.settle(effects);
+    let notice = bench.wizard.notice().unwrap();
+    assert_eq!(notice.severity, Severity::Attention);
+    for part in ["no weather monitor", "points are not in its own frame"] {
+        assert!(notice.what.contains(part), "{notice:?}");
+    }
+    assert!(matches!(bench.last_entry(), Entry::Connected { identity } if identity.contains("own frame")));
+}
+
+#[test]
+fn while_the_link_is_down_nothing_is_measured_and_nothing_waits_to_be() {
+    let mut bench = Bench::with(&linked(), Step::Capture);
+    bench.measure(1);
+    let look =
+        |down: Option<&str>| Event::Live(LiveReading { down: down.map(str::to_owned), ..LiveReading::default() });
+    bench.wizard.update(look(Some("the connection is lost: closed")));
+    assert!(bench.intend(Intent::Measure).is_empty());
+    let told = bench.told();
+    assert_eq!(told, "not now: the link is down: the connection is lost: closed; it is being connected again");
+    // It comes back: what was asked for before is not done now.
+    assert!(bench.wizard.update(look(None)).is_empty());
+    assert!(bench.wizard.is_idle());
+    let (_, request) = started(&bench.intend(Intent::Measure));
+    assert!(matches!(request, Request::Measure(_)));
+}
+
+fn linked() -> InstrumentChoice {
+    InstrumentChoice::Linked(LinkChoice { address: "emscon:192.168.0.2".to_owned(), ..LinkChoice::default() })
 }

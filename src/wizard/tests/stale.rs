@@ -9,7 +9,10 @@ fn strangers(id: RequestId) -> Vec<Event> {
     vec![
         Event::Answer { id, answer: Answer::Cancelled },
         Event::Answer { id, answer: failure("too late") },
-        Event::Answer { id, answer: Answer::Connected { identity: "another".to_owned(), recorded: Vec::new() } },
+        Event::Answer {
+            id,
+            answer: Answer::Connected { identity: "another".to_owned(), warnings: Vec::new(), recorded: Vec::new() },
+        },
         Event::Answer { id, answer: Answer::Delivered { files: vec!["x".to_owned()], left_out: Vec::new() } },
         Event::Progress { id, progress: Progress::Search(crate::procedure::plan::Progress::Searching) },
         Event::Store(StoreEvent::Written { id }),

@@ -428,6 +428,10 @@ impl Protocol for AsciiProtocol {
             None => self.silence_deadline(),
         }
     }
+
+    fn shows_live(&self) -> bool {
+        self.lines().is_some()
+    }
 }
 
 fn failure(rejection: Rejection) -> Failure {

@@ -7,6 +7,7 @@ use thiserror::Error;
 use super::super::Shot;
 use super::super::crc::crc16_arc;
 use super::super::crc::nmea_xor;
+use super::super::known_sigma;
 use super::super::text::shown;
 use super::number::number;
 use super::number::time;
@@ -248,7 +249,7 @@ impl<'line> Fields<'line> {
         if sigmas.iter().any(|sigma| *sigma < 0.0) {
             return Err(Rejection::Garbled("a standard deviation is negative".to_owned()));
         }
-        Ok(sigmas.iter().all(|sigma| *sigma > 0.0).then_some(sigmas))
+        Ok(known_sigma(sigmas))
     }
 }
 

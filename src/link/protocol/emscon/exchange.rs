@@ -13,6 +13,10 @@ pub(super) const ORDINARY: Duration = Duration::from_secs(30);
 /// The initialisation is answered within this: the head of the tracker turns.
 pub(super) const INITIALIZE: Duration = Duration::from_secs(90);
 
+/// The first question of a connection is answered within this: it only reads. What takes the connection and says nothing is often
+/// no tracker.
+pub(super) const FIRST: Duration = Duration::from_secs(8);
+
 /// A command whose answer is not complete.
 #[derive(Clone, Debug)]
 pub(super) struct Exchange {
@@ -45,6 +49,11 @@ impl Exchange {
     pub(super) fn new(command: Command, now: Moment) -> Self {
         let state = State::Sent { until: now + patience(command.id) };
         Self { command, state, patience: Patience::default() }
+    }
+
+    /// The first one of a connection.
+    pub(super) fn first(command: Command, now: Moment) -> Self {
+        Self { state: State::Sent { until: now + FIRST }, ..Self::new(command, now) }
     }
 
     /// True where an answer to this command is the answer to this exchange.

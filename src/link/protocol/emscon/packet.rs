@@ -16,6 +16,9 @@ pub const MIN_PACKET: usize = 12;
 /// A size above this is no size but lost synchronisation (bytes).
 pub const MAX_PACKET: usize = 65_536;
 
+/// Numbers of types are small; a dozen is known.
+const MAX_TYPE: i32 = 1000;
+
 /// Why bytes are no packet.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum PacketError {
@@ -67,6 +70,20 @@ impl Framer {
             self.unread.skip(length);
         }
         Ok(packet)
+    }
+
+    /// Whether the next packet has a size or a type that no tracker sends, of whatever firmware.
+    pub fn announces_unknown(&self) -> bool {
+        let rest = self.unread.bytes();
+        let size = i32_at(rest, 0).map(|size| usize::try_from(size).unwrap_or(0));
+        size.is_some_and(|size| !(MIN_PACKET..=MAX_PACKET).contains(&size))
+            || i32_at(rest, 4).is_some_and(|kind| !(0..MAX_TYPE).contains(&kind))
+    }
+
+    /// The first bytes that wait, at most so many.
+    pub fn start(&self, most: usize) -> &[u8] {
+        let rest = self.unread.bytes();
+        rest.get(..most).unwrap_or(rest)
     }
 
     /// Bytes that wait for the rest of their packet.

@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use super::super::outbox::Outbox;
+use super::super::text::shown;
 use super::super::{Failure, Moment, ProtocolEvent, Severity};
 use super::EmsconOptions;
 use super::command::Command;
-use super::exchange::{Due, Exchange, patience};
+use super::exchange::{Due, Exchange, FIRST, patience};
 use super::packet::{Framer, Packet, Reply, SingleResult};
 use super::setup::{Outcome, SetUp, WARM_UP_PAUSE};
 use super::shot::{position_of, shot_of};
@@ -15,6 +16,9 @@ use super::step::reading_of;
 
 /// Re-checks in a row that find yet another change, after which somebody else is at the settings.
 const MAX_RECHECKS: u32 = 5;
+
+/// So many bytes of what is no packet are shown.
+const SHOWN: usize = 16;
 
 /// What the link is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +62,8 @@ pub(super) struct Session {
     was_not_ready: bool,
     face: Option<u8>,
     last_heard: Moment,
+    /// When a tracker was known by its first packet, if it was over this connection.
+    known_since: Option<Moment>,
 }
 
 impl Session {
@@ -76,7 +82,13 @@ impl Session {
             was_not_ready: false,
             face: None,
             last_heard: Moment::ZERO,
+            known_since: None,
         }
+    }
+
+    /// Whether positions of the reflector come between shots.
+    pub(super) const fn shows_live(&self) -> bool {
+        self.options.reflector_positions
     }
 
     /// A new connection.
@@ -95,8 +107,17 @@ impl Session {
         self.last_heard = now;
         self.framer.feed(bytes);
         while self.phase != Phase::Off {
+            if self.known_since.is_none() && self.framer.announces_unknown() {
+                // Nothing was understood so far: this never was a tracker.
+                let start = shown(&String::from_utf8_lossy(self.framer.start(SHOWN)));
+                self.lose(Failure::Foreign(format!("no emScon answers there, what comes begins with `{start}`")));
+                return;
+            }
             match self.framer.next_packet() {
-                Ok(Some(packet)) => self.take(&packet, now),
+                Ok(Some(packet)) => {
+                    self.known_since.get_or_insert(now);
+                    self.take(&packet, now);
+                }
                 Ok(None) => return,
                 Err(error) => self.lose(Failure::Garbled(error.to_string())),
             }
@@ -372,6 +393,11 @@ impl Session {
     /// An answer did not come. Without any answer to a status or a stop the tracker is gone.
     fn timed_out(&mut self, now: Moment) {
         let Some(exchange) = self.exchange.take() else { return };
+        if self.known_since.is_none() {
+            let seconds = FIRST.as_secs();
+            let text = format!("it took the connection, but has not answered the first question for {seconds} s");
+            return self.lose(Failure::Foreign(text));
+        }
         let seconds = patience(exchange.command.id).as_secs_f64();
         let failure = Failure::Silent { what: exchange.command.id.words().to_owned(), seconds };
         if self.phase == Phase::Starting {
@@ -432,7 +458,8 @@ impl Session {
 
     fn send(&mut self, command: Command, now: Moment) {
         self.outbox.send(command.encode());
-        self.exchange = Some(Exchange::new(command, now));
+        let exchange = if self.known_since.is_some() { Exchange::new } else { Exchange::first };
+        self.exchange = Some(exchange(command, now));
     }
 
     /// Answers the trigger.

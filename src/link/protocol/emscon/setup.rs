@@ -236,12 +236,14 @@ impl SetUp {
 
     fn judge_transformation(&mut self, values: [f64; 7]) -> Result<(), Failure> {
         let is_applied = self.system.is_none_or(|settings| settings.apply_transformation_params != 0);
+        let [.., scale] = values;
+        if is_applied && !is_same(&[scale], &[1.0]) {
+            return Err(Failure::Scaled(scale));
+        }
         if is_applied && !is_same(&values, &NO_TRANSFORMATION) && self.is_whole {
-            let scale = values[6];
-            self.warnings.push(format!(
-                "the tracker transforms its points; scale {scale}: {}",
-                if (scale - 1.0).abs() > SAME { "distances are wrong by this factor" } else { "distances stay right" }
-            ));
+            let text =
+                "the tracker transforms its points (scale 1): distances stay right, points are not in its own frame";
+            self.warnings.push(text.to_owned());
         }
         unchanged("transformation", &mut self.transformation, values)
     }
@@ -290,6 +292,13 @@ impl SetUp {
     fn judge_settings(&mut self, fields: Fields<'_>, is_check: bool) -> Result<(), Failure> {
         let found = SystemSettings::from_numbers(fields.integers(16));
         let wanted = self.wanted(found);
+        let applied = |settings: SystemSettings| {
+            [settings.apply_transformation_params, settings.apply_station_orientation_params].map(|flag| flag != 0)
+        };
+        if self.system.is_some_and(|before| applied(before) != applied(found)) {
+            let text = "another frame is applied than before; points before and after do not fit together";
+            return Err(Failure::Settings(text.to_owned()));
+        }
         self.system = Some(found);
         if found.weather_monitor_status == 0 {
             self.warnings.push("no weather monitor: check the weather values at the tracker".to_owned());

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::super::{Failure, Shot};
+use super::super::{Failure, Shot, known_sigma};
 use super::EmsconOptions;
 use super::packet::SingleResult;
 use super::status::ResultStatus;
@@ -35,10 +35,9 @@ pub(super) fn shot_of(result: SingleResult, options: &EmsconOptions, face: Optio
             "the point is {distance:.6} m from the tracker; {nearest} m to {farthest} m can be measured"
         )));
     }
-    let is_sigma = result.sigma.iter().all(|value| value.is_finite() && *value >= 0.0);
     let [temperature, pressure, humidity] = result.weather.map(|value| Some(value).filter(|value| value.is_finite()));
     Ok(Shot {
-        sigma: is_sigma.then(|| result.sigma.map(|value| value / MM_PER_METRE)),
+        sigma: known_sigma(result.sigma.map(|value| value / MM_PER_METRE)),
         face,
         temperature,
         pressure,

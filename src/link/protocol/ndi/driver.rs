@@ -36,7 +36,7 @@ const DRAIN: Duration = Duration::from_millis(200);
 const POLL: Duration = Duration::from_millis(10);
 
 /// Time between live positions; they show too that the instrument is still there.
-const LIVE: Duration = Duration::from_secs(1);
+const LIVE: Duration = Duration::from_millis(300);
 
 /// How often a command is sent again that was damaged on its way.
 const MAX_RESENDS: u32 = 2;
@@ -430,5 +430,9 @@ impl Protocol for NdiProtocol {
 
     fn next_deadline(&self) -> Option<Moment> {
         self.pending.as_ref().map(|pending| pending.at)
+    }
+
+    fn shows_live(&self) -> bool {
+        true
     }
 }

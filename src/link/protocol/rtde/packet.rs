@@ -30,6 +30,18 @@ pub mod packet_type {
     pub const CONTROL_PACKAGE_START: u8 = b'S';
     /// `P`: pauses the stream.
     pub const CONTROL_PACKAGE_PAUSE: u8 = b'P';
+
+    /// All of them.
+    pub const ALL: [u8; 8] = [
+        REQUEST_PROTOCOL_VERSION,
+        GET_URCONTROL_VERSION,
+        TEXT_MESSAGE,
+        DATA_PACKAGE,
+        CONTROL_PACKAGE_SETUP_OUTPUTS,
+        CONTROL_PACKAGE_SETUP_INPUTS,
+        CONTROL_PACKAGE_START,
+        CONTROL_PACKAGE_PAUSE,
+    ];
 }
 
 /// Why bytes are no packet.
@@ -38,6 +50,9 @@ pub enum PacketError {
     /// The header says what no header says.
     #[error("a packet of {0} bytes was announced; three are the least, so the stream is out of step")]
     Size(u16),
+    /// The header names a type that a controller never sends.
+    #[error("a packet of type {0:#04x} was announced, which no controller sends")]
+    Type(u8),
     /// A packet does not have the size that its kind has.
     #[error("packet '{kind}' has {size} bytes behind its header, {least} are needed")]
     Short {
@@ -82,6 +97,20 @@ impl Framer {
         let packet = (*kind, content.to_vec());
         self.unread.skip(length);
         Ok(Some(packet))
+    }
+
+    /// Whether what has arrived can be the beginning of a packet of a controller; one byte too few to say counts as yes.
+    ///
+    /// # Errors
+    /// [`PacketError::Size`], [`PacketError::Type`].
+    pub fn check_header(&self) -> Result<(), PacketError> {
+        match *self.unread.bytes() {
+            [high, low, ..] if usize::from(u16::from_be_bytes([high, low])) < MIN_PACKET => {
+                Err(PacketError::Size(u16::from_be_bytes([high, low])))
+            }
+            [_, _, kind, ..] if !packet_type::ALL.contains(&kind) => Err(PacketError::Type(kind)),
+            _ => Ok(()),
+        }
     }
 
     /// Bytes that wait for the rest of their packet.

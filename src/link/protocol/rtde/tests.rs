@@ -341,3 +341,15 @@ fn no_bytes_make_the_simulated_controller_panic_or_hoard() {
     let bounds = Bounds { pending: (1 << 16) - 1, outputs: 200_000 };
     fuzz_simulator(all, &ready(&[]).sent, RtdeSimulator::pending, bounds);
 }
+
+#[test]
+fn what_is_no_controller_is_told_by_its_first_bytes() {
+    for first in [&b"HTTP/1.1 400 Bad Request\r\n"[..], b"SSH-2.0-OpenSSH", &[0x10, 0, 0, 0, 0, 0, 0, 0], &[0, 2]] {
+        let mut protocol = Rtde::default();
+        protocol.start(Duration::ZERO);
+        protocol.feed(first, Duration::ZERO);
+        let lost = std::iter::from_fn(|| protocol.next_event()).last();
+        let Some(ProtocolEvent::Lost(failure @ Failure::Foreign(_))) = &lost else { panic!("{first:?}: {lost:?}") };
+        assert!(failure.controller_hint().contains("30004"), "{}", failure.controller_hint());
+    }
+}

@@ -9,6 +9,7 @@ faults! {
         Joined "joined" "Measures in no time and sends all answers in one write. Occasion: a connection.",
         InUse "in-use" "Says that another program is connected, and hangs up. Occasion: a connection.",
         Scaled "scaled" "Has a transformation with scale 1.0001 that is applied. Occasion: a connection.",
+        Moved "moved" "Has a transformation that shifts by 0.5 m and does not scale, and is applied. Occasion: a connection.",
         UnusedScale "unused-scale" "Has a transformation with scale 1.0001 that is not applied. Occasion: a connection.",
         WarmingUp "warming-up" "Its laser is warming up. Occasion: a reading of the system status.",
         Metres "metres" "Accepts new units and stays with metres. Occasion: a setting of the units.",

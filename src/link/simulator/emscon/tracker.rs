@@ -1,6 +1,6 @@
 //! What the simulated tracker is set to: it survives a connection, as in a real one.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::wire::PacketWriter;
 use crate::link::protocol::emscon::{CommandId, CoordinateType, LengthUnit, ResultStatus, i32_at};
@@ -16,11 +16,11 @@ struct ListedReflector {
     name: &'static str,
 }
 
-/// The list of reflectors.
+/// The list of reflectors. Their names are the only text of a tracker: they say what it is.
 const REFLECTORS: [ListedReflector; 3] = [
-    ListedReflector { id: 0, kind: 5, offset: 0.019_05, name: "RRR 1.5in" },
-    ListedReflector { id: 1, kind: 6, offset: 0.006_35, name: "RRR 0.5in" },
-    ListedReflector { id: 2, kind: 9, offset: 0.006_35, name: "TBR 0.5in" },
+    ListedReflector { id: 0, kind: 5, offset: 0.019_05, name: "SIMULATED RRR 1.5in" },
+    ListedReflector { id: 1, kind: 6, offset: 0.006_35, name: "SIMULATED RRR 0.5in" },
+    ListedReflector { id: 2, kind: 9, offset: 0.006_35, name: "SIMULATED TBR 0.5in" },
 ];
 
 /// Settings of the tracker. It starts with none of those that a set-up asks for.
@@ -36,7 +36,7 @@ pub(super) struct Tracker {
     /// In the order of the wire: weather monitor 0, transformation 1, unsolicited messages 4, positions 5, try mode 6.
     pub(super) settings: [i32; 9],
     pub(super) orientation: [f64; 6],
-    /// Translation in the unit of length, rotation, scale.
+    /// Translation (m), rotation, scale. Rotations are told, but nothing is turned.
     pub(super) transformation: [f64; 7],
     pub(super) is_initialized: bool,
 }
@@ -79,7 +79,7 @@ impl Tracker {
             CommandId::GetReflector => ok().i32(self.reflector),
             CommandId::GetSystemSettings => ok().integers(&self.settings),
             CommandId::GetStationOrientationParams => ok().numbers(&self.orientation),
-            CommandId::GetTransformationParams => ok().numbers(&self.transformation),
+            CommandId::GetTransformationParams => ok().numbers(&self.told_transformation()),
             CommandId::GetReflectors => return Some(self.list(command)),
             CommandId::SetUnits
             | CommandId::SetCoordinateSystemType
@@ -130,8 +130,10 @@ impl Tracker {
 
     /// Coordinates of a point (m) as they are set.
     pub(super) fn coordinates(&self, point: &Point3<f64>) -> [f64; 3] {
-        let scale = if self.settings[1] == 0 { 1.0 } else { self.transformation[6] };
-        let [x, y, z] = (point.coords * (scale * self.units_per_metre())).into();
+        let [scale, shift] =
+            if self.settings[1] == 0 { [1.0, 0.0] } else { [self.transformation[6], self.transformation[0]] };
+        let moved = point.coords * scale + Vector3::x() * shift;
+        let [x, y, z] = (moved * self.units_per_metre()).into();
         if self.coordinate_type == CoordinateType::RightHanded {
             return [x, y, z];
         }
@@ -142,6 +144,14 @@ impl Tracker {
             _ => 1.0,
         };
         [y.atan2(x) * per_radian, (z / distance).acos() * per_radian, distance]
+    }
+
+    /// The transformation with its translation in the unit that is set.
+    fn told_transformation(&self) -> [f64; 7] {
+        let [x, y, z, rest @ ..] = self.transformation;
+        let [x, y, z] = [x, y, z].map(|part| part * self.units_per_metre());
+        let [a, b, c, scale] = rest;
+        [x, y, z, a, b, c, scale]
     }
 
     /// The unit of length in a metre.

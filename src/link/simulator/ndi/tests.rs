@@ -73,7 +73,7 @@ fn the_identity_says_what_text_cannot() {
     for reply in BOTH {
         let mut bench = Bench::new(NdiProtocol::new(options(reply)).unwrap(), NdiSimulator::new(TIP_MM, []));
         let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!("not ready") };
-        assert_eq!(identity.name, "NDI tracker, version G.003.001");
+        assert_eq!(identity.name, "NDI tracker, version G.003.001 SIMULATED");
         assert_eq!(identity.notes.iter().any(|text| text.contains("0.01 mm")), reply == ReplyFormat::Text);
     }
 }

@@ -53,10 +53,12 @@ fn lines(live: &LiveView, content: &CaptureView) -> Vec<(String, Role)> {
         ];
     }
     let mut lines = vec![match live.point_mm {
-        Some([x, y, z]) => (format!("SMR at x {x:.3}  y {y:.3}  z {z:.3} mm"), Role::Title),
+        Some(_) => (format!("SMR at {}", values::seen(live)), Role::Title),
+        None if live.is_blind => ("This instrument shows nothing between measurements.".to_owned(), Role::Dim),
+        None if live.silent_s.is_some() => (format!("Seen: {}", values::seen(live)), Role::Warn),
         None => ("No SMR is seen.".to_owned(), Role::Warn),
     }];
-    lines.extend(values::live(live).map(|text| (text, Role::Plain)));
+    lines.extend(values::live(live).filter(|_| live.point_mm.is_some()).map(|text| (text, Role::Plain)));
     if let (Some((joint, difference)), Some(pose)) = (live.joint_difference, &content.pose) {
         let name = content.joints.get(joint).map_or_else(|| (joint + 1).to_string(), |joint| joint.name.clone());
         let unit = content.joints.get(joint).map_or("deg", |joint| joint.unit.as_str());

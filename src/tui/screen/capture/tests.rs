@@ -207,6 +207,8 @@ fn live() -> ViewModel {
     });
     let seen = LiveView {
         point_mm: Some([1234.567, -345.678, 987.654]),
+        is_blind: false,
+        silent_s: None,
         rest_s: Some(2.5),
         scatter_mm: Some(0.004),
         from_predicted_mm: Some(7.25),

@@ -22,7 +22,7 @@ fn the_identity_says_who_answers_what_was_checked_and_which_reflector_is_in_use(
     let Some(ProtocolEvent::Ready(identity)) = events.last() else { panic!("{events:?}") };
     assert_eq!(identity.name, "Leica emScon tracker, serial 4711, version 3.6.0");
     let reflector = identity.reflector.clone().unwrap();
-    assert_eq!((reflector.id, reflector.name.as_str()), (0, "RRR 1.5in"));
+    assert_eq!((reflector.id, reflector.name.as_str()), (0, "SIMULATED RRR 1.5in"));
     assert!((reflector.offset - 0.019_05).abs() < 1e-12);
     assert_eq!(identity.warnings, Vec::<String>::new());
     assert!(identity.checked.iter().any(|line| line == "units: mm, rad, \u{b0}C, mbar, %RH (read back)"));
@@ -59,7 +59,7 @@ fn a_reflector_that_was_asked_for_is_set_and_read_back() {
     let mut bench = bench_with(EmsconOptions { reflector: Some(1), ..EmsconOptions::default() }, &[]);
     let events = bench.settle();
     let Some(ProtocolEvent::Ready(identity)) = events.last() else { panic!("{events:?}") };
-    assert_eq!(identity.reflector.as_ref().unwrap().name, "RRR 0.5in");
+    assert_eq!(identity.reflector.as_ref().unwrap().name, "SIMULATED RRR 0.5in");
     let mut bench = bench_with(EmsconOptions { reflector: Some(9), ..EmsconOptions::default() }, &[]);
     assert_eq!(
         bench.settle().last(),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 
-use super::super::{EmsconOptions, ResultStatus};
+use super::super::{Emscon, EmsconOptions, ResultStatus};
 use super::{EmsconBench, bench, bench_with, failure, ready, statuses};
 use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::Cell;
@@ -225,7 +225,7 @@ fn a_frame_or_a_reflector_that_somebody_changed_ends_the_link_because_points_no_
         (EmsconFault::FrameChanged, "the station orientation was changed; points before and after do not fit together"),
         (
             EmsconFault::ReflectorChanged,
-            "reflector: expected 'RRR 1.5in' (0), surface offset 19.0500 mm, the tracker has 'RRR 0.5in' (1), surface offset \
+            "reflector: expected 'SIMULATED RRR 1.5in' (0), surface offset 19.0500 mm, the tracker has 'SIMULATED RRR 0.5in' (1), surface offset \
              6.3500 mm; points with different reflectors do not fit together",
         ),
     ] {
@@ -278,18 +278,32 @@ fn what_an_instrument_does_not_know_is_a_warning_where_points_do_not_depend_on_i
 }
 
 #[test]
-fn a_scale_of_the_tracker_is_a_warning() {
+fn a_scale_of_the_tracker_ends_the_set_up_and_a_shift_is_a_warning() {
     let mut unused = ready(&[Planned::once(EmsconFault::UnusedScale)]);
     let Some(ProtocolEvent::Ready(identity)) = unused.settle().pop() else { panic!() };
     assert_eq!(identity.warnings, Vec::<String>::new());
     assert_recovered(&mut unused);
-    let mut bench = bench(&[Planned::once(EmsconFault::Scaled)]);
-    let events = bench.settle();
+    let mut scaled = bench(&[Planned::once(EmsconFault::Scaled)]);
+    let events = scaled.settle();
+    let failure = failure(&events);
+    assert_eq!(*failure, Failure::Scaled(1.0001));
+    assert!(failure.to_string().contains("scale 1.0001"), "{failure}");
+    assert!(failure.hint().contains("set the scale of the instrument's transformation to 1"), "{}", failure.hint());
+    let mut moved = bench(&[Planned::once(EmsconFault::Moved)]);
+    let events = moved.settle();
     let Some(ProtocolEvent::Ready(identity)) = events.last() else { panic!("{events:?}") };
-    assert_eq!(
-        identity.warnings,
-        ["the tracker transforms its points; scale 1.0001: distances are wrong by this factor"]
-    );
+    let warning = "the tracker transforms its points (scale 1): distances stay right, points are not in its own frame";
+    assert_eq!(identity.warnings, [warning]);
+}
+
+#[test]
+fn a_scale_that_is_applied_later_ends_the_link() {
+    let mut bench = ready(&[Planned::once(EmsconFault::UnusedScale)]);
+    // What another program does: the settings with the transformation applied, and the announcement of it.
+    bench.simulator.apply_transformation();
+    let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
+    let Failure::Settings(why) = failure(&events) else { panic!("{events:?}") };
+    assert!(why.contains("another frame is applied"), "{why}");
 }
 
 #[test]
@@ -337,9 +351,9 @@ fn a_change_that_never_ends_is_said() {
     assert_eq!(events.last(), Some(&ProtocolEvent::Lost(Failure::Settings(words))));
 }
 
-/// Faults in any order and number. A scale is no fault of the link but a setting that it warns of.
+/// Faults in any order and number. A shift is no fault of the link but a setting that it warns of.
 fn any_faults() -> impl Strategy<Value = Vec<Planned<EmsconFault>>> {
-    let fault = prop::sample::select(EmsconFault::ALL).prop_filter("warned of", |fault| *fault != EmsconFault::Scaled);
+    let fault = prop::sample::select(EmsconFault::ALL).prop_filter("warned of", |fault| *fault != EmsconFault::Moved);
     let planned = (fault, 1_u32..6, 1_u32..3).prop_map(|(fault, first, times)| Planned::from(fault, first, times));
     prop::collection::vec(planned, 0..8)
 }
@@ -365,4 +379,34 @@ proptest! {
             is_ready = !events.iter().chain(&rest).any(|event| matches!(event, ProtocolEvent::Lost(_)));
         }
     }
+}
+
+#[test]
+fn what_is_no_tracker_is_told_by_its_first_bytes() {
+    for (first, part) in [
+        (&b"HTTP/1.1 400 Bad Request\r\n"[..], "begins with `HTTP/1.1 400 Bad`"),
+        (b"SSH-2.0-OpenSSH", "begins with `SSH-2.0"),
+        // A refused version of RTDE.
+        (&[0, 4, b'V', 0], "no emScon answers there"),
+        // A size that may be, a type that no firmware has.
+        (&[0x20, 0, 0, 0, b't', b'e', b'x', b't'], "no emScon answers there"),
+    ] {
+        let mut protocol = Emscon::default();
+        protocol.start(Duration::ZERO);
+        protocol.feed(first, Duration::ZERO);
+        let lost = std::iter::from_fn(|| protocol.next_event()).last();
+        let Some(ProtocolEvent::Lost(failure @ Failure::Foreign(why))) = &lost else { panic!("{lost:?}") };
+        assert!(why.contains(part), "{why}");
+        assert!(failure.hint().contains("this kind of instrument, and the right port"), "{}", failure.hint());
+    }
+}
+
+#[test]
+fn what_takes_the_connection_and_says_nothing_is_told_soon() {
+    let mut protocol = Emscon::default();
+    protocol.start(Duration::ZERO);
+    protocol.tick(Duration::from_secs(8));
+    let lost = std::iter::from_fn(|| protocol.next_event()).last();
+    let Some(ProtocolEvent::Lost(Failure::Foreign(why))) = lost else { panic!("{lost:?}") };
+    assert_eq!(why, "it took the connection, but has not answered the first question for 8 s");
 }
