@@ -146,7 +146,8 @@ fn who_the_instrument_said_it_is_is_noted_once_and_again_when_it_is_another() {
     let (id, request) = started(&written);
     assert!(matches!(request, Request::Connect { .. }));
     let identity = "a SIMULATED instrument".to_owned();
-    let effects = other.answer(id, Answer::Connected { identity: identity.clone(), recorded: Vec::new() });
+    let effects =
+        other.answer(id, Answer::Connected { identity: identity.clone(), recorded: Vec::new(), warnings: Vec::new() });
     other.settle(effects);
     assert_eq!(noted(&other), [named("bench instrument"), named(&identity)]);
     assert_eq!((bench.wizard.session().is_simulated(), other.wizard.session().is_simulated()), (false, true));
