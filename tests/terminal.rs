@@ -28,8 +28,8 @@ use trupose::session::set_up::Step;
 use trupose::session::state::Session;
 use trupose::store::session::read_journal;
 
-/// A terminal that went away is noticed within this, on a busy machine too; what it may cost is below.
-const GONE: Duration = Duration::from_secs(5);
+/// A terminal that went away is noticed within this.
+const GONE: Duration = Duration::from_secs(1);
 /// Processor time (s) that closing a session may take.
 const CLOSING: f64 = 0.3;
 const SIZE: (u16, u16) = (80, 24);

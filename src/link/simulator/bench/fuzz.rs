@@ -281,3 +281,19 @@ fn tease_freely<S: Simulator>(mut teased: Teased<'_, S>, valid: &[u8], random: &
         teased.tick(now);
     }
 }
+
+/// Floods a simulator with requests whose answers nobody reads: it keeps a bounded number of bytes, and hangs up once.
+///
+/// # Panics
+/// The test fails.
+pub fn assert_hangs_up_once<S: Simulator>(simulator: &mut S, requests: &[u8]) {
+    simulator.accept(START);
+    simulator.feed(requests, &mut Cell::default(), START);
+    (0..10).for_each(|_| simulator.tick(&mut Cell::default(), START));
+    let outputs: Vec<Output> = std::iter::from_fn(|| simulator.next_output()).collect();
+    let bytes: usize =
+        outputs.iter().map(|output| if let Output::Bytes(bytes) = output { bytes.len() } else { 0 }).sum();
+    assert!(bytes < 2 << 20, "{bytes}");
+    let closes = outputs.iter().filter(|output| **output == Output::Close).count();
+    assert_eq!((closes, outputs.last()), (1, Some(&Output::Close)));
+}
