@@ -1,17 +1,17 @@
 //! Where the tracker stands, as far as the measured points tell.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 
 use super::state::{Sample, Session};
-use crate::geometry::register;
+use crate::geometry::{Registration, register};
 use crate::kinematics::ForwardKinematics;
 
 /// Fewest samples that tell it.
 pub const FEWEST: usize = 4;
 
-/// The transform from the frame of the measured coordinates into the base: the samples that count, registered to the nominal arm.
-/// `None` before there are [`FEWEST`] of them. The tracker stands at the origin of its coordinates.
-pub fn base_from_tracker(session: &Session) -> Option<Isometry3<f64>> {
+/// The measured coordinates registered to the base: the samples that count, to where the nominal arm has the reflector. `None` before
+/// there are [`FEWEST`] of them. The tracker stands at the origin of its coordinates.
+pub fn registration(session: &Session) -> Option<Registration> {
     let profile = session.mounted_profile()?;
     let target = profile.targets().first().map_or_else(Point3::origin, |target| target.position_in_flange);
     let forward = ForwardKinematics::new(profile.chain());
@@ -26,10 +26,10 @@ pub fn base_from_tracker(session: &Session) -> Option<Isometry3<f64>> {
 }
 
 /// The rigid motion that brings points as measured (m) to where they are in the base (m), from at least [`FEWEST`] pairs.
-pub fn registered(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<f64>> {
+pub fn registered(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Registration> {
     if pairs.len() < FEWEST {
         return None;
     }
-    let found = register(pairs.iter().map(|(from, to)| (1.0, *from, *to)))?.to_from_from;
-    found.to_matrix().iter().all(|value| value.is_finite()).then_some(found)
+    let found = register(pairs.iter().map(|(from, to)| (1.0, *from, *to)))?;
+    found.to_from_from.to_matrix().iter().all(|value| value.is_finite()).then_some(found)
 }

@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::register;
 use crate::kinematics::ForwardKinematics;
 use crate::session::reading::LiveReading;
 use crate::session::state::Session;
+use crate::session::station;
 use crate::units::{DEGREE, MILLIMETRE, to_deg, to_mm};
 
 use super::view::{LivePoint, LiveView};
@@ -23,8 +23,6 @@ const REST: f64 = 0.1 * MILLIMETRE;
 pub(super) const REST_TIME: f64 = 2.0;
 /// It has to move by so much before the wizard measures by itself again (m).
 const MOVED: f64 = 5.0 * MILLIMETRE;
-/// Fewest samples that tell where the tracker stands.
-const FEWEST: usize = 4;
 /// The SMR is near if it is within this of its predicted place (m), or within [`NEAR_SPREADS`] of what samples miss.
 const NEAR: f64 = 30.0 * MILLIMETRE;
 const NEAR_SPREADS: f64 = 4.0;
@@ -40,12 +38,6 @@ pub(super) struct Live {
     measured_at: Option<Point3<f64>>,
     /// Something was seen since the link is there.
     has_seen: bool,
-}
-
-/// Where the tracker stands as the samples so far tell it.
-struct Registered {
-    base_from_tracker: nalgebra::Isometry3<f64>,
-    rms: f64,
 }
 
 impl Live {
@@ -94,9 +86,9 @@ impl Live {
     /// Distance of the SMR from where it should be at row `row` (m).
     fn off_predicted(&self, session: &Session, row: usize) -> Option<(f64, f64)> {
         let (_, here) = *self.points.back()?;
-        let registered = registered(session)?;
+        let registered = station::registration(session)?;
         let predicted = predicted(session, &session.rows.get(row)?.planned.configuration)?;
-        Some(((registered.base_from_tracker * here - predicted).norm(), registered.rms))
+        Some(((registered.to_from_from * here - predicted).norm(), registered.rms))
     }
 
     /// Largest difference of a joint from the plan (rad), and which joint.
@@ -165,16 +157,4 @@ fn predicted(session: &Session, q: &[f64]) -> Option<Point3<f64>> {
     let profile = session.mounted_profile()?;
     let target = profile.targets().first()?.position_in_flange;
     (q.len() == profile.chain().dof()).then(|| ForwardKinematics::new(profile.chain()).point_in_base(q, &target))
-}
-
-fn registered(session: &Session) -> Option<Registered> {
-    let pairs: Vec<(Point3<f64>, Point3<f64>)> = session
-        .counted()
-        .filter_map(|sample| Some((session.point_of(sample), predicted(session, &session.configuration_of(sample))?)))
-        .collect();
-    if pairs.len() < FEWEST {
-        return None;
-    }
-    let found = register(pairs.iter().map(|(from, to)| (1.0, *from, *to)))?;
-    Some(Registered { base_from_tracker: found.to_from_from, rms: found.rms })
 }

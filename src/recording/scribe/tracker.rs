@@ -34,7 +34,7 @@ impl Station {
         match entry {
             Entry::Profile { .. } => *self = Self::default(),
             Entry::Sample(_) | Entry::Correction(_) | Entry::Decision { .. } => {
-                self.base_from_tracker = station::base_from_tracker(session);
+                self.base_from_tracker = station::registration(session).map(|found| found.to_from_from);
                 if let (Some(found), false) = (self.base_from_tracker, self.is_identified) {
                     return self.stands_at(&found);
                 }
@@ -111,5 +111,5 @@ fn of_result(session: &Session, identified: &IdentifiedText) -> Option<Isometry3
             Some((measured, from_xyz_mm(point.at_mm) + from_xyz_mm(point.identified_mm).coords))
         })
         .collect();
-    station::registered(&pairs)
+    station::registered(&pairs).map(|found| found.to_from_from)
 }

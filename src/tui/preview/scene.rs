@@ -259,8 +259,8 @@ impl Scene {
 
     /// Puts the tracker where the measured points say that it stands; it stays as planned where they do not.
     fn place_tracker(&mut self, session: &Session) {
-        let Some(found) = station::base_from_tracker(session) else { return };
-        let place = Point3::from(found.translation.vector);
+        let Some(found) = station::registration(session) else { return };
+        let place = Point3::from(found.to_from_from.translation.vector);
         self.tracker = Some(place);
         if let Some(beam) = &mut self.beam {
             beam.from = place;
