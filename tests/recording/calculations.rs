@@ -1,0 +1,102 @@
+//! Recordings without a session, and their replay.
+
+use std::fs;
+
+use trupose::recording;
+use trupose::session::state::Session;
+
+use crate::content::{TEMPERATURES, compare_frames, opens_on, views};
+use crate::crashes::{one_by_one, torn_part};
+use crate::place::Place;
+use crate::reading::{numbers, results, rows};
+use crate::running::{begun, recorded, session_of, succeeded, text};
+
+#[test]
+fn an_identification_from_files_is_recorded() {
+    let place = recorded(&format!("{} CaptureAll(Fail)", begun("")));
+    let table = place.run(&["replay", "sessions/s", "--csv"]);
+    succeeded(&table);
+    fs::write(place.path("measured.csv"), &table.stdout).unwrap();
+    let output =
+        place.run(&["identify", "--profile", "soochow", "--measurements", "measured.csv", "--record", "out.rrd"]);
+    assert!([0, 1].contains(&output.status.code().unwrap()), "{}", text(&output.stderr));
+    let path = place.path("out.rrd");
+    let journal = recording::read(&path).unwrap().lines().unwrap();
+    let session = Session::of(&journal).unwrap();
+    assert!(recording::check(&path).unwrap().is_whole());
+    let (_, measured) = session_of(&place.session());
+    assert_eq!(session.samples.len(), measured.counted().count());
+    let profile = session.mounted_profile().unwrap();
+    compare_frames(&path, &session, "/world/nominal/frames", "nominal", profile.chain());
+    assert_eq!(results(&journal).len(), 1);
+    assert!(!views(&path).contains(TEMPERATURES));
+    // An instrument that knows the temperature.
+    let rows = text(&table.stdout);
+    let lines = rows.lines().map(str::to_owned).enumerate();
+    let warm: Vec<String> =
+        lines.map(|(row, line)| if row == 0 { line + ",temperature_degc" } else { line + ",21.5" }).collect();
+    fs::write(place.path("warm.csv"), warm.join("\n")).unwrap();
+    let output = place.run(&["identify", "--profile", "soochow", "--measurements", "warm.csv", "--record", "warm.rrd"]);
+    assert!([0, 1].contains(&output.status.code().unwrap()), "{}", text(&output.stderr));
+    let path = place.path("warm.rrd");
+    assert!(views(&path).contains(TEMPERATURES));
+    let temperatures = numbers(&path, "/capture/temperature_degc", "pose", "Scalars:scalars");
+    assert_eq!(temperatures.len(), session.samples.len());
+    assert!(temperatures.iter().all(|(_, values)| values == &[21.5]), "{temperatures:?}");
+}
+
+#[test]
+fn a_recording_is_replayed_like_its_session_also_when_it_is_half_written() {
+    let place = Place::new();
+    let script = place.write_script("run.script.ron", &format!("{} {}", begun(""), one_by_one(6)));
+    let half = &torn_part(&place, &script);
+    assert!(!recording::check(half).unwrap().has_index);
+    let last = recording::read(half).unwrap().numbers.last().unwrap().to_string();
+    let rest = place.write_script("rest.script.ron", "CaptureAll(Fail)");
+    // The file goes when the session goes on.
+    fs::copy(half, place.path("half.rrd")).unwrap();
+    succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
+    fs::copy(place.recording(), place.path("whole.rrd")).unwrap();
+    for format in ["--print", "--csv"] {
+        for (file, more) in [("whole.rrd", &[] as &[&str]), ("half.rrd", &["--entry", &last])] {
+            let (shown, expected) =
+                (place.run(&["replay", file, format]), place.run(&[&["replay", "sessions/s", format], more].concat()));
+            succeeded(&shown);
+            succeeded(&expected);
+            assert!(shown.stdout.len() > 200);
+            assert_eq!(text(&shown.stdout), text(&expected.stdout), "{file} {format}");
+        }
+    }
+}
+
+#[test]
+fn a_plan_is_recorded_and_opens_on_its_search() {
+    let place = Place::new();
+    let output = place.run(&[
+        "plan",
+        "--profile",
+        "soochow",
+        "--poses",
+        "16",
+        "--verification",
+        "4",
+        "--candidates",
+        "150",
+        "--record",
+        "p.rrd",
+    ]);
+    succeeded(&output);
+    let path = place.path("p.rrd");
+    assert!(recording::check(&path).unwrap().is_whole());
+    assert_eq!(opens_on(&path), "[plan_iteration]");
+    let search = numbers(&path, "/search/condition_number", "plan_iteration", "Scalars:scalars");
+    assert!(search.len() > 1, "{search:?}");
+    let steps: Vec<i64> = search.iter().map(|(step, _)| *step).collect();
+    assert_eq!(steps, (1..).take(steps.len()).collect::<Vec<i64>>());
+    let journal = recording::read(&path).unwrap().lines().unwrap();
+    let planned = rows(&path, false)
+        .into_iter()
+        .find(|(entity, _, values)| entity == "/world/plan/poses" && values.contains_key("Points3D:positions"));
+    let rows = Session::of(&journal).unwrap().rows.len();
+    assert_eq!(planned.unwrap().2["Points3D:positions"].matches('[').count(), rows + 1);
+}
