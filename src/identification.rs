@@ -25,6 +25,7 @@ mod pairs;
 pub mod plausibility;
 pub mod predicted;
 mod problem;
+mod repetitions;
 mod result;
 mod robust;
 mod settings;
@@ -42,6 +43,7 @@ pub(crate) use observability::raw_unit;
 pub use observability::{BlindGroup, Observability};
 pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint, TargetAt};
+pub use repetitions::Places;
 pub use result::{Estimate, Identification, Rejected, RejectionReason, SampleIndex, Sigma};
 pub use settings::{Estimator, Iteration, Prior, Settings, SigmaSource, TerminationReason, Weighting};
 

@@ -347,6 +347,131 @@ fn few_verification_samples_are_not_enough() {
 }
 
 #[test]
+fn a_pose_that_is_measured_again_counts_once() {
+    /// Every row `times` times, each some micrometres elsewhere.
+    fn repeated(rows: &[Vec<String>], times: usize) -> Vec<Vec<String>> {
+        let again = |(number, row): (usize, &Vec<String>)| {
+            let mut row = row.clone();
+            let x: f64 = row[7].parse().unwrap();
+            row[7] = format!("{:.4}", x + 0.003 * (number as f64).sin());
+            row
+        };
+        rows.iter().cycle().take(times * rows.len()).enumerate().map(again).collect()
+    }
+    let once = Table::changed(|_, rows| rows.truncate(10));
+    let thrice = Table::changed(|_, rows| *rows = repeated(&rows[..10], 3));
+    let poor = |table: &Table| {
+        let (code, report) = table.json(&[]);
+        assert_eq!(code, 1);
+        let warnings = report["warnings"].as_array().unwrap();
+        let warning = warnings.iter().find(|warning| warning["code"] == "poor_data").unwrap();
+        warning["message"].as_str().unwrap().to_owned()
+    };
+    assert!(poor(&once).starts_with("too few data: 24 independent values for 21 combinations of parameters; "));
+    let message = poor(&thrice);
+    assert!(message.starts_with("too few data: 24 independent values for 21 combinations"), "{message}");
+    assert!(message.contains("(a pose that is measured again counts once)"), "{message}");
+
+    let (_folder, calibration) = calibrated(&[]);
+    let text = example("verification.csv");
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header = lines.next().unwrap();
+    let first: Vec<Vec<String>> = vec![lines.next().unwrap().split(',').map(str::to_owned).collect()];
+    let rows: Vec<String> = repeated(&first, 20).iter().map(|row| row.join(",")).collect();
+    let table = Table::text(&format!("{header}\n{}", rows.join("\n")));
+    for refit in ["none", "frame"] {
+        let (code, report) = verified(&calibration, table.path().to_str().unwrap(), &["--refit", refit]);
+        assert_eq!((code, report["verdict"]["status"].as_str()), (1, Some("not_accepted")), "{refit}");
+        let found = codes(&report);
+        assert!(found.contains(&"few_verification_samples".to_owned()), "{found:?}");
+        assert_eq!(found.contains(&"few_data".to_owned()), refit == "frame", "{found:?}");
+        // Between repetitions there is nothing but noise.
+        assert!(report["verification"]["identified"]["distance_mm"].is_null(), "{refit}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_verification_samples_is_named() {
+    let (_folder, calibration) = calibrated(&[]);
+    let text = example("verification.csv");
+    let mut lines: Vec<String> = text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect();
+    // One SMR was bumped.
+    let bumped: Vec<&str> = lines[5].split(',').collect();
+    let x = bumped[7].parse::<f64>().unwrap() + 4.0;
+    lines[5] = [&bumped[..7], &[&x.to_string()], &bumped[8..]].concat().join(",");
+    let table = Table::text(&lines.join("\n"));
+    let path = table.path();
+    let path = path.to_str().unwrap();
+    let far = |report: &Value| {
+        let warnings = report["warnings"].as_array().unwrap();
+        let warning = warnings.iter().find(|warning| warning["code"] == "far_verification_samples").unwrap();
+        warning["message"].as_str().unwrap().to_owned()
+    };
+    let (code, report) = verified(&calibration, path, &[]);
+    assert_eq!(code, 1);
+    assert!(far(&report).contains(": pose 4 (line 6) by 3.9"), "{}", far(&report));
+    let measurements = "sessions/soochow-example/measurements.csv";
+    let identify = ["identify", "--profile", "soochow", "--measurements", measurements, "--verify", path, "--json"];
+    let output = trupose(&identify);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(far(&report).contains(": pose 4 (line 6) by 3.9"), "{}", far(&report));
+    // All of them in another unit.
+    let inches = |line: &String| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let of =
+            |cell: &&str| cell.parse::<f64>().map_or_else(|_| (*cell).to_owned(), |value| (value / 25.4).to_string());
+        [cells[..7].join(","), cells[7..].iter().map(of).collect::<Vec<_>>().join(",")].join(",")
+    };
+    fs::write(path, lines.iter().map(inches).collect::<Vec<_>>().join("\n")).unwrap();
+    let output = trupose(&identify);
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8(output.stderr).unwrap().replace("\n ", "");
+    assert!(message.contains("verification: the measured points are typically"), "{message}");
+    assert!(message.contains("inches were read as millimetres"), "{message}");
+}
+
+#[test]
+fn simulated_points_are_called_so_wherever_they_go() {
+    let points = "sessions/example/measurements.csv";
+    let folder = tempfile::tempdir().unwrap();
+    let results = folder.path().join("results");
+    let out = ["--out", results.to_str().unwrap()];
+    let identify = ["identify", "--profile", "soochow", "--measurements", points, "--use", "kind == 'identification'"];
+    let output = trupose(&[&identify[..], &["--verify-rest", "--json"], &out].concat());
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let said = "SIMULATED: the points come from the simulated cell (seed 14), not from a robot";
+    let warnings = |report: &Value| -> Vec<String> {
+        let warnings = report["warnings"].as_array().unwrap().iter().filter(|warning| warning["code"] == "simulated");
+        warnings.map(|warning| warning["message"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(warnings(&report).len(), 1);
+    assert!(warnings(&report)[0].starts_with(said), "{report}");
+    assert!(fs::read_to_string(results.join("report.html")).unwrap().contains("SIMULATED."));
+    let calibration = results.join("calibration.ron");
+    let (_, report) = verified(calibration.to_str().unwrap(), points, &["--use", "kind == 'verification'"]);
+    assert_eq!(warnings(&report).len(), 1);
+    // Also where only one of both is simulated.
+    let real = Table::changed(|_, _| {});
+    let measured = real.path();
+    let output = trupose(&[
+        "identify",
+        "--profile",
+        "soochow",
+        "--measurements",
+        measured.to_str().unwrap(),
+        "--verify",
+        points,
+        "--json",
+    ]);
+    // The tracker of one is elsewhere than that of the other: what matters is what is said.
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(warnings(&report).len(), 1);
+    let (_folder, calibration) = calibrated(&[]);
+    let (_, report) = verified(&calibration, points, &["--refit", "frame", "--use", "kind == 'verification'"]);
+    assert_eq!(warnings(&report).len(), 1);
+}
+
+#[test]
 fn no_usable_solution_ends_with_4_and_leaves_no_calibration() {
     let shifted = Table::changed(|_, rows| {
         let points: Vec<Vec<String>> = rows.iter().map(|row| row[7..].to_vec()).collect();

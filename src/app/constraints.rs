@@ -115,7 +115,9 @@ pub(super) fn run<O: Write, E: Write>(
             warnings.extend(checks::set_warnings(joints, &places(&identification), &places(&rest)));
             verification.independent = checks::is_independent(&warnings);
         }
-        warnings.extend(checks::few_warning(verification.samples));
+        let tested = if args.verify_rest { &rest } else { &identification };
+        let poses = tested.observations.distinct(joints).min(verification.samples);
+        warnings.extend(checks::few_warning(verification.samples, poses));
     }
     let nominal = setup.nominal(&identification.observations)?;
     let unusable = result::is_unusable(&warnings, &found, &setup.settings);

@@ -48,10 +48,13 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
 
     // With two files in play, what is said about rows names the file.
     let file = verification.as_ref().map(|_| identification.input.file.as_str());
-    let set = sample_set(&rows, profile, file, &identification.table.warnings)?;
+    let mut set = sample_set(&rows, profile, file, &identification.table.warnings)?;
     let file = verification.as_ref().map(|loaded| loaded.input.file.as_str());
     let odd = verification.as_ref().map_or(&[][..], |loaded| &loaded.table.warnings);
     let verification_set = sample_set(&verification_rows, profile, file, odd)?;
+    // What either is made of, all of the result is.
+    let of_verification = || verification.as_ref().and_then(|loaded| loaded.simulated.clone());
+    set.warnings.extend(identification.simulated.clone().or_else(of_verification));
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
     let request = IdentifyRequest {
         mounted: None,

@@ -6,9 +6,10 @@ use crate::error::{ExitStatus, Failure};
 use crate::identification::{PointSample, TargetAt};
 use crate::procedure::{input_file, joint_types};
 use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
+use crate::session::export::simulation_of_table;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, Measurements, Row, read_bytes_as};
-use crate::session::summary::InputFile;
+use crate::session::summary::{InputFile, Warning};
 use crate::store;
 
 /// A profile with the text it came from.
@@ -61,6 +62,8 @@ pub(super) fn parse_profile(text: String, file: &str) -> Result<LoadedProfile, F
 pub(super) struct LoadedTable {
     pub(super) table: Measurements,
     pub(super) input: InputFile,
+    /// It says that its points are simulated.
+    pub(super) simulated: Option<Warning>,
 }
 
 /// A measurement table for the robot of a profile.
@@ -69,7 +72,8 @@ pub(super) fn measurements(path: &Path, layout: Layout, profile: &Profile, role:
     let file = path.display().to_string();
     let table = read_bytes_as(layout, &bytes, &file, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
-    Ok(LoadedTable { table, input: input_file(role, file, &bytes) })
+    let simulated = simulation_of_table(&bytes).map(|said| Warning::simulated(&said));
+    Ok(LoadedTable { table, input: input_file(role, file, &bytes), simulated })
 }
 
 /// A filter and whether it fits the columns of a table.

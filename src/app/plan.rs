@@ -155,8 +155,8 @@ fn choose<O: Write, E: Write>(
         while let Ok(progress) = receiver.recv() {
             match progress {
                 procedure::Progress::Searching => lines = Progress::new(&mut console.err),
-                procedure::Progress::Sweep { found, sweeps, starts } => {
-                    lines.say(|| sweep_text(&found, sweeps, starts));
+                procedure::Progress::Sweep { found, done, sweeps, starts } => {
+                    lines.say(|| sweep_text(&found, &bar(done, sweeps), starts));
                 }
                 procedure::Progress::Unreachable { poses } => {
                     console.remark(&format!("{poses} poses cannot be reached without a collision: choosing again"));
@@ -179,14 +179,13 @@ fn tell(sender: &SyncSender<procedure::Progress>, progress: procedure::Progress)
 }
 
 /// A line about a sweep.
-fn sweep_text(found: &crate::planning::Progress, sweeps: usize, starts: usize) -> String {
+fn sweep_text(found: &crate::planning::Progress, bar: &str, starts: usize) -> String {
     let stage = match found.stage {
         Stage::Prediction => "predicting",
         Stage::Objective { .. } => "choosing",
     };
     format!(
-        "{stage} [{}] start {} of {starts}, condition {:.1}, predicted error {:.3} sigma",
-        bar(found.sweep, sweeps),
+        "{stage} [{bar}] start {} of {starts}, condition {:.1}, predicted error {:.3} sigma",
         found.start + 1,
         found.condition_number,
         found.predicted_error

@@ -9,10 +9,10 @@ use super::{Console, load, to_json};
 use crate::cli::{RefitArg, VerifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{ArmModel, Observations, PointSample, Problem, TargetAt};
+use crate::identification::{ArmModel, Observations, Places, PointSample, Problem, TargetAt};
 use crate::kinematics::{FreeParameter, ParameterId};
 use crate::procedure::assess::{point_verification, verdict};
-use crate::procedure::checks::{self, Compared};
+use crate::procedure::checks;
 use crate::procedure::{identification_failure, input_file, nominal_targets, provenance, warning};
 use crate::profile::{Level, Profile};
 use crate::report;
@@ -24,8 +24,6 @@ use crate::units::{MICROMETRE, MILLIMETRE, from_mm, to_mm};
 const NEW_MOUNTING: f64 = 50.0 * MILLIMETRE;
 /// Positions this many times worse than distances are not those of the same set-up.
 const MOVED: f64 = 10.0;
-/// Fewer points than this cannot show a mistake in a whole table.
-const ENOUGH_TO_COMPARE: usize = 4;
 
 pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let file = args.calibration.display().to_string();
@@ -56,8 +54,9 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let configurations = rows.iter().map(|row| (row.line, row.configuration.as_slice()));
     warnings.extend(checks::limit_warning(profile, None, configurations));
     warnings.extend(carried_over(&calibration));
-    warnings.extend(calibration.warnings.iter().filter(|warning| warning.code == SIMULATED).cloned());
-    warnings.extend(plausible.and_then(|compared| compared.warning));
+    let of_calibration = calibration.warnings.iter().find(|warning| warning.code == SIMULATED);
+    warnings.extend(measured.simulated.as_ref().or(of_calibration).cloned());
+    warnings.extend(plausible);
     let (refit, basis, fitted) = match args.refit {
         RefitArg::None => ("none", "same set-up as the identification", 0),
         RefitArg::Frame => ("frame", "another set-up: the place of the tracker was fitted to these very points", 6),
@@ -66,20 +65,24 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
             ("frame+target", basis, 6 + remounted_targets(profile, &samples).len())
         }
     };
-    if fitted > 0 && 3 * samples.len() < 4 * fitted {
+    let joints = profile.chain().joints();
+    let tested: Vec<TargetAt> = samples.iter().map(|sample| sample.at.clone()).collect();
+    let poses = Places::new(joints, &tested).distinct();
+    if fitted > 0 && 3 * poses < 4 * fitted {
+        let noun = if poses == 1 { "pose" } else { "poses" };
         let message = format!(
-            "{fitted} numbers of the set-up were fitted to only {} points: the position errors are too small to be believed",
-            samples.len()
+            "{fitted} numbers of the set-up were fitted to only {poses} {noun}: the position errors are too small to be believed"
         );
         warnings.push(warning("few_data", message, true));
     }
     let known = identification_places(&calibration, profile, &file)?;
-    let tested: Vec<TargetAt> = samples.iter().map(|sample| sample.at.clone()).collect();
-    warnings.extend(checks::set_warnings(profile.chain().joints(), &known, &tested));
-    warnings.extend(checks::few_warning(samples.len()));
+    warnings.extend(checks::set_warnings(joints, &known, &tested));
+    warnings.extend(checks::few_warning(samples.len(), poses));
+    let named = rows.iter().zip(&identified_errors.vectors);
+    warnings.extend(checks::far_warning(named.map(|(row, error)| (row.pose.as_str(), row.line, error))));
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let mut verification = point_verification(
-        profile.chain().joints(),
+        joints,
         &samples,
         &nominal_errors,
         &identified_errors,
@@ -103,21 +106,18 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     Ok(exit_status(report.verdict.status))
 }
 
-/// Looks for mistakes in the whole table, as `identify` does. Too few points to tell are left to other checks.
-fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) -> Result<Option<Compared>, Failure> {
-    if samples.len() < ENOUGH_TO_COMPARE {
-        return Ok(None);
-    }
+/// Looks for mistakes in the whole table, as `identify` does.
+fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) -> Result<Option<Warning>, Failure> {
     let mut parameters = profile.free_parameters(Level::Geometric);
     if args.refit == RefitArg::FrameAndTarget {
         parameters.retain(|parameter| matches!(parameter.id, ParameterId::Link { .. }));
         parameters.extend(remounted_targets(profile, samples));
     }
     let targets = nominal_targets(profile);
-    let observations = Observations { points: samples.to_vec(), ..Observations::default() };
+    let observations = Observations::default();
     let problem =
         Problem { chain: profile.chain(), targets: &targets, parameters: &parameters, observations: &observations };
-    checks::check_plausibility(&problem).map(Some)
+    checks::check_verification(&problem, samples)
 }
 
 /// Distances do not feel where the tracker stands, positions do.

@@ -292,6 +292,8 @@ pub enum Weakness {
         values: usize,
         /// Combinations that are to be found.
         combinations: usize,
+        /// Some samples repeat others, and count once.
+        repeats: bool,
     },
     /// A joint that does not move.
     StillJoint {
@@ -323,8 +325,9 @@ impl Weakness {
     /// What it is and what to do.
     pub fn describe(&self, joint_name: impl Fn(usize) -> String, joint_type: impl Fn(usize) -> JointType) -> String {
         match self {
-            Self::TooFewData { values, combinations } => format!(
-                "too few data: {values} independent values for {combinations} combinations of parameters; measure at least {} poses, better twice as many",
+            Self::TooFewData { values, combinations, repeats } => format!(
+                "too few data: {values} independent values for {combinations} combinations of parameters{}; measure at least {} poses, better twice as many",
+                if *repeats { " (a pose that is measured again counts once)" } else { "" },
                 (VALUES_PER_COMBINATION * combinations + 6).div_ceil(3)
             ),
             Self::StillJoint { joint, range } => {
@@ -381,7 +384,8 @@ pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec
     let problem = &Problem { observations: &accepted, ..*problem };
     let (observability, sigma) = (&identification.observability, identification.sigma.used);
     let mut found = Vec::new();
-    let values = problem.observations.independent_values();
+    let once = problem.observations.without_repetitions(problem.chain.joints());
+    let (values, all) = (once.independent_values(), problem.observations.independent_values());
     // A handful of samples cannot show the rank that the robot has: what could be found sets the demand.
     let combinations = if values < VALUES_PER_COMBINATION * problem.parameters.len() {
         structural_rank(problem)
@@ -389,7 +393,7 @@ pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec
         observability.rank.unwrap_or(problem.parameters.len())
     };
     if values < VALUES_PER_COMBINATION * combinations {
-        found.push(Weakness::TooFewData { values, combinations });
+        found.push(Weakness::TooFewData { values, combinations, repeats: values < all });
     }
     for (joint, definition) in problem.chain.joints().iter().enumerate() {
         let values = || problem.observations.places().map(|place| place.configuration[joint]);

@@ -2,8 +2,8 @@
 
 use nalgebra::Point3;
 
-use super::{IdentificationError, Rejected, SampleIndex};
-use crate::kinematics::{FreeParameter, KinematicChain, ParameterId};
+use super::{IdentificationError, Places, Rejected, SampleIndex};
+use crate::kinematics::{FreeParameter, Joint, KinematicChain, ParameterId};
 
 /// A configuration and the target that was observed there.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,11 +71,41 @@ impl Observations {
     /// Number of independent values in the observations: 3 per point less 6 per station, 3 per seat less 3 per shared point,
     /// one per length.
     pub fn independent_values(&self) -> usize {
-        let stations = self.points.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
         let of_station = |station: usize| self.points.iter().filter(|sample| sample.station == station).count();
-        let points: usize = (0..stations).map(|station| (3 * of_station(station)).saturating_sub(6)).sum();
+        let points: usize = (0..self.stations()).map(|station| (3 * of_station(station)).saturating_sub(6)).sum();
         let shared: usize = self.shared.iter().map(|shared| 3 * shared.at.len().saturating_sub(1)).sum();
         points + shared + self.lengths.len()
+    }
+
+    /// Points and seats without repetitions: of every configuration and target the first per station and per shared point.
+    #[must_use]
+    pub fn without_repetitions(&self, joints: &[Joint]) -> Self {
+        let of_station = |station: usize| {
+            let points: Vec<&PointSample> = self.points.iter().filter(|sample| sample.station == station).collect();
+            let first = Places::new(joints, points.iter().map(|sample| &sample.at)).first_of_each();
+            let kept = points.into_iter().enumerate().zip(first).filter(|((index, _), first)| index == first);
+            kept.map(|((_, sample), _)| sample.clone()).collect::<Vec<_>>()
+        };
+        let once = |shared: &SharedPoint| {
+            let first = Places::new(joints, &shared.at).first_of_each();
+            let kept = shared.at.iter().enumerate().zip(first).filter(|((index, _), first)| index == first);
+            SharedPoint { at: kept.map(|((_, at), _)| at.clone()).collect() }
+        };
+        Self {
+            points: (0..self.stations()).flat_map(of_station).collect(),
+            shared: self.shared.iter().map(once).collect(),
+            lengths: self.lengths.clone(),
+        }
+    }
+
+    /// How many points, seats and lengths there are, without repetitions.
+    pub fn distinct(&self, joints: &[Joint]) -> usize {
+        let once = self.without_repetitions(joints);
+        once.points.len() + once.shared.iter().map(|shared| shared.at.len()).sum::<usize>() + once.lengths.len()
+    }
+
+    fn stations(&self) -> usize {
+        self.points.iter().map(|sample| sample.station + 1).max().unwrap_or(0)
     }
 
     /// The observations without the rejected ones. Shared points keep their place in the list, also without a seat.

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 
 use super::linearise::{ArmModel, Weights, point_residuals};
 use super::problem::{LengthEnd, Observations, PointSample, Problem};
-use super::{Estimator, IdentificationError, Prior, Settings, Weighting, identify};
+use super::{Estimator, IdentificationError, Places, Prior, Settings, Weighting, identify};
 use crate::kinematics::{FreeParameter, Joint, JointType};
 use crate::units::MILLIMETRE;
 
@@ -60,7 +60,8 @@ pub struct ModelErrors {
     pub axis_mean: [f64; 3],
     /// Largest absolute error along x, y, z (m) (table IV).
     pub axis_max: [f64; 3],
-    /// Distance errors `|l_measured − l_predicted|` over pairs of samples of one station (table III); `None` below two samples.
+    /// Distance errors `|l_measured − l_predicted|` over pairs of samples of one station (table III), but not between repetitions
+    /// of a pose, whose distance is that of no two poses; `None` without a pair.
     pub distance: Option<ErrorStatistics>,
 }
 
@@ -79,19 +80,20 @@ impl ModelErrors {
         };
         let axis_mean = over_axes(&|sum, value| sum + value).map(|sum| sum / vectors.len() as f64);
         let axis_max = over_axes(&f64::max);
-        let distance = distance_errors(samples, &predicted);
+        let distance = distance_errors(model.chain.joints(), samples, &predicted);
         Some(Self { vectors, position, axis_mean, axis_max, distance })
     }
 }
 
-/// Distance errors over all pairs of one station; evenly picked samples where there are more than 2000.
-fn distance_errors(samples: &[PointSample], predicted: &[Point3<f64>]) -> Option<ErrorStatistics> {
+/// Distance errors over all pairs of one station that are no repetitions; evenly picked samples where there are more than 2000.
+fn distance_errors(joints: &[Joint], samples: &[PointSample], predicted: &[Point3<f64>]) -> Option<ErrorStatistics> {
+    let pose = Places::new(joints, samples.iter().map(|sample| &sample.at)).first_of_each();
     let used = samples.len().min(PAIRED_POINTS);
     let picked: Vec<usize> = (0..used).map(|index| index * samples.len() / used).collect();
     let mut errors = Vec::with_capacity(used * used.saturating_sub(1) / 2);
     for (position, &k) in picked.iter().enumerate() {
         for &j in &picked[..position] {
-            if samples[j].station == samples[k].station {
+            if samples[j].station == samples[k].station && pose[j] != pose[k] {
                 let measured = (samples[k].point - samples[j].point).norm();
                 errors.push(measured - (predicted[k] - predicted[j]).norm());
             }

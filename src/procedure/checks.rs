@@ -1,26 +1,30 @@
 //! What `identify`, `verify` and `constraints` check about their data in the same way: odd rows, joint limits, mistakes in a
 //! whole table, and whether the verification samples are independent, enough, and where the identification samples are.
 
+use nalgebra::Vector3;
+
 use super::{identification_failure, warning};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::plausibility::compare_with_nominal;
 use crate::identification::verification::{CoverageGap, coverage_gaps};
-use crate::identification::{Problem, TargetAt};
+use crate::identification::{Observations, Places, PointSample, Problem, TargetAt};
 use crate::kinematics::Joint;
 use crate::profile::Profile;
 use crate::report::number;
 use crate::session::TableProblem;
 use crate::session::summary::Warning;
-use crate::units::{Quantity, to_mm};
+use crate::units::{MICROMETRE, Quantity, to_mm};
 
 /// Verification samples that were also identification samples.
 pub(crate) const NOT_INDEPENDENT: &str = "not_independent";
-/// Fewer verification samples than this rule acceptance out.
-const TOO_FEW_SAMPLES: usize = 5;
-/// Fewer verification samples than this say little about the largest error.
-const FEW_SAMPLES: usize = 10;
-/// Joint values closer than this (deg, sliding joints mm) are the same configuration, written down once more.
-const SAME_JOINT_VALUE: f64 = 0.01;
+/// Fewer verification poses than this rule acceptance out.
+const TOO_FEW_POSES: usize = 5;
+/// Fewer verification poses than this say little about the largest error.
+const FEW_POSES: usize = 10;
+/// Fewer points than this cannot show a mistake in a whole table.
+const ENOUGH_TO_COMPARE: usize = 4;
+/// A verification sample is far off if its error is so many times the median of all.
+const FAR: f64 = 10.0;
 /// Problems of one kind that a warning lists.
 const SHOWN: usize = 3;
 
@@ -74,8 +78,8 @@ pub(crate) struct Compared {
 }
 
 /// Refuses points that a known mistake explains better than this robot does. `problem` frees all that the robot may deviate in,
-/// whatever is to be identified.
-pub(crate) fn check_plausibility(problem: &Problem<'_>) -> Result<Compared, Failure> {
+/// whatever is to be identified; `what` comes before the message.
+pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Compared, Failure> {
     let plausibility = compare_with_nominal(problem).map_err(|error| identification_failure(&error))?;
     let expected = plausibility.expected;
     if plausibility.is_plausible() {
@@ -83,7 +87,7 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>) -> Result<Compared, Fail
     }
     let joints = problem.chain.joints();
     let gap = format!(
-        "the measured points are typically {} mm off the nominal robot, {} mm can be expected",
+        "{what}the measured points are typically {} mm off the nominal robot, {} mm can be expected",
         number(to_mm(plausibility.nominal), 1),
         number(to_mm(expected), 1)
     );
@@ -96,10 +100,46 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>) -> Result<Compared, Fail
     Ok(Compared { expected, warning: Some(warning("implausible", message, true)) })
 }
 
+/// Looks for the same mistakes in the verification points of a table. Too few to tell are left to other checks. The other
+/// observations of `problem` do not matter.
+pub(crate) fn check_verification(problem: &Problem<'_>, tested: &[PointSample]) -> Result<Option<Warning>, Failure> {
+    if tested.len() < ENOUGH_TO_COMPARE {
+        return Ok(None);
+    }
+    let observations = Observations { points: tested.to_vec(), ..Observations::default() };
+    let problem = Problem { observations: &observations, ..*problem };
+    check_plausibility(&problem, "verification: ").map(|compared| compared.warning)
+}
+
+/// Verification samples that are far worse than the others: what they have in common hides in a mean. `named` are the samples,
+/// as pose and line, with their errors.
+pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &'a Vector3<f64>)>) -> Option<Warning> {
+    let mut samples: Vec<(&str, usize, f64)> =
+        named.into_iter().map(|(pose, line, error)| (pose, line, error.norm())).collect();
+    samples.sort_by(|(.., one), (.., other)| other.total_cmp(one));
+    let typical = samples.get(samples.len() / 2)?.2;
+    let far = samples.partition_point(|(.., error)| *error > FAR * typical.max(MICROMETRE));
+    let worst: Vec<String> = samples
+        .iter()
+        .take(far.min(SHOWN))
+        .map(|(pose, line, error)| format!("pose {pose} (line {line}) by {} mm", number(to_mm(*error), 3)))
+        .collect();
+    let more = if far > SHOWN { format!(" and {} more", far - SHOWN) } else { String::new() };
+    (far > 0).then(|| {
+        let message = format!(
+            "verification samples far off where others are off by {} mm: {}{more}; a bumped SMR, another unit, a row in another place? Nothing is left out of a verification",
+            number(to_mm(typical), 3),
+            worst.join(", ")
+        );
+        warning("far_verification_samples", message, false)
+    })
+}
+
 /// What is doubtful about a pair of identification and verification sets.
 pub(crate) fn set_warnings(joints: &[Joint], known: &[TargetAt], tested: &[TargetAt]) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    let shared = shared_samples(joints, known, tested);
+    let places = Places::new(joints, known);
+    let shared = tested.iter().filter(|at| places.contains(at)).count();
     if shared > 0 {
         let verb = if shared == 1 { "is" } else { "are" };
         let message = format!(
@@ -119,51 +159,22 @@ pub(crate) fn is_independent(warnings: &[Warning]) -> bool {
     warnings.iter().all(|warning| warning.code != NOT_INDEPENDENT)
 }
 
-/// Too few verification samples.
-pub(crate) fn few_warning(samples: usize) -> Option<Warning> {
-    (samples < FEW_SAMPLES).then(|| {
-        let message = format!("only {}: the largest error is hardly known", counted(samples));
-        warning("few_verification_samples", message, samples < TOO_FEW_SAMPLES)
+/// Too few verification poses: `samples` show `poses`. One that is measured again tells nothing new.
+pub(crate) fn few_warning(samples: usize, poses: usize) -> Option<Warning> {
+    (poses < FEW_POSES).then(|| {
+        let mut what = counted(samples);
+        if poses < samples {
+            let noun = if poses == 1 { "pose" } else { "poses" };
+            what = format!("{poses} {noun} in {what}");
+        }
+        let message = format!("only {what}: the largest error is hardly known");
+        warning("few_verification_samples", message, poses < TOO_FEW_POSES)
     })
 }
 
 fn counted(samples: usize) -> String {
     let noun = if samples == 1 { "sample" } else { "samples" };
     format!("{samples} verification {noun}")
-}
-
-/// How many of `tested` repeat a configuration and target of `known`. Sorted by one number per configuration, so that only few
-/// candidates are compared joint by joint.
-fn shared_samples(joints: &[Joint], known: &[TargetAt], tested: &[TargetAt]) -> usize {
-    let tolerances: Vec<f64> =
-        joints.iter().map(|joint| joint.joint_type.quantity().from_edge(SAME_JOINT_VALUE)).collect();
-    // Joint values in tolerances, with weights between 1 and 2 that no regular grid of configurations has.
-    let weights: Vec<f64> = (0..joints.len()).map(|index| 1.0 + (0.618_034 * index as f64).fract()).collect();
-    let key = |at: &TargetAt| -> f64 {
-        at.configuration
-            .iter()
-            .zip(&tolerances)
-            .zip(&weights)
-            .map(|((value, size), weight)| value / size * weight)
-            .sum()
-    };
-    let reach: f64 = weights.iter().sum();
-    let mut sorted: Vec<(f64, &TargetAt)> = known.iter().map(|at| (key(at), at)).collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let same = |a: &TargetAt, b: &TargetAt| {
-        a.target == b.target
-            && a.configuration
-                .iter()
-                .zip(&b.configuration)
-                .zip(&tolerances)
-                .all(|((a, b), size)| (a - b).abs() <= *size)
-    };
-    let is_known = |at: &&TargetAt| {
-        let key = key(at);
-        let first = sorted.partition_point(|(other, _)| *other < key - reach);
-        sorted[first..].iter().take_while(|(other, _)| *other <= key + reach).any(|(_, other)| same(other, at))
-    };
-    tested.iter().filter(is_known).count()
 }
 
 fn coverage_warning(joints: &[Joint], gap: &CoverageGap) -> Warning {

@@ -9,7 +9,7 @@ use super::{EstimationSettings, checks, identification_failure, nominal_targets,
 use crate::error::Failure;
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{
-    ArmModel, Identification, Iteration, Observations, PointSample, Problem, TargetAt, identify_while,
+    ArmModel, Identification, Iteration, Observations, Places, PointSample, Problem, TargetAt, identify_while,
 };
 use crate::profile::{Level, Profile};
 use crate::session::calibration::{self, Calibration, MountedText, SampleText};
@@ -118,7 +118,8 @@ pub fn identify(
     let mut warnings = identification.warnings.clone();
     warnings.extend(checks::limit_warning(profile, file, identification.configurations()));
     let expected = request.settings.parameters_of(Level::Geometric, profile);
-    let compared = checks::check_plausibility(&Problem { parameters: &expected, ..problem })?;
+    let expected = Problem { parameters: &expected, ..problem };
+    let compared = checks::check_plausibility(&expected, "")?;
     warnings.extend(compared.warning);
 
     let distance = observations.points.iter().map(|sample| sample.point.coords.norm()).sum::<f64>()
@@ -133,15 +134,23 @@ pub fn identify(
     warnings.extend(verification.warnings.iter().cloned());
     warnings.extend(checks::limit_warning(profile, verification.file.as_deref(), verification.configurations()));
     let tested = verification.points();
-    let mut verified = verify(profile, &nominal, &found, &tested, request.basis.clone());
-    if let Some(verified) = &mut verified {
+    // In a session every reading was looked at by itself.
+    if request.verification_mode != VerificationMode::Session {
+        warnings.extend(checks::check_verification(&expected, &tested)?);
+    }
+    let verified = verify(profile, &nominal, &found, &tested, request.basis.clone());
+    let verified = verified.map(|(mut verified, errors)| {
         let places = |samples: &[PointSample]| samples.iter().map(|sample| sample.at.clone()).collect::<Vec<_>>();
         let (known, tested) = (places(&observations.points), places(&tested));
-        let doubts = checks::set_warnings(profile.chain().joints(), &known, &tested);
+        let joints = profile.chain().joints();
+        let doubts = checks::set_warnings(joints, &known, &tested);
         verified.independent = checks::is_independent(&doubts);
         warnings.extend(doubts);
-        warnings.extend(checks::few_warning(verified.samples));
-    }
+        warnings.extend(checks::few_warning(verified.samples, Places::new(joints, &tested).distinct()));
+        let named = verification.samples.iter().zip(&errors.vectors);
+        warnings.extend(checks::far_warning(named.map(|(named, error)| (named.pose.as_str(), named.line, error))));
+        verified
+    });
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let unusable = result::is_unusable(&warnings, &found, &settings);
     let name = |named: &NamedSample| SampleName { pose: named.pose.clone(), line: named.line };
@@ -191,10 +200,11 @@ fn verify(
     found: &Identification,
     samples: &[PointSample],
     basis: String,
-) -> Option<VerificationSummary> {
+) -> Option<(VerificationSummary, ModelErrors)> {
     let nominal = ModelErrors::new(&nominal.model, &nominal.base_from_station, samples)?;
     let identified = ModelErrors::new(&found.model, &found.base_from_station, samples)?;
-    Some(point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, "none"))
+    let summary = point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, "none");
+    Some((summary, identified))
 }
 
 /// The calibration file of a result; `warnings` are those about the identification itself.

@@ -4,6 +4,8 @@ mod history;
 mod request;
 mod summary;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use history::History;
 
 use super::cell::cell;
@@ -14,8 +16,8 @@ use crate::kinematics::{FreeParameter, JointType, ParameterId};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
-    Chosen, Information, JointBox, Objective, PlanningError, Score, Search, SearchSettings, low_discrepancy, random,
-    verification_set,
+    Chosen, Information, JointBox, Objective, PlanningError, Score, Search, SearchSettings, Stage, low_discrepancy,
+    random, verification_set,
 };
 use crate::profile::Profile;
 use crate::search::{available_threads, plan_in_parallel};
@@ -305,9 +307,13 @@ impl<'a> Planner<'a> {
         let starts = settings.starts;
         let search = Search::new(information, settings).map_err(|error| planning_failure(&error))?;
         let threads = self.request.threads.unwrap_or_else(available_threads);
+        // Starts run side by side: what each has done says nothing about the whole.
+        let (predicted, optimised) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let told = |found: &crate::planning::Progress| {
-            let sweeps = search.settings().sweeps_of(found.stage);
-            progress(Progress::Sweep { found: *found, sweeps, starts });
+            let count = if found.stage == Stage::Prediction { &predicted } else { &optimised };
+            let done = count.fetch_add(1, Ordering::Relaxed) + 1;
+            let sweeps = starts * search.settings().sweeps_of(found.stage);
+            progress(Progress::Sweep { found: *found, done, sweeps, starts });
         };
         progress(Progress::Searching);
         plan_in_parallel(&search, threads, keep_going, &told).map_err(|error| planning_failure(&error))

@@ -5,6 +5,16 @@ use super::measurements::{self, Row as MeasuredRow};
 use super::plan::{self, PoseKind};
 use super::state::{Robot, Session};
 
+/// How the comment begins that says of a table that nothing was measured.
+const SIMULATED_MARK: &str = "# SIMULATED: ";
+
+/// What a table says about a simulation that its points come from.
+pub fn simulation_of_table(bytes: &[u8]) -> Option<String> {
+    let mut lines = bytes.split(|byte| *byte == b'\n').take_while(|line| line.starts_with(b"#"));
+    let said = lines.find_map(|line| line.strip_prefix(SIMULATED_MARK.as_bytes()))?;
+    Some(String::from_utf8_lossy(said).trim().to_owned())
+}
+
 /// The present plan as `plan.csv` has it; rows of earlier plans only where they were measured.
 pub fn plan_csv(session: &Session, robot: &Robot) -> String {
     let is_in = |index: &usize| {
@@ -16,7 +26,7 @@ pub fn plan_csv(session: &Session, robot: &Robot) -> String {
 }
 
 /// The samples that count as a table that `trupose identify` reads: identification poses, then verification poses. A column
-/// `kind` tells them apart.
+/// `kind` tells them apart; a comment before them says if they are simulated.
 pub fn measurements_csv(session: &Session, robot: &Robot) -> String {
     table(session, robot, &[PoseKind::Identification, PoseKind::Verification])
 }
@@ -48,5 +58,6 @@ fn table(session: &Session, robot: &Robot, of: &[PoseKind]) -> String {
     }
     let table = measurements::write(&rows, &robot.joint_types);
     let lines: Vec<String> = table.lines().zip(kinds).map(|(line, kind)| format!("{line},{kind}")).collect();
-    lines.join("\n") + "\n"
+    let mark = session.simulation().map(|said| format!("{SIMULATED_MARK}{said}\n")).unwrap_or_default();
+    mark + &lines.join("\n") + "\n"
 }

@@ -342,6 +342,16 @@ impl Session {
         matches!(self.instrument, Some(InstrumentChoice::Simulated(_))) || self.identities.iter().any(says_so)
     }
 
+    /// What has to be said wherever points of this session go, if they are simulated.
+    pub fn simulation(&self) -> Option<String> {
+        let cause = match &self.instrument {
+            Some(InstrumentChoice::Simulated(simulation)) => format!("the simulated cell (seed {})", simulation.seed),
+            _ => format!("a simulated instrument ({})", self.identities.join("; ")),
+        };
+        let said = format!("the points come from {cause}, not from a robot; this result is for no real arm");
+        self.is_simulated().then_some(said)
+    }
+
     /// Whether anything was measured.
     pub fn has_measurements(&self) -> bool {
         !self.samples.is_empty() || !self.circle_points.is_empty()

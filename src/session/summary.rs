@@ -214,6 +214,13 @@ pub struct Warning {
     pub blocks_acceptance: bool,
 }
 
+impl Warning {
+    /// That points are simulated, as `said`.
+    pub fn simulated(said: &str) -> Self {
+        Self { code: SIMULATED.to_owned(), message: format!("SIMULATED: {said}"), blocks_acceptance: false }
+    }
+}
+
 /// Statistics of a non-negative error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StatisticsSummary {

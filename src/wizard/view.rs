@@ -602,9 +602,8 @@ const fn sweep(progress: &Progress) -> Option<&crate::planning::Progress> {
 /// Part of the stage of a search that is done.
 fn part_done(progress: &Progress) -> Option<f64> {
     match progress {
-        Progress::Search(plan::Progress::Sweep { found, sweeps, starts }) => {
-            let of_start = found.sweep as f64 / (*sweeps).max(1) as f64;
-            Some(((found.start as f64 + of_start) / (*starts).max(1) as f64).min(1.0))
+        Progress::Search(plan::Progress::Sweep { done, sweeps, .. }) => {
+            Some((*done as f64 / (*sweeps).max(1) as f64).min(1.0))
         }
         Progress::Search(plan::Progress::Searching | plan::Progress::Unreachable { .. }) | Progress::Solver(_) => None,
     }

@@ -32,7 +32,7 @@ fn an_identification_from_files_is_recorded() {
     assert!(!views(&path).contains(TEMPERATURES));
     // An instrument that knows the temperature.
     let rows = text(&table.stdout);
-    let lines = rows.lines().map(str::to_owned).enumerate();
+    let lines = rows.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).enumerate();
     let warm: Vec<String> =
         lines.map(|(row, line)| if row == 0 { line + ",temperature_degc" } else { line + ",21.5" }).collect();
     fs::write(place.path("warm.csv"), warm.join("\n")).unwrap();

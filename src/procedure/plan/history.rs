@@ -65,7 +65,7 @@ mod tests {
             o1: 1e-3,
             predicted_error: value,
         };
-        Progress::Sweep { found, sweeps: 3, starts: 2 }
+        Progress::Sweep { found, done: sweep, sweeps: 6, starts: 2 }
     }
 
     #[test]

@@ -81,7 +81,9 @@ pub enum Progress {
     Sweep {
         /// What it found.
         found: planning::Progress,
-        /// Number of sweeps that this stage takes per start.
+        /// Sweeps of this stage that all starts together have done.
+        done: usize,
+        /// Sweeps that this stage takes of all starts together.
         sweeps: usize,
         /// Number of starts.
         starts: usize,

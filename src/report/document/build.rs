@@ -17,11 +17,16 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, TargetChoice};
 use crate::session::sha256;
 use crate::session::state::{Robot, Sample, Session};
-use crate::session::summary::ParameterSummary;
+use crate::session::summary::{IdentificationSummary, ParameterSummary, SIMULATED};
 use crate::units::to_mm;
 
 /// Points of the drawn arm closer than this (mm) are one.
 const SAME_POINT: f64 = 0.001;
+
+/// Whether the table that a result was made from said so.
+fn says_simulated(result: Option<&IdentificationSummary>) -> bool {
+    result.is_some_and(|result| result.warnings.iter().any(|warning| warning.code == SIMULATED))
+}
 
 impl Document {
     /// The report of a session as it stands, with the hashes of the `files` (name and text) that lie beside it.
@@ -32,6 +37,7 @@ impl Document {
             schema: SCHEMA,
             state: state(session),
             points_from: match &session.instrument {
+                None if says_simulated(result.as_ref()) => PointOrigin::Simulated,
                 None => PointOrigin::Tables,
                 Some(InstrumentChoice::Manual { .. }) => PointOrigin::Typed,
                 Some(InstrumentChoice::Simulated(_)) => PointOrigin::Simulated,

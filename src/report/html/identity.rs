@@ -78,8 +78,12 @@ pub(super) fn section(document: &Document) -> String {
 fn measured(report: &Details) -> String {
     let session = &report.session;
     match (&session.first_sample, &session.last_sample) {
-        // Rows of a table carry no time.
-        _ if report.points_from == PointOrigin::Tables => "read from tables, which carry no time".to_owned(),
+        // Rows of a table carry no time, also if they are simulated.
+        _ if report.points_from == PointOrigin::Tables
+            || (report.points_from == PointOrigin::Simulated && report.instrument.is_none()) =>
+        {
+            "read from tables, which carry no time".to_owned()
+        }
         (Some(first), Some(last)) => {
             let work = format!("{} min of work", number(session.worked_min, 0));
             format!("{} to {} ({work})", time(first), time(last))

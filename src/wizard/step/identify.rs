@@ -8,10 +8,10 @@ use crate::procedure::points::point_errors;
 use crate::session::export::measurements_csv;
 use crate::session::journal::{Entry, IdentifiedText};
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{InstrumentChoice, Step};
+use crate::session::set_up::Step;
 use crate::session::sha256;
 use crate::session::state::{Sample, SampleState, Session};
-use crate::session::summary::{InputFile, SIMULATED, VerificationMode, Warning};
+use crate::session::summary::{InputFile, VerificationMode, Warning};
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::Notice;
@@ -79,15 +79,7 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
 
 /// What a reader of the result must know about how it was measured.
 fn remarks(session: &Session) -> Vec<Warning> {
-    let cause = match &session.instrument {
-        Some(InstrumentChoice::Simulated(simulation)) => format!("the simulated cell (seed {})", simulation.seed),
-        _ => format!("a simulated instrument ({})", session.identities.join("; ")),
-    };
-    let simulated = session.is_simulated().then(|| Warning {
-        code: SIMULATED.to_owned(),
-        message: format!("SIMULATED: the points come from {cause}, not from a robot; this result is for no real arm"),
-        blocks_acceptance: false,
-    });
+    let simulated = session.simulation().map(|said| Warning::simulated(&said));
     simulated.into_iter().chain(left_out(session, PoseKind::Identification)).collect()
 }
 
