@@ -12,7 +12,7 @@ use crate::error::{ExitStatus, Failure};
 use crate::recording::Live;
 use crate::report;
 use crate::runtime::{Clock, Engine, Options, signals};
-use crate::script::{Format, Outcome, Runner, Script, Transcript};
+use crate::script::{Format, Outcome, Runner, Script, ScriptError, Transcript};
 use crate::session::journal::JournalError;
 use crate::session::state::Session;
 use crate::store;
@@ -65,8 +65,19 @@ pub(super) fn resume<O: Write, E: Write>(
 }
 
 fn parse(text: &str, file: &str, args: &ScriptArgs) -> Result<Script, Failure> {
-    let values: BTreeMap<String, String> = args.values.iter().cloned().collect();
-    Script::parse(text, &values).map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))
+    let mut values = BTreeMap::new();
+    for (name, value) in &args.values {
+        if values.insert(name.clone(), value.clone()).is_some() {
+            return Err(Failure::new(ExitStatus::Usage, format!("'{name}' is given twice")));
+        }
+    }
+    Script::parse(text, &values).map_err(|error| {
+        let failure = Failure::new(ExitStatus::Usage, format!("'{file}': {error}"));
+        let set: Vec<String> = values.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        // A value that does not fit in its place is an error of the text around it.
+        let may_be_a_value = matches!(error, ScriptError::Syntax { .. }) && !set.is_empty();
+        if may_be_a_value { failure.hint(format!("does a given value fit there? {}", set.join(", "))) } else { failure }
+    })
 }
 
 fn options(script: &Script, args: &ScriptArgs) -> Result<Options, Failure> {
