@@ -128,6 +128,7 @@ impl CaptureStep {
             joints: to_edge(&planned.configuration, &robot.joint_types),
             reported_joints: reported,
             xyz_mm: to_xyz_mm(&reading.point, 9),
+            factor: None,
             sigma_mm: reading.sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0).map(to_mm),
             scatter_mm: reading
                 .scatter
@@ -159,14 +160,10 @@ impl CaptureStep {
                 .hint("wait until it is at rest and measure again; or take the reading as it is");
             return vec![Action::Write(vec![entry]), Action::Say(notice)];
         }
+        let mut noted = noted;
+        checks::judge(cx, &mut noted);
         let remark = not_as_planned(&noted, robot);
-        self.write(noted, cx).into_iter().chain(remark.map(Action::Say)).collect()
-    }
-
-    /// Writes a sample with what the checks say about it.
-    fn write(&mut self, mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
-        noted.findings = checks::findings(cx, &noted);
-        vec![Action::Write(vec![self.sample(noted, cx)])]
+        [Action::Write(vec![self.sample(noted, cx)])].into_iter().chain(remark.map(Action::Say)).collect()
     }
 
     /// A sample with what a calibration from all samples up to it would be worth.
@@ -323,7 +320,7 @@ impl StepMachine for CaptureStep {
                 let Some(Held { mut noted, reason }) = self.held.take() else { return Vec::new() };
                 let number = session.measurements + 1;
                 noted.number = number;
-                noted.findings = checks::findings(cx, &noted);
+                checks::judge(cx, &mut noted);
                 // Taking it as it is settles that it scatters; what its distances say is another question.
                 let is_settled = noted.findings.is_empty();
                 noted.findings.push(FindingText {
@@ -347,7 +344,10 @@ impl StepMachine for CaptureStep {
             Intent::LeaveOut => self.decide(Decision::LeaveOut),
             Intent::ApplyRemedy => {
                 let remedy = self.asked(session).and_then(|(_, finding)| finding.remedy.clone());
-                remedy.map(|remedy| Action::Write(vec![Entry::Correction(remedy)])).into_iter().collect()
+                remedy
+                    .map(|remedy| Action::Write(vec![Entry::Correction(ended(remedy, session))]))
+                    .into_iter()
+                    .collect()
             }
             Intent::Skip => {
                 self.held = None;
@@ -355,9 +355,7 @@ impl StepMachine for CaptureStep {
             }
             Intent::Undo => {
                 let last = session.samples.iter().rev().find(|sample| sample.state == SampleState::Counts);
-                let entry =
-                    last.map(|sample| Entry::Decision { sample: sample.noted.number, decision: Decision::Undo });
-                entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+                last.map(|sample| Action::Write(undo(sample.noted.number, session))).into_iter().collect()
             }
             Intent::GoToPose(pose) => Self::go_to(&pose, session),
             Intent::Note(text) => {
@@ -415,6 +413,9 @@ impl StepMachine for CaptureStep {
                     _ if self.question.is_none() => self.advance(session),
                     _ => {}
                 }
+                if let Some(factor) = noted.factor {
+                    return vec![Action::Say(other_unit(noted, factor))];
+                }
             }
             Entry::Decision { sample, decision } => {
                 self.prediction = Prediction::of(session);
@@ -449,13 +450,45 @@ impl StepMachine for CaptureStep {
     }
 }
 
+/// A correction of a unit is about what is measured, not about what will be.
+fn ended(remedy: Correction, session: &Session) -> Correction {
+    match remedy {
+        // Proposed by an earlier version.
+        Correction::Scale { since, factor, until: None } => {
+            Correction::Scale { since, factor, until: Some(session.measurements) }
+        }
+        remedy => remedy,
+    }
+}
+
+/// Takes a sample back, and the corrections that it led to.
+fn undo(sample: u64, session: &Session) -> Vec<Entry> {
+    let corrections = session.corrections_since(sample);
+    let taken_back = corrections.map(|corrected| Entry::Correction(Correction::TakenBack { line: corrected.line }));
+    taken_back.chain([Entry::Decision { sample, decision: Decision::Undo }]).collect()
+}
+
+/// What to say about a sample that is in another unit like the one before.
+fn other_unit(noted: &MeasuredText, factor: f64) -> Notice {
+    let what = format!("pose {}: still in the other unit; its coordinates count {factor} times", noted.pose);
+    Notice::attention(what).hint("set the unit of the instrument back; a point in the right unit counts as it is")
+}
+
 fn corrected(correction: &Correction) -> String {
     match correction {
-        Correction::Scale { since, factor } => {
-            format!("coordinates from measurement {since} on count {factor} times; what was noted stays in the journal")
+        Correction::Scale { since, factor, until } => {
+            let which = match until {
+                None => format!("from measurement {since} on"),
+                Some(until) if until == since => format!("of measurement {since}"),
+                Some(until) => format!("of measurements {since} to {until}"),
+            };
+            format!("coordinates {which} count {factor} times; what was noted stays in the journal")
         }
         Correction::Swap { first, second } => format!("measurements {first} and {second} changed places"),
         Correction::Row { sample, .. } => format!("measurement {sample} counts for the pose where the robot stood"),
         Correction::Joints { sample, .. } => format!("measurement {sample} counts with the corrected joint values"),
+        Correction::TakenBack { .. } => {
+            "the correction that the measurement led to is taken back with it; both stay in the journal".to_owned()
+        }
     }
 }
