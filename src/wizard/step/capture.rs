@@ -19,6 +19,7 @@ use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
 use crate::wizard::view::Content;
 use prediction::Prediction;
+pub(super) use prediction::fewest_samples;
 
 /// Wait before the first shot (s), as in the method paper.
 const SETTLE: f64 = 2.0;
@@ -38,6 +39,8 @@ pub(in crate::wizard) struct CaptureStep {
     question: Option<u64>,
     /// A measurement is under way; what else fails is no refused measurement.
     measuring: bool,
+    /// Fewest identification samples; neither robot nor SMR change while it is measured.
+    fewest: Option<usize>,
     /// What the samples so far let expect.
     prediction: Prediction,
     /// The same with the measurement of this number, which is being written.
@@ -51,10 +54,9 @@ struct Held {
     reason: String,
 }
 
-/// Why there are too few identification samples to identify from.
-pub(super) fn too_few(session: &Session) -> Option<String> {
-    let free = session.mounted_profile()?.free_parameters(crate::profile::Level::Geometric).len();
-    let fewest = (free + 6).div_ceil(3);
+/// Why there are too few identification samples to identify from, if it takes `fewest`.
+pub(super) fn too_few(session: &Session, fewest: Option<usize>) -> Option<String> {
+    let fewest = fewest?;
     let measured = session.counted_of(PoseKind::Identification).count();
     (measured < fewest).then(|| format!("{measured} of at least {fewest} identification poses are measured"))
 }
@@ -73,6 +75,7 @@ impl CaptureStep {
             held: None,
             question: None,
             measuring: false,
+            fewest: fewest_samples(session),
             prediction: Prediction::of(session),
             expected: None,
         };
@@ -276,7 +279,7 @@ impl StepMachine for CaptureStep {
         let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
             .unless(not_by_hand.or_else(|| if asked.is_some() { no_instrument.clone() } else { blocked.clone() }));
         let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone()).or(is_down);
-        let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session));
+        let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session, self.fewest));
         let mut intents = vec![
             if has_more && !manual { measure.default_action() } else { measure },
             if manual && (has_more || asked.is_some()) { type_in.default_action() } else { type_in },
