@@ -58,7 +58,7 @@ pub use bound::DesignBound;
 pub use cell::{Body, BoxInBase, Cell, CellError, KeepOutBox, MountedTarget, TrackerStand};
 pub use choice::{Chosen, Objective, Progress, Search, SearchSettings, Stage};
 pub use error::PlanningError;
-pub use information::Information;
+pub use information::{Information, fewest_poses, findable};
 pub use sampling::{JointBox, low_discrepancy, random};
 pub use score::{ObservabilityIndices, ParameterPrecision, Score};
 pub use trade_off::{TradeOff, trade_off};

@@ -200,7 +200,7 @@ fn the_poses_of_a_file_can_be_the_plan() {
     let plan = "pose,kind,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,identification,0,0,0,0,30,0\nb,verification,10,5,0,20,40,0\n";
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("few.csv"), plan).unwrap();
-    let steps = "Do(LoadPlan(\"few.csv\")), Do(AcceptPlan), CaptureAll(Fail), Blocked(Next, \"1 of at least 11 identification poses\")";
+    let steps = "Do(LoadPlan(\"few.csv\")), Do(AcceptPlan), CaptureAll(Fail), Blocked(Next, \"1 of at least 9 identification poses\")";
     fs::write(folder.path().join("test.script.ron"), begun(steps)).unwrap();
     let output = trupose(folder.path(), &["--script", "test.script.ron"]);
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));

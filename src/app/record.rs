@@ -285,6 +285,7 @@ fn measured(row: usize, kind: PoseKind, named: &NamedSample, types: &[JointType]
         joints: to_edge(&sample.at.configuration, types),
         reported_joints: None,
         xyz_mm: to_xyz_mm(&sample.point, 9),
+        factor: None,
         sigma_mm: sample.sigma.map(to_mm),
         scatter_mm: None,
         shots: 1,

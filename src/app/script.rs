@@ -1,7 +1,7 @@
 //! `trupose --script`, `trupose demo` and `trupose resume DIR --script`: the wizard without a terminal.
 
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 use jiff::Timestamp;
@@ -15,8 +15,8 @@ use crate::runtime::{Clock, Engine, Options, signals};
 use crate::script::{Format, Outcome, Runner, Script, ScriptError, Transcript};
 use crate::session::journal::JournalError;
 use crate::session::state::Session;
-use crate::store;
 use crate::store::session::{SessionError, SessionFolder};
+use crate::store::{self, StoreError};
 
 /// The script of `trupose demo`.
 const DEMO: &str = include_str!("../../sessions/demo.script.ron");
@@ -130,6 +130,13 @@ pub(super) fn session_failure(error: &SessionError) -> Failure {
         SessionError::Journal { .. } => {
             failure.hint("nothing was changed; copy the folder, then cut the journal before the damaged line to save what is before it")
         }
+        SessionError::Store(StoreError::Write { source, .. })
+            if matches!(source.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem) =>
+        {
+            failure.hint(
+                "it belongs to somebody else, or is write-protected: go on as that user, or copy the folder and go on with the copy",
+            )
+        }
         SessionError::Store(_) => failure,
     }
 }
@@ -200,5 +207,22 @@ fn play<O: Write, E: Write>(
             (Some(failure), false) => Err(Failure::new(failure.status, format!("{cause}; no session was begun"))),
             (None, _) => Ok(ExitStatus::Accepted),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_may_not_write_a_session_is_told_what_to_do() {
+        let failure = |kind: io::ErrorKind| {
+            session_failure(&StoreError::Write { path: "s/.lock".into(), source: kind.into() }.into())
+        };
+        for kind in [io::ErrorKind::PermissionDenied, io::ErrorKind::ReadOnlyFilesystem] {
+            let hints = failure(kind).hints;
+            assert!(hints.iter().any(|hint| hint.contains("write-protected")), "{hints:?}");
+        }
+        assert!(failure(io::ErrorKind::StorageFull).hints.is_empty());
     }
 }

@@ -40,6 +40,18 @@ pub struct Information {
     fresh: DMatrix<f64>,
 }
 
+/// Fewest poses M that can determine so many combinations of parameters, and the frame: `3 M ≥ rank + 6`.
+pub const fn fewest_poses(rank: usize) -> usize {
+    (rank + FRAME).div_ceil(3)
+}
+
+/// Number of combinations of `parameters` that distances can find by measuring at all of `places`; `None` if it is not clear, or
+/// the sizes do not fit.
+pub fn findable(model: &ArmModel, parameters: &[FreeParameter], places: &[TargetAt]) -> Option<usize> {
+    check(model, parameters, places).ok()?;
+    observe(model, parameters, places).rank
+}
+
 impl Information {
     /// Of `candidates` for identifying `parameters` of `model`, judged by the error at `fresh` poses.
     ///
@@ -109,9 +121,9 @@ impl Information {
         self.basis.ncols()
     }
 
-    /// Fewest poses that can determine them: `3 M ≥ rank + 6`.
+    /// Fewest poses that can determine them: see [`fewest_poses`].
     pub fn fewest_poses(&self) -> usize {
-        (self.rank() + FRAME).div_ceil(3)
+        fewest_poses(self.rank())
     }
 
     /// Predicted position of a candidate in the base (m).

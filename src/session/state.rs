@@ -4,6 +4,8 @@
 //! seen. What was measured stays as it was noted; corrections are applied when samples are used ([`Session::point_of`] and the
 //! configuration).
 
+mod correction;
+
 use std::collections::BTreeSet;
 
 use jiff::Timestamp;
@@ -12,14 +14,16 @@ use thiserror::Error;
 
 use super::calibration::MountedText;
 use super::journal::{
-    CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText,
-    PlannedText, from_edge, from_xyz_mm, to_xyz_mm,
+    CirclePointText, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText,
+    from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
 use super::set_up::{About, InstrumentChoice, Step, TargetChoice};
 use crate::kinematics::JointType;
 use crate::profile::Profile;
 use crate::units::from_mm;
+pub use correction::Corrected;
+use correction::is_factor;
 
 /// A longer time between two entries (s) is a break, or a clock that was set.
 const LONGEST_STEP: f64 = 3600.0;
@@ -65,10 +69,8 @@ pub struct Session {
     pub measurements: u64,
     /// No sample has ever belonged to this row of the plan or to a later one.
     rows_measured: usize,
-    /// From which measurement on noted coordinates have to be multiplied by what.
-    pub scales: Vec<(u64, f64)>,
-    /// What was set right, oldest first.
-    pub corrections: Vec<Correction>,
+    /// What was set right and stands, oldest first.
+    pub corrections: Vec<Corrected>,
     /// Remarks.
     pub notes: Vec<Note>,
     /// Serial number, operator and place.
@@ -271,8 +273,7 @@ impl Session {
                 self.decide(*sample, *decision).ok_or_else(|| misfit("a decision about an unknown sample"))?;
             }
             Entry::Correction(correction) => {
-                self.correct(correction).ok_or_else(|| misfit("a correction of an unknown sample"))?;
-                self.corrections.push(correction.clone());
+                self.correct(correction, line.number).ok_or_else(|| misfit("a correction of an unknown sample"))?;
             }
             Entry::Row(row) => {
                 self.rows.get(*row).ok_or_else(|| misfit("a row that is in no plan"))?;
@@ -409,17 +410,17 @@ impl Session {
 
     /// Where the SMR of a sample was seen, in the tracker frame (m), corrections applied.
     pub fn point_of(&self, sample: &Sample) -> Point3<f64> {
-        self.corrected(sample.noted.number, sample.noted.xyz_mm)
+        self.point_noted(&sample.noted)
     }
 
-    /// A point that was noted at a measurement, in the tracker frame (m), corrections applied.
-    pub fn corrected(&self, number: u64, xyz_mm: (f64, f64, f64)) -> Point3<f64> {
-        from_xyz_mm(xyz_mm) * self.scale_of(number)
+    /// The same of a sample that need not be in the session yet.
+    pub fn point_noted(&self, noted: &MeasuredText) -> Point3<f64> {
+        from_xyz_mm(noted.xyz_mm) * self.scale_noted(noted)
     }
 
-    /// What lengths that were noted at a measurement have to be multiplied by.
-    pub fn scale_of(&self, number: u64) -> f64 {
-        self.scales.iter().filter(|(since, _)| *since <= number).map(|(_, factor)| factor).product()
+    /// A point of the circles in the tracker frame (m), corrections applied.
+    pub fn point_of_circle(&self, point: &CirclePointText) -> Point3<f64> {
+        from_xyz_mm(point.xyz_mm) * self.correction_of(point.number)
     }
 
     /// Where the robot stood at a sample: pendant values (rad, m).
@@ -429,12 +430,12 @@ impl Session {
 
     /// Standard deviation of a sample (m), where the instrument stated one.
     pub fn sigma_of(&self, sample: &Sample) -> Option<f64> {
-        self.corrected_sigma(sample.noted.number, sample.noted.sigma_mm)
+        self.sigma_noted(&sample.noted)
     }
 
-    /// A standard deviation that was noted at a measurement (m), corrections applied.
-    pub fn corrected_sigma(&self, number: u64, sigma_mm: Option<f64>) -> Option<f64> {
-        Some(from_mm(sigma_mm?) * self.scale_of(number)).filter(|sigma| *sigma > 0.0)
+    /// The same of a sample that need not be in the session yet.
+    pub fn sigma_noted(&self, noted: &MeasuredText) -> Option<f64> {
+        Some(from_mm(noted.sigma_mm?) * self.scale_noted(noted)).filter(|sigma| *sigma > 0.0)
     }
 
     /// What was found about samples that count and were neither kept nor corrected, oldest first: the sample it is about and
@@ -486,6 +487,9 @@ impl Session {
         if !(self.fits(&noted.joints) && noted.reported_joints.as_deref().is_none_or(|joints| self.fits(joints))) {
             return Err("a sample whose joint values do not fit the robot");
         }
+        if !noted.factor.is_none_or(is_factor) {
+            return Err("a sample in an impossible unit");
+        }
         self.measurements = noted.number;
         self.shown = Some(noted.row);
         // Most rows are measured once: of a large table not every sample need be looked through for every one.
@@ -530,76 +534,6 @@ impl Session {
             }
         }
         Some(())
-    }
-
-    fn correct(&mut self, correction: &Correction) -> Option<()> {
-        match correction {
-            Correction::Scale { since, factor } => {
-                if !(factor.is_finite() && *factor > 0.0) {
-                    return None;
-                }
-                self.scales.push((*since, *factor));
-                self.settle(|number| number >= *since);
-            }
-            Correction::Swap { first, second } => {
-                let place = |number: u64| self.samples.iter().position(|sample| sample.noted.number == number);
-                let (a, b) = (place(*first)?, place(*second)?);
-                let (row, joints) = (self.samples[a].row, self.samples[a].joints.clone());
-                let (other_row, other_joints) = (self.samples[b].row, self.samples[b].joints.clone());
-                (self.samples[a].row, self.samples[a].joints) = (other_row, other_joints);
-                (self.samples[b].row, self.samples[b].joints) = (row, joints);
-                self.keep_latest(row);
-                self.keep_latest(other_row);
-                self.settle(|number| number == *first || number == *second);
-            }
-            Correction::Row { sample, row } => {
-                let robot = self.robot.as_ref()?;
-                let joints: Vec<f64> = {
-                    let planned = &self.rows.get(*row)?.planned;
-                    super::journal::to_edge(&planned.configuration, &robot.joint_types)
-                };
-                let moved = *sample;
-                let counts = self.sample(moved)?.state == SampleState::Counts;
-                for other in self.samples.iter_mut().filter(|other| other.row == *row && other.noted.number != moved) {
-                    if counts && matches!(other.state, SampleState::Counts | SampleState::LeftOut) {
-                        other.state = SampleState::Superseded;
-                    }
-                }
-                let sample = self.sample_mut(moved)?;
-                (sample.row, sample.joints) = (*row, joints);
-                self.rows_measured = self.rows_measured.max(*row + 1);
-                self.settle(|number| number == moved);
-                self.keep_latest(*row);
-            }
-            Correction::Joints { sample, joints } => {
-                if !self.fits(joints) {
-                    return None;
-                }
-                let sample = self.sample_mut(*sample)?;
-                sample.joints.clone_from(joints);
-                let mended = sample.noted.number;
-                self.settle(|number| number == mended);
-            }
-        }
-        Some(())
-    }
-
-    /// At most one sample of a row counts or is left out: the latest one.
-    fn keep_latest(&mut self, row: usize) {
-        let stands = |sample: &&mut Sample| {
-            sample.row == row && matches!(sample.state, SampleState::Counts | SampleState::LeftOut)
-        };
-        for sample in self.samples.iter_mut().filter(stands).rev().skip(1) {
-            sample.state = SampleState::Superseded;
-        }
-    }
-
-    /// What was found about these measurements is settled.
-    fn settle(&mut self, concerns: impl Fn(u64) -> bool) {
-        let measurements = self.measurements;
-        for sample in self.samples.iter_mut().filter(|sample| concerns(sample.noted.number)) {
-            sample.settled = measurements;
-        }
     }
 }
 

@@ -74,7 +74,7 @@ impl Dialog {
     /// The question that an intent on offer needs before it can be done; none: it can be done at once.
     pub fn before(info: &IntentInfo, view: &ViewModel) -> Option<Self> {
         let text = |label: &str, value: &str, intent: fn(String) -> Intent| {
-            Some(Self::Text { field: TextField::new(label, value), intent })
+            Some(Self::Text { field: TextField::new(label, value).proposed(), intent })
         };
         match &info.intent {
             Intent::ChooseProfile(_) => choose_profile(view),

@@ -85,7 +85,10 @@ pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut
 pub(super) fn say_too_small(theme: Theme, area: Rect, buf: &mut Buffer) {
     let (columns, rows) = SMALLEST;
     let said = format!("terminal {}x{}, need {columns}x{rows}", area.width, area.height);
-    paint::text(buf, area, (0, 0), &said, theme.style(Role::Warn));
+    let lines = wrapped(&said, usize::from(area.width));
+    for (row, line) in (0..area.height).zip(&lines) {
+        paint::text(buf, area, (0, row), line, theme.style(Role::Warn));
+    }
 }
 
 /// Draws the keys below a rule; gives back the row of the rule.

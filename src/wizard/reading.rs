@@ -10,6 +10,8 @@ use crate::units::{MILLIMETRE, to_mm};
 const SCATTER_FACTOR: f64 = 5.0;
 /// Scatter that every instrument may have (m).
 const SCATTER_ALWAYS: f64 = 0.03 * MILLIMETRE;
+/// Longer text that was typed is not repeated as a whole.
+const LONGEST_QUOTED: usize = 40;
 /// No instrument measures farther (m).
 const FARTHEST: f64 = 1000.0;
 
@@ -31,9 +33,8 @@ pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
             c => c,
         })
         .collect();
-    let separated = separate(&cleaned).ok_or_else(|| {
-        format!("'{}' can be read in several ways; separate the numbers by blanks or ';'", short(text))
-    })?;
+    let separated =
+        separate(&cleaned).map_err(|advice| format!("'{}' can be read in several ways; {advice}", short(text)))?;
     let mut values = Vec::with_capacity(3);
     let mut axes = String::new();
     for word in separated {
@@ -63,6 +64,12 @@ pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
     }
     match values[..] {
         [x, y, z] => Ok(Point3::new(x, y, z) * unit.size()),
+        [_, _, _, ..] => Err(format!(
+            "found {} numbers in '{}': one point at a time, three numbers in {}",
+            values.len(),
+            short(text),
+            unit.sign()
+        )),
         _ => Err(format!("{}; found {}", expected(), super::counted(values.len(), "number", "numbers"))),
     }
 }
@@ -76,25 +83,38 @@ pub fn check(text: &str, unit: CoordinateUnit) -> Result<(), String> {
     gate(&point, None).map_or(Ok(()), Err)
 }
 
-/// The words of a point. A comma separates numbers, or stands before decimals: which one must be clear.
-fn separate(text: &str) -> Option<Vec<String>> {
+/// What to do about numbers that can be read in several ways.
+const SEPARATE: &str = "separate the numbers by blanks or ';'";
+const NO_THOUSANDS: &str = "leave out the thousands separator";
+const ONE_DECIMAL_SIGN: &str = "write all decimals with a point";
+
+/// The words of a point. A comma separates numbers, or stands before decimals: which one must be clear, else what to do.
+fn separate(text: &str) -> Result<Vec<String>, &'static str> {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let has_both = |text: &str| text.contains(',') && text.contains('.');
+    // `1,234.5`, `1.234,5`: in one number, one of them is a thousands separator.
+    let mixed = |numbers: &[String]| {
+        let is_long = |number: &String| has_both(number.trim_matches(','));
+        if numbers.iter().any(is_long) { NO_THOUSANDS } else { ONE_DECIMAL_SIGN }
+    };
     if text.contains(';') {
         // Between numbers stands ';', so a comma is a decimal sign, unless there are points as well.
-        if text.contains(',') && text.contains('.') {
-            return None;
-        }
-        return Some(words(&text.replace(';', " ").replace(',', ".")));
+        let numbers = text.replace(';', " ");
+        return if has_both(text) { Err(mixed(&words(&numbers))) } else { Ok(words(&numbers.replace(',', "."))) };
     }
     if !text.contains(',') {
-        return Some(words(text));
+        return Ok(words(text));
     }
     let parts = words(text);
     let has_outer_commas = parts.iter().any(|part| part.ends_with(',') || part.starts_with(','));
     if has_outer_commas {
         // `1, 2, 3`: separators; a comma inside a word would be a second meaning.
-        let inner = parts.iter().any(|part| part.trim_matches(',').contains(','));
-        return (!inner).then(|| words(&text.replace(',', " ")));
+        let inner: Vec<&String> = parts.iter().filter(|part| part.trim_matches(',').contains(',')).collect();
+        return match inner.as_slice() {
+            [] => Ok(words(&text.replace(',', " "))),
+            inner if inner.iter().any(|part| part.contains('.')) => Err(NO_THOUSANDS),
+            _ => Err(SEPARATE),
+        };
     }
     if parts.len() >= 3 {
         // `1,5 2,5 3,5`: decimal commas, if there is no decimal point. One comma with three digits behind may mean thousands.
@@ -105,12 +125,16 @@ fn separate(text: &str) -> Option<Vec<String>> {
             }
             _ => false,
         };
-        return (!text.contains('.') && !thousands).then(|| words(&text.replace(',', ".")));
+        return match (text.contains('.'), thousands) {
+            (true, _) => Err(mixed(&parts)),
+            (false, true) => Err("leave out the thousands separator, or write decimals with a point"),
+            (false, false) => Ok(words(&text.replace(',', "."))),
+        };
     }
     // `1.5,2.5,3.5`: separators, if every part can be a number of its own.
     let parts: Vec<&str> = text.split(',').collect();
-    (parts.len() == 3 && (text.contains('.') || parts.iter().all(|part| part.trim().len() > 3)))
-        .then(|| words(&text.replace(',', " ")))
+    let is_clear = parts.len() == 3 && (text.contains('.') || parts.iter().all(|part| part.trim().len() > 3));
+    if is_clear { Ok(words(&text.replace(',', " "))) } else { Err(SEPARATE) }
 }
 
 /// `x=12`, `X:12`: the name goes, to `axes`.
@@ -125,9 +149,14 @@ fn strip_name<'a>(word: &'a str, axes: &mut String) -> &'a str {
     }
 }
 
+/// The beginning of what was typed.
 fn short(text: &str) -> String {
-    let text: String = crate::session::printable(text.trim()).chars().take(40).collect();
-    text
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let text = crate::session::printable(&words.join(" "));
+    match text.char_indices().nth(LONGEST_QUOTED) {
+        Some((end, _)) => format!("{}…", text.get(..end).unwrap_or_default().trim_end()),
+        None => text,
+    }
 }
 
 /// A reading that was typed in.
@@ -212,13 +241,23 @@ mod tests {
         for (text, part) in [
             ("", "found 0 numbers"),
             ("1 2", "found 2 numbers"),
-            ("1 2 3 4", "found 4 numbers"),
+            ("1 2 3 4", "found 4 numbers in '1 2 3 4': one point at a time, three numbers in mm"),
+            (
+                "100.5 200.25 300.125\n110.5 210.25 310.125\n1 2 3",
+                "found 9 numbers in '100.5 200.25 300.125 110.5 210.25 310.12…': one point at a time",
+            ),
             ("1 2 x", "named 'x'"),
             ("one two three", "is not a point"),
             ("nan 1 2", "is not a point"),
-            ("1,2,3", "several ways"),
-            ("1,234.5; 2,0; 3", "several ways"),
-            ("1,234 -20 88", "several ways"),
+            ("1,2,3", "several ways; separate the numbers by blanks or ';'"),
+            ("1,5, 2,5, 3,5", "several ways; separate the numbers by blanks or ';'"),
+            ("1,234.5; 2,0; 3", "several ways; leave out the thousands separator"),
+            ("1.234,5; 2; 3", "several ways; leave out the thousands separator"),
+            ("1,234.5 2 3", "several ways; leave out the thousands separator"),
+            ("1,234.5, 2, 3", "several ways; leave out the thousands separator"),
+            ("1,5; 2.5; 3", "several ways; write all decimals with a point"),
+            ("1,5 2.5 3", "several ways; write all decimals with a point"),
+            ("1,234 -20 88", "several ways; leave out the thousands separator, or write decimals with a point"),
             ("Z 88 Y -20.1 X 1234.5", "named 'zyx'"),
             ("x=1 2 3", "named 'x'"),
             ("1 2 3 in", "was chosen in the instrument step"),

@@ -121,7 +121,7 @@ impl Phase {
             Step::Target => Self::Target(target::TargetStep::enter(session)),
             Step::Plan => Self::Plan(plan::PlanStep::default()),
             Step::Capture => Self::Capture(Box::new(capture::CaptureStep::enter(session))),
-            Step::Identify => Self::Identify(identify::IdentifyStep),
+            Step::Identify => Self::Identify(identify::IdentifyStep::enter(session)),
             Step::Verify => Self::Verify(identify::VerifyStep),
             Step::Deliver => Self::Deliver(deliver::DeliverStep),
         }

@@ -9,3 +9,4 @@ mod resume;
 mod shutdown;
 mod stale;
 mod steps;
+mod units;

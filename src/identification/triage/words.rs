@@ -137,7 +137,9 @@ fn unit_story(factor: f64) -> &'static str {
 
 fn advice(cause: &Cause, names: &Names<'_>) -> String {
     match cause {
-        Cause::Unit { .. } => "set the unit of the instrument; the points before can be converted".to_owned(),
+        Cause::Unit { .. } => {
+            "set the unit of the instrument back; what was measured in the other one can be converted".to_owned()
+        }
         Cause::JointSign { joint } => {
             format!("check the sign of joint {}, or 'direction' in the profile", (names.joint)(*joint))
         }

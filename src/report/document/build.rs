@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point3;
 
-use super::decisions::{findings, not_counted};
+use super::decisions::{corrections, findings, not_counted};
 use super::{
     Counts, Details, Document, DriftPart, FilePart, Found, NotePart, ParameterNote, PlanPart, PointOrigin, PointPart,
     PredictionPart, RefusedPart, ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
@@ -12,7 +12,7 @@ use super::{
 use crate::kinematics::ForwardKinematics;
 use crate::profile::Profile;
 use crate::report::text::found;
-use crate::session::journal::{correction_text, instrument_text, target_text};
+use crate::session::journal::{instrument_text, target_text};
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, TargetChoice};
 use crate::session::sha256;
@@ -78,7 +78,7 @@ impl Document {
                 })
                 .collect(),
             findings: findings(session),
-            corrections: session.corrections.iter().map(correction_text).collect(),
+            corrections: corrections(session),
             notes: session
                 .notes
                 .iter()

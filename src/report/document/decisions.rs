@@ -1,6 +1,7 @@
 //! What became of the samples that do not count, and of what the checks found.
 
 use super::{FindingPart, NotCounted};
+use crate::session::journal::correction_text;
 use crate::session::state::{Sample, SampleState, Session};
 
 /// Samples that do not count. Outliers of the identification are not among them: they count, and the identification says why it
@@ -31,6 +32,22 @@ fn reason(session: &Session, sample: &Sample) -> String {
         SampleState::LeftOut => format!("left out by the operator{found}"),
         SampleState::Undone => format!("taken back by the operator{found}"),
     }
+}
+
+/// What was set right, and which points were read in the other unit after it was.
+pub(super) fn corrections(session: &Session) -> Vec<String> {
+    let corrected = session.corrections.iter().map(|corrected| correction_text(&corrected.correction));
+    let in_other_unit = session.samples.chunk_by(|one, next| one.noted.factor == next.noted.factor);
+    let in_other_unit = in_other_unit.filter_map(|samples| {
+        let (first, last) = (&samples.first()?.noted, &samples.last()?.noted);
+        let which = if first.number == last.number {
+            format!("measurement {}", first.number)
+        } else {
+            format!("measurements {} to {}", first.number, last.number)
+        };
+        Some(format!("{which}, in the other unit like the one before: coordinates times {}", first.factor?))
+    });
+    corrected.chain(in_other_unit).collect()
 }
 
 /// What the checks found while measuring.

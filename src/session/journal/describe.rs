@@ -62,7 +62,7 @@ fn xyz((x, y, z): (f64, f64, f64)) -> String {
 }
 
 fn sample_text(sample: &MeasuredText) -> String {
-    let MeasuredText { number, pose, kind, xyz_mm, scatter_mm, findings, .. } = sample;
+    let MeasuredText { number, pose, kind, xyz_mm, factor, scatter_mm, findings, .. } = sample;
     let kind = match kind {
         PoseKind::Identification => "",
         PoseKind::Verification => " (verification)",
@@ -70,9 +70,10 @@ fn sample_text(sample: &MeasuredText) -> String {
         PoseKind::Home | PoseKind::Via => " (on the way)",
     };
     let scatter = scatter_mm.map_or_else(String::new, |scatter| format!(", scatter {scatter:.4} mm"));
+    let factor = factor.map_or_else(String::new, |factor| format!(" times {factor}, in the unit of the one before"));
     let findings: Vec<String> =
         findings.iter().map(|finding| format!("; CHECK {}: {}", finding.cause, finding.message)).collect();
-    format!("measurement {number}: pose {pose}{kind} at {}{scatter}{}", xyz(*xyz_mm), findings.concat())
+    format!("measurement {number}: pose {pose}{kind} at {}{factor}{scatter}{}", xyz(*xyz_mm), findings.concat())
 }
 
 fn plan_text(plan: &PlanText) -> String {
@@ -92,8 +93,14 @@ fn plan_text(plan: &PlanText) -> String {
 /// What was set right, in one line.
 pub fn correction_text(correction: &Correction) -> String {
     match correction {
-        Correction::Scale { since, factor } => {
+        Correction::Scale { since, factor, until: None } => {
             format!("corrected: coordinates from measurement {since} on times {factor}")
+        }
+        Correction::Scale { since, factor, until: Some(until) } if since == until => {
+            format!("corrected: coordinates of measurement {since} times {factor}")
+        }
+        Correction::Scale { since, factor, until: Some(until) } => {
+            format!("corrected: coordinates of measurements {since} to {until} times {factor}")
         }
         Correction::Swap { first, second } => format!("corrected: measurements {first} and {second} change places"),
         Correction::Row { sample, row } => {
@@ -103,6 +110,7 @@ pub fn correction_text(correction: &Correction) -> String {
             let joints: Vec<String> = joints.iter().map(|value| format!("{value:.3}")).collect();
             format!("corrected: at measurement {sample} the robot stood at ({})", joints.join(", "))
         }
+        Correction::TakenBack { line } => format!("the correction in line {line} is taken back"),
     }
 }
 

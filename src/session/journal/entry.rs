@@ -229,6 +229,10 @@ pub struct MeasuredText {
     pub reported_joints: Option<Vec<f64>>,
     /// Measured point in the tracker frame, as the instrument or the operator gave it.
     pub xyz_mm: (f64, f64, f64),
+    /// What the coordinates count times: they fit only in the other unit that the measurement before was corrected to. Not in
+    /// journals of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub factor: Option<f64>,
     /// Standard deviation of a coordinate, if the instrument states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_mm: Option<f64>,
@@ -302,6 +306,9 @@ pub enum Correction {
         since: u64,
         /// What the noted coordinates have to be multiplied by.
         factor: f64,
+        /// Last measurement. None in journals of earlier versions: all that follow as well.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        until: Option<u64>,
     },
     /// Two measurements belong to each other's poses.
     Swap {
@@ -323,6 +330,11 @@ pub enum Correction {
         sample: u64,
         /// True pendant joint values.
         joints: Vec<f64>,
+    },
+    /// An earlier correction does not stand any more: the measurement that led to it is taken back.
+    TakenBack {
+        /// Line of the journal that has it, from 1.
+        line: u64,
     },
 }
 

@@ -63,6 +63,7 @@ fn sample(number: u64) -> MeasuredText {
         joints: vec![0.1 + 0.2, -1e-9, 180.0],
         reported_joints: Some(vec![f64::MIN_POSITIVE, f64::MAX, -0.0]),
         xyz_mm: (1.0 / 3.0, -2_345.678_901, 1e-300),
+        factor: Some(25.4),
         sigma_mm: Some(0.012),
         scatter_mm: Some(0.0),
         shots: u32::MAX,
@@ -100,6 +101,13 @@ fn findings_of_journals_before_there_was_a_table_are_read() {
     let text = r#"(about: 3, cause: "wrong_pose", ratio: 9.5, message: "it does not fit")"#;
     let found: FindingText = ron::from_str(text).unwrap();
     assert_eq!((found.about, found.worst), (3, Vec::new()));
+}
+
+#[test]
+fn corrections_of_units_of_journals_before_they_had_an_end_are_read() {
+    let correction: Correction = ron::from_str("Scale(since: 5, factor: 25.4)").unwrap();
+    assert_eq!(correction, Correction::Scale { since: 5, factor: 25.4, until: None });
+    assert_eq!(ron::to_string(&correction).unwrap(), "Scale(since:5,factor:25.4)");
 }
 
 fn plan() -> PlanText {
@@ -203,13 +211,16 @@ fn all_entries() -> Vec<Entry> {
         TargetChoice::Circles { xyz_mm: (0.1, 1e10, -0.0), sigma_mm: 0.013 },
     ];
     let corrections = [
-        Correction::Scale { since: 1, factor: 25.4 },
+        Correction::Scale { since: 1, factor: 25.4, until: None },
+        Correction::Scale { since: 1, factor: 25.4, until: Some(9) },
         Correction::Swap { first: 4, second: 5 },
         Correction::Row { sample: 6, row: 0 },
         Correction::Joints { sample: 7, joints: vec![0.1, -170.25] },
+        Correction::TakenBack { line: 12 },
     ];
     let bare = MeasuredText {
         reported_joints: None,
+        factor: None,
         sigma_mm: None,
         scatter_mm: None,
         temperature_degc: None,
@@ -518,7 +529,7 @@ proptest! {
     /// Numbers come back bit by bit.
     #[test]
     fn every_number_comes_back(x in any::<f64>(), factor in any::<f64>()) {
-        let correction = Entry::Correction(Correction::Scale { since: 1, factor });
+        let correction = Entry::Correction(Correction::Scale { since: 1, factor, until: Some(1) });
         let measured = Entry::Sample(MeasuredText { xyz_mm: (x, -x, 1.0), ..sample(1) });
         let written = lines(vec![opened(), correction, measured]);
         let (bytes, _) = self::text(&written);

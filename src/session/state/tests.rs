@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::profile::builtin;
-use crate::session::journal::SCHEMA;
+use crate::session::journal::{Correction, SCHEMA};
 
 const ROWS: usize = 4;
 
@@ -51,6 +51,7 @@ fn sample(number: u64, row: usize) -> Entry {
         joints: vec![row as f64; 6],
         reported_joints: None,
         xyz_mm: (number as f64, 0.0, 0.0),
+        factor: None,
         sigma_mm: None,
         scatter_mm: None,
         shots: 1,
@@ -68,6 +69,8 @@ enum Deed {
     Decide(u64, Decision),
     Swap(u64, u64),
     Move(u64, usize),
+    Scale(u64, Option<u64>),
+    TakeBack(usize),
     Skip(usize, bool),
     Replan,
 }
@@ -80,6 +83,8 @@ fn deed() -> impl Strategy<Value = Deed> {
             .prop_map(|(number, decision)| Deed::Decide(number, decision)),
         2 => (number(), number()).prop_map(|(first, second)| Deed::Swap(first, second)),
         2 => (number(), 0..ROWS).prop_map(|(number, row)| Deed::Move(number, row)),
+        1 => (number(), proptest::option::of(number())).prop_map(|(since, until)| Deed::Scale(since, until)),
+        1 => (0..4_usize).prop_map(Deed::TakeBack),
         1 => (0..ROWS, any::<bool>()).prop_map(|(row, skipped)| Deed::Skip(row, skipped)),
         1 => Just(Deed::Replan),
     ]
@@ -91,6 +96,11 @@ fn entry(deed: &Deed, session: &Session) -> Entry {
         Deed::Decide(sample, decision) => Entry::Decision { sample, decision },
         Deed::Swap(first, second) => Entry::Correction(Correction::Swap { first, second }),
         Deed::Move(sample, row) => Entry::Correction(Correction::Row { sample, row }),
+        Deed::Scale(since, until) => Entry::Correction(Correction::Scale { since, factor: 2.0, until }),
+        Deed::TakeBack(place) => {
+            let line = session.corrections.get(place).map_or(0, |corrected| corrected.line);
+            Entry::Correction(Correction::TakenBack { line })
+        }
         Deed::Skip(row, skipped) => Entry::Skipped { row, skipped },
         Deed::Replan => Entry::Plan(plan()),
     }
@@ -125,6 +135,58 @@ proptest! {
             prop_assert_eq!(numbers.len(), measured);
         }
     }
+}
+
+/// What the samples say: where, at which pose, whether they count.
+fn standing(session: &Session) -> Vec<(Sample, Point3<f64>)> {
+    session.samples.iter().map(|sample| (sample.clone(), session.point_of(sample))).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_correction_that_is_taken_back_leaves_nothing(deeds in proptest::collection::vec(deed(), 0..25), correction in deed()) {
+        let mut session = begun();
+        for deed in deeds {
+            let entry = entry(&deed, &session);
+            drop(session.apply(&line(session.lines + 1, 0, entry)));
+        }
+        let before = standing(&session);
+        let corrections = session.corrections.clone();
+        let taken_back = session.lines + 1;
+        let entry = entry(&correction, &session);
+        let is_correction = matches!(entry, Entry::Correction(ref made) if !matches!(made, Correction::TakenBack { .. }));
+        if is_correction && session.apply(&line(taken_back, 0, entry)).is_ok() {
+            let undo = Entry::Correction(Correction::TakenBack { line: taken_back });
+            session.apply(&line(taken_back + 1, 0, undo)).unwrap();
+            prop_assert_eq!(standing(&session), before);
+            prop_assert_eq!(session.corrections, corrections);
+        }
+    }
+}
+
+#[test]
+fn a_scale_counts_for_the_measurements_it_names() {
+    let mut session = begun();
+    for number in 1..=4 {
+        session.apply(&line(session.lines + 1, 0, sample(number, 0))).unwrap();
+    }
+    let scale = |since, until| Entry::Correction(Correction::Scale { since, factor: 2.0, until });
+    session.apply(&line(session.lines + 1, 0, scale(2, Some(3)))).unwrap();
+    let scales = |session: &Session| (1..=5).map(|number| session.correction_of(number)).collect::<Vec<_>>();
+    assert_eq!(scales(&session), [1.0, 2.0, 2.0, 1.0, 1.0]);
+    session.apply(&line(session.lines + 1, 0, scale(3, None))).unwrap();
+    assert_eq!(scales(&session), [1.0, 2.0, 4.0, 2.0, 2.0]);
+    let Entry::Sample(noted) = sample(5, 1) else { panic!("it is a sample") };
+    for factor in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let noted = MeasuredText { factor: Some(factor), ..noted.clone() };
+        assert!(session.clone().apply(&line(session.lines + 1, 0, Entry::Sample(noted))).is_err(), "{factor}");
+    }
+    let noted = MeasuredText { factor: Some(3.0), sigma_mm: Some(1.0), ..noted };
+    session.apply(&line(session.lines + 1, 0, Entry::Sample(noted))).unwrap();
+    let last = session.samples.last().unwrap();
+    assert_eq!((session.point_of(last), session.sigma_of(last)), (Point3::new(0.03, 0.0, 0.0), Some(0.006)));
 }
 
 #[test]
@@ -182,8 +244,9 @@ fn entries_that_do_not_fit_are_refused() {
         Entry::Correction(Correction::Row { sample: 1, row: 0 }),
         Entry::Correction(Correction::Joints { sample: 1, joints: vec![0.0; 6] }),
         Entry::Correction(Correction::Swap { first: 1, second: 1 }),
-        Entry::Correction(Correction::Scale { since: 1, factor: 0.0 }),
-        Entry::Correction(Correction::Scale { since: 1, factor: f64::NAN }),
+        Entry::Correction(Correction::TakenBack { line: 3 }),
+        Entry::Correction(Correction::Scale { since: 1, factor: 0.0, until: None }),
+        Entry::Correction(Correction::Scale { since: 1, factor: f64::NAN, until: Some(1) }),
         Entry::Skipped { row: ROWS, skipped: true },
     ];
     for entry in misfits {

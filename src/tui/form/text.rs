@@ -23,15 +23,25 @@ pub struct TextField {
     characters: Vec<char>,
     /// Before which character the cursor stands.
     cursor: usize,
+    /// The text is a proposal: what is typed first takes its place, unless the cursor was moved into it.
+    is_proposal: bool,
     check: Option<Check>,
 }
 
 impl TextField {
     /// A field with a text to begin with, the cursor behind it.
     pub fn new(label: impl Into<String>, text: &str) -> Self {
-        let mut field = Self { label: label.into(), characters: Vec::new(), cursor: 0, check: None };
+        let mut field =
+            Self { label: label.into(), characters: Vec::new(), cursor: 0, is_proposal: false, check: None };
         field.paste(text);
         field
+    }
+
+    /// The text to begin with is a proposal, as good as selected: typing takes its place.
+    #[must_use]
+    pub const fn proposed(mut self) -> Self {
+        self.is_proposal = !self.characters.is_empty();
+        self
     }
 
     /// With a check that runs as it is typed.
@@ -69,6 +79,9 @@ impl TextField {
 
     /// Inserts pasted text: line breaks and tabs become blanks, other control characters go.
     pub fn paste(&mut self, text: &str) {
+        if std::mem::take(&mut self.is_proposal) {
+            self.clear();
+        }
         let blank = |c: char| if matches!(c, '\n' | '\r' | '\t') { ' ' } else { c };
         let room = LONGEST.saturating_sub(self.characters.len());
         let text = text.trim_end_matches(['\n', '\r']);
@@ -80,6 +93,14 @@ impl TextField {
 
     /// Takes a key.
     pub fn on_key(&mut self, key: Key) -> Reaction {
+        let was_proposal = self.is_proposal;
+        let reaction = self.edited(key);
+        // Whoever moves or deletes in it wants to change it.
+        self.is_proposal = was_proposal && reaction == Reaction::Ignored;
+        reaction
+    }
+
+    fn edited(&mut self, key: Key) -> Reaction {
         match (key.code, key.has_modifier()) {
             (KeyCode::Enter, _) if self.problem().is_none() => return Reaction::Done,
             (KeyCode::Enter, _) => {}
@@ -145,7 +166,9 @@ impl TextField {
         let before = shown(self.characters.get(first..self.cursor).unwrap_or_default());
         let at = self.characters.get(self.cursor).map_or_else(|| " ".to_owned(), |c| shown(&[*c]));
         let after = shown(self.characters.get(self.cursor + 1..).unwrap_or_default());
-        let column = paint::text(buf, area, (start, 0), &before, theme.style(Role::Plain));
+        // A proposal looks selected.
+        let role = if self.is_proposal { Role::Focus } else { Role::Plain };
+        let column = paint::text(buf, area, (start, 0), &before, theme.style(role));
         let column = paint::text(buf, area, (column, 0), &at, theme.style(Role::Focus));
         paint::text(buf, area, (column, 0), &after, theme.style(Role::Plain));
     }
@@ -174,6 +197,24 @@ mod tests {
         field.on_key(Key::ctrl('u'));
         field.on_key(Key::ctrl('k'));
         assert_eq!(field.text(), "");
+    }
+
+    #[test]
+    fn typing_takes_the_place_of_a_proposal() {
+        let proposed = || TextField::new("file", "plan.csv").proposed();
+        let mut field = proposed();
+        typed(&mut field, &[KeyCode::F(5), KeyCode::Char('a'), KeyCode::Char('b')]);
+        assert_eq!(field.text(), "ab");
+        let mut field = proposed();
+        field.paste("other.csv");
+        assert_eq!(field.text(), "other.csv");
+        // Once the cursor has moved, or something was deleted, it is a text like any other.
+        let mut field = proposed();
+        typed(&mut field, &[KeyCode::Home, KeyCode::Char('a'), KeyCode::End, KeyCode::Backspace]);
+        assert_eq!(field.text(), "aplan.cs");
+        let mut field = proposed();
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Done);
+        assert_eq!(field.text(), "plan.csv");
     }
 
     #[test]

@@ -121,6 +121,8 @@ fn too_small_says_what_it_needs() {
     let [unicode, _] = themes();
     let shown = paint::snapshot(&drawn(&view(), unicode, &[], 40, 10));
     assert!(shown.starts_with("terminal 40x10, need 60x18\n"), "{shown}");
+    let shown = paint::snapshot(&drawn(&view(), unicode, &[], 20, 5));
+    assert!(shown.starts_with("terminal 20x5, need\n60x18\n"), "{shown}");
 }
 
 #[test]

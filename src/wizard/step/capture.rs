@@ -19,6 +19,7 @@ use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
 use crate::wizard::view::Content;
 use prediction::Prediction;
+pub(super) use prediction::fewest_samples;
 
 /// Wait before the first shot (s), as in the method paper.
 const SETTLE: f64 = 2.0;
@@ -38,6 +39,8 @@ pub(in crate::wizard) struct CaptureStep {
     question: Option<u64>,
     /// A measurement is under way; what else fails is no refused measurement.
     measuring: bool,
+    /// Fewest identification samples; neither robot nor SMR change while it is measured.
+    fewest: Option<usize>,
     /// What the samples so far let expect.
     prediction: Prediction,
     /// The same with the measurement of this number, which is being written.
@@ -51,10 +54,9 @@ struct Held {
     reason: String,
 }
 
-/// Why there are too few identification samples to identify from.
-pub(super) fn too_few(session: &Session) -> Option<String> {
-    let free = session.mounted_profile()?.free_parameters(crate::profile::Level::Geometric).len();
-    let fewest = (free + 6).div_ceil(3);
+/// Why there are too few identification samples to identify from, if it takes `fewest`.
+pub(super) fn too_few(session: &Session, fewest: Option<usize>) -> Option<String> {
+    let fewest = fewest?;
     let measured = session.counted_of(PoseKind::Identification).count();
     (measured < fewest).then(|| format!("{measured} of at least {fewest} identification poses are measured"))
 }
@@ -73,6 +75,7 @@ impl CaptureStep {
             held: None,
             question: None,
             measuring: false,
+            fewest: fewest_samples(session),
             prediction: Prediction::of(session),
             expected: None,
         };
@@ -128,6 +131,7 @@ impl CaptureStep {
             joints: to_edge(&planned.configuration, &robot.joint_types),
             reported_joints: reported,
             xyz_mm: to_xyz_mm(&reading.point, 9),
+            factor: None,
             sigma_mm: reading.sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0).map(to_mm),
             scatter_mm: reading
                 .scatter
@@ -159,14 +163,10 @@ impl CaptureStep {
                 .hint("wait until it is at rest and measure again; or take the reading as it is");
             return vec![Action::Write(vec![entry]), Action::Say(notice)];
         }
+        let mut noted = noted;
+        checks::judge(cx, &mut noted);
         let remark = not_as_planned(&noted, robot);
-        self.write(noted, cx).into_iter().chain(remark.map(Action::Say)).collect()
-    }
-
-    /// Writes a sample with what the checks say about it.
-    fn write(&mut self, mut noted: MeasuredText, cx: &Cx<'_>) -> Vec<Action> {
-        noted.findings = checks::findings(cx, &noted);
-        vec![Action::Write(vec![self.sample(noted, cx)])]
+        [Action::Write(vec![self.sample(noted, cx)])].into_iter().chain(remark.map(Action::Say)).collect()
     }
 
     /// A sample with what a calibration from all samples up to it would be worth.
@@ -279,7 +279,7 @@ impl StepMachine for CaptureStep {
         let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
             .unless(not_by_hand.or_else(|| if asked.is_some() { no_instrument.clone() } else { blocked.clone() }));
         let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone()).or(is_down);
-        let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session));
+        let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session, self.fewest));
         let mut intents = vec![
             if has_more && !manual { measure.default_action() } else { measure },
             if manual && (has_more || asked.is_some()) { type_in.default_action() } else { type_in },
@@ -323,7 +323,7 @@ impl StepMachine for CaptureStep {
                 let Some(Held { mut noted, reason }) = self.held.take() else { return Vec::new() };
                 let number = session.measurements + 1;
                 noted.number = number;
-                noted.findings = checks::findings(cx, &noted);
+                checks::judge(cx, &mut noted);
                 // Taking it as it is settles that it scatters; what its distances say is another question.
                 let is_settled = noted.findings.is_empty();
                 noted.findings.push(FindingText {
@@ -347,7 +347,10 @@ impl StepMachine for CaptureStep {
             Intent::LeaveOut => self.decide(Decision::LeaveOut),
             Intent::ApplyRemedy => {
                 let remedy = self.asked(session).and_then(|(_, finding)| finding.remedy.clone());
-                remedy.map(|remedy| Action::Write(vec![Entry::Correction(remedy)])).into_iter().collect()
+                remedy
+                    .map(|remedy| Action::Write(vec![Entry::Correction(ended(remedy, session))]))
+                    .into_iter()
+                    .collect()
             }
             Intent::Skip => {
                 self.held = None;
@@ -355,9 +358,7 @@ impl StepMachine for CaptureStep {
             }
             Intent::Undo => {
                 let last = session.samples.iter().rev().find(|sample| sample.state == SampleState::Counts);
-                let entry =
-                    last.map(|sample| Entry::Decision { sample: sample.noted.number, decision: Decision::Undo });
-                entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+                last.map(|sample| Action::Write(undo(sample.noted.number, session))).into_iter().collect()
             }
             Intent::GoToPose(pose) => Self::go_to(&pose, session),
             Intent::Note(text) => {
@@ -415,6 +416,9 @@ impl StepMachine for CaptureStep {
                     _ if self.question.is_none() => self.advance(session),
                     _ => {}
                 }
+                if let Some(factor) = noted.factor {
+                    return vec![Action::Say(other_unit(noted, factor))];
+                }
             }
             Entry::Decision { sample, decision } => {
                 self.prediction = Prediction::of(session);
@@ -449,13 +453,45 @@ impl StepMachine for CaptureStep {
     }
 }
 
+/// A correction of a unit is about what is measured, not about what will be.
+fn ended(remedy: Correction, session: &Session) -> Correction {
+    match remedy {
+        // Proposed by an earlier version.
+        Correction::Scale { since, factor, until: None } => {
+            Correction::Scale { since, factor, until: Some(session.measurements) }
+        }
+        remedy => remedy,
+    }
+}
+
+/// Takes a sample back, and the corrections that it led to.
+fn undo(sample: u64, session: &Session) -> Vec<Entry> {
+    let corrections = session.corrections_since(sample);
+    let taken_back = corrections.map(|corrected| Entry::Correction(Correction::TakenBack { line: corrected.line }));
+    taken_back.chain([Entry::Decision { sample, decision: Decision::Undo }]).collect()
+}
+
+/// What to say about a sample that is in another unit like the one before.
+fn other_unit(noted: &MeasuredText, factor: f64) -> Notice {
+    let what = format!("pose {}: still in the other unit; its coordinates count {factor} times", noted.pose);
+    Notice::attention(what).hint("set the unit of the instrument back; a point in the right unit counts as it is")
+}
+
 fn corrected(correction: &Correction) -> String {
     match correction {
-        Correction::Scale { since, factor } => {
-            format!("coordinates from measurement {since} on count {factor} times; what was noted stays in the journal")
+        Correction::Scale { since, factor, until } => {
+            let which = match until {
+                None => format!("from measurement {since} on"),
+                Some(until) if until == since => format!("of measurement {since}"),
+                Some(until) => format!("of measurements {since} to {until}"),
+            };
+            format!("coordinates {which} count {factor} times; what was noted stays in the journal")
         }
         Correction::Swap { first, second } => format!("measurements {first} and {second} changed places"),
         Correction::Row { sample, .. } => format!("measurement {sample} counts for the pose where the robot stood"),
         Correction::Joints { sample, .. } => format!("measurement {sample} counts with the corrected joint values"),
+        Correction::TakenBack { .. } => {
+            "the correction that the measurement led to is taken back with it; both stay in the journal".to_owned()
+        }
     }
 }

@@ -22,7 +22,16 @@ const FEWEST_VERIFICATION: usize = 3;
 
 /// The identify step.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::wizard) struct IdentifyStep;
+pub(in crate::wizard) struct IdentifyStep {
+    /// Fewest identification samples.
+    fewest: Option<usize>,
+}
+
+impl IdentifyStep {
+    pub(super) fn enter(session: &Session) -> Self {
+        Self { fewest: super::capture::fewest_samples(session) }
+    }
+}
 
 /// The verify step.
 #[derive(Clone, Copy, Debug)]
@@ -106,7 +115,7 @@ fn result<'a>(cx: &Cx<'a>) -> Option<&'a IdentifiedText> {
 
 impl StepMachine for IdentifyStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
-        let few = super::capture::too_few(cx.session);
+        let few = super::capture::too_few(cx.session, self.fewest);
         let is_current = cx.session.is_current();
         let stale = match result(cx) {
             None => Some("identify first".to_owned()),

@@ -15,6 +15,8 @@ use crate::wizard::view::{Content, PlanFigures, PlanView};
 #[derive(Clone, Debug, Default)]
 pub(in crate::wizard) struct PlanStep {
     settings: PlanSettings,
+    /// The file that was asked for last.
+    file: Option<String>,
     proposal: Option<Proposal>,
 }
 
@@ -97,7 +99,10 @@ impl StepMachine for PlanStep {
         let mut intents = vec![
             IntentInfo::new(Intent::AcceptPlan, "measure this plan").unless(no_proposal),
             IntentInfo::new(Intent::MakePlan(self.settings), "choose poses"),
-            IntentInfo::new(Intent::LoadPlan("plan.csv".to_owned()), "take the poses of a file"),
+            IntentInfo::new(
+                Intent::LoadPlan(self.file.clone().unwrap_or_else(|| "plan.csv".to_owned())),
+                "take the poses of a file",
+            ),
             IntentInfo::new(Intent::PlanFromRecording, "take the recorded poses").unless(not_recorded),
             IntentInfo::new(Intent::Next, "go on to measuring").unless(no_plan),
         ];
@@ -123,6 +128,7 @@ impl StepMachine for PlanStep {
             }
             Intent::LoadPlan(file) => {
                 let Some(profile) = cx.profile() else { return Vec::new() };
+                self.file = Some(file.clone());
                 vec![Action::Ask(Request::LoadPlan { file, profile: Box::new(profile) })]
             }
             Intent::PlanFromRecording => {

@@ -100,7 +100,7 @@ fn locate(session: &Session) -> Option<Result<TargetLocation, CirclePointError>>
     let mut series: Vec<Measured> = Vec::new();
     for point in &session.circle_points {
         let configuration = from_edge(&point.joints, &robot.joint_types);
-        let measured = session.corrected(point.number, point.xyz_mm);
+        let measured = session.point_of_circle(point);
         match series.iter_mut().find(|(joint, ..)| *joint == point.joint) {
             Some((_, configurations, points)) => {
                 configurations.push(configuration);

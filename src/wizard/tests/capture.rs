@@ -34,7 +34,7 @@ fn the_first_pose_is_shown_with_all_that_can_be_done() {
             "GoToPose",
             "Note",
             "SuggestPoses -- nothing is measured yet",
-            "Next -- 0 of at least 11 identification poses are measured",
+            "Next -- 0 of at least 9 identification poses are measured",
             "Back",
             "Quit"
         ]
@@ -92,8 +92,8 @@ fn a_whole_plan_is_measured_in_its_order() {
 #[test]
 fn too_few_samples_block_identifying_with_numbers() {
     let mut bench = Bench::at(Step::Capture);
-    bench.measure(10);
-    let few = "10 of at least 11 identification poses are measured";
+    bench.measure(8);
+    let few = "8 of at least 9 identification poses are measured";
     assert_eq!(blocked(&bench.wizard, "Next"), few);
     assert_eq!(bench.capture().too_few.as_deref(), Some(few));
     bench.measure(1);
@@ -104,13 +104,28 @@ fn too_few_samples_block_identifying_with_numbers() {
     assert_eq!(blocked(&bench.wizard, "Next"), few);
 }
 
+/// As many as planning allows, which counts what distances can find: see there.
 #[test]
-fn an_smr_that_is_identified_as_well_needs_another_sample() {
+fn the_fewest_samples_that_can_be_planned_can_be_identified_from_and_are_warned_of() {
+    let mut bench = Bench::at(Step::Capture);
+    bench.measure(9);
+    bench.does(Intent::Next);
+    bench.does(Intent::Identify);
+    let result = bench.wizard.session().identified.clone().unwrap();
+    assert!(result.calibration.is_some());
+    let poor = result.summary.warnings.iter().find(|warning| warning.code == "poor_data").unwrap();
+    assert!(poor.message.starts_with("too few data: 21 independent values for 21 combinations"), "{}", poor.message);
+    assert!(poor.blocks_acceptance);
+}
+
+/// Distances tell its coordinates and the last link apart no better than the last link alone.
+#[test]
+fn an_smr_that_is_identified_as_well_needs_no_more_samples() {
     let mut bench = Bench::at(Step::Target);
     bench.does(Intent::ChooseTarget(crate::session::set_up::TargetChoice::Free { sigma_mm: 50.0 }));
     bench.does(Intent::Next);
     bench.pass(&super::bench::simulated());
-    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 12 identification poses are measured");
+    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 9 identification poses are measured");
 }
 
 #[test]
@@ -175,7 +190,7 @@ fn skipping_everything_leaves_nothing_to_measure() {
     for name in ["Measure", "Skip"] {
         assert_eq!(blocked(&bench.wizard, name), "all poses of the plan are measured");
     }
-    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 11 identification poses are measured");
+    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 9 identification poses are measured");
     bench.does(go_to("3"));
     bench.does(Intent::Measure);
     assert_eq!(bench.capture().measured, 1);

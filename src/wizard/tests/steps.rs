@@ -224,6 +224,20 @@ fn recorded_poses_can_be_the_plan() {
 }
 
 #[test]
+fn a_file_that_could_not_be_read_is_proposed_again() {
+    let mut bench = Bench::at(Step::Plan);
+    let proposed = |bench: &Bench| {
+        let infos = bench.wizard.intents();
+        infos.into_iter().find_map(|info| if let Intent::LoadPlan(file) = info.intent { Some(file) } else { None })
+    };
+    assert_eq!(proposed(&bench).as_deref(), Some("plan.csv"));
+    let effects = bench.intend(Intent::LoadPlan(text("plns/cell 4.csv")));
+    let (id, _) = started(&effects);
+    bench.answer(id, super::bench::failure("cannot read it"));
+    assert_eq!((bench.told().as_str(), proposed(&bench).as_deref()), ("cannot read it", Some("plns/cell 4.csv")));
+}
+
+#[test]
 fn poses_of_another_arm_are_never_written() {
     let mut bench = Bench::at(Step::Plan);
     let effects = bench.intend(Intent::LoadPlan(text("other.csv")));

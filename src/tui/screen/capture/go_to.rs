@@ -150,7 +150,8 @@ fn table(content: &CaptureView, most: usize) -> Vec<(String, Role)> {
         let again = if pair.is_drift { " (again)" } else { "" };
         let word = if pair.difference_mm < 0.0 { "too short" } else { "too long" };
         format!(
-            "  {:<16}{:>10.3}{:>11.3}{:>9.3} {word:<9} {:>6.3}",
+            // Blanks between all columns: what does not fit moves the rest.
+            "  {:<15} {:>10.3} {:>10.3} {:>8.3} {word:<9} {:>6.3}",
             format!("pose {}{again}", pair.pose),
             pair.measured_mm,
             pair.predicted_mm,
@@ -159,7 +160,7 @@ fn table(content: &CaptureView, most: usize) -> Vec<(String, Role)> {
         )
     };
     let from = format!("mm, from {}", finding.pose);
-    let head = format!("  {from:<16}{:>10}{:>11}{:>9} {:<9} {:>6}", "measured", "predicted", "differs", "", "usual");
+    let head = format!("  {from:<15} {:>10} {:>10} {:>8} {:<9} {:>6}", "measured", "predicted", "differs", "", "usual");
     let rows = finding.worst.iter().take(most).map(|pair| (row(pair), Role::Plain));
     std::iter::once((head, Role::Dim)).chain(rows).collect()
 }

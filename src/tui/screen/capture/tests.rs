@@ -236,6 +236,20 @@ fn what_the_instrument_sees_is_shown() {
     insta::assert_snapshot!("live_none", shown(&drawn(&on(Tab::Live), &of(normal()), unicode, (80, 24))));
 }
 
+/// A metre taken for a millimetre: the columns stay apart.
+#[test]
+fn distances_that_are_far_off_stay_apart() {
+    let mut view = in_question();
+    let Content::Capture(capture) = &mut view.content else { panic!("not capturing") };
+    let finding = capture.finding.as_mut().unwrap();
+    let pair = &mut finding.worst[0];
+    (pair.measured_mm, pair.predicted_mm, pair.difference_mm) = (1_083_586.953, 100_569.228, 983_017.725);
+    let drawn = shown(&drawn(&on(Tab::GoTo), &view, themes()[0], (80, 24)));
+    let row = drawn.lines().find(|line| line.contains("pose 3 ")).unwrap();
+    let words: Vec<&str> = row.split_whitespace().collect();
+    assert_eq!(words, ["pose", "3", "1083586.953", "100569.228", "983017.725", "too", "long", "0.410"], "{drawn}");
+}
+
 #[test]
 fn digits_and_paste_open_the_question_for_coordinates() {
     let view = manual();

@@ -15,11 +15,39 @@ const UNKNOWN_SIGMA: f64 = 0.05 * MILLIMETRE;
 const DRIFT_FACTOR: f64 = 6.0;
 /// … and by what a robot does not repeat (m).
 const REPEATABILITY: f64 = 0.1 * MILLIMETRE;
+/// Factors between units that differ by less than this are the same.
+const SAME_FACTOR: f64 = 1e-9;
 
-/// All findings about a point that is about to be written, the most important first.
-pub(super) fn findings(cx: &Cx<'_>, noted: &MeasuredText) -> Vec<FindingText> {
-    let Some(profile) = cx.profile() else { return Vec::new() };
-    drift(cx.session, noted, &profile).into_iter().chain(by_distance(cx, noted, &profile)).collect()
+/// What the distances say about a point.
+struct Found {
+    text: FindingText,
+    /// Something else is as likely.
+    is_ambiguous: bool,
+}
+
+/// Judges a point that is about to be written: writes into it all that is found, the most important first, and what its
+/// coordinates count times where it is in the other unit still that the measurement before was corrected to.
+pub(super) fn judge(cx: &Cx<'_>, noted: &mut MeasuredText) {
+    let Some(profile) = cx.profile() else { return };
+    let mut found = by_distance(cx, noted, &profile);
+    noted.factor = found.as_ref().and_then(|found| unit_before(cx.session, noted, found));
+    if noted.factor.is_some() {
+        found = by_distance(cx, noted, &profile);
+    }
+    let found = found.map(|found| found.text);
+    // How far a point in an unknown unit has moved cannot be told.
+    let has_unit = !matches!(found.as_ref().and_then(|found| found.remedy.as_ref()), Some(Correction::Scale { .. }));
+    let drift = drift(cx.session, noted, &profile).filter(|_| has_unit);
+    noted.findings = drift.into_iter().chain(found).collect();
+}
+
+/// What the coordinates of a new point count times if it is found to be in another unit, and for sure in the one that the
+/// measurement before was corrected to. Once corrected, the operator is not asked again for every point.
+fn unit_before(session: &Session, noted: &MeasuredText, found: &Found) -> Option<f64> {
+    let Some(Correction::Scale { since, factor, .. }) = found.text.remedy else { return None };
+    let before = session.scale_noted(&session.counted().last()?.noted);
+    let is_same = (session.scale_noted(noted) * factor / before - 1.0).abs() < SAME_FACTOR;
+    (since == noted.number && is_same && !found.is_ambiguous).then_some(factor)
 }
 
 /// σ of a coordinate of one shot (m).
@@ -29,7 +57,7 @@ fn stated_sigma(profile: &Profile) -> f64 {
 }
 
 /// What the distances to all earlier points say.
-fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<FindingText> {
+fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<Found> {
     let session = cx.session;
     let robot = cx.robot()?;
     // A sample of the same row is about to be superseded.
@@ -49,8 +77,8 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
     let joints = noted.reported_joints.as_ref().unwrap_or(&noted.joints);
     samples.push(point_sample(
         from_edge(joints, &robot.joint_types),
-        session.corrected(noted.number, noted.xyz_mm),
-        session.corrected_sigma(noted.number, noted.sigma_mm),
+        session.point_noted(noted),
+        session.sigma_noted(noted),
     ));
     let excluded: Vec<usize> =
         earlier.iter().enumerate().filter(|(_, sample)| sample.kept).map(|(index, _)| index).collect();
@@ -84,14 +112,15 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
         pose: &|index| of_row(index).map_or_else(|| "?".to_owned(), |row| row.planned.pose.clone()),
         joint: &|joint| profile.chain().joints().get(joint).map_or_else(|| "?".to_owned(), |joint| joint.name.clone()),
     };
-    Some(FindingText {
+    let text = FindingText {
         about: number(found.sample),
         cause: cause_name(&found.cause).to_owned(),
         ratio: (found.ratio * 10.0).round() / 10.0,
         message: found.describe(&names),
         remedy: remedy(&found, cx, &number, &samples, &rows),
         worst: worst(&found, &number, &samples),
-    })
+    };
+    Some(Found { text, is_ambiguous: found.is_ambiguous() })
 }
 
 /// The distances that fit least.
@@ -136,7 +165,8 @@ fn remedy(
         Cause::Unit { factor, since } => {
             // From the first sample on means from the first measurement on: refused ones and circles came the same way.
             let since = if *since == 0 { 1 } else { number(*since) };
-            Some(Correction::Scale { since, factor: *factor })
+            // Up to this one: in which unit those are that follow must show.
+            Some(Correction::Scale { since, factor: *factor, until: Some(number(samples.len() - 1)) })
         }
         Cause::SwappedRows { with } => Some(Correction::Swap { first: number(*with), second: number(found.sample) }),
         Cause::WrongPose { planned } => {
@@ -166,8 +196,8 @@ fn drift(session: &Session, noted: &MeasuredText, profile: &Profile) -> Option<F
     let is_first =
         |sample: &&Sample| session.kind_of(sample) != PoseKind::Drift && session.pose_of(sample) == noted.pose;
     let first = session.counted().find(is_first)?;
-    let moved = (session.corrected(noted.number, noted.xyz_mm) - session.point_of(first)).norm();
-    let sigma = session.corrected_sigma(noted.number, noted.sigma_mm).unwrap_or_else(|| stated_sigma(profile));
+    let moved = (session.point_noted(noted) - session.point_of(first)).norm();
+    let sigma = session.sigma_noted(noted).unwrap_or_else(|| stated_sigma(profile));
     // Six coordinates scatter.
     let expected = 6.0_f64.sqrt() * sigma;
     let limit = (DRIFT_FACTOR * expected).max(REPEATABILITY);

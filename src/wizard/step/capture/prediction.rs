@@ -1,7 +1,7 @@
 //! How good a calibration from the samples so far would be, and whether more of them are worth the time.
 
 use crate::identification::{ArmModel, TargetAt};
-use crate::planning::{Information, JointBox, random};
+use crate::planning::{Information, JointBox, fewest_poses, findable, random};
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
 use crate::session::state::Session;
@@ -30,7 +30,6 @@ impl Prediction {
 
     fn try_of(session: &Session) -> Option<Self> {
         let profile = &session.mounted_profile()?;
-        let at = |configuration: Vec<f64>| TargetAt { configuration, target: 0 };
         let measured: Vec<TargetAt> =
             session.counted_of(PoseKind::Identification).map(|sample| at(session.configuration_of(sample))).collect();
         let open = session
@@ -39,10 +38,8 @@ impl Prediction {
             .filter(|row| row.planned.kind == PoseKind::Identification)
             .map(|row| at(row.planned.configuration.clone()));
         let pool: Vec<TargetAt> = measured.iter().cloned().chain(open).collect();
-        let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
-        let model = ArmModel { chain: profile.chain().clone(), targets };
-        let fresh: Vec<TargetAt> = random(&joint_box(profile)?, FRESH_SEED).take(FRESH_POSES).map(at).collect();
-        let information = Information::new(&model, &profile.free_parameters(Level::Geometric), &pool, &fresh).ok()?;
+        let parameters = profile.free_parameters(Level::Geometric);
+        let information = Information::new(&model(profile), &parameters, &pool, &fresh(profile)?).ok()?;
         let of_first = |count: usize| information.predicted_error(&(0..count).collect::<Vec<_>>());
         let curve = (information.fewest_poses()..=measured.len()).filter_map(|n| Some((n, of_first(n)?))).collect();
         Some(Self { curve, with_all: of_first(pool.len()) })
@@ -60,6 +57,29 @@ impl Prediction {
             _ => false,
         }
     }
+}
+
+/// Fewest identification samples that can determine what distances can find, by the same rule as planning. Where that is not
+/// clear all free parameters count.
+pub(in crate::wizard::step) fn fewest_samples(session: &Session) -> Option<usize> {
+    let profile = &session.mounted_profile()?;
+    let parameters = profile.free_parameters(Level::Geometric);
+    let rank = fresh(profile).and_then(|fresh| findable(&model(profile), &parameters, &fresh));
+    Some(fewest_poses(rank.unwrap_or(parameters.len())))
+}
+
+fn at(configuration: Vec<f64>) -> TargetAt {
+    TargetAt { configuration, target: 0 }
+}
+
+fn model(profile: &Profile) -> ArmModel {
+    let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
+    ArmModel { chain: profile.chain().clone(), targets }
+}
+
+/// Poses all over the range in which the robot is to be accurate.
+fn fresh(profile: &Profile) -> Option<Vec<TargetAt>> {
+    Some(random(&joint_box(profile)?, FRESH_SEED).take(FRESH_POSES).map(at).collect())
 }
 
 /// The range in which the robot is to be accurate.

@@ -46,7 +46,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         drift: drift(session),
         prediction: prediction(step, session),
         typed_unit: CaptureStep::manual_unit(cx).map(|unit| unit.sign().to_owned()),
-        too_few: too_few(session),
+        too_few: too_few(session, step.fewest),
         rows,
         notes: session.notes.iter().map(|note| (note.pose.clone(), note.text.clone())).collect(),
         refused: session.refused.iter().map(|refused| (refused.pose.clone(), refused.reason.clone())).collect(),
