@@ -489,7 +489,8 @@ impl Wizard {
     /// Ends in good order: what is under way is cancelled, the journal is closed.
     fn shut_down(&mut self, cause: String) -> Vec<Effect> {
         if self.ended.is_some() {
-            // Told a second time, nothing is waited for any more.
+            // Told a second time, nothing is waited for any more: nor is anything done with what is still answered.
+            self.drop_everything();
             return vec![Effect::Exit];
         }
         // What is on its way to the disk is waited for: an opened session is closed in good order.

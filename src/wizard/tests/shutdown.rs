@@ -138,3 +138,14 @@ fn leaving_while_a_note_is_written_happens_after_it() {
     bench.settle(effects);
     assert_eq!((bench.exits, bench.wizard.session().notes.len()), (1, 1));
 }
+
+#[test]
+fn told_twice_while_something_is_written_it_writes_nothing_more() {
+    let mut bench = Bench::at(Step::Capture);
+    let effects = bench.intend(Intent::Note("warm".to_owned()));
+    let (id, _) = appended(&effects);
+    assert!(shut_down(&mut bench).is_empty(), "the note is waited for");
+    assert_eq!(texts(&shut_down(&mut bench)), ["exit"]);
+    assert!(bench.wizard.update(Event::Store(StoreEvent::Written { id })).is_empty());
+    is_over(&mut bench);
+}
