@@ -31,7 +31,7 @@ use thiserror::Error;
 
 pub use compact::{Check, Compaction, check, compact_file};
 pub use read::{Recording, read};
-pub use recorder::{Live, Recorder, RecordingEvent};
+pub use recorder::{Live, Recorder, RecordingEvent, Room};
 pub use segments::{FILE_NAME, compact_folder, files, foreign_lines, rebuild, write};
 
 /// Why a recording cannot be written or read. The session goes on without it.

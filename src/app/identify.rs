@@ -28,6 +28,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     for diagnostic in &loaded.warnings {
         console.remark(&diagnostic.to_string());
     }
+    args.record.record.as_deref().map_or(Ok(()), record::check_target)?;
     let identification = load::measurements(&args.measurements, args.layout, profile, "identification")?;
     let filter = load::filter(estimation.filter.as_deref(), &identification.table.columns)?;
     let (rows, rest) = load::split(&identification.table, filter.as_ref())?;

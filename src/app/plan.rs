@@ -33,6 +33,7 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
         console.remark(&diagnostic.to_string());
     }
     let profile = &loaded.profile;
+    args.record.record.as_deref().map_or(Ok(()), record::check_target)?;
     let mut request = request(args, profile)?;
     procedure::check_request(profile, &request)?;
     let interrupted = interrupt_flag()?;

@@ -194,6 +194,16 @@ pub(super) fn failure(error: &RecordingError) -> Failure {
     Failure::from_error(ExitStatus::Store, error)
 }
 
+/// Refuses to write a recording over something else, such as the measurements.
+pub(super) fn check_target(path: &Path) -> Result<(), Failure> {
+    let size = std::fs::metadata(path).map_or(0, |found| if found.is_file() { found.len() } else { 0 });
+    if size == 0 || recording::read(path).is_ok() {
+        return Ok(());
+    }
+    let message = format!("'{}' is there already and is no recording", path.display());
+    Err(Failure::new(ExitStatus::Usage, message).hint("give '--record' another file"))
+}
+
 /// Writes a recording of an identification from files.
 pub(super) fn identification(
     path: &Path,

@@ -101,7 +101,7 @@ pub(super) const FIT: &str = "solver/mean_error_mm";
 pub(super) const SIGNIFICANCE: &str = "parameters/deviation_in_sigma";
 
 /// Errors at each pose of the result number `run`: `quantity` is `position` or `distance`, `arm` is `nominal` or `identified`,
-/// `samples` is `fit` or `verification`.
+/// `samples` is `fit`, `verification` or `rejected`.
 pub(super) fn errors(run: usize, quantity: &str, arm: &str, samples: &str) -> String {
     format!("{}/{samples}_{run}", all_errors(quantity, arm))
 }

@@ -1,6 +1,7 @@
 //! The thread that records while a session is worked on. Nobody waits for it, and nothing depends on it.
 
 use std::io;
+use std::iter;
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,6 +22,8 @@ use crate::session::journal::Line;
 const WAITING: usize = 1024;
 /// Longest time for a batch to reach the disk.
 const FLUSH: Duration = Duration::from_secs(5);
+/// Longest time for the recording to give its room back.
+const GIVE_BACK: Duration = Duration::from_secs(2);
 /// Longest time to wait at the end for the parts to become one file: a hundred times what a long session takes.
 const FINISH: Duration = Duration::from_secs(20);
 
@@ -82,10 +85,34 @@ impl Live {
     }
 }
 
+/// What the thread is told.
+#[derive(Debug)]
+enum Message {
+    /// Lines that are on disk.
+    Lines(Vec<Line>),
+    /// The disk is full and the session needs the room. The answer comes when it is given back.
+    GiveRoom(SyncSender<()>),
+}
+
+/// Lets whoever writes the session have the room of its recording.
+#[derive(Clone, Debug)]
+pub struct Room(SyncSender<Message>);
+
+impl Room {
+    /// Ends the recording and gives its room back. Does not wait for long.
+    pub fn give_back(&self) {
+        let (answer, given) = sync_channel(1);
+        if self.0.try_send(Message::GiveRoom(answer)).is_ok() {
+            // What is not given back by then is missed by a write that fails once more, and says so.
+            let _given_or_not = given.recv_timeout(GIVE_BACK).is_ok();
+        }
+    }
+}
+
 /// Records a session.
 #[derive(Debug)]
 pub struct Recorder {
-    lines: Option<SyncSender<Vec<Line>>>,
+    lines: Option<SyncSender<Message>>,
     finished: Receiver<Result<(), String>>,
     is_hurried: Arc<AtomicBool>,
 }
@@ -101,7 +128,7 @@ impl Recorder {
         live: Option<Live>,
         tell: impl Fn(RecordingEvent) + Send + 'static,
     ) -> io::Result<Self> {
-        let (lines, received) = sync_channel::<Vec<Line>>(WAITING);
+        let (lines, received) = sync_channel(WAITING);
         let (done, finished) = sync_channel(1);
         let folder = folder.to_owned();
         let is_hurried = Arc::new(AtomicBool::new(false));
@@ -111,9 +138,19 @@ impl Recorder {
             if !before.is_empty() {
                 work.begin(&before);
             }
-            while let Ok(mut lines) = received.recv() {
+            while let Ok(first) = received.recv() {
                 // What has piled up is written at once.
-                lines.extend(received.try_iter().flatten());
+                let mut lines = Vec::new();
+                for message in iter::once(first).chain(received.try_iter()) {
+                    match message {
+                        Message::Lines(more) => lines.extend(more),
+                        Message::GiveRoom(answer) => {
+                            work.give_room();
+                            // Nobody may be waiting any more.
+                            let _nobody = answer.try_send(()).is_err();
+                        }
+                    }
+                }
                 work.take(&lines);
             }
             // Nobody may be waiting any more.
@@ -128,13 +165,18 @@ impl Recorder {
     /// The recorder cannot take them, and nothing after them.
     pub fn take(&mut self, lines: &[Line]) -> Result<(), &'static str> {
         let Some(sender) = &self.lines else { return Ok(()) };
-        let refused = match sender.try_send(lines.to_vec()) {
+        let refused = match sender.try_send(Message::Lines(lines.to_vec())) {
             Ok(()) => return Ok(()),
             Err(TrySendError::Full(_)) => "the disk is too slow for it",
             Err(TrySendError::Disconnected(_)) => "an internal error ended it",
         };
         self.lines = None;
         Err(refused)
+    }
+
+    /// What gives its room back when the disk is full.
+    pub fn room(&self) -> Option<Room> {
+        self.lines.clone().map(Room)
     }
 
     /// There is no time to make one file of the parts: they stay, and whoever goes on with the session joins them.
@@ -223,6 +265,9 @@ impl<T: Fn(RecordingEvent)> Work<T> {
     }
 
     fn take(&mut self, lines: &[Line]) {
+        if lines.is_empty() {
+            return;
+        }
         if self.file.is_none() && self.view.is_none() {
             // The first lines of a session, or all has failed.
             if self.failure.is_none() {
@@ -254,6 +299,15 @@ impl<T: Fn(RecordingEvent)> Work<T> {
             drop(std::fs::remove_file(path));
         }
         (self.tell)(RecordingEvent::Failed(message));
+    }
+
+    /// Ends the recording, whose room the session needs.
+    fn give_room(&mut self) {
+        if self.failure.is_none() {
+            self.fail("the disk is full, and the session needs its room".to_owned());
+        }
+        // Also those of earlier programs.
+        segments::remove_parts(&self.folder);
     }
 
     /// Ends the part and makes one file of all.
@@ -325,6 +379,26 @@ mod tests {
         assert_eq!(died, Err(RecvTimeoutError::Disconnected));
         assert_eq!(recorder.take(&opened()), Err("an internal error ended it"));
         recorder.finish().unwrap();
+    }
+
+    #[test]
+    fn the_session_gets_the_room_of_its_recording() {
+        let folder = tempfile::tempdir().unwrap();
+        let (told, heard) = channel();
+        let mut recorder =
+            Recorder::start(folder.path(), Vec::new(), None, move |event| drop(told.send(event))).unwrap();
+        recorder.take(&opened()).unwrap();
+        let room = recorder.room().unwrap();
+        room.give_back();
+        assert!(segments::files(folder.path()).is_empty());
+        let event = heard.recv_timeout(Duration::from_secs(1)).unwrap();
+        assert!(matches!(&event, RecordingEvent::Failed(cause) if cause.contains("the disk is full")), "{event:?}");
+        room.give_back();
+        recorder.take(&opened()).unwrap();
+        drop(room);
+        assert!(recorder.finish().unwrap_err().contains("the disk is full"));
+        assert!(segments::files(folder.path()).is_empty());
+        assert!(heard.recv_timeout(Duration::from_secs(1)).is_err(), "it is told once");
     }
 
     #[test]

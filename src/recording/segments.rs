@@ -145,6 +145,14 @@ pub(super) fn remove(files: &[PathBuf]) -> Result<(), RecordingError> {
     Ok(())
 }
 
+/// Removes all parts in `folder`. The journal has what was in them.
+pub(super) fn remove_parts(folder: &Path) {
+    for (_, path) in parts(folder) {
+        // What cannot be removed keeps its room.
+        drop(fs::remove_file(path));
+    }
+}
+
 /// Removes what a program left that was ended while it made one file of all. The folder must be held.
 pub(super) fn clean(folder: &Path) {
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);

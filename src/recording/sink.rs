@@ -77,8 +77,9 @@ impl DurableSink {
 /// The message of an error with those of its causes.
 fn cause(error: &(dyn std::error::Error + 'static)) -> String {
     let chain = std::iter::successors(Some(error), |error| error.source());
+    // Some say their cause themselves.
     let mut texts: Vec<String> = chain.map(ToString::to_string).collect();
-    texts.dedup();
+    texts.dedup_by(|cause, said| said.ends_with(&**cause));
     texts.join(": ")
 }
 

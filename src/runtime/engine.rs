@@ -11,7 +11,7 @@ use std::time::Duration;
 use super::clock::Clock;
 use super::jobs;
 use super::links::LinkThread;
-use super::store_thread::{Command, StoreThread};
+use super::store_thread::{Command, SharedRoom, StoreThread};
 use crate::link::RawLog;
 use crate::recording::{Live, Recorder, RecordingEvent};
 use crate::session::journal::{Journal, Line};
@@ -101,6 +101,8 @@ pub struct Deed {
 struct Recording {
     is_wanted: bool,
     live: Option<Live>,
+    /// Where who writes the session finds the recording's room. Dropped before the recorder, which waits for it.
+    room: SharedRoom,
     recorder: Option<Recorder>,
 }
 
@@ -157,12 +159,13 @@ impl Engine {
     fn with(wizard: Wizard, folder: Option<SessionFolder>, options: Options) -> io::Result<Self> {
         let (sender, events) = sync_channel(WAITING);
         let sender = Events(sender);
+        let room = SharedRoom::default();
         Ok(Self {
             wizard,
             clock: options.clock,
-            store: StoreThread::start(options.sessions, folder, sender.clone())?,
+            store: StoreThread::start(options.sessions, folder, sender.clone(), room.clone())?,
             link: LinkThread::start(sender.clone(), options.raw_log)?,
-            recording: Recording { is_wanted: options.is_recorded, live: options.live, recorder: None },
+            recording: Recording { is_wanted: options.is_recorded, live: options.live, room, recorder: None },
             sender,
             events,
             cancelled: BTreeMap::new(),
@@ -255,9 +258,10 @@ impl Engine {
     /// Makes one file of the recording while the session's folder is still held. Says what the operator should know if that
     /// fails; the parts stay then, and the next program joins them.
     pub fn end_recording(&mut self) -> Option<String> {
+        self.recording.room.set(None);
         let mut recorder = self.recording.recorder.take()?;
         let cause = recorder.finish().err()?;
-        Some(format!("the 3D recording is not complete: {cause}; 'trupose record compact' or 'rebuild' mends it"))
+        Some(format!("the 3D recording is not complete: {cause}; 'trupose record rebuild' mends it"))
     }
 
     /// What has happened since it was asked last.
@@ -274,7 +278,10 @@ impl Engine {
         // Nobody waits for the recorder, and the recorder does not wait for the wizard.
         let tell = move |event: RecordingEvent| events.offer(Event::Remark(remark(&event)));
         match Recorder::start(folder, before, self.recording.live.take(), tell) {
-            Ok(recorder) => self.recording.recorder = Some(recorder),
+            Ok(recorder) => {
+                self.recording.room.set(recorder.room());
+                self.recording.recorder = Some(recorder);
+            }
             Err(error) => self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(error.to_string())))),
         }
     }
@@ -283,6 +290,7 @@ impl Engine {
     fn record_lines(&mut self, lines: &[Line]) {
         let Some(recorder) = &mut self.recording.recorder else { return };
         if let Err(cause) = recorder.take(lines) {
+            self.recording.room.set(None);
             self.recording.recorder = None;
             self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(cause.to_owned()))));
         }

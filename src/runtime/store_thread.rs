@@ -3,15 +3,35 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use super::engine::Events;
+use crate::recording::Room;
 use crate::session::journal::Line;
 use crate::store::session::{SessionError, SessionFolder};
 use crate::wizard::{Answer, Event, Problem, RequestId, StoreEvent};
 
 /// Commands that wait; the wizard never has more than one under way.
 const WAITING: usize = 4;
+
+/// The room of the recording, while there is one: whoever ends it takes this away first, as the recorder waits for it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SharedRoom(Arc<Mutex<Option<Room>>>);
+
+impl SharedRoom {
+    /// There is a recording, or none any more.
+    pub(super) fn set(&self, room: Option<Room>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = room;
+    }
+
+    fn give_back(&self) {
+        let room = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(room) = room {
+            room.give_back();
+        }
+    }
+}
 
 /// What the thread is asked for.
 #[derive(Debug)]
@@ -30,10 +50,17 @@ pub(super) struct StoreThread {
 
 impl StoreThread {
     /// Begins with a folder that is held already, or makes one below `root` when asked.
-    pub(super) fn start(root: PathBuf, folder: Option<SessionFolder>, events: Events) -> io::Result<Self> {
+    /// `room` is the recording's, once there is one: the session goes first.
+    pub(super) fn start(
+        root: PathBuf,
+        folder: Option<SessionFolder>,
+        events: Events,
+        room: SharedRoom,
+    ) -> io::Result<Self> {
         let (commands, received) = sync_channel(WAITING);
-        let thread =
-            thread::Builder::new().name("store".to_owned()).spawn(move || work(&root, folder, &received, &events))?;
+        let thread = thread::Builder::new()
+            .name("store".to_owned())
+            .spawn(move || work(&root, folder, &received, &events, &room))?;
         Ok(Self { commands: Some(commands), thread: Some(thread) })
     }
 
@@ -60,7 +87,13 @@ impl Drop for StoreThread {
     }
 }
 
-fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Command>, events: &Events) {
+fn work(
+    root: &Path,
+    mut held: Option<SessionFolder>,
+    commands: &Receiver<Command>,
+    events: &Events,
+    room: &SharedRoom,
+) {
     while let Ok(command) = commands.recv() {
         let event = match command {
             Command::Create { id, name } => Event::Store(match SessionFolder::create(root, &name) {
@@ -72,13 +105,16 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
                 }
                 Err(error) => StoreEvent::Failed { id, message: chain(&error) },
             }),
-            Command::Append { id, lines } => Event::Store(match held.as_mut().map(|folder| folder.append(&lines)) {
-                Some(Ok(())) => StoreEvent::Written { id },
-                Some(Err(error)) => StoreEvent::Failed { id, message: chain(&SessionError::from(error)) },
-                None => StoreEvent::Failed { id, message: "the session has no folder".to_owned() },
-            }),
+            Command::Append { id, lines } => {
+                let written = held.as_mut().map(|folder| with_room(room, || folder.append(&lines)));
+                Event::Store(match written {
+                    Some(Ok(())) => StoreEvent::Written { id },
+                    Some(Err(error)) => StoreEvent::Failed { id, message: chain(&SessionError::from(error)) },
+                    None => StoreEvent::Failed { id, message: "the session has no folder".to_owned() },
+                })
+            }
             Command::Replace { id, files, left_out } => {
-                Event::Answer { id, answer: replace(held.as_ref(), &files, left_out) }
+                Event::Answer { id, answer: replace(held.as_ref(), &files, left_out, room) }
             }
         };
         if !events.send(event) {
@@ -87,12 +123,37 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
     }
 }
 
-fn replace(held: Option<&SessionFolder>, files: &[(String, String)], left_out: Vec<String>) -> Answer {
+/// Writes; where the disk is full, once more in the room of the recording.
+fn with_room<E: std::error::Error + 'static>(
+    room: &SharedRoom,
+    mut write: impl FnMut() -> Result<(), E>,
+) -> Result<(), E> {
+    match write() {
+        Err(error) if is_full(&error) => {
+            room.give_back();
+            write()
+        }
+        written => written,
+    }
+}
+
+/// Whether there was no room on the disk.
+fn is_full(error: &(dyn std::error::Error + 'static)) -> bool {
+    let mut chain = std::iter::successors(Some(error), |error| error.source());
+    chain.any(|error| error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::StorageFull))
+}
+
+fn replace(
+    held: Option<&SessionFolder>,
+    files: &[(String, String)],
+    left_out: Vec<String>,
+    room: &SharedRoom,
+) -> Answer {
     let Some(folder) = held else {
         return Answer::Failed(Problem { message: "the session has no folder".to_owned(), hints: Vec::new() });
     };
     for (name, text) in files {
-        if let Err(error) = folder.replace(name, text) {
+        if let Err(error) = with_room(room, || folder.replace(name, text)) {
             return Answer::Failed(Problem { message: chain(&error), hints: Vec::new() });
         }
     }

@@ -1,11 +1,12 @@
 //! Recordings without a session, and their replay.
 
 use std::fs;
+use std::path::Path;
 
 use trupose::recording;
 use trupose::session::state::Session;
 
-use crate::content::{TEMPERATURES, compare_frames, opens_on, views};
+use crate::content::{TEMPERATURES, compare_frames, enlarged, opens_on, views};
 use crate::crashes::{one_by_one, torn_part};
 use crate::place::Place;
 use crate::reading::{numbers, results, rows};
@@ -30,6 +31,16 @@ fn an_identification_from_files_is_recorded() {
     compare_frames(&path, &session, "/world/nominal/frames", "nominal", profile.chain());
     assert_eq!(results(&journal).len(), 1);
     assert!(!views(&path).contains(TEMPERATURES));
+    // A recording may be made anew; nothing else is overwritten, least of all what was measured.
+    let identify = ["identify", "--profile", "soochow", "--measurements", "measured.csv", "--record"];
+    for (target, code) in [("out.rrd", &[0, 1][..]), ("measured.csv", &[2])] {
+        let output = place.run(&[&identify[..], &[target]].concat());
+        assert!(code.contains(&output.status.code().unwrap()), "{target}: {}", text(&output.stderr));
+    }
+    assert_eq!(fs::read(place.path("measured.csv")).unwrap(), table.stdout);
+    let output = place.run(&["plan", "--profile", "soochow", "--record", "measured.csv"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("'measured.csv' is there already and is no recording"));
     // An instrument that knows the temperature.
     let rows = text(&table.stdout);
     let lines = rows.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).enumerate();
@@ -43,6 +54,49 @@ fn an_identification_from_files_is_recorded() {
     let temperatures = numbers(&path, "/capture/temperature_degc", "pose", "Scalars:scalars");
     assert_eq!(temperatures.len(), session.samples.len());
     assert!(temperatures.iter().all(|(_, values)| values == &[21.5]), "{temperatures:?}");
+}
+
+#[test]
+fn a_rejected_sample_spoils_no_scale_no_mean_and_no_pair() {
+    let place = recorded(&format!("{} CaptureAll(Fail)", begun("")));
+    let table = text(&place.run(&["replay", "sessions/s", "--csv"]).stdout);
+    let identify = |name: &str, table: &str| {
+        fs::write(place.path("measured.csv"), table).unwrap();
+        let output =
+            place.run(&["identify", "--profile", "soochow", "--measurements", "measured.csv", "--record", name]);
+        assert!([0, 1].contains(&output.status.code().unwrap()), "{}", text(&output.stderr));
+        place.path(name)
+    };
+    let good = identify("good.rrd", &table);
+    let mut lines: Vec<String> = table.lines().map(str::to_owned).collect();
+    let mut cells: Vec<String> = lines[9].split(',').map(str::to_owned).collect();
+    cells[7] = (cells[7].parse::<f64>().unwrap() + 3.0).to_string();
+    lines[9] = cells.join(",");
+    let bad = identify("bad.rrd", &lines.join("\n"));
+    let mean = |path: &Path, entity: &str| {
+        let values: Vec<f64> =
+            numbers(path, entity, "pose", "Scalars:scalars").into_iter().flat_map(|(_, values)| values).collect();
+        assert!(!values.is_empty(), "{entity}");
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    for entity in ["/errors_mm/position_identified/fit_1", "/errors_mm/distance_identified/fit_1"] {
+        assert!(mean(&bad, entity) < 1.2 * mean(&good, entity), "{entity}");
+    }
+    let rejected = numbers(&bad, "/errors_mm/position_identified/rejected_1", "pose", "Scalars:scalars");
+    assert!(rejected.len() == 1 && (rejected[0].1[0] - 3.0).abs() < 0.1, "{rejected:?}");
+    let scales = enlarged(&bad, "(identified) ") / enlarged(&good, "(identified) ");
+    assert!((0.3..3.0).contains(&scales), "{scales}");
+    let solved = |path: &Path| {
+        let steps = numbers(path, "/solver/mean_error_mm", "solver_iteration", "Scalars:scalars");
+        steps.last().unwrap().1[0]
+    };
+    assert!(solved(&bad) < 1.2 * solved(&good));
+    let worst = rows(&bad, false)
+        .into_iter()
+        .find(|(entity, _, values)| entity == "/world/pairs/identified" && values.contains_key("LineStrips3D:labels"));
+    let labels = worst.unwrap().2["LineStrips3D:labels"].clone();
+    assert!(labels.contains("+0.0") || labels.contains("-0.0"), "{labels}");
+    assert!(!labels.contains("2."), "{labels}");
 }
 
 #[test]

@@ -86,6 +86,7 @@ pub(super) fn compare_with_journal(folder: &Path) {
                         let kind = session.kind_of(session.sample(**number).unwrap());
                         (kind == PoseKind::Verification) == is_verification
                     })
+                    .inspect(|(_, text)| assert!(!text.rejected, "a rejected sample is no {suffix}"))
                     .map(|(number, text)| (i64::try_from(*number).unwrap(), error(text).coords.norm()))
                     .collect();
                 expected.sort_by_key(|(number, _)| *number);

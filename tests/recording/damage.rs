@@ -266,3 +266,26 @@ fn a_full_disk_ends_the_recording_with_a_message_and_not_the_session() {
     succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json", "--no-recording"]));
     assert!(place.session().join("report.html").exists());
 }
+
+#[test]
+fn on_a_small_disk_the_session_goes_before_its_recording() {
+    let steps = format!("{} CaptureAll(Fail)", begun(""));
+    let all = session_of(&recorded(&steps).session()).1.counted().count();
+    let mut given = 0;
+    // Whichever of them finds the disk full.
+    for kilobytes in (64..=192).step_by(16) {
+        let place = Place::new();
+        let Some(_disk) = SmallDisk::mount(place.path("sessions"), &format!("{kilobytes}k")) else {
+            let skipped = "SKIPPED on_a_small_disk_the_session_goes_before_its_recording: no right to mount a tmpfs";
+            writeln!(io::stderr(), "{skipped}").unwrap();
+            return;
+        };
+        let output = place.script(&steps, &[]);
+        succeeded(&output);
+        let (_, session) = session_of(&place.session());
+        assert!(session.closed && session.counted().count() == all, "{kilobytes} kB");
+        assert_eq!(recording::files(&place.session()), [] as [PathBuf; 0], "{kilobytes} kB");
+        given += u32::from(text(&output.stdout).contains("the disk is full, and the session needs its room"));
+    }
+    assert!(given > 0, "the recording found it full every time");
+}

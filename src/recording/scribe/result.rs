@@ -35,6 +35,8 @@ struct Judged<'a> {
     sample: &'a Sample,
     /// Its configuration: pendant values ((rad) or (m)).
     q: Vec<f64>,
+    /// Measured, in the frame of the tracker.
+    point: Point3<f64>,
     /// Measured, in the base of the identified arm.
     measured: Point3<f64>,
     /// Where the nominal arm has it, in its own registration.
@@ -60,13 +62,14 @@ pub(super) fn draw(
     parameters(canvas, identified);
     let Some(calibration) = &identified.calibration else { return };
     let judged = judged(session, &profile, identified, calibration);
+    let trusted = || judged.iter().filter(|one| !one.text.rejected);
     let scales = Scales {
-        nominal: scale(&profile, judged.iter().map(|one| one.nominal.norm())),
-        identified: scale(&profile, judged.iter().map(|one| one.identified.norm())),
+        nominal: scale(&profile, trusted().map(|one| one.nominal.norm())),
+        identified: scale(&profile, trusted().map(|one| one.identified.norm())),
         arm: arm_scale(&profile, calibration, &judged),
         ellipsoid: ellipsoid_scale(&profile, &judged),
     };
-    vectors(canvas, &judged, &scales, time);
+    vectors(canvas, &profile, &judged, &scales, time);
     arms(canvas, session, &profile, calibration, scales.arm);
     series(canvas, session, &judged, run);
     pairs(canvas, &judged);
@@ -107,6 +110,7 @@ fn judged<'a>(
                 sample,
                 nominal_at: Posture::new(profile.chain(), &at, &q).reflector,
                 q,
+                point: session.point_of(sample),
                 measured: identified_at + error,
                 identified_at,
                 nominal: from_xyz_mm(text.nominal_mm).coords,
@@ -137,12 +141,18 @@ fn ellipsoid_scale(profile: &Profile, judged: &[Judged<'_>]) -> f64 {
     enlargement(axes.fold(0.0, f64::max), SHOWN_ELLIPSOID * reach(profile))
 }
 
+/// An error as long as it is drawn. That of a rejected sample, which no scale is for, is cut.
+fn drawn_error(profile: &Profile, one: &Judged<'_>, error: &Vector3<f64>, scale: f64) -> Vector3<f64> {
+    let drawn = error * scale;
+    if one.text.rejected { drawn.cap_magnitude(SHOWN * reach(profile)) } else { drawn }
+}
+
 /// Errors as arrows from where the identified arm has the point. Not on the timeline of the solver, which has its own.
-fn vectors(canvas: &Canvas, judged: &[Judged<'_>], scales: &Scales, time: Timestamp) {
+fn vectors(canvas: &Canvas, profile: &Profile, judged: &[Judged<'_>], scales: &Scales, time: Timestamp) {
     let moment = Moment { time: Some(time), ..Moment::pose(0) };
     let arrows = |scale: f64, pick: fn(&Judged<'_>) -> Vector3<f64>| {
         Arrows3D::update_fields()
-            .with_vectors(judged.iter().map(|one| layout::vector(&(pick(one) * scale))))
+            .with_vectors(judged.iter().map(|one| layout::vector(&drawn_error(profile, one, &pick(one), scale))))
             .with_origins(judged.iter().map(|one| layout::at(&one.identified_at)))
     };
     let nominal = arrows(scales.nominal, |one| one.nominal);
@@ -191,41 +201,65 @@ fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Cal
     }
 }
 
+/// What became of a sample.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Group {
+    Fit,
+    Verification,
+    Rejected,
+}
+
+impl Group {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Fit => "fit",
+            Self::Verification => "verification",
+            Self::Rejected => "rejected",
+        }
+    }
+}
+
 /// Errors at each pose. What the identification has seen is a residual, and is named so.
 fn series(canvas: &Canvas, session: &Session, judged: &[Judged<'_>], run: usize) {
-    let by_kind = |is_verification: bool| {
-        judged.iter().filter(move |one| (session.kind_of(one.sample) == PoseKind::Verification) == is_verification)
+    let is_verification = |one: &Judged<'_>| session.kind_of(one.sample) == PoseKind::Verification;
+    let group_of = |one: &Judged<'_>| match one.text.rejected {
+        true => Group::Rejected,
+        false if is_verification(one) => Group::Verification,
+        false => Group::Fit,
     };
     let again = if run > 1 { format!(" (result {run})") } else { String::new() };
-    for (is_verification, suffix) in [(false, "fit"), (true, "verification")] {
-        let group: Vec<&Judged<'_>> = by_kind(is_verification).collect();
-        if group.is_empty() {
+    let used: Vec<&Judged<'_>> = judged.iter().filter(|one| group_of(one) == Group::Fit).collect();
+    for group in [Group::Fit, Group::Verification, Group::Rejected] {
+        let suffix = group.name();
+        let members: Vec<&Judged<'_>> = judged.iter().filter(|one| group_of(one) == group).collect();
+        if members.is_empty() {
             continue;
         }
+        // A rejected sample is compared with those that were used.
+        let others = if group == Group::Rejected { &used } else { &members };
         for quantity in ["position", "distance"] {
             for (arm, color) in [("nominal", layout::NOMINAL_ERROR), ("identified", layout::IDENTIFIED)] {
                 let (path, name) = (names::errors(run, quantity, arm, suffix), format!("{arm}, {suffix}{again}"));
-                if is_verification {
-                    // They are far apart: a line would invent what is between them.
-                    let style = SeriesPoints::new()
-                        .with_names([name])
-                        .with_colors([layout::VERIFICATION])
-                        .with_marker_sizes([3.0]);
-                    canvas.fix(&path, &style);
-                } else {
-                    let style = SeriesLines::new().with_names([name]).with_colors([color]);
-                    canvas.fix(&path, &style);
+                // Single ones are far apart: a line would invent what is between them.
+                let points =
+                    |color| SeriesPoints::new().with_names([&*name]).with_colors([color]).with_marker_sizes([3.0]);
+                match group {
+                    Group::Fit => {
+                        canvas.fix(&path, &SeriesLines::new().with_names([&*name]).with_colors([color]));
+                    }
+                    Group::Verification => canvas.fix(&path, &points(layout::VERIFICATION)),
+                    Group::Rejected => canvas.fix(&path, &points(layout::OUT)),
                 }
             }
         }
-        for one in &group {
+        for one in &members {
             let moment = Moment::pose(one.sample.noted.number);
             let plot = |quantity: &str, arm: &str, error: f64| {
                 canvas.draw(moment, &names::errors(run, quantity, arm, suffix), &Scalars::new([to_mm(error)]));
             };
             plot("position", "nominal", one.nominal.norm());
             plot("position", "identified", one.identified.norm());
-            if let Some((nominal, identified)) = distance_errors(one, &group) {
+            if let Some((nominal, identified)) = distance_errors(one, others) {
                 plot("distance", "nominal", nominal);
                 plot("distance", "identified", identified);
             }
@@ -248,7 +282,7 @@ fn distance_errors(one: &Judged<'_>, group: &[&Judged<'_>]) -> Option<(f64, f64)
 
 /// Distance errors (m) of a pair, measured less predicted: of the nominal and of the identified arm.
 fn pair(one: &Judged<'_>, other: &Judged<'_>) -> (f64, f64) {
-    let measured = (one.measured - other.measured).norm();
+    let measured = (one.point - other.point).norm();
     (measured - (one.nominal_at - other.nominal_at).norm(), measured - (one.identified_at - other.identified_at).norm())
 }
 
@@ -257,8 +291,9 @@ type Pick = fn(&(f64, f64)) -> f64;
 
 /// The worst pairs as lines, and the errors of all pairs as a picture.
 fn pairs(canvas: &Canvas, judged: &[Judged<'_>]) {
-    let step = judged.len().div_ceil(MAP_SIZE).max(1);
-    let shown: Vec<&Judged<'_>> = judged.iter().step_by(step).collect();
+    let trusted: Vec<&Judged<'_>> = judged.iter().filter(|one| !one.text.rejected).collect();
+    let step = trusted.len().div_ceil(MAP_SIZE).max(1);
+    let shown: Vec<&Judged<'_>> = trusted.into_iter().step_by(step).collect();
     let mut all = Vec::new();
     let count = shown.len();
     let mut maps = (vec![0_u16; count * count], vec![0_u16; count * count]);
@@ -362,10 +397,17 @@ fn solver(
         let errors: Vec<Vector3<f64>> =
             pairs.map(|(measured, predicted)| found.to_from_from * measured - predicted).collect();
         let arrows = Arrows3D::update_fields()
-            .with_vectors(errors.iter().map(|error| layout::vector(&(error * scales.nominal))))
+            .with_vectors(
+                judged
+                    .iter()
+                    .zip(&errors)
+                    .map(|(one, error)| layout::vector(&drawn_error(profile, one, error, scales.nominal))),
+            )
             .with_origins(predicted.iter().map(layout::at));
         canvas.draw(moment, names::ERRORS_SOLVING, &arrows);
-        let mean = errors.iter().map(nalgebra::Matrix::norm).sum::<f64>() / errors.len().max(1) as f64;
+        let counted = judged.iter().zip(&errors).filter(|(one, _)| !one.text.rejected);
+        let (count, sum) = counted.fold((0_u32, 0.0), |(count, sum), (_, error)| (count + 1, sum + error.norm()));
+        let mean = sum / f64::from(count.max(1));
         canvas.draw(moment, names::FIT, &Scalars::new([to_mm(mean)]));
     }
 }
