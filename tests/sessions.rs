@@ -11,6 +11,8 @@
 
 #[path = "support/place.rs"]
 mod place;
+#[path = "support/small_disk.rs"]
+mod small_disk;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -23,6 +25,7 @@ use place::Place;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
+use small_disk::SmallDisk;
 use trupose::session::journal::{Entry, Journal, Line, Sum, encode};
 use trupose::session::set_up::Step;
 use trupose::session::state::Session;
@@ -510,35 +513,13 @@ fn a_reader_that_goes_away_costs_nothing_that_was_saved() {
     }
 }
 
-/// A small file system in memory; none where that is not allowed.
-struct SmallDisk(PathBuf);
-
-impl SmallDisk {
-    fn mount(path: PathBuf) -> Option<Self> {
-        fs::create_dir(&path).unwrap();
-        let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", "size=1024k", "tmpfs"]).arg(&path);
-        mount.output().is_ok_and(|output| output.status.success()).then_some(Self(path))
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        drop(Command::new("umount").arg(&self.0).output());
-    }
-}
-
 #[test]
 fn a_full_disk_stops_the_run_and_goes_on_when_there_is_room() {
     let expected = finished().measurements("sessions/s");
     for room in [4, 12, 16, 20, 24] {
         let place = Place::new();
-        let Some(disk) = SmallDisk::mount(place.path("sessions")) else {
-            // Not by `eprintln!`, which the test harness swallows.
-            let skipped = "SKIPPED a_full_disk_stops_the_run_and_goes_on_when_there_is_room: no right to mount a tmpfs";
-            writeln!(io::stderr(), "{skipped}").unwrap();
-            return;
-        };
+        let test = "a_full_disk_stops_the_run_and_goes_on_when_there_is_room";
+        let Some(disk) = SmallDisk::mount(place.path("sessions"), 1024, test) else { return };
         let ballast = disk.0.join("ballast");
         fs::write(&ballast, vec![0; (1024 - room) * 1024]).unwrap();
         let output = place.script(&whole());

@@ -4,9 +4,9 @@ use std::io;
 use std::iter;
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Weak};
 use std::thread;
 use std::time::Duration;
 
@@ -94,15 +94,16 @@ enum Message {
     GiveRoom(SyncSender<()>),
 }
 
-/// Lets whoever writes the session have the room of its recording.
+/// Lets whoever writes the session have the room of its recording. The recorder ends without waiting for it.
 #[derive(Clone, Debug)]
-pub struct Room(SyncSender<Message>);
+pub struct Room(Weak<SyncSender<Message>>);
 
 impl Room {
     /// Ends the recording and gives its room back. Does not wait for long.
     pub fn give_back(&self) {
+        let Some(recorder) = self.0.upgrade() else { return };
         let (answer, given) = sync_channel(1);
-        if self.0.try_send(Message::GiveRoom(answer)).is_ok() {
+        if recorder.try_send(Message::GiveRoom(answer)).is_ok() {
             // What is not given back by then is missed by a write that fails once more, and says so.
             let _given_or_not = given.recv_timeout(GIVE_BACK).is_ok();
         }
@@ -112,7 +113,7 @@ impl Room {
 /// Records a session.
 #[derive(Debug)]
 pub struct Recorder {
-    lines: Option<SyncSender<Message>>,
+    lines: Option<Arc<SyncSender<Message>>>,
     finished: Receiver<Result<(), String>>,
     is_hurried: Arc<AtomicBool>,
 }
@@ -156,7 +157,7 @@ impl Recorder {
             // Nobody may be waiting any more.
             let _nobody = done.send(work.end(&hurried));
         })?;
-        Ok(Self { lines: Some(lines), finished, is_hurried })
+        Ok(Self { lines: Some(Arc::new(lines)), finished, is_hurried })
     }
 
     /// Takes lines that are on disk. Never waits.
@@ -176,7 +177,7 @@ impl Recorder {
 
     /// What gives its room back when the disk is full.
     pub fn room(&self) -> Option<Room> {
-        self.lines.clone().map(Room)
+        self.lines.as_ref().map(|lines| Room(Arc::downgrade(lines)))
     }
 
     /// There is no time to make one file of the parts: they stay, and whoever goes on with the session joins them.
@@ -397,10 +398,11 @@ mod tests {
         assert!(matches!(&event, RecordingEvent::Failed(cause) if cause.contains("the disk is full")), "{event:?}");
         room.give_back();
         recorder.take(&opened()).unwrap();
-        drop(room);
         assert!(recorder.finish().unwrap_err().contains("the disk is full"));
         assert!(segments::files(folder.path()).is_empty());
         assert!(heard.recv_timeout(Duration::from_secs(1)).is_err(), "it is told once");
+        // Nobody is there any more.
+        room.give_back();
     }
 
     #[test]

@@ -101,7 +101,7 @@ pub struct Deed {
 struct Recording {
     is_wanted: bool,
     live: Option<Live>,
-    /// Where who writes the session finds the recording's room. Dropped before the recorder, which waits for it.
+    /// Where who writes the session finds the recording's room.
     room: SharedRoom,
     recorder: Option<Recorder>,
 }
@@ -258,7 +258,6 @@ impl Engine {
     /// Makes one file of the recording while the session's folder is still held. Says what the operator should know if that
     /// fails; the parts stay then, and the next program joins them.
     pub fn end_recording(&mut self) -> Option<String> {
-        self.recording.room.set(None);
         let mut recorder = self.recording.recorder.take()?;
         let cause = recorder.finish().err()?;
         Some(format!("the 3D recording is not complete: {cause}; 'trupose record rebuild' mends it"))
@@ -279,7 +278,10 @@ impl Engine {
         let tell = move |event: RecordingEvent| events.offer(Event::Remark(remark(&event)));
         match Recorder::start(folder, before, self.recording.live.take(), tell) {
             Ok(recorder) => {
-                self.recording.room.set(recorder.room());
+                // A session is recorded once.
+                if let Some(room) = recorder.room() {
+                    self.recording.room.get_or_init(|| room);
+                }
                 self.recording.recorder = Some(recorder);
             }
             Err(error) => self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(error.to_string())))),
@@ -290,7 +292,6 @@ impl Engine {
     fn record_lines(&mut self, lines: &[Line]) {
         let Some(recorder) = &mut self.recording.recorder else { return };
         if let Err(cause) = recorder.take(lines) {
-            self.recording.room.set(None);
             self.recording.recorder = None;
             self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(cause.to_owned()))));
         }

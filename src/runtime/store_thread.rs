@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 
 use super::engine::Events;
@@ -15,23 +15,8 @@ use crate::wizard::{Answer, Event, Problem, RequestId, StoreEvent};
 /// Commands that wait; the wizard never has more than one under way.
 const WAITING: usize = 4;
 
-/// The room of the recording, while there is one: whoever ends it takes this away first, as the recorder waits for it.
-#[derive(Clone, Debug, Default)]
-pub(super) struct SharedRoom(Arc<Mutex<Option<Room>>>);
-
-impl SharedRoom {
-    /// There is a recording, or none any more.
-    pub(super) fn set(&self, room: Option<Room>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = room;
-    }
-
-    fn give_back(&self) {
-        let room = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some(room) = room {
-            room.give_back();
-        }
-    }
-}
+/// The room of the recording, once there is one.
+pub(super) type SharedRoom = Arc<OnceLock<Room>>;
 
 /// What the thread is asked for.
 #[derive(Debug)]
@@ -130,7 +115,9 @@ fn with_room<E: std::error::Error + 'static>(
 ) -> Result<(), E> {
     match write() {
         Err(error) if is_full(&error) => {
-            room.give_back();
+            if let Some(room) = room.get() {
+                room.give_back();
+            }
             write()
         }
         written => written,

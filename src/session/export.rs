@@ -10,6 +10,7 @@ const SIMULATED_MARK: &str = "# SIMULATED: ";
 
 /// What a table says about a simulation that its points come from.
 pub fn simulation_of_table(bytes: &[u8]) -> Option<String> {
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
     let mut lines = bytes.split(|byte| *byte == b'\n').take_while(|line| line.starts_with(b"#"));
     let said = lines.find_map(|line| line.strip_prefix(SIMULATED_MARK.as_bytes()))?;
     Some(String::from_utf8_lossy(said).trim().to_owned())

@@ -4,7 +4,6 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use rand::{RngExt as _, SeedableRng as _};
@@ -17,6 +16,7 @@ use crate::crashes::{one_by_one, torn_part};
 use crate::place::Place;
 use crate::reading::content;
 use crate::running::{RESULT, begun, recorded, session_of, succeeded, text};
+use crate::small_disk::SmallDisk;
 
 #[test]
 fn torn_and_damaged_files_are_named_and_never_stop_the_program() {
@@ -223,33 +223,11 @@ fn a_folder_that_may_not_be_written_to_is_told() {
     assert!(text(&output.stderr).contains("cannot write the recording"), "{}", text(&output.stderr));
 }
 
-/// A small file system in memory; none where that is not allowed.
-pub(super) struct SmallDisk(PathBuf);
-
-impl SmallDisk {
-    fn mount(path: PathBuf, size: &str) -> Option<Self> {
-        fs::create_dir(&path).unwrap();
-        let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(&path);
-        mount.output().is_ok_and(|output| output.status.success()).then_some(Self(path))
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        drop(Command::new("umount").arg(&self.0).output());
-    }
-}
-
 #[test]
 fn a_full_disk_ends_the_recording_with_a_message_and_not_the_session() {
     let place = Place::new();
-    let Some(_disk) = SmallDisk::mount(place.path("sessions"), "256k") else {
-        let skipped =
-            "SKIPPED a_full_disk_ends_the_recording_with_a_message_and_not_the_session: no right to mount a tmpfs";
-        writeln!(io::stderr(), "{skipped}").unwrap();
-        return;
-    };
+    let test = "a_full_disk_ends_the_recording_with_a_message_and_not_the_session";
+    let Some(_disk) = SmallDisk::mount(place.path("sessions"), 256, test) else { return };
     let start = Instant::now();
     // What is delivered waits: the recording gives its room back a little later than the disk is full.
     let output = place.script(&format!("{} CaptureAll(Fail), Do(Next), Do(Identify), Do(Next)", begun("")), &[]);
@@ -274,11 +252,8 @@ fn on_a_small_disk_the_session_goes_before_its_recording() {
     // Whichever of them finds the disk full.
     for kilobytes in (64..=192).step_by(16) {
         let place = Place::new();
-        let Some(_disk) = SmallDisk::mount(place.path("sessions"), &format!("{kilobytes}k")) else {
-            let skipped = "SKIPPED on_a_small_disk_the_session_goes_before_its_recording: no right to mount a tmpfs";
-            writeln!(io::stderr(), "{skipped}").unwrap();
-            return;
-        };
+        let test = "on_a_small_disk_the_session_goes_before_its_recording";
+        let Some(_disk) = SmallDisk::mount(place.path("sessions"), kilobytes, test) else { return };
         let output = place.script(&steps, &[]);
         succeeded(&output);
         let (_, session) = session_of(&place.session());

@@ -16,3 +16,5 @@ mod live;
 mod place;
 mod reading;
 mod running;
+#[path = "../support/small_disk.rs"]
+mod small_disk;
