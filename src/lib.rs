@@ -8,6 +8,7 @@
 //!
 //! Layers, lowest first; a module knows only those before it (`tests/architecture.rs` checks it):
 //!
+//! - [`text`]: words for people. Knows nothing of robots.
 //! - [`units`], [`geometry`], [`kinematics`], [`compensation`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`model`]: models of the arm in the formats of others, in and out.
@@ -43,6 +44,7 @@ pub mod script;
 pub mod search;
 pub mod session;
 pub mod store;
+pub mod text;
 pub mod tui;
 pub mod units;
 pub mod wizard;
