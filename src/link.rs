@@ -4,8 +4,6 @@
 //! else is a [`LinkError`]. Points are in the frame of the instrument (m), configurations are pendant values (rad, sliding
 //! joints m).
 
-#![warn(missing_docs)]
-
 mod build;
 mod cell_view;
 pub mod protocol;

@@ -4,8 +4,6 @@
 //! It knows no file, clock or terminal: the time of creation, names of files and their hashes come in as data, and what is said
 //! on the way goes to a callback. Failures are told as an operator reads them.
 
-#![warn(missing_docs)]
-
 pub(crate) mod assess;
 pub(crate) mod cell;
 pub(crate) mod checks;

@@ -12,8 +12,6 @@
 //! | `recording.part-001.rrd`, … | what a running program writes, flushed to disk after every entry |
 //! | `recording.rrd` | all parts as one, with an index; made when the program ends in good order |
 
-#![warn(missing_docs)]
-
 mod blueprint;
 mod canvas;
 mod compact;

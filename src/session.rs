@@ -6,8 +6,6 @@
 //! This module reads no file and no clock, and never estimates anything. All defects of a table are reported together
 //! ([`TableErrors`]), each with its place and what to do about it.
 
-#![warn(missing_docs)]
-
 pub mod calibration;
 pub mod constraints;
 pub mod export;

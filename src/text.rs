@@ -2,6 +2,8 @@
 //!
 //! Columns are those of a terminal: a wide character takes two, a combining mark none.
 
+#![warn(missing_docs)]
+
 use std::borrow::Borrow;
 use std::error::Error;
 

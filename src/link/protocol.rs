@@ -9,6 +9,8 @@
 //! of the connection. After [`ProtocolEvent::Lost`] nothing is valid until the owner has connected again and called `start`. A point is given only on
 //! an explicit success of the instrument.
 
+#![warn(missing_docs)]
+
 pub mod ascii;
 pub mod crc;
 pub mod emscon;
