@@ -2,11 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a failure of a test or benchmark is a panic")]
 
-#[path = "../tests/support/mod.rs"]
-mod support;
+#[path = "../tests/support/paper_case.rs"]
+mod paper_case;
 
 use divan::{Bencher, black_box};
-use support::{
+use paper_case::{
     PaperCase, paper_chain, paper_deviations, paper_parameters, paper_target, random_configurations, seeded,
 };
 use trupose::identification::{Identification, Observability, Settings, SigmaSource, Weighting, identify};

@@ -2,12 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that fails should say so")]
 
-#[path = "../tests/support/mod.rs"]
-mod support;
+#[path = "../tests/support/paper_case.rs"]
+mod paper_case;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use support::{paper_chain, paper_parameters, paper_target, random_configurations, seeded};
+use paper_case::{paper_chain, paper_parameters, paper_target, random_configurations, seeded};
 use trupose::identification::{ArmModel, TargetAt};
 use trupose::kinematics::FreeParameter;
 use trupose::planning::{DesignBound, Information, Objective, Score, Search, SearchSettings, Yardstick, trade_off};

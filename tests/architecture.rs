@@ -1,9 +1,9 @@
 //! The layers: who may know whom, what the pure parts must not touch, and that every module says what it is for.
 
-#![expect(clippy::unwrap_used, clippy::string_slice, reason = "a failure of a test or benchmark is a panic")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
+
+use crate::support::root;
 
 /// Modules with the crate modules that they may use, lowest layer first; every one may use `text`.
 const LAYERS: &[(&str, &[&str])] = &[
@@ -120,7 +120,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 
 /// All source files with their top module and text; `main.rs` and `lib.rs` belong to none.
 fn modules() -> Vec<(PathBuf, String, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let root = root().join("src");
     let mut paths = Vec::new();
     sources(&root, &mut paths);
     paths

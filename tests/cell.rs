@@ -1,13 +1,8 @@
 //! Shipped profiles in their cells: what passes the filters and the ordering also passes an independent check, which knows
 //! capsules only as sampled points.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail as tests do")]
-
-#[path = "support/point_cloud.rs"]
-mod point_cloud;
-
+use crate::support::point_cloud::{PointCloud, SPACING};
 use nalgebra::Point3;
-use point_cloud::{PointCloud, SPACING};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use trupose::planning::candidates::{CandidateFilter, Candidates, Rule, on_grid};

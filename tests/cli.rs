@@ -1,29 +1,13 @@
 //! The program as its users run it: exit codes, messages about bad data, files written and read back.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::disallowed_methods,
-    clippy::string_slice,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
-
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
 
+use crate::support::{root, trupose};
 use serde_json::Value;
 
-fn trupose(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_trupose"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
 fn example(file: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/soochow-example").join(file);
+    let path = root().join("sessions/soochow-example").join(file);
     fs::read_to_string(path).unwrap()
 }
 

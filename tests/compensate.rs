@@ -1,19 +1,11 @@
 //! Compensation: closed loop on a simulated arm, what is not reachable, and the commands that apply a calibration.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
+use crate::support::paper_case::{PaperCase, RANGES, paper_deviations, random_configurations, seeded};
+use crate::support::trupose;
 use nalgebra::{DVector, Isometry3, Point3, Translation3};
-use support::{PaperCase, RANGES, paper_deviations, random_configurations, seeded};
 use trupose::compensation::{Compensator, Goal, Settings, Status, ToolArm};
 use trupose::geometry::register;
 use trupose::identification::{ArmModel, identify};
@@ -174,14 +166,6 @@ fn limits_singularities_and_reach_are_told_apart() {
     assert_eq!(solve(&limits, &point).status, Status::Reached);
     let far = Goal::Position { point_in_base: Point3::new(3.0, 0.4, 0.5), near: None };
     assert_eq!(solve(&limits, &far).status, Status::OutOfReach);
-}
-
-fn trupose(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_trupose"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(arguments)
-        .output()
-        .unwrap()
 }
 
 fn calibrate(folder: &Path) -> String {

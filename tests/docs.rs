@@ -6,20 +6,13 @@
 //! terminal, an instrument, or somebody who ends it. What is not run must at least be a command line that the program understands. Other programs
 //! that may be shown are in [`OTHERS`]. Each document has a folder of its own, its commands run in order.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::string_slice,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; what is tested is real files and a real program"
-)]
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread;
 
+use crate::support::{command, root};
 use clap::Parser as _;
 use trupose::cli::{Cli, Command as Told};
 
@@ -36,10 +29,6 @@ struct Shown {
     words: Vec<String>,
     exit_code: i32,
     is_run: bool,
-}
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// Words of a line as a shell splits it, and the remark behind it. Nothing else of a shell is understood.
@@ -179,14 +168,8 @@ fn run(document: &Path) -> (Vec<String>, usize) {
         if !arguments.iter().any(|word| word.contains("candidates")) {
             arguments.extend(quicker.iter().map(|word| (*word).to_owned()));
         }
-        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
-        let output = command
-            .current_dir(folder.path())
-            .args(arguments)
-            .stdin(Stdio::null())
-            .env_remove("TERM")
-            .output()
-            .unwrap();
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let output = command(folder.path(), &arguments).stdin(Stdio::null()).env_remove("TERM").output().unwrap();
         ran += 1;
         if output.status.code() != Some(shown.exit_code) {
             let error = String::from_utf8_lossy(&output.stderr);

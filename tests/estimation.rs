@@ -1,12 +1,11 @@
 //! Estimates against truth that is known: error bars by Monte Carlo, outliers, mirrored frames, other kinds of data.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure of a test or benchmark is a panic")]
-
-mod support;
-
+use crate::support::paper_case::{
+    PaperCase, measure, normal, paper_chain, paper_deviations, paper_parameters, random_configurations, seeded,
+    station_from_base,
+};
 use nalgebra::{DMatrix, DVector, Point3};
 use rand::RngExt as _;
-use support::{PaperCase, measure, normal, paper_deviations, paper_parameters, random_configurations, seeded};
 use trupose::geometry::register;
 use trupose::identification::predicted::position_covariances;
 use trupose::identification::verification::{DirectErrors, ModelErrors};
@@ -174,7 +173,7 @@ fn a_mirrored_frame_is_refused() {
 #[test]
 fn joint_offsets_alone() {
     let mut truth = paper_deviations();
-    let chain = support::paper_chain();
+    let chain = paper_chain();
     for (value, parameter) in truth.iter_mut().zip(paper_parameters()) {
         if !parameter.id.is_joint_offset(&chain) {
             *value = 0.0;
@@ -211,7 +210,7 @@ fn several_targets_are_identified_together() {
         let mut samples = measure(&model, &[configuration], 0.0, &mut rng);
         let sample = &mut samples[0];
         sample.at.target = index % 2;
-        sample.point = support::station_from_base() * model.point_in_base(&sample.at);
+        sample.point = station_from_base() * model.point_in_base(&sample.at);
         for axis in 0..3 {
             sample.point[axis] += NOISE * normal(&mut rng);
         }
@@ -224,7 +223,7 @@ fn several_targets_are_identified_together() {
             let mut samples = measure(&model, &random_configurations(100, &mut rng), 0.0, &mut rng);
             for sample in &mut samples {
                 sample.at.target = target;
-                sample.point = support::station_from_base() * model.point_in_base(&sample.at);
+                sample.point = station_from_base() * model.point_in_base(&sample.at);
             }
             samples
         })

@@ -3,20 +3,12 @@
 //! `soochow-example` is made here from the method paper's tables. To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test example`.
 //! `example` is a finished session; the head of `sessions/example.script.ron` has the command that makes it.
 
-#![expect(
-    clippy::disallowed_methods,
-    clippy::unwrap_used,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
+use crate::support::paper_case::{PaperCase, measure, paper_deviations, random_configurations, seeded};
+use crate::support::{root, trupose};
 use serde_json::Value;
-use support::{PaperCase, measure, paper_deviations, random_configurations, seeded};
 use trupose::identification::ArmModel;
 use trupose::kinematics::JointType;
 use trupose::session::calibration::Calibration;
@@ -26,7 +18,7 @@ use trupose::units::{MICROMETRE, to_mm};
 const JOINTS: [JointType; 6] = [JointType::Revolute; 6];
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/soochow-example")
+    root().join("sessions/soochow-example")
 }
 
 /// Random poses of the paper's robot with the errors of table II and 10 µm of noise, as two tables.
@@ -79,13 +71,9 @@ fn the_committed_example_is_what_the_generator_makes() {
 
 #[test]
 fn the_first_identification_of_the_readme() {
-    let output = Command::new(env!("CARGO_BIN_EXE_trupose"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(["identify", "--profile", "soochow"])
-        .args(["--measurements", "sessions/soochow-example/measurements.csv"])
-        .args(["--verify", "sessions/soochow-example/verification.csv"])
-        .output()
-        .unwrap();
+    let measurements = ["--measurements", "sessions/soochow-example/measurements.csv"];
+    let verification = ["--verify", "sessions/soochow-example/verification.csv"];
+    let output = trupose(&[&["identify", "--profile", "soochow"][..], &measurements, &verification].concat());
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
@@ -131,17 +119,13 @@ fn words(text: &str) -> Vec<&str> {
 
 #[test]
 fn the_finished_session_is_what_its_script_makes() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let command = "trupose --script sessions/example.script.ron --sessions sessions";
-    assert!(fs::read_to_string(root.join("sessions/example.script.ron")).unwrap().contains(command));
+    let in_words = "trupose --script sessions/example.script.ron --sessions sessions";
+    assert!(fs::read_to_string(root().join("sessions/example.script.ron")).unwrap().contains(in_words));
     let place = tempfile::tempdir().unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_trupose"))
-        .current_dir(root)
-        .args(["--script", "sessions/example.script.ron", "--sessions", place.path().to_str().unwrap()])
-        .output()
-        .unwrap();
+    let sessions = place.path().to_str().unwrap();
+    let output = trupose(&["--script", "sessions/example.script.ron", "--sessions", sessions]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let (made, committed) = (place.path().join("example"), root.join("sessions/example"));
+    let (made, committed) = (place.path().join("example"), root().join("sessions/example"));
     let names = |folder: &Path| {
         let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
         let mut names: Vec<String> = names.filter(|name| name != ".lock").collect();

@@ -1,15 +1,11 @@
 //! Laws of the kinematics, for every parameter of every shipped robot.
 
-#![expect(clippy::unwrap_used, reason = "a failure of a test or benchmark is a panic")]
-
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::support::paper_case::seeded;
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
-use support::seeded;
 use trupose::kinematics::{
     Axis, Convention, ForwardKinematics, IdentificationJacobian, Joint, JointType, KinematicChain, Link, LinkParameter,
     ParameterId,

@@ -1,16 +1,11 @@
 //! The wizard in plain lines, through pipes, what is recorded there, and sessions looked at again.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
-
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Output, Stdio};
 
+use crate::support::{command, text};
 use trupose::session::journal::Entry;
 use trupose::session::state::Session;
 use trupose::store::session::read_journal;
@@ -24,15 +19,11 @@ fn place() -> tempfile::TempDir {
 }
 
 fn run(folder: &Path, arguments: &[&str], input: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
-    command.current_dir(folder).args(arguments).env("TERM", "dumb").env("LANG", "C").env_remove("LC_ALL");
+    let mut command = command(folder, arguments);
+    command.env("TERM", "dumb").env("LANG", "C").env_remove("LC_ALL");
     let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
     child.wait_with_output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 /// The whole demo in lines.

@@ -1,17 +1,5 @@
 //! Instruments on a wire, through the program itself: rehearsals over every wire, `simulate` against `link test`, a flood.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; deadlines need a clock; test files need no atomic writes"
-)]
-#![cfg(target_os = "linux")]
-
-#[path = "support/pty.rs"]
-#[expect(dead_code, reason = "some of it is for the tests of the terminal")]
-mod pty;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -21,21 +9,14 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use pty::{ENTER, Terminal};
+use crate::support::pty::{ENTER, Terminal};
+use crate::support::{PROGRAM, text, trupose, trupose_in};
 use tempfile::TempDir;
 use trupose::report::{Document, PointOrigin};
 use trupose::session::calibration::Calibration;
 use trupose::session::journal::Entry;
 use trupose::session::state::Session;
 use trupose::store::session::read_journal;
-
-fn trupose(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_trupose")).current_dir(folder).args(arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
 
 /// A folder with a plan of 18 poses.
 fn folder() -> TempDir {
@@ -54,7 +35,7 @@ fn run(folder: &Path, instrument: &str, steps: &str, more: &[&str]) -> Output {
         ])"#
     );
     fs::write(folder.join("test.script.ron"), script).unwrap();
-    trupose(folder, &[&["--script", "test.script.ron", "--no-recording"], more].concat())
+    trupose_in(folder, &[&["--script", "test.script.ron", "--no-recording"], more].concat())
 }
 
 /// What a rehearsal ends with.
@@ -147,7 +128,7 @@ struct Simulator {
 
 impl Simulator {
     fn start(arguments: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
+        let mut command = Command::new(PROGRAM);
         command.arg("simulate").args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut child = command.spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(Result::unwrap);
@@ -173,7 +154,7 @@ impl Simulator {
             arguments.extend(["--robot", robot.as_str()]);
         }
         arguments.extend(more);
-        let output = trupose(Path::new("."), &arguments);
+        let output = trupose(&arguments);
         (output.status.code(), text(&output.stdout), text(&output.stderr))
     }
 }
@@ -213,7 +194,7 @@ fn a_robot_is_tested_with_its_instrument_and_alone() {
     let (code, output, errors) = simulator.tested(&["--shots", "1", "--seconds", "1.5"]);
     assert_eq!((code, errors.as_str()), (Some(0), ""), "{output}");
     assert!(output.contains("robot at rest at 0.000 15.000 -5.000"), "{output}");
-    let alone = trupose(Path::new("."), &["link", "test", simulator.robot.as_deref().unwrap(), "--seconds", "1.5"]);
+    let alone = trupose(&["link", "test", simulator.robot.as_deref().unwrap(), "--seconds", "1.5"]);
     let output = text(&alone.stdout);
     assert!(alone.status.success(), "{output}{}", text(&alone.stderr));
     assert!(output.contains("robot at rest at 0.000 15.000 -5.000") && output.contains("sign by sign"), "{output}");
@@ -239,7 +220,7 @@ fn the_test_of_a_link_says_what_is_wrong_and_what_to_do() {
             assert!(words(&errors).contains(part), "{protocol} {fault}: '{part}' is missing: {errors}");
         }
     }
-    let refused = trupose(Path::new("."), &["simulate", "ndi", "--listen", "127.0.0.1:0", "--fault", "earthquake"]);
+    let refused = trupose(&["simulate", "ndi", "--listen", "127.0.0.1:0", "--fault", "earthquake"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("there is no fault 'earthquake'"), "{}", text(&refused.stderr));
 }
@@ -305,7 +286,7 @@ fn where_the_robot_fails_the_instrument_is_not_blamed_for_it() {
 
 #[test]
 fn a_simulator_that_cannot_tell_shots_from_looks_does_not_go_on_by_itself() {
-    let refused = trupose(Path::new("."), &["simulate", "ndi", "--listen", "127.0.0.1:0", "--shots", "3"]);
+    let refused = trupose(&["simulate", "ndi", "--listen", "127.0.0.1:0", "--shots", "3"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("give 'next'"), "{}", text(&refused.stderr));
 }
@@ -323,7 +304,7 @@ fn what_the_profile_says_about_the_link_is_proposed_and_stays_in_the_session() {
     for (arguments, steps) in [(vec![], begin.as_str()), (vec!["resume", "sessions/s"], proposed)] {
         fs::write(folder.path().join("test.script.ron"), format!("(title: \"test\", steps: [{steps}])")).unwrap();
         let output =
-            trupose(folder.path(), &[&arguments[..], &["--script", "test.script.ron", "--no-recording"]].concat());
+            trupose_in(folder.path(), &[&arguments[..], &["--script", "test.script.ron", "--no-recording"]].concat());
         assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
     }
 }

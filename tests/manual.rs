@@ -1,25 +1,12 @@
 //! Completions and manual pages: made from the command line itself, for every command.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
-
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
+use crate::support::{command, root, text, trupose};
 use clap::CommandFactory as _;
 use trupose::cli::Cli;
-
-fn trupose(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_trupose")).args(arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
-}
 
 /// Names of all pages that there should be.
 fn pages(command: &clap::Command, before: &str, found: &mut Vec<String>) {
@@ -92,8 +79,7 @@ fn the_completions_of_bash_are_a_script() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("trupose.bash");
     let out = fs::File::create(&file).unwrap();
-    let status =
-        Command::new(env!("CARGO_BIN_EXE_trupose")).args(["completions", "bash"]).stdout(out).status().unwrap();
+    let status = command(root(), &["completions", "bash"]).stdout(out).status().unwrap();
     assert!(status.success());
     let ask = format!(
         ". {}; COMP_WORDS=(trupose comp); COMP_CWORD=1; _trupose trupose comp trupose; echo \"${{COMPREPLY[@]}}\"",

@@ -1,22 +1,16 @@
 //! Measured data of real robots, end to end through the program. The data are not part of this project: sources are named in the
 //! README. They are looked for in the folder `TRUPOSE_MEASURED_DATA`, or in `../shared/data` beside the project.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stdout,
-    reason = "a failure of a test is a panic; a skipped test says so"
-)]
+#![expect(clippy::print_stdout, reason = "a failure of a test is a panic; a skipped test says so")]
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
+use crate::support::{root, trupose};
 use serde_json::Value;
 
 /// A file of the measured data; `None`, said loudly, where there is none.
 fn data(file: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
     let path = folder.join(file);
     if path.is_file() {
         return Some(path);
@@ -26,8 +20,8 @@ fn data(file: &str) -> Option<PathBuf> {
 }
 
 /// Runs the program and reads its JSON object. Exit code 0 or 1: a verdict was reached.
-fn trupose(arguments: &[&str]) -> Value {
-    let output = Command::new(env!("CARGO_BIN_EXE_trupose")).args(arguments).arg("--json").output().unwrap();
+fn json(arguments: &[&str]) -> Value {
+    let output = trupose(&[arguments, &["--json"]].concat());
     let code = output.status.code().unwrap();
     assert!(code <= 1, "{arguments:?}: exit {code}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
@@ -56,7 +50,7 @@ fn ur5_from_59_grid_poses() {
     let (grid, random) = (grid.to_str().unwrap(), random.to_str().unwrap());
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().to_str().unwrap();
-    let rest = trupose(&[
+    let rest = json(&[
         "identify",
         "--profile",
         "ur5",
@@ -76,13 +70,13 @@ fn ur5_from_59_grid_poses() {
 
     let calibration = out.path().join("calibration.ron");
     let calibration = calibration.to_str().unwrap();
-    let fresh = trupose(&["verify", "--calibration", calibration, "--measurements", random]);
+    let fresh = json(&["verify", "--calibration", calibration, "--measurements", random]);
     assert_near(nominal(&fresh, "rms"), 0.595, 5e-4);
     assert!(identified(&fresh, "mean") <= 0.114 && identified(&fresh, "max") <= 0.20, "{}", fresh["verification"]);
 
     // The σ of the residuals, for a profile that states none, does as well on the grid.
     let sigma = number(&rest, "sigma.from_residuals_mm").to_string();
-    let own = trupose(&[
+    let own = json(&[
         "identify",
         "--profile",
         "ur5",
@@ -101,7 +95,7 @@ fn ur5_from_59_grid_poses() {
 fn ur5_from_all_grid_poses() {
     let Some(grid) = data("ur5/grid.csv") else { return };
     let Some(random) = data("ur5/random.csv") else { return };
-    let found = trupose(&[
+    let found = json(&[
         "identify",
         "--profile",
         "ur5",
@@ -133,14 +127,14 @@ fn ur10_carries_over_to_another_series() {
         "--out",
         folder,
     ];
-    let rest = trupose(&arguments);
+    let rest = json(&arguments);
     assert!(identified(&rest, "rms") <= 0.456 && identified(&rest, "mean") <= 0.412, "{}", rest["verification"]);
     // Two readings repeat the one before to the last digit.
     let stale = rest["warnings"].as_array().unwrap().iter().filter(|warning| warning["code"] == "table").count();
     assert_eq!(stale, 2);
     let calibration = out.path().join("calibration.ron");
     let verify = |calibration: &str| {
-        trupose(&["verify", "--calibration", calibration, "--measurements", series_c, "--refit", "frame+target"])
+        json(&["verify", "--calibration", calibration, "--measurements", series_c, "--refit", "frame+target"])
     };
     let other = verify(calibration.to_str().unwrap());
     assert_eq!(other["verification"]["refit"], "frame+target");
@@ -152,7 +146,7 @@ fn ur10_carries_over_to_another_series() {
 #[test]
 fn without_a_prior_the_report_says_that_parameters_ran_away() {
     let Some(grid) = data("ur5/grid.csv") else { return };
-    let found = trupose(&[
+    let found = json(&[
         "identify",
         "--profile",
         "ur5",
@@ -180,7 +174,7 @@ fn left_out(file: &Path, statistic: &str) -> (f64, f64) {
     let (mut nominal, mut identified) = (0.0, 0.0);
     for position in &positions {
         let condition = format!("position != '{position}'");
-        let found = trupose(&[
+        let found = json(&[
             "constraints",
             "--profile",
             "franka_panda",
@@ -214,7 +208,7 @@ fn balls_in_sockets_without_any_instrument() {
         assert!(identified <= max, "{name}: max {identified}");
     }
     let Some(file) = data("ball_socket/panda_1.csv") else { return };
-    let pooled = trupose(&[
+    let pooled = json(&[
         "constraints",
         "--profile",
         "franka_panda",

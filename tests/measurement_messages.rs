@@ -1,8 +1,9 @@
 //! Every table in `tests/measurements/invalid` has one defect (the names say which); its message is a snapshot.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::support::root;
 use trupose::kinematics::JointType;
 use trupose::session::constraints::{read_constraints, read_constraints_bytes};
 use trupose::session::filter::Filter;
@@ -12,7 +13,7 @@ const JOINTS: [JointType; 3] = [JointType::Revolute; 3];
 
 #[test]
 fn defects_are_named_with_place_and_remedy() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/measurements/invalid");
+    let folder = root().join("tests/measurements/invalid");
     let mut files: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     assert!(files.len() >= 20);

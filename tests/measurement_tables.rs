@@ -2,8 +2,9 @@
 
 use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::support::root;
 use nalgebra::Point3;
 use proptest::prelude::*;
 use trupose::kinematics::JointType::{self, Prismatic, Revolute};
@@ -140,8 +141,7 @@ fn deep_filters_are_refused_and_long_ones_are_not() {
 
 #[test]
 fn measured_tables_of_others_are_read() {
-    let folder = env::var_os("TRUPOSE_MEASURED_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let folder = env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
     if !folder.is_dir() {
         println!("skipped: no measured data");
         return;

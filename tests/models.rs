@@ -1,10 +1,8 @@
 //! Models in and out: URDF to profile, profile to URDF, the identified arm in every format, each proven at random configurations.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure of a test is a panic")]
-
 use std::fs;
-use std::path::Path;
 
+use crate::support::root;
 use nalgebra::Isometry3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +22,7 @@ fn profile(name: &str) -> Profile {
 }
 
 fn fixture(name: &str) -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/urdf").join(name)).unwrap()
+    fs::read_to_string(root().join("tests/urdf").join(name)).unwrap()
 }
 
 /// The chain written as a profile and read again.

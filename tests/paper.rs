@@ -1,10 +1,6 @@
 //! The method paper's robot: tables I and II, and the anchor values of the method.
 
-#![expect(clippy::unwrap_used, reason = "a failure of a test or benchmark is a panic")]
-
-mod support;
-
-use support::{PaperCase, measure, paper_deviations, random_configurations, seeded};
+use crate::support::paper_case::{PaperCase, measure, paper_deviations, random_configurations, seeded};
 use trupose::identification::verification::ModelErrors;
 use trupose::identification::{
     ArmModel, Estimator, Identification, Prior, Settings, SigmaSource, TerminationReason, Weighting, identify,

@@ -3,23 +3,12 @@
 //!
 //! To print them anew: `TRUPOSE_WRITE_PICTURES=1 cargo test --test pictures`.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    clippy::panic,
-    reason = "a failure of a test is a panic; test files need no atomic writes; one variable asks for new pictures"
-)]
-#![cfg(target_os = "linux")]
-
-#[path = "support/pty.rs"]
-#[expect(dead_code, reason = "some of it is for other tests")]
-mod pty;
-
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
-use pty::{PATIENCE, Shown, Terminal};
+use crate::support::pty::{PATIENCE, Shown, Terminal};
+use crate::support::root;
 
 const SIZE: (u16, u16) = (80, 24);
 
@@ -45,10 +34,6 @@ const PICTURES: [Picture; 11] = [
     Picture { name: "errors", entries: 47, keys: "4", has: "[4 picture]" },
     Picture { name: "deliver", entries: 50, keys: "", has: "Written" },
 ];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn document() -> PathBuf {
     root().join("docs/technician.md")

@@ -1,25 +1,9 @@
 //! `trupose plan` and `trupose program` as their users run them.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
-
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
 
+use crate::support::{root, trupose};
 use serde_json::Value;
-
-fn trupose(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_trupose"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
 
 fn json(arguments: &[&str]) -> Value {
     let output = trupose(&[arguments, &["--json"]].concat());
@@ -199,7 +183,7 @@ fn measured_poses_stay_in_and_new_ones_complete_them() {
 #[test]
 fn bad_requests_are_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
-    let profile = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("profiles/soochow.ron")).unwrap();
+    let profile = fs::read_to_string(root().join("profiles/soochow.ron")).unwrap();
     let inside = folder.path().join("inside.ron");
     fs::write(&inside, profile.replace("position_mm: (3500.0, 0.0, 1000.0)", "position_mm: (0.0, 0.0, 300.0)"))
         .unwrap();

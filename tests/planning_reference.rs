@@ -3,21 +3,17 @@
 //!
 //! Budgets are numbers of starts and sweeps, not clocks; times are printed for the reader (`--nocapture`).
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "clippy's exception for tests does not reach their helpers"
-)]
-
-mod support;
+#![expect(clippy::print_stdout, reason = "clippy's exception for tests does not reach their helpers")]
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use crate::support::paper_case::{
+    measure, normal, paper_chain, paper_parameters, paper_target, random_configurations, seeded,
+};
 use nalgebra::DVector;
 use rand::seq::SliceRandom as _;
-use support::{measure, normal, paper_chain, paper_parameters, paper_target, random_configurations, seeded};
 use trupose::identification::verification::ModelErrors;
 use trupose::identification::{
     ArmModel, Estimator, Observability, Observations, PointSample, Prior, Problem, Settings, SigmaSource, TargetAt,

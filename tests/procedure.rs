@@ -1,7 +1,5 @@
 //! The procedure of a calibration on data in memory, as the wizard uses it.
 
-#![expect(clippy::unwrap_used, reason = "a failure of a test is a panic")]
-
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

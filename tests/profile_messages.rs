@@ -2,13 +2,14 @@
 //!
 //! Files whose name begins with `warning` can be used all the same.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::support::root;
 use proptest::prelude::*;
 use trupose::profile::{Profile, Severity, builtin, check_text};
 
 fn invalid_profiles() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/profiles/invalid");
+    let folder = root().join("tests/profiles/invalid");
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
         .into_iter()
         .flatten()

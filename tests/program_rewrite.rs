@@ -1,7 +1,5 @@
 //! Robot programs of every dialect with their joint targets replaced: everything else byte by byte as it was.
 
-#![expect(clippy::unwrap_used, reason = "a failure of a test is a panic")]
-
 use jiff::civil::date;
 use trupose::profile::{Profile, builtin};
 use trupose::program::rewrite::{Scan, rewrite, scan};

@@ -1,7 +1,5 @@
 //! Robot programs: snapshots of every dialect, joint values read back out of the text, refusals.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail as tests do")]
-
 use jiff::civil::date;
 use trupose::profile::{Profile, builtin};
 use trupose::program::{Dialect, Options, Pause, Program, ProgramError, Robot, write};

@@ -1,20 +1,12 @@
 //! The report: its numbers are those of the journal, nothing foreign becomes markup, nothing refers to the outside, and every
 //! session has one, however little is in it.
 
-#![expect(
-    clippy::panic,
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    clippy::indexing_slicing,
-    clippy::string_slice,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
+#![expect(clippy::indexing_slicing, reason = "a failure of a test is a panic; test files need no atomic writes")]
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
 use std::sync::LazyLock;
 
+use crate::support::{trupose, trupose_in};
 use serde_json::Value;
 use trupose::procedure::deliver::{data_files, files, reports};
 use trupose::profile::builtin;
@@ -43,15 +35,11 @@ struct Calibrated {
     journal: Journal,
 }
 
-fn trupose(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_trupose")).current_dir(folder).args(arguments).output().unwrap()
-}
-
 static CALIBRATED: LazyLock<Calibrated> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("plan.csv"), include_str!("sessions/plan.csv")).unwrap();
     fs::write(folder.path().join("a.script.ron"), SCRIPT).unwrap();
-    let output = trupose(folder.path(), &["--script", "a.script.ron", "--no-recording"]);
+    let output = trupose_in(folder.path(), &["--script", "a.script.ron", "--no-recording"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let journal = read_journal(&folder.path().join("sessions/s")).unwrap();
     Calibrated { folder, journal }
@@ -553,7 +541,7 @@ fn the_command_makes_the_same_report_anew() {
     let place = CALIBRATED.folder.path();
     let delivered = fs::read_to_string(place.join("sessions/s/report.json")).unwrap();
     fs::create_dir_all(place.join("again")).unwrap();
-    let output = trupose(place, &["session", "report", "sessions/s", "--out", "again/mine.html"]);
+    let output = trupose_in(place, &["session", "report", "sessions/s", "--out", "again/mine.html"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(said, "written: again/mine.json\nwritten: again/mine.html\n");
@@ -566,7 +554,7 @@ fn the_command_makes_the_same_report_anew() {
     };
     assert_eq!(read(&fs::read_to_string(place.join("again/mine.json")).unwrap()), read(&delivered));
     check_page(&fs::read_to_string(place.join("again/mine.html")).unwrap());
-    let output = trupose(place, &["session", "report", "nowhere"]);
+    let output = trupose_in(place, &["session", "report", "nowhere"]);
     assert_ne!(output.status.code(), Some(0));
 }
 
@@ -574,7 +562,7 @@ fn the_command_makes_the_same_report_anew() {
 fn the_report_is_printed_as_plain_text() {
     let place = CALIBRATED.folder.path();
     let before = fs::read_dir(place.join("sessions/s")).unwrap().count();
-    let output = trupose(place, &["session", "report", "sessions/s", "--text"]);
+    let output = trupose_in(place, &["session", "report", "sessions/s", "--text"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stderr.is_empty());
     let said = String::from_utf8(output.stdout).unwrap();
@@ -586,18 +574,17 @@ fn the_report_is_printed_as_plain_text() {
     assert!(said.chars().all(|c| c == '\n' || !c.is_control()), "{said:?}");
     assert!(said.lines().all(|line| line.chars().count() <= 80), "{said}");
     assert_eq!(fs::read_dir(place.join("sessions/s")).unwrap().count(), before);
-    let output = trupose(place, &["session", "report", "sessions/s", "--text", "--out", "x.html"]);
+    let output = trupose_in(place, &["session", "report", "sessions/s", "--text", "--out", "x.html"]);
     assert_eq!(output.status.code(), Some(2));
 }
 
 #[test]
 fn identify_writes_both_reports() {
     let folder = tempfile::tempdir().unwrap();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let out = folder.path().join("r");
     let arguments = ["identify", "--profile", "soochow", "--measurements", "sessions/soochow-example/measurements.csv"];
     let verify = ["--verify", "sessions/soochow-example/verification.csv", "--out", out.to_str().unwrap()];
-    let output = trupose(root, &[&arguments[..], &verify].concat());
+    let output = trupose(&[&arguments[..], &verify].concat());
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let html = fs::read_to_string(out.join("report.html")).unwrap();
     check_page(&html);

@@ -1,29 +1,15 @@
 //! Scripts through the whole program: every script that is shipped, the demo's transcript, what fails and how, recorded data.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; test files need no atomic writes"
-)]
-
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
+use std::process::Output;
 
+use crate::support::{root, text, trupose_in};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Runs the program in `folder`, which keeps its sessions.
-fn trupose(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_trupose")).current_dir(folder).args(arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
-
 fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions").join(name)
+    root().join("sessions").join(name)
 }
 
 /// A script written to a temporary folder, and its run there.
@@ -32,7 +18,7 @@ fn run_script(script: &str, more: &[&str]) -> (TempDir, Output) {
     fs::write(folder.path().join("test.script.ron"), script).unwrap();
     let mut arguments = vec!["--script", "test.script.ron"];
     arguments.extend(more);
-    let output = trupose(folder.path(), &arguments);
+    let output = trupose_in(folder.path(), &arguments);
     (folder, output)
 }
 
@@ -69,7 +55,7 @@ fn every_shipped_script_that_needs_no_data_passes_and_says_nothing_on_stderr() {
             continue;
         }
         let folder = tempfile::tempdir().unwrap();
-        let output = trupose(folder.path(), &["--script", shipped(&name).to_str().unwrap()]);
+        let output = trupose_in(folder.path(), &["--script", shipped(&name).to_str().unwrap()]);
         assert_eq!(
             (output.status.code(), text(&output.stderr)),
             (Some(0), String::new()),
@@ -83,7 +69,7 @@ fn every_shipped_script_that_needs_no_data_passes_and_says_nothing_on_stderr() {
 fn the_demo_gives_the_same_transcript_for_the_same_seed() {
     let run = |seed: &str| {
         let folder = tempfile::tempdir().unwrap();
-        let output = trupose(folder.path(), &["demo", "--seed", seed]);
+        let output = trupose_in(folder.path(), &["demo", "--seed", seed]);
         assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
         let calibration = fs::read_to_string(folder.path().join("sessions/demo/calibration.ron")).unwrap();
         let journal = fs::read_to_string(folder.path().join("sessions/demo/journal.ron")).unwrap();
@@ -188,7 +174,7 @@ fn what_was_done_can_be_recorded_and_played_again() {
     let (folder, output) =
         run_script(&planned("CaptureAll(Fail), Do(Next), Do(Identify)"), &["--record-script", "again.script.ron"]);
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
-    let again = trupose(folder.path(), &["--script", "again.script.ron"]);
+    let again = trupose_in(folder.path(), &["--script", "again.script.ron"]);
     assert_eq!((again.status.code(), text(&again.stderr)), (Some(0), String::new()));
     let tables =
         |output: &Output| text(&output.stdout).split_once("\nIdentification of").unwrap().1.replace("test-2", "test");
@@ -202,7 +188,7 @@ fn the_poses_of_a_file_can_be_the_plan() {
     fs::write(folder.path().join("few.csv"), plan).unwrap();
     let steps = "Do(LoadPlan(\"few.csv\")), Do(AcceptPlan), CaptureAll(Fail), Blocked(Next, \"1 of at least 9 identification poses\")";
     fs::write(folder.path().join("test.script.ron"), begun(steps)).unwrap();
-    let output = trupose(folder.path(), &["--script", "test.script.ron"]);
+    let output = trupose_in(folder.path(), &["--script", "test.script.ron"]);
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
 }
 
@@ -213,7 +199,7 @@ fn a_calibration_with_a_found_smr_verifies_its_own_measurements() {
     let text_of = fs::read_to_string(script).unwrap();
     let with_files = text_of.replace("    ],\n)", "        Do(Next),\n        Do(Deliver),\n    ],\n)");
     fs::write(folder.path().join("test.script.ron"), with_files).unwrap();
-    let output = trupose(folder.path(), &["--script", "test.script.ron"]);
+    let output = trupose_in(folder.path(), &["--script", "test.script.ron"]);
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
     let arguments = [
         "verify",
@@ -225,7 +211,7 @@ fn a_calibration_with_a_found_smr_verifies_its_own_measurements() {
         "kind == 'verification'",
         "--json",
     ];
-    let verified = trupose(folder.path(), &arguments);
+    let verified = trupose_in(folder.path(), &arguments);
     let verified: Value = serde_json::from_str(&text(&verified.stdout)).unwrap();
     let report = fs::read_to_string(folder.path().join("sessions/circles/report.json")).unwrap();
     let report: Value = serde_json::from_str(&report).unwrap();
@@ -236,8 +222,7 @@ fn a_calibration_with_a_found_smr_verifies_its_own_measurements() {
 
 /// The measured data, if they are here.
 fn measured_data() -> Option<PathBuf> {
-    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
     folder.join("ur5/grid.csv").is_file().then(|| folder.canonicalize().unwrap())
 }
 
@@ -251,7 +236,7 @@ fn recorded_data_give_the_same_numbers_as_identify() {
     let ur5 = data.join("ur5");
     let set = format!("data={}", ur5.display());
     let output =
-        trupose(folder.path(), &["--script", shipped("ur5-recorded.script.ron").to_str().unwrap(), "--set", &set]);
+        trupose_in(folder.path(), &["--script", shipped("ur5-recorded.script.ron").to_str().unwrap(), "--set", &set]);
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
     let report = fs::read_to_string(folder.path().join("sessions/ur5-recorded/report.json")).unwrap();
     let report: Value = serde_json::from_str(&report).unwrap();
@@ -268,7 +253,7 @@ fn recorded_data_give_the_same_numbers_as_identify() {
         random.to_str().unwrap(),
         "--json",
     ];
-    let direct: Value = serde_json::from_str(&text(&trupose(folder.path(), &arguments).stdout)).unwrap();
+    let direct: Value = serde_json::from_str(&text(&trupose_in(folder.path(), &arguments).stdout)).unwrap();
     for part in ["rank", "samples", "parameters", "rejected"] {
         compare(&report[part], &direct[part], part);
     }

@@ -2,18 +2,6 @@
 //!
 //! A run is paused where a test wants it by a `Say` that is longer than a pipe holds: nothing here waits for time to pass.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    reason = "a failure of a test is a panic; what is skipped is said; test files need no atomic writes"
-)]
-#![cfg(unix)]
-
-#[path = "support/place.rs"]
-mod place;
-#[path = "support/small_disk.rs"]
-mod small_disk;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -21,11 +9,12 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Output, Stdio};
 
-use place::Place;
+use crate::support::place::Place;
+use crate::support::small_disk::SmallDisk;
+use crate::support::{PROGRAM, text};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use small_disk::SmallDisk;
 use trupose::session::journal::{Entry, Journal, Line, Sum, encode};
 use trupose::session::set_up::Step;
 use trupose::session::state::Session;
@@ -80,20 +69,20 @@ fn long_say() -> String {
 }
 
 impl Place {
-    fn write_script(&self, name: &str, steps: &[String]) -> String {
+    fn write_steps(&self, name: &str, steps: &[String]) -> String {
         fs::write(self.path(name), script_of(Some("2026-01-05T08:00:00Z"), steps)).unwrap();
         name.to_owned()
     }
 
     /// Runs a script to its end.
-    fn script(&self, steps: &[String]) -> Output {
-        let script = self.write_script("run.script.ron", steps);
+    fn run_steps(&self, steps: &[String]) -> Output {
+        let script = self.write_steps("run.script.ron", steps);
         self.run(&["--script", &script, "--json", "--no-recording"])
     }
 
     /// Goes on with a session by a script.
     fn resume(&self, folder: &str, steps: &[String]) -> Output {
-        let script = self.write_script("rest.script.ron", steps);
+        let script = self.write_steps("rest.script.ron", steps);
         self.run(&["resume", folder, "--script", &script, "--json", "--no-recording"])
     }
 
@@ -112,7 +101,7 @@ impl Place {
     /// A run that is paused behind `before`, with what it has written until then.
     fn pause(&self, before: &[&str]) -> Paused {
         let say = long_say();
-        let script = self.write_script("run.script.ron", &paused(&[before, &[&say]].concat()));
+        let script = self.write_steps("run.script.ron", &paused(&[before, &[&say]].concat()));
         Paused::start(self.command(&["--script", &script, "--json", "--no-recording"]))
     }
 }
@@ -134,10 +123,6 @@ fn checked(folder: &Path) -> (Journal, Session) {
     let rows: Vec<usize> = session.counted().map(|sample| sample.row).collect();
     assert_eq!(rows.iter().collect::<BTreeSet<_>>().len(), rows.len(), "a row counts twice: {rows:?}");
     (journal, session)
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 /// Records of a transcript; a line that was cut is none.
@@ -216,7 +201,7 @@ impl Paused {
 /// An uninterrupted run.
 fn finished() -> Place {
     let place = Place::new();
-    let output = place.script(&whole());
+    let output = place.run_steps(&whole());
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert!(everything_saved_is_there(&output.stdout, &place.session()) > POSES);
     place
@@ -237,12 +222,12 @@ fn kill_at_random(seed: u64, kills: usize, expected: &str) -> (usize, BTreeSet<u
             let step = journal.as_ref().map_or(Step::Profile, |journal| Session::of(journal).unwrap().step);
             let before = journal.as_ref().map_or(0, |journal| journal.lines.len());
             let command = if journal.is_some() {
-                let script = place.write_script("rest.script.ron", &from_step(step));
+                let script = place.write_steps("rest.script.ron", &from_step(step));
                 place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"])
             } else {
                 // Killed before anything was saved: there is nothing to go on with.
                 drop(fs::remove_dir_all(place.session()));
-                let script = place.write_script("run.script.ron", &whole());
+                let script = place.write_steps("run.script.ron", &whole());
                 place.command(&["--script", &script, "--json", "--no-recording"])
             };
             let mut running = Paused::start(command);
@@ -274,7 +259,7 @@ fn kill_at_random(seed: u64, kills: usize, expected: &str) -> (usize, BTreeSet<u
             if place.session().exists() {
                 folder = "sessions/s-2";
             }
-            assert_eq!(place.script(&whole()).status.code(), Some(0));
+            assert_eq!(place.run_steps(&whole()).status.code(), Some(0));
             assert_eq!(place.measurements(folder), expected);
             continue;
         }
@@ -353,7 +338,7 @@ fn a_session_that_is_open_in_another_process_is_refused_with_its_number() {
 fn many_processes_at_once_work_on_a_session_one_after_the_other() {
     let place = Place::new();
     place.pause(&["Capture(2, Fail)"]).until_measured(2).kill();
-    let script = place.write_script("rest.script.ron", &["Capture(1, Fail)".to_owned()]);
+    let script = place.write_steps("rest.script.ron", &["Capture(1, Fail)".to_owned()]);
     let run =
         || Paused::start(place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"]));
     let running: Vec<Paused> = (0..8).map(|_| run()).collect();
@@ -374,7 +359,7 @@ fn many_processes_at_once_work_on_a_session_one_after_the_other() {
 #[test]
 fn many_new_sessions_of_one_name_get_a_folder_each() {
     let place = Place::new();
-    let script = place.write_script("run.script.ron", &whole()[..3]);
+    let script = place.write_steps("run.script.ron", &whole()[..3]);
     let running: Vec<Paused> =
         (0..6).map(|_| Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]))).collect();
     for program in running {
@@ -421,7 +406,7 @@ fn a_signal_at_any_moment_leaves_a_session_that_goes_on() {
     let expected = finished().measurements("sessions/s");
     for (index, (name, number, _)) in (0..24).zip(SIGNALS.into_iter().cycle()) {
         let place = Place::new();
-        let script = place.write_script("run.script.ron", &whole());
+        let script = place.write_steps("run.script.ron", &whole());
         let mut running = Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]));
         // The first line comes when signals are watched.
         running.read_lines(1 + index * 2);
@@ -476,11 +461,8 @@ fn a_journal_that_cannot_grow_stops_the_run_and_goes_on_later() {
     // In blocks of 512 bytes. The files of a result are smaller than the journal.
     for blocks in (1..full / 512).step_by(3) {
         let place = Place::new();
-        let script = place.write_script("run.script.ron", &whole());
-        let limited = format!(
-            "trap '' XFSZ; ulimit -f {blocks}; exec '{}' --script {script} --json",
-            env!("CARGO_BIN_EXE_trupose")
-        );
+        let script = place.write_steps("run.script.ron", &whole());
+        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{}' --script {script} --json", PROGRAM);
         let output = Command::new("sh").args(["-c", &limited]).current_dir(place.0.path()).output().unwrap();
         says_what_is_safe(&place, &output, "File too large");
         stopped += 1;
@@ -497,7 +479,7 @@ fn a_reader_that_goes_away_costs_nothing_that_was_saved() {
     let expected = finished().measurements("sessions/s");
     for lines in [1, 12, 20, 30] {
         let place = Place::new();
-        let script = place.write_script("run.script.ron", &whole());
+        let script = place.write_steps("run.script.ron", &whole());
         let mut running = Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]));
         assert!(running.read_lines(lines));
         let Paused { mut child, out, seen, .. } = running;
@@ -522,12 +504,12 @@ fn a_full_disk_stops_the_run_and_goes_on_when_there_is_room() {
         let Some(disk) = SmallDisk::mount(place.path("sessions"), 1024, test) else { return };
         let ballast = disk.0.join("ballast");
         fs::write(&ballast, vec![0; (1024 - room) * 1024]).unwrap();
-        let output = place.script(&whole());
+        let output = place.run_steps(&whole());
         says_what_is_safe(&place, &output, "No space left on device");
         fs::remove_file(&ballast).unwrap();
         if read_journal(&place.session()).is_err() {
             // Nothing was measured: begun anew, under the same name if the folder could not be made either.
-            assert_eq!(place.script(&whole()).status.code(), Some(0));
+            assert_eq!(place.run_steps(&whole()).status.code(), Some(0));
             continue;
         }
         place.complete("sessions/s");
@@ -646,7 +628,7 @@ fn a_damaged_session_does_not_hide_the_others() {
         ("missing", "it has no journal.ron"),
     ] {
         let folder = format!("sessions/{name}");
-        let script = place.write_script("rest.script.ron", &[]);
+        let script = place.write_steps("rest.script.ron", &[]);
         for arguments in [
             &["session", "show", &folder][..],
             &["session", "show", &folder, "--json"],

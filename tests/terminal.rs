@@ -2,27 +2,14 @@
 //!
 //! What is looked for is stable: the step in the header, `saved`, what a key does.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::disallowed_methods,
-    clippy::panic,
-    reason = "a failure of a test is a panic; deadlines need a clock; test files need no atomic writes"
-)]
-#![cfg(target_os = "linux")]
-
-#[path = "support/place.rs"]
-mod place;
-#[path = "support/pty.rs"]
-#[expect(dead_code, reason = "some of it is for the benchmark")]
-mod pty;
-
 use std::fs;
 use std::time::Duration;
 
-use place::Place;
+use crate::support::PROGRAM;
+use crate::support::place::Place;
+use crate::support::pty::{CTRL_U, CTRL_Z, ENTER, PATIENCE, Terminal, processor_seconds};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
-use pty::{CTRL_U, CTRL_Z, ENTER, PATIENCE, Terminal, processor_seconds};
 use trupose::session::journal::Entry;
 use trupose::session::set_up::Step;
 use trupose::session::state::Session;
@@ -59,8 +46,7 @@ impl Place {
     /// The wizard in a terminal, with the first step shown.
     fn wizard(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Terminal {
         let arguments = [&["wizard", "--profile", "soochow"], arguments].concat();
-        let program = env!("CARGO_BIN_EXE_trupose");
-        let terminal = Terminal::start_with(self.0.path(), program, &arguments, SIZE, variables);
+        let terminal = Terminal::start_with(self.0.path(), PROGRAM, &arguments, SIZE, variables);
         terminal.wait_for_step(1);
         terminal
     }
@@ -107,8 +93,7 @@ fn is_given_back(terminal: &Terminal) {
 fn the_whole_calibration_is_walked_by_keys() {
     let place = Place::new();
     // The program sees the modes as the shell has set them: so they must be when it has ended.
-    let program = env!("CARGO_BIN_EXE_trupose");
-    let line = format!("stty -a; '{program}' wizard --profile soochow; echo \"code $?\"; stty -a; echo over");
+    let line = format!("stty -a; '{PROGRAM}' wizard --profile soochow; echo \"code $?\"; stty -a; echo over");
     let mut terminal = Terminal::start_with(place.0.path(), "bash", &["-c", &line], SIZE, &[]);
     terminal.wait_for_step(1);
     assert!(terminal.look(|shown| shown.screen().alternate_screen() && shown.screen().hide_cursor()));
@@ -195,9 +180,8 @@ fn sigterm_closes_the_session_and_gives_the_terminal_back() {
 #[test]
 fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
     let place = Place::new();
-    let program = env!("CARGO_BIN_EXE_trupose");
     let line = format!(
-        "set -m; '{program}' wizard --profile soochow; echo stopped; stty -a; read answer; fg >/dev/null; echo \"code $?\"; stty -a"
+        "set -m; '{PROGRAM}' wizard --profile soochow; echo stopped; stty -a; read answer; fg >/dev/null; echo \"code $?\"; stty -a"
     );
     let mut terminal = Terminal::start_with(place.0.path(), "bash", &["-c", &line], SIZE, &[]);
     terminal.wait_for_step(1);

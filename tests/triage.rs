@@ -2,12 +2,13 @@
 //! here is what `docs/triage.md` promises; `cargo test --test triage -- --nocapture` prints its tables.
 //! `TRUPOSE_TRIAGE_SESSIONS` sets the number of sessions per row.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a failure of a test is a panic; the tables are printed")]
+#![expect(clippy::print_stdout, reason = "a failure of a test is a panic; the tables are printed")]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::support::root;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -346,8 +347,7 @@ const COLUMN_X: usize = 7;
 /// A real arm is less perfect than its tracker; it must not raise an alarm at every point.
 #[test]
 fn a_measured_ur5_is_left_alone() {
-    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
     let file = folder.join("ur5/grid.csv");
     let Ok(text) = std::fs::read_to_string(&file) else {
         println!("SKIPPED: no measured data ({} is not there)", file.display());

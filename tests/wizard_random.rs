@@ -3,7 +3,6 @@
 //!
 //! More events: raise [`SEEDS`] or [`EVENTS`]; the streams of the present seeds stay the same.
 
-#![expect(clippy::unwrap_used, reason = "a failure of a test is a panic")]
 #![expect(clippy::print_stderr, reason = "a failure names its seed")]
 
 use std::ops::ControlFlow;

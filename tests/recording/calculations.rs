@@ -3,14 +3,15 @@
 use std::fs;
 use std::path::Path;
 
+use crate::support::text;
 use trupose::recording;
 use trupose::session::state::Session;
 
-use crate::content::{TEMPERATURES, compare_frames, enlarged, opens_on, views};
-use crate::crashes::{one_by_one, torn_part};
-use crate::place::Place;
-use crate::reading::{numbers, results, rows};
-use crate::running::{begun, recorded, session_of, succeeded, text};
+use super::content::{TEMPERATURES, compare_frames, enlarged, opens_on, views};
+use super::crashes::{one_by_one, torn_part};
+use super::reading::{numbers, results, rows};
+use super::running::{begun, recorded, session_of, succeeded};
+use crate::support::place::Place;
 
 #[test]
 fn an_identification_from_files_is_recorded() {

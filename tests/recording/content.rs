@@ -13,9 +13,9 @@ use trupose::session::journal::{Entry, Journal, PointErrorText};
 use trupose::session::plan::PoseKind;
 use trupose::session::state::Session;
 
-use crate::place::Place;
-use crate::reading::{SINGLE, assert_near, assert_points, content, frames, messages, numbers, results, rows};
-use crate::running::{RESULT, begun, eventful, plain, recorded, session_of, sliding, succeeded};
+use super::reading::{SINGLE, assert_near, assert_points, content, frames, messages, numbers, results, rows};
+use super::running::{RESULT, begun, eventful, plain, recorded, session_of, sliding, succeeded};
+use crate::support::place::Place;
 
 /// Every frame of `chain` at every sample.
 pub(super) fn compare_frames(path: &Path, session: &Session, entity: &str, arm: &str, chain: &KinematicChain) {

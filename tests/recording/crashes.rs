@@ -14,9 +14,9 @@ use trupose::recording;
 use trupose::session::state::Session;
 use trupose::store::session::read_journal;
 
-use crate::content::{compare_with_journal, compare_with_rebuilt};
-use crate::place::Place;
-use crate::running::{RESULT, begun, succeeded};
+use super::content::{compare_with_journal, compare_with_rebuilt};
+use super::running::{RESULT, begun, succeeded};
+use crate::support::place::Place;
 
 pub(super) struct Running {
     child: Child,

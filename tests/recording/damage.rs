@@ -3,26 +3,27 @@
 use std::fs;
 use std::io::{self, Write as _};
 use std::os::unix::fs::PermissionsExt as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use crate::support::{root, text};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use trupose::recording;
 use trupose::store::session::read_journal;
 
-use crate::content::{compare_with_journal, compare_with_rebuilt};
-use crate::crashes::{one_by_one, torn_part};
-use crate::place::Place;
-use crate::reading::content;
-use crate::running::{RESULT, begun, recorded, session_of, succeeded, text};
-use crate::small_disk::SmallDisk;
+use super::content::{compare_with_journal, compare_with_rebuilt};
+use super::crashes::{one_by_one, torn_part};
+use super::reading::content;
+use super::running::{RESULT, begun, recorded, session_of, succeeded};
+use crate::support::place::Place;
+use crate::support::small_disk::SmallDisk;
 
 #[test]
 fn torn_and_damaged_files_are_named_and_never_stop_the_program() {
     let place = Place::new();
     // Always the same bytes: one flipped bit of thousands asks the library for more memory than there is, and ends the program.
-    let whole = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/example/recording.rrd")).unwrap();
+    let whole = fs::read(root().join("sessions/example/recording.rrd")).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let file = place.path("damaged.rrd");
     let mut unwhole = 0;
@@ -66,7 +67,7 @@ fn torn_and_damaged_files_are_named_and_never_stop_the_program() {
 #[test]
 fn what_is_damaged_is_not_made_compact() {
     let place = Place::new();
-    let whole = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/example/recording.rrd")).unwrap();
+    let whole = fs::read(root().join("sessions/example/recording.rrd")).unwrap();
     let cut = whole[..whole.len() * 3 / 5].to_vec();
     assert!(cut.len() > 200_000, "it has lines of the journal");
     let mut flipped = whole.clone();
@@ -93,7 +94,7 @@ fn what_is_damaged_is_not_made_compact() {
     // Beside the journal there is no need for what is damaged.
     let session = place.session();
     fs::create_dir_all(&session).unwrap();
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/example");
+    let example = root().join("sessions/example");
     fs::copy(example.join("journal.ron"), session.join("journal.ron")).unwrap();
     fs::copy(place.path("cut.rrd"), place.recording()).unwrap();
     assert_eq!(place.check().0, Some(1));

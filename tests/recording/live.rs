@@ -7,11 +7,12 @@ use std::path::PathBuf;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
+use crate::support::text;
 use trupose::recording;
 
-use crate::place::Place;
-use crate::reading::content;
-use crate::running::{begun, plain, recorded, succeeded, text};
+use super::reading::content;
+use super::running::{begun, plain, recorded, succeeded};
+use crate::support::place::Place;
 
 /// A port that was free a moment ago.
 pub(super) fn free_port() -> u16 {

@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use crate::support::text;
 use trupose::recording;
 use trupose::session::journal::Journal;
 use trupose::session::state::Session;
 use trupose::store::session::read_journal;
 
-use crate::place::Place;
+use crate::support::place::Place;
 
 impl Place {
     pub(super) fn recording(&self) -> PathBuf {
@@ -36,10 +37,6 @@ impl Place {
         let output = self.run(&["record", "check", path]);
         (output.status.code(), text(&output.stdout))
     }
-}
-
-pub(super) fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 pub(super) fn succeeded(output: &Output) {

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
+use super::command;
+
 /// A folder in which the program runs; `plan.csv` is in it.
 pub(crate) struct Place(pub(crate) tempfile::TempDir);
 
@@ -24,8 +26,8 @@ impl Place {
     }
 
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_trupose"));
-        command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
+        let mut command = command(self.0.path(), arguments);
+        command.stdin(Stdio::null());
         command
     }
 
