@@ -25,7 +25,7 @@ use crate::cli::{Cli, Command, EstimationArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::Weighting;
 use crate::procedure::EstimationSettings;
-use crate::session::printable;
+use crate::text::printable;
 use crate::units::from_mm;
 
 /// Where a command prints: data to `out`, everything else to `err`.

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fmt;
 use std::process::ExitCode;
 
-use crate::session::printable;
+use crate::text::printable;
 
 /// How a command ended, with the exit code of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -24,7 +24,7 @@ mod table;
 pub mod targets;
 pub mod wire;
 
-pub use table::{Defect, TableErrors, TableProblem, printable};
+pub use table::{Defect, TableErrors, TableProblem};
 
 use sha2::{Digest as _, Sha256};
 

@@ -15,9 +15,9 @@ use crate::kinematics::{Joint, KinematicChain};
 use crate::model::{CalibratedArm, from_roll_pitch_yaw};
 use crate::procedure::joint_types;
 use crate::profile::Target;
-use crate::session::printable;
 use crate::session::targets::{TargetGoal, decimal, quoted, read_bytes};
 use crate::store;
+use crate::text::printable;
 use crate::units::{to_deg, to_mm};
 
 /// Places that are named one by one.

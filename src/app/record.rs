@@ -135,7 +135,7 @@ fn check_one<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Re
         .lines
         .iter()
         .filter(|line| !lines.contains(&line.number))
-        .map(|line| format!("{:>5} {}", line.number, crate::session::printable(&line.entry.describe())))
+        .map(|line| format!("{:>5} {}", line.number, crate::text::printable(&line.entry.describe())))
         .collect();
     if is_foreign {
         console.print(&format!(

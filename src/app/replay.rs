@@ -9,10 +9,11 @@ use crate::cli::{ReplayArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
 use crate::recording;
 use crate::report;
+use crate::session::export;
 use crate::session::journal::Journal;
 use crate::session::state::{SampleState, Session};
-use crate::session::{export, printable};
 use crate::store::session::read_journal;
+use crate::text::printable;
 use crate::tui::replay::{self, Replay};
 use crate::units::to_mm;
 

@@ -12,10 +12,10 @@ use crate::report::identification_text;
 use crate::session::export;
 use crate::session::journal::{Journal, instrument_text, target_text};
 use crate::session::plan::PoseKind;
-use crate::session::printable;
 use crate::session::state::{SampleState, Session};
 use crate::store;
 use crate::store::session::{folders, read_journal};
+use crate::text::printable;
 
 pub(super) fn run<O: Write, E: Write>(
     command: &SessionCommand,

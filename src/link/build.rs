@@ -61,7 +61,7 @@ fn read<T: DeserializeOwned + Default>(options: Option<&str>) -> Result<T, Strin
     ron::Options::default()
         .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
         .from_str(text)
-        .map_err(|error| format!("the options '{}' of the link: {error}", crate::session::printable(text)))
+        .map_err(|error| format!("the options '{}' of the link: {error}", crate::text::printable(text)))
 }
 
 /// The protocol of an address. `options` is the name of a preset or a RON struct of what differs from the usual.

@@ -10,8 +10,8 @@ use super::{Link, LinkError};
 use crate::kinematics::JointType;
 use crate::profile::Profile;
 use crate::session::measurements::{Layout, Measurements, Row, read_bytes_as};
-use crate::session::printable;
 use crate::session::reading::{MeasureRequest, Reading};
+use crate::text::printable;
 use crate::units::{DEGREE, MICROMETRE};
 
 /// Joint values differ by no more than this at the same pose: 0.001° (rad), 1 µm (m).

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::transforms::{number, roll_pitch_yaw};
 use crate::kinematics::{Convention, Joint, JointType, KinematicChain};
 use crate::profile::{ExpectedDeviations, JointRange, Profile, Target};
-use crate::session::printable;
+use crate::text::printable;
 use crate::units::{MICROMETRE, MILLIRADIAN, Quantity, to_deg, to_mm};
 
 /// What stands at the top of every profile and about its arm.

@@ -8,7 +8,7 @@ use super::ModelError;
 use super::transforms::{JointFrames, from_roll_pitch_yaw, is_coupled, number, roll_pitch_yaw, screw_z};
 use crate::kinematics::{Convention, Joint, JointType, KinematicChain, Link};
 use crate::profile::Target;
-use crate::session::printable;
+use crate::text::printable;
 use crate::units::{from_deg, from_mm, to_deg, to_mm};
 
 /// Version of the layout of the JSON.

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::transforms::{from_roll_pitch_yaw, motion};
 use crate::kinematics::JointType;
-use crate::session::printable;
+use crate::text::printable;
 
 /// What is wrong with a URDF.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -13,7 +13,7 @@ use super::transforms::{JointFrames, is_coupled, link_values, number, roll_pitch
 use super::urdf::{Urdf, UrdfChain, UrdfJoint, UrdfJointType};
 use crate::kinematics::{ForwardKinematics, JointType, KinematicChain};
 use crate::profile::JointRange;
-use crate::session::printable;
+use crate::text::printable;
 use crate::units::{MILLIMETRE, MILLIRADIAN, to_deg, to_mm};
 
 /// Link names of a fresh URDF.

@@ -3,8 +3,9 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::diagnostic::{Findings, Span, is_printable};
+use super::diagnostic::{Findings, Span};
 use super::syntax::{Ast, Field, Node, shortened};
+use crate::text::is_printable;
 use crate::units::Quantity;
 
 /// The fields of a struct, after unknown and repeated ones were reported.

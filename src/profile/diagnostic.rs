@@ -6,6 +6,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::text::printable;
+
 /// Widest message line (characters).
 const WIDTH: usize = 80;
 /// Characters of a source line that are shown.
@@ -192,18 +194,6 @@ fn cut(line: &str, indent: usize, carets: usize) -> (String, usize, usize) {
         shown.push_str("...");
     }
     (shown, indent - first + shift, carets.min(last.saturating_sub(indent)).max(1))
-}
-
-/// A text from outside made fit for a terminal: control characters and marks that reorder text become `?`.
-pub(super) fn printable(text: &str) -> String {
-    text.chars().map(|character| if is_printable(character) { character } else { '?' }).collect()
-}
-
-/// Whether a character stays in its place in a terminal line.
-pub(super) fn is_printable(character: char) -> bool {
-    let reorders =
-        matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
-    !character.is_control() && !reorders
 }
 
 /// Lines of at most `width` characters, broken at spaces.

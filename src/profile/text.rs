@@ -5,6 +5,7 @@
 use super::diagnostic::{joined, wrapped};
 use super::{Diagnostic, JointRange, Level, PARALLEL_TOLERANCE, Profile, ProfileErrors};
 use crate::kinematics::{Convention, Joint, JointType};
+use crate::text::printable;
 use crate::units::{Quantity, to_deg, to_mm};
 
 /// Widest line (characters).
@@ -49,7 +50,7 @@ pub fn check_text(file_name: &str, outcome: &Result<(Profile, Vec<Diagnostic>), 
     if !diagnostics.is_empty() {
         text.push_str("\n\n");
     }
-    let file = super::diagnostic::printable(file_name);
+    let file = printable(file_name);
     let (errors, warnings) = (counted(errors, "error"), counted(diagnostics.len() - errors, "warning"));
     format!("{text}{file}: {verdict}: {errors}, {warnings}\n")
 }

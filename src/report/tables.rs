@@ -1,6 +1,6 @@
 //! Numbers and paragraphs laid out for 80 columns.
 
-use crate::session::printable;
+use crate::text::printable;
 
 /// Width of a report.
 pub(super) const WIDTH: usize = 80;

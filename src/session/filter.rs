@@ -20,7 +20,7 @@ use std::cmp::Ordering;
 
 use thiserror::Error;
 
-use super::table::printable;
+use crate::text::printable;
 
 /// A condition on the cells of a row.
 #[derive(Clone, Debug, PartialEq)]

@@ -14,7 +14,9 @@ mod problem;
 pub(super) use columns::{Header, Measure, NumberColumn};
 pub(super) use encoding::decode;
 pub(super) use number::Numbers;
-pub use problem::{Defect, TableErrors, TableProblem, printable};
+pub use problem::{Defect, TableErrors, TableProblem};
+
+use crate::text::printable;
 
 /// One line of a table, split into cells.
 #[derive(Debug)]

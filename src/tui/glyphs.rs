@@ -2,7 +2,7 @@
 
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 
-use crate::session::printable;
+use crate::text::printable;
 
 /// Which characters the terminal can show. Decided once, at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

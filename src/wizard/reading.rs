@@ -152,7 +152,7 @@ fn strip_name<'a>(word: &'a str, axes: &mut String) -> &'a str {
 /// The beginning of what was typed.
 fn short(text: &str) -> String {
     let words: Vec<&str> = text.split_whitespace().collect();
-    let text = crate::session::printable(&words.join(" "));
+    let text = crate::text::printable(&words.join(" "));
     match text.char_indices().nth(LONGEST_QUOTED) {
         Some((end, _)) => format!("{}…", text.get(..end).unwrap_or_default().trim_end()),
         None => text,

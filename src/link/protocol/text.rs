@@ -1,6 +1,6 @@
 //! Texts of a peer on their way to a screen.
 
-use crate::session::printable;
+use crate::text::printable;
 
 /// Longest part of a text that stands in a message (characters).
 const LONGEST: usize = 60;

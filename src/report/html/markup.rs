@@ -1,7 +1,7 @@
 //! Text, numbers and tables as HTML. Nothing foreign gets in but through [`escape`]; nothing refers to the outside.
 
 use crate::report::tables::fixed;
-use crate::session::printable;
+use crate::text::printable;
 
 /// Stands for a number that is not there or not finite.
 pub(super) const NONE: &str = "–";

@@ -4,7 +4,7 @@ use std::iter::Peekable;
 use std::vec::IntoIter;
 
 use super::{Condition, FilterError, Operator};
-use crate::session::table::printable;
+use crate::text::printable;
 
 /// Parentheses and `not` inside each other: far more than anyone writes, far less than the stack holds.
 const MAX_DEPTH: usize = 50;

@@ -164,7 +164,7 @@ pub fn instrument_text(instrument: &InstrumentChoice) -> String {
         InstrumentChoice::Linked(LinkChoice { address, robot, is_automatic, .. }) => {
             let robot = robot.as_ref().map_or_else(String::new, |robot| format!(", robot {robot}"));
             let by_itself = if *is_automatic { ", measuring by itself" } else { "" };
-            crate::session::printable(&format!("{address}{robot}{by_itself}"))
+            crate::text::printable(&format!("{address}{robot}{by_itself}"))
         }
         InstrumentChoice::Replay { sets } => {
             let files: Vec<&str> = sets.iter().map(|set| set.file.as_str()).collect();

@@ -55,6 +55,6 @@ impl FromStr for Layout {
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         let known = Self::ALL.into_iter().find(|layout| layout.name().eq_ignore_ascii_case(name));
-        known.ok_or_else(|| UnknownLayout { name: crate::session::table::printable(name) })
+        known.ok_or_else(|| UnknownLayout { name: crate::text::printable(name) })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Row, joint_names};
 use crate::kinematics::JointType;
-use crate::session::table::printable;
+use crate::text::printable;
 use crate::units::{Quantity, to_mm};
 
 /// Decimals of an angle in degrees: 0.02 nrad.

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::{Fault, FaultKind};
-use crate::session::table::printable;
+use crate::text::printable;
 use crate::units::Quantity;
 
 /// How each fault is written, the parts in brackets may be missing.

@@ -4,6 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::text::printable;
+
 /// Problems shown in a message; the others are counted.
 const SHOWN_PROBLEMS: usize = 20;
 
@@ -398,18 +400,6 @@ impl fmt::Display for TableErrors {
 }
 
 impl std::error::Error for TableErrors {}
-
-/// `text` with replacement characters for control characters and for the invisible ones that reorder a line.
-pub fn printable(text: &str) -> String {
-    if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
-        return text.to_owned();
-    }
-    let is_harmful = |c: char| {
-        c.is_control()
-            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
-    };
-    text.chars().map(|c| if is_harmful(c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
-}
 
 /// The beginning of a text, for a message.
 fn excerpt(text: &str) -> String {

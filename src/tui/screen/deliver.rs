@@ -74,7 +74,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
     };
     if content.files.is_empty() {
         let of = &content.about;
-        let said = |text: &str| if text.is_empty() { "-".to_owned() } else { crate::session::printable(text) };
+        let said = |text: &str| if text.is_empty() { "-".to_owned() } else { crate::text::printable(text) };
         page.paragraph(
             &format!(
                 "Report for: serial number {}, operator {}, place {}",

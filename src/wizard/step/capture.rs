@@ -203,7 +203,7 @@ impl CaptureStep {
         // Of those that are done the pose itself, not its repetitions for drift.
         let found = found.or_else(|| rows.iter().find(active)).or_else(|| rows.last()).copied();
         let Some(row) = found else {
-            let pose = crate::session::printable(pose);
+            let pose = crate::text::printable(pose);
             return vec![Action::Say(Notice::error(format!("there is no pose '{pose}' in the plan")))];
         };
         let is_skipped = session.rows.get(row).is_some_and(|row| row.skipped);
@@ -362,7 +362,7 @@ impl StepMachine for CaptureStep {
             }
             Intent::GoToPose(pose) => Self::go_to(&pose, session),
             Intent::Note(text) => {
-                let text = crate::session::printable(text.trim());
+                let text = crate::text::printable(text.trim());
                 let pose = self.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.pose.clone());
                 let entry = (!text.is_empty()).then_some(Entry::Note { pose, text });
                 entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()

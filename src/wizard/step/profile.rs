@@ -67,7 +67,7 @@ impl StepMachine for ProfileStep {
                     self.name = Some(name);
                     return Vec::new();
                 }
-                let name = crate::session::printable(&name);
+                let name = crate::text::printable(&name);
                 vec![Action::Say(
                     Notice::error(format!("'{name}' cannot be the name of a session"))
                         .hint("use up to 64 letters, digits, '-', '_' and '.', beginning with a letter or digit"),

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::super::unread::Unread;
 use super::status::{CommandId, MeasurementMode, PacketType, ResultStatus, SystemEvent};
-use crate::session::printable;
+use crate::text::printable;
 
 /// The smallest packet that exists (bytes).
 pub const MIN_PACKET: usize = 12;

@@ -4,7 +4,7 @@
 use thiserror::Error;
 
 use super::super::unread::Unread;
-use crate::session::printable;
+use crate::text::printable;
 
 /// The smallest packet: nothing but its header (bytes).
 pub const MIN_PACKET: usize = 3;
