@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{command, root, text, trupose};
+use crate::support::{command, root, skip, text, trupose};
 use clap::CommandFactory as _;
 use trupose::cli::Cli;
 
@@ -73,7 +73,7 @@ fn every_shell_completes_every_command() {
 #[test]
 fn the_completions_of_bash_are_a_script() {
     if !Path::new("/bin/bash").exists() {
-        eprintln!("skipped: there is no bash");
+        skip("there is no bash");
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -1,23 +1,10 @@
 //! Measured data of real robots, end to end through the program. The data are not part of this project: sources are named in the
 //! README. They are looked for in the folder `TRUPOSE_MEASURED_DATA`, or in `../shared/data` beside the project.
 
-#![expect(clippy::print_stdout, reason = "a failure of a test is a panic; a skipped test says so")]
+use std::path::Path;
 
-use std::path::{Path, PathBuf};
-
-use crate::support::{root, trupose};
+use crate::support::{measured_data, trupose};
 use serde_json::Value;
-
-/// A file of the measured data; `None`, said loudly, where there is none.
-fn data(file: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    let path = folder.join(file);
-    if path.is_file() {
-        return Some(path);
-    }
-    println!("SKIPPED: no measured data ({} is not there)", path.display());
-    None
-}
 
 /// Runs the program and reads its JSON object. Exit code 0 or 1: a verdict was reached.
 fn json(arguments: &[&str]) -> Value {
@@ -45,8 +32,8 @@ fn assert_near(found: f64, expected: f64, tolerance: f64) {
 
 #[test]
 fn ur5_from_59_grid_poses() {
-    let Some(grid) = data("ur5/grid.csv") else { return };
-    let Some(random) = data("ur5/random.csv") else { return };
+    let Some(grid) = measured_data("ur5/grid.csv") else { return };
+    let Some(random) = measured_data("ur5/random.csv") else { return };
     let (grid, random) = (grid.to_str().unwrap(), random.to_str().unwrap());
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().to_str().unwrap();
@@ -93,8 +80,8 @@ fn ur5_from_59_grid_poses() {
 
 #[test]
 fn ur5_from_all_grid_poses() {
-    let Some(grid) = data("ur5/grid.csv") else { return };
-    let Some(random) = data("ur5/random.csv") else { return };
+    let Some(grid) = measured_data("ur5/grid.csv") else { return };
+    let Some(random) = measured_data("ur5/random.csv") else { return };
     let found = json(&[
         "identify",
         "--profile",
@@ -110,8 +97,8 @@ fn ur5_from_all_grid_poses() {
 
 #[test]
 fn ur10_carries_over_to_another_series() {
-    let Some(series_b) = data("ur10/series_b.csv") else { return };
-    let Some(series_c) = data("ur10/series_c.csv") else { return };
+    let Some(series_b) = measured_data("ur10/series_b.csv") else { return };
+    let Some(series_c) = measured_data("ur10/series_c.csv") else { return };
     let (series_b, series_c) = (series_b.to_str().unwrap(), series_c.to_str().unwrap());
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().to_str().unwrap();
@@ -145,7 +132,7 @@ fn ur10_carries_over_to_another_series() {
 
 #[test]
 fn without_a_prior_the_report_says_that_parameters_ran_away() {
-    let Some(grid) = data("ur5/grid.csv") else { return };
+    let Some(grid) = measured_data("ur5/grid.csv") else { return };
     let found = json(&[
         "identify",
         "--profile",
@@ -197,7 +184,7 @@ fn balls_in_sockets_without_any_instrument() {
     // (file, nominal rms, identified rms, mean, max): averages over the positions left out.
     let published = [("panda_3", 2.86, 0.213, 0.196, 0.43), ("panda_2_clean", 8.24, 0.322, 0.282, 0.94)];
     for (name, nominal_rms, rms, mean, max) in published {
-        let Some(file) = data(&format!("ball_socket/{name}.csv")) else { return };
+        let Some(file) = measured_data(&format!("ball_socket/{name}.csv")) else { return };
         // Published with two or three digits.
         let (nominal, identified) = left_out(&file, "rms");
         assert_near(nominal, nominal_rms, 5e-3);
@@ -207,7 +194,7 @@ fn balls_in_sockets_without_any_instrument() {
         let identified = left_out(&file, "max").1;
         assert!(identified <= max, "{name}: max {identified}");
     }
-    let Some(file) = data("ball_socket/panda_1.csv") else { return };
+    let Some(file) = measured_data("ball_socket/panda_1.csv") else { return };
     let pooled = json(&[
         "constraints",
         "--profile",

@@ -1,10 +1,8 @@
 //! Measurement tables: layouts and units, laws on random tables and random bytes, and real files.
 
-use std::env;
 use std::fs;
-use std::path::PathBuf;
 
-use crate::support::root;
+use crate::support::measured_data;
 use nalgebra::Point3;
 use proptest::prelude::*;
 use trupose::kinematics::JointType::{self, Prismatic, Revolute};
@@ -141,11 +139,7 @@ fn deep_filters_are_refused_and_long_ones_are_not() {
 
 #[test]
 fn measured_tables_of_others_are_read() {
-    let folder = env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    if !folder.is_dir() {
-        println!("skipped: no measured data");
-        return;
-    }
+    let Some(folder) = measured_data("") else { return };
     let text = |name: &str| fs::read_to_string(folder.join(name)).unwrap();
     for (name, rows) in
         [("ur5/grid.csv", 1000), ("ur5/random.csv", 20), ("ur10/series_b.csv", 1495), ("ur10/series_c.csv", 2773)]

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Output;
 
-use crate::support::{root, text, trupose_in};
+use crate::support::{measured_data, root, text, trupose_in};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -220,20 +220,11 @@ fn a_calibration_with_a_found_smr_verifies_its_own_measurements() {
     assert!(rms(&report) < 0.05);
 }
 
-/// The measured data, if they are here.
-fn measured_data() -> Option<PathBuf> {
-    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    folder.join("ur5/grid.csv").is_file().then(|| folder.canonicalize().unwrap())
-}
-
 #[test]
 fn recorded_data_give_the_same_numbers_as_identify() {
-    let Some(data) = measured_data() else {
-        println!("skipped: no measured data");
-        return;
-    };
+    let Some(ur5) = measured_data("ur5") else { return };
+    let ur5 = ur5.canonicalize().unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let ur5 = data.join("ur5");
     let set = format!("data={}", ur5.display());
     let output =
         trupose_in(folder.path(), &["--script", shipped("ur5-recorded.script.ron").to_str().unwrap(), "--set", &set]);

@@ -500,8 +500,7 @@ fn a_full_disk_stops_the_run_and_goes_on_when_there_is_room() {
     let expected = finished().measurements("sessions/s");
     for room in [4, 12, 16, 20, 24] {
         let place = Place::new();
-        let test = "a_full_disk_stops_the_run_and_goes_on_when_there_is_room";
-        let Some(disk) = SmallDisk::mount(place.path("sessions"), 1024, test) else { return };
+        let Some(disk) = SmallDisk::mount(place.path("sessions"), 1024) else { return };
         let ballast = disk.0.join("ballast");
         fs::write(&ballast, vec![0; (1024 - room) * 1024]).unwrap();
         let output = place.run_steps(&whole());

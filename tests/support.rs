@@ -1,7 +1,10 @@
 //! What the tests share: the program to run, folders, terminals, small disks, simulated robots.
 
-use std::path::Path;
+use std::env;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::thread;
 
 pub(crate) mod paper_case;
 pub(crate) mod place;
@@ -35,6 +38,24 @@ pub(crate) fn trupose(arguments: &[&str]) -> Output {
 /// Runs the program with `arguments` in `folder`.
 pub(crate) fn trupose_in(folder: &Path, arguments: &[&str]) -> Output {
     command(folder, arguments).output().unwrap()
+}
+
+/// Says that the running test is skipped, on the standard error that the test harness does not capture.
+pub(crate) fn skip(reason: &str) {
+    // The harness names the thread of a test after it.
+    let thread = thread::current();
+    writeln!(io::stderr(), "SKIPPED {}: {reason}", thread.name().unwrap_or("a test")).unwrap();
+}
+
+/// A file or folder of the measured data, in `TRUPOSE_MEASURED_DATA` or beside the project; where it is missing the test is skipped.
+pub(crate) fn measured_data(path: &str) -> Option<PathBuf> {
+    let folder = env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    let path = folder.join(path);
+    if !path.exists() {
+        skip(&format!("no measured data ({} is missing)", path.display()));
+        return None;
+    }
+    Some(path)
 }
 
 /// Output of a program as text.

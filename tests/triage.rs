@@ -4,11 +4,10 @@
 
 #![expect(clippy::print_stdout, reason = "a failure of a test is a panic; the tables are printed")]
 
-use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::support::root;
+use crate::support::{measured_data, skip};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -320,7 +319,7 @@ fn faults_are_found_and_named() {
 #[test]
 fn small_faults_by_size_and_place() {
     if std::env::var_os("TRUPOSE_TRIAGE_TABLE").is_none() {
-        println!("skipped: prints a table of docs/triage.md, in minutes, with TRUPOSE_TRIAGE_TABLE=1");
+        skip("it prints a table of docs/triage.md, in minutes, with TRUPOSE_TRIAGE_TABLE=1");
         return;
     }
     for robot in [Robot::new("soochow"), Robot::new("ur5")] {
@@ -347,12 +346,8 @@ const COLUMN_X: usize = 7;
 /// A real arm is less perfect than its tracker; it must not raise an alarm at every point.
 #[test]
 fn a_measured_ur5_is_left_alone() {
-    let folder = std::env::var_os("TRUPOSE_MEASURED_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    let file = folder.join("ur5/grid.csv");
-    let Ok(text) = std::fs::read_to_string(&file) else {
-        println!("SKIPPED: no measured data ({} is not there)", file.display());
-        return;
-    };
+    let Some(file) = measured_data("ur5/grid.csv") else { return };
+    let text = std::fs::read_to_string(file).unwrap();
     let robot = Robot::new("ur5");
     let rows: Vec<Vec<f64>> = text
         .lines()

@@ -1,12 +1,11 @@
 //! Files that are damaged, disks that are full, folders that may not be written to.
 
 use std::fs;
-use std::io::{self, Write as _};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use crate::support::{root, text};
+use crate::support::{root, skip, text};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use trupose::recording;
@@ -217,7 +216,7 @@ fn a_folder_that_may_not_be_written_to_is_told() {
     let output = place.run(&["record", "rebuild", "sessions/s"]);
     fs::set_permissions(&folder, fs::Permissions::from_mode(0o755)).unwrap();
     if !is_refused {
-        writeln!(io::stderr(), "SKIPPED a_folder_that_may_not_be_written_to_is_told: root may write anywhere").unwrap();
+        skip("root may write anywhere");
         return;
     }
     assert_eq!(output.status.code(), Some(5));
@@ -227,8 +226,7 @@ fn a_folder_that_may_not_be_written_to_is_told() {
 #[test]
 fn a_full_disk_ends_the_recording_with_a_message_and_not_the_session() {
     let place = Place::new();
-    let test = "a_full_disk_ends_the_recording_with_a_message_and_not_the_session";
-    let Some(_disk) = SmallDisk::mount(place.path("sessions"), 256, test) else { return };
+    let Some(_disk) = SmallDisk::mount(place.path("sessions"), 256) else { return };
     let start = Instant::now();
     // What is delivered waits: the recording gives its room back a little later than the disk is full.
     let output = place.script(&format!("{} CaptureAll(Fail), Do(Next), Do(Identify), Do(Next)", begun("")), &[]);
@@ -253,8 +251,7 @@ fn on_a_small_disk_the_session_goes_before_its_recording() {
     // Whichever of them finds the disk full.
     for kilobytes in (64..=192).step_by(16) {
         let place = Place::new();
-        let test = "on_a_small_disk_the_session_goes_before_its_recording";
-        let Some(_disk) = SmallDisk::mount(place.path("sessions"), kilobytes, test) else { return };
+        let Some(_disk) = SmallDisk::mount(place.path("sessions"), kilobytes) else { return };
         let output = place.script(&steps, &[]);
         succeeded(&output);
         let (_, session) = session_of(&place.session());

@@ -1,25 +1,24 @@
 //! A file system that is soon full.
 
 use std::fs;
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::Command;
+
+use super::skip;
 
 /// A small file system in memory.
 pub(crate) struct SmallDisk(pub(crate) PathBuf);
 
 impl SmallDisk {
-    /// Makes one of this size at `path`; where that is not allowed, says that `test` is skipped.
-    pub(crate) fn mount(path: PathBuf, kilobytes: usize, test: &str) -> Option<Self> {
+    /// Makes one of this size at `path`; where that is not allowed the test is skipped.
+    pub(crate) fn mount(path: PathBuf, kilobytes: usize) -> Option<Self> {
         fs::create_dir(&path).unwrap();
         let mut mount = Command::new("mount");
         mount.args(["-t", "tmpfs", "-o", &format!("size={kilobytes}k"), "tmpfs"]).arg(&path);
         if mount.output().is_ok_and(|output| output.status.success()) {
             return Some(Self(path));
         }
-        // Not by `eprintln!`, which the test harness swallows.
-        let mut out = io::stderr();
-        writeln!(out, "SKIPPED {test}: no right to mount a tmpfs").unwrap();
+        skip("no right to mount a tmpfs");
         None
     }
 }
