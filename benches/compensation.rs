@@ -39,8 +39,7 @@ fn measure(name: &str) {
     let deviations =
         free.iter().zip([1.0, -1.0].into_iter().cycle()).map(|(free, sign)| (free.id, sign * free.expected));
     let arm = |chain| ToolArm { chain, flange_from_tool: Isometry3::identity() };
-    let (nominal, identified) =
-        (arm(profile.chain().clone()), arm(profile.chain().with_deviations(deviations).unwrap()));
+    let (nominal, identified) = (arm(profile.chain().clone()), arm(profile.arm().with(deviations).unwrap().chain));
     let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
     let compensator = Compensator::new(&nominal, &identified, &limits, Settings::default());
     let forward = ForwardKinematics::new(profile.chain());

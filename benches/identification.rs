@@ -6,11 +6,9 @@
 mod paper_case;
 
 use divan::{Bencher, black_box};
-use paper_case::{
-    PaperCase, paper_chain, paper_deviations, paper_parameters, paper_target, random_configurations, seeded,
-};
+use paper_case::{PaperCase, paper_deviations, paper_parameters, random_configurations, seeded};
 use trupose::identification::{Identification, Observability, Settings, SigmaSource, Weighting, identify};
-use trupose::kinematics::{ForwardKinematics, IdentificationJacobian};
+use trupose::kinematics::{IdentificationJacobian, Place};
 use trupose::units::MICROMETRE;
 
 fn main() {
@@ -32,14 +30,13 @@ fn instrument(weighting: Weighting) -> Settings {
 /// Forward kinematics and the 3 × 25 Jacobian of one pose.
 #[divan::bench]
 fn forward_and_jacobian(bencher: Bencher<'_, '_>) {
-    let chain = paper_chain();
-    let arm = ForwardKinematics::new(&chain);
+    let PaperCase { arm, .. } = PaperCase::new(Vec::new());
+    let arm = arm.prepared();
     let ids: Vec<_> = paper_parameters().iter().map(|parameter| parameter.id).collect();
     let mut jacobian = IdentificationJacobian::new(&ids);
-    let configuration = random_configurations(1, &mut seeded(1)).remove(0);
+    let place = Place { configuration: random_configurations(1, &mut seeded(1)).remove(0), target: 0 };
     let mut rows = vec![0.0; 3 * ids.len()];
-    let target = paper_target();
-    bencher.bench_local(|| jacobian.evaluate(&arm, black_box(&configuration), 0, &target, &mut rows));
+    bencher.bench_local(|| jacobian.at(&arm, black_box(&place), &mut rows));
 }
 
 /// Rank, blind directions and condition numbers of a set.

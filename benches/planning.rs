@@ -8,8 +8,7 @@ mod paper_case;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use paper_case::{paper_chain, paper_parameters, paper_target, random_configurations, seeded};
-use trupose::identification::{ArmModel, TargetAt};
-use trupose::kinematics::FreeParameter;
+use trupose::kinematics::{Arm, FreeParameter, Place};
 use trupose::planning::{DesignBound, Information, Objective, Score, Search, SearchSettings, Yardstick, trade_off};
 use trupose::units::{DEGREE, MILLIMETRE, Quantity};
 
@@ -17,13 +16,13 @@ fn main() {
     divan::main();
 }
 
-fn places(count: usize, seed: u64) -> Vec<TargetAt> {
+fn places(count: usize, seed: u64) -> Vec<Place> {
     let configurations = random_configurations(count, &mut seeded(seed));
-    configurations.into_iter().map(|configuration| TargetAt { configuration, target: 0 }).collect()
+    configurations.into_iter().map(|configuration| Place { configuration, target: 0 }).collect()
 }
 
-fn information(candidates: &[TargetAt]) -> Information {
-    let model = ArmModel { chain: paper_chain(), targets: vec![paper_target()] };
+fn information(candidates: &[Place]) -> Information {
+    let model = Arm { chain: paper_chain(), targets: vec![paper_target()] };
     let expected = |parameter: FreeParameter| FreeParameter {
         expected: match parameter.id.quantity() {
             Quantity::Length => MILLIMETRE,

@@ -38,17 +38,16 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, DVector, Point3};
 
 pub use error::IdentificationError;
-pub use linearise::ArmModel;
 pub(crate) use observability::raw_unit;
 pub use observability::{BlindGroup, Observability};
 pub(crate) use pairs::SAME_POINT;
-pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint, TargetAt};
+pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint};
 pub use repetitions::Places;
 pub use result::{Estimate, Identification, Rejected, RejectionReason, SampleIndex, Sigma};
 pub use settings::{Estimator, Iteration, Prior, Settings, SigmaSource, TerminationReason, Weighting};
 
 use crate::geometry::{principal_spread, register};
-use crate::kinematics::ParameterId;
+use crate::kinematics::Arm;
 use crate::units::MICROMETRE;
 use linearise::{Evaluation, SMALLEST_SIGMA, Weights, length_rows};
 use solver::{Basis, Linearised, Solve};
@@ -93,8 +92,8 @@ pub fn identify_while(
         return Err(IdentificationError::NoParameters);
     }
     let observability = Observability::new(problem);
-    let nominal = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
-    check_chirality(problem, &nominal, None)?;
+    let nominal = problem.arm;
+    check_chirality(problem, nominal, None)?;
     let basis = Basis::new(problem, settings.prior, &observability)?;
 
     let mut fit = Fit {
@@ -129,7 +128,7 @@ pub fn identify_while(
     if termination == TerminationReason::NonFinite || !at.x.iter().all(|value| value.is_finite()) {
         return Err(IdentificationError::Diverged);
     }
-    check_chirality(problem, &at.model, Some(&fit.weights))?;
+    check_chirality(problem, &at.arm, Some(&fit.weights))?;
     let Fit { weights, iterations, path, .. } = fit;
     Ok(summarise(Solved {
         problem,
@@ -250,7 +249,7 @@ fn residual_sigma(solve: &Solve<'_, '_>, at: &Linearised) -> Option<Scatter> {
         place += shared.at.len();
     }
     if !observations.lengths.is_empty() {
-        let evaluation = Evaluation::new(problem, &at.model);
+        let evaluation = Evaluation::new(problem, &at.arm);
         let rows = length_rows(problem, &evaluation, weights, weights);
         for ((length, residual), trust) in observations.lengths.iter().zip(&rows.residuals).zip(&weights.length_trust) {
             // A known distance between sockets is a condition, not a sample of the scatter.
@@ -305,7 +304,7 @@ fn summarise(solved: Solved<'_, '_>) -> Identification {
         .enumerate()
         .map(|(index, parameter)| Estimate {
             id: parameter.id,
-            nominal: nominal_value(problem, parameter.id),
+            nominal: problem.arm.value(parameter.id).unwrap_or(0.0),
             deviation: at.x[index],
             sigma: covariance[(index, index)].max(0.0).sqrt(),
             expected: parameter.expected,
@@ -320,7 +319,7 @@ fn summarise(solved: Solved<'_, '_>) -> Identification {
         Observability::new(&Problem { observations: &accepted, ..*problem })
     };
     Identification {
-        model: at.model,
+        arm: at.arm,
         estimates,
         covariance,
         observability,
@@ -331,14 +330,6 @@ fn summarise(solved: Solved<'_, '_>) -> Identification {
         termination,
         base_from_station: at.points.base_from_station,
         residuals: at.points.of_places,
-    }
-}
-
-/// Nominal value of a parameter of the problem (m) or (rad).
-fn nominal_value(problem: &Problem<'_>, id: ParameterId) -> f64 {
-    match id {
-        ParameterId::Link { .. } => problem.chain.parameter(id).unwrap_or(0.0),
-        ParameterId::Target { target, axis } => problem.targets.get(target).map_or(0.0, |point| point[axis.index()]),
     }
 }
 
@@ -370,7 +361,7 @@ fn rejected(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights) -> Vec<Re
         return Vec::new();
     }
     let judged = robust::judge(solve, at, weights, 0.0);
-    let predicted = |place: usize| at.model.point_in_base(&points[place].at);
+    let predicted = |place: usize| at.arm.point_in_base(&points[place].at);
     let measured = |place: usize| at.points.base_from_station[points[place].station] * points[place].point;
     // Close enough to be the other's point: a small part of how far off each is where it stands.
     let fits = |place: usize, other: usize| {
@@ -385,7 +376,7 @@ fn rejected(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights) -> Vec<Re
             .find(|&other| fits(place, other) && fits(other, place))
     };
     let length_residual = |index: usize| {
-        let errors = verification::DirectErrors::new(&at.model, problem.observations);
+        let errors = verification::DirectErrors::new(&at.arm, problem.observations);
         errors.lengths.get(index).map_or(0.0, |error| error.abs())
     };
     left_out
@@ -403,13 +394,9 @@ fn rejected(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights) -> Vec<Re
 }
 
 /// Distances cannot see a mirrored frame; the registration can.
-fn check_chirality(
-    problem: &Problem<'_>,
-    model: &ArmModel,
-    weights: Option<&Weights>,
-) -> Result<(), IdentificationError> {
+fn check_chirality(problem: &Problem<'_>, arm: &Arm, weights: Option<&Weights>) -> Result<(), IdentificationError> {
     let samples = &problem.observations.points;
-    let predicted = model.points_in_base(samples.iter().map(|sample| &sample.at));
+    let predicted = arm.points_in_base(samples.iter().map(|sample| &sample.at));
     let stations = samples.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
     for station in 0..stations {
         let members = samples.iter().zip(&predicted).enumerate().filter(|(index, (sample, _))| {

@@ -8,6 +8,7 @@
 
 #![warn(missing_docs)]
 
+mod arm;
 mod chain;
 mod forward;
 mod jacobian;
@@ -15,6 +16,7 @@ mod parameters;
 
 use thiserror::Error;
 
+pub use arm::{Arm, Place, PreparedArm};
 pub use chain::{Convention, Joint, JointType, KinematicChain, Link};
 pub use forward::ForwardKinematics;
 pub use jacobian::{ConfigurationJacobian, IdentificationJacobian};

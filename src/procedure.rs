@@ -21,7 +21,7 @@ pub(crate) mod summary;
 pub use provenance::input_file;
 pub(crate) use provenance::provenance;
 pub use settings::EstimationSettings;
-pub(crate) use settings::{nominal_targets, target_parameters};
+pub(crate) use settings::target_parameters;
 
 use crate::error::{ExitStatus, Failure};
 use crate::identification::IdentificationError;

@@ -27,7 +27,7 @@ pub use text::{check_text, list_text, show_text};
 
 use wire::LinkSettings;
 
-use crate::kinematics::{Axis, FreeParameter, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{Arm, Axis, FreeParameter, KinematicChain, LinkParameter, ParameterId};
 
 /// Angle below which neighbouring axes count as parallel (rad): 1°, far above any assembly error and far below any design angle.
 pub const PARALLEL_TOLERANCE: f64 = crate::units::DEGREE;
@@ -141,9 +141,15 @@ impl Profile {
         &self.source
     }
 
-    /// The nominal arm.
+    /// Links and joints of the nominal arm.
     pub const fn chain(&self) -> &KinematicChain {
         &self.chain
+    }
+
+    /// The nominal arm with its targets.
+    pub fn arm(&self) -> Arm {
+        let targets = self.targets.iter().map(|target| target.position_in_flange).collect();
+        Arm { chain: self.chain.clone(), targets }
     }
 
     /// Limits and speeds, one entry per joint of the chain.

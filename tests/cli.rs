@@ -171,16 +171,16 @@ fn poor_data_are_never_accepted() {
 #[test]
 fn only_two_moving_joints_are_called_out() {
     // Simulated on the nominal robot, so that nothing but the excitation is wrong.
-    use trupose::identification::{ArmModel, TargetAt};
     use trupose::kinematics::JointType;
+    use trupose::kinematics::Place;
     use trupose::session::measurements::{Row, write};
     let (profile, _) = trupose::profile::Profile::parse(trupose::profile::builtin("soochow").unwrap(), "").unwrap();
-    let model = ArmModel { chain: profile.chain().clone(), targets: vec![profile.targets()[0].position_in_flange] };
+    let model = profile.arm();
     let rows: Vec<Row> = (0..40)
         .map(|index| {
             let turn = f64::from(index);
             let configuration = vec![(0.9 * turn).sin(), 0.8 * (1.7 * turn).cos(), 0.1, 0.2, 0.5, 0.3];
-            let point = model.point_in_base(&TargetAt { configuration: configuration.clone(), target: 0 });
+            let point = model.point_in_base(&Place { configuration: configuration.clone(), target: 0 });
             Row {
                 line: 0,
                 pose: index.to_string(),

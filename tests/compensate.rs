@@ -8,8 +8,8 @@ use crate::support::trupose;
 use nalgebra::{DVector, Isometry3, Point3, Translation3};
 use trupose::compensation::{Compensator, Goal, Settings, Status, ToolArm};
 use trupose::geometry::register;
-use trupose::identification::{ArmModel, identify};
-use trupose::kinematics::{ForwardKinematics, KinematicChain};
+use trupose::identification::identify;
+use trupose::kinematics::{Arm, ForwardKinematics, KinematicChain};
 use trupose::link::SimulatedCell;
 use trupose::model::CalibratedArm;
 use trupose::model::proof::configurations;
@@ -44,14 +44,14 @@ fn closed_loop(noise: f64, seed: u64, position_only: bool) -> [(f64, f64); 3] {
     let case = PaperCase::simulated(&truth, 56, noise, &mut rng);
     let found = identify(&case.problem(), &trupose::identification::Settings::default(), &mut |_| {}).unwrap();
     let deviations = DVector::from_iterator(found.estimates.len(), found.estimates.iter().map(|e| e.deviation));
-    let nominal = ArmModel { chain: case.chain.clone(), targets: case.targets.clone() };
-    let identified = ArmModel::with_deviations(&case.problem(), &deviations);
-    let real = ArmModel::with_deviations(&case.problem(), &truth);
+    let nominal = case.arm.clone();
+    let identified = case.problem().arm_with(&deviations);
+    let real = case.problem().arm_with(&truth);
     let limits: Vec<_> = RANGES.iter().map(|(low, high)| Some((from_deg(*low) - 0.2, from_deg(*high) + 0.2))).collect();
     let arms = [&nominal, &identified].map(|model| with_tool(&model.chain, model.targets.first()));
     let settings = Settings { position_only, ..Settings::default() };
     let compensator = Compensator::new(&arms[0], &arms[1], &limits, settings);
-    let point = |model: &ArmModel, q: &[f64]| ForwardKinematics::new(&model.chain).point_in_base(q, &model.targets[0]);
+    let point = |model: &Arm, q: &[f64]| ForwardKinematics::new(&model.chain).point_in_base(q, &model.targets[0]);
     let (mut meant, mut naive, mut predicted, mut compensated) = (vec![], vec![], vec![], vec![]);
     for q in random_configurations(2000, &mut rng) {
         let done = compensator.solve(&Goal::Configuration(q.clone()));
@@ -95,7 +95,7 @@ fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
         let free = profile.free_parameters(Level::Geometric);
         let deviations =
             free.iter().zip([0.5, -0.5].into_iter().cycle()).map(|(free, half)| (free.id, half * free.expected));
-        let arms = [profile.chain().clone(), profile.chain().with_deviations(deviations).unwrap()];
+        let arms = [profile.chain().clone(), profile.arm().with(deviations).unwrap().chain];
         let arms = arms.map(|chain| with_tool(&chain, None));
         let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
         let planning: Vec<_> = profile.joints().iter().map(|range| range.planning_limits).collect();
@@ -132,8 +132,7 @@ fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
 fn limits_singularities_and_reach_are_told_apart() {
     let ur = profile("ur5");
     let deviations = ur.free_parameters(Level::Geometric).into_iter().map(|free| (free.id, free.expected));
-    let arms =
-        [ur.chain().clone(), ur.chain().with_deviations(deviations).unwrap()].map(|chain| with_tool(&chain, None));
+    let arms = [ur.chain().clone(), ur.arm().with(deviations).unwrap().chain].map(|chain| with_tool(&chain, None));
     let limits: Vec<_> = ur.joints().iter().map(|range| range.limits).collect();
     let solve = |limits: &[Option<(f64, f64)>], goal: &Goal| {
         Compensator::new(&arms[0], &arms[1], limits, Settings::default()).solve(goal)
@@ -530,10 +529,10 @@ fn closed_loop_in_the_cell(robot: &str, truth: Truth) -> [f64; 3] {
         }
         let command: Vec<f64> = cells[2..8].iter().map(|cell| from_deg(cell.parse().unwrap())).collect();
         meant.push(point(nominal.chain(), &nominal.targets()[0].position_in_flange, q));
-        naive.push(point(&hidden.chain, &hidden.targets[0], q));
+        naive.push(point(&hidden.arm.chain, &hidden.arm.targets[0], q));
         predicted.push(point(&identified.identified, &identified.targets[0].position_in_flange, q));
-        real.push(point(&hidden.chain, &hidden.targets[0], q));
-        compensated.push(point(&hidden.chain, &hidden.targets[0], &command));
+        real.push(point(&hidden.arm.chain, &hidden.arm.targets[0], q));
+        compensated.push(point(&hidden.arm.chain, &hidden.arm.targets[0], &command));
     }
     assert!(meant.len() > 300, "{robot}: {} reached", meant.len());
     [errors(&meant, &naive).0, errors(&predicted, &real).0, errors(&meant, &compensated).0]

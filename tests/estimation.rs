@@ -10,10 +10,10 @@ use trupose::geometry::register;
 use trupose::identification::predicted::position_covariances;
 use trupose::identification::verification::{DirectErrors, ModelErrors};
 use trupose::identification::{
-    ArmModel, Estimator, Identification, IdentificationError, Length, LengthEnd, Observations, PointSample, Rejected,
-    RejectionReason, SampleIndex, Settings, SharedPoint, SigmaSource, TargetAt, Weighting, identify,
+    Estimator, Identification, IdentificationError, Length, LengthEnd, Observations, PointSample, Rejected,
+    RejectionReason, SampleIndex, Settings, SharedPoint, SigmaSource, Weighting, identify,
 };
-use trupose::kinematics::{Axis, FreeParameter, ParameterId};
+use trupose::kinematics::{Arm, Axis, FreeParameter, ParameterId, Place};
 use trupose::units::{MICROMETRE, MILLIMETRE};
 
 const NOISE: f64 = 10.0 * MICROMETRE;
@@ -195,7 +195,7 @@ fn several_targets_are_identified_together() {
     let mut rng = seeded(6);
     let mut case = PaperCase::new(Vec::new());
     let second = Point3::new(0.08, -0.05, 0.06);
-    case.targets.push(second);
+    case.arm.targets.push(second);
     for target in 0..2 {
         case.parameters.extend(
             Axis::ALL
@@ -205,7 +205,7 @@ fn several_targets_are_identified_together() {
     let mut truth = paper_deviations().as_slice().to_vec();
     truth.extend([3e-3, -2e-3, 1e-3, -8e-3, 5e-3, 12e-3]);
     let truth = DVector::from_vec(truth);
-    let model = ArmModel::with_deviations(&case.problem(), &truth);
+    let model = case.problem().arm_with(&truth);
     for (index, configuration) in random_configurations(60, &mut rng).into_iter().enumerate() {
         let mut samples = measure(&model, &[configuration], 0.0, &mut rng);
         let sample = &mut samples[0];
@@ -228,7 +228,7 @@ fn several_targets_are_identified_together() {
             samples
         })
         .collect();
-    let errors = ModelErrors::new(&found.model, &found.base_from_station, &fresh).unwrap();
+    let errors = ModelErrors::new(&found.arm, &found.base_from_station, &fresh).unwrap();
     assert!(errors.position.rms < 12.0 * MICROMETRE, "{:?}", errors.position);
 }
 
@@ -253,9 +253,9 @@ fn two_stations_share_one_robot() {
 fn lengths_alone_identify_the_robot() {
     let mut rng = seeded(8);
     let mut case = PaperCase::new(Vec::new());
-    let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
-    let mut place = || TargetAt { configuration: random_configurations(1, &mut rng).remove(0), target: 0 };
-    let pairs: Vec<(TargetAt, TargetAt)> = (0..200).map(|_| (place(), place())).collect();
+    let truth = case.problem().arm_with(&paper_deviations());
+    let mut place = || Place { configuration: random_configurations(1, &mut rng).remove(0), target: 0 };
+    let pairs: Vec<(Place, Place)> = (0..200).map(|_| (place(), place())).collect();
     let lengths = pairs.into_iter().map(|(from, to)| {
         let length = (truth.point_in_base(&to) - truth.point_in_base(&from)).norm() + NOISE * normal(&mut rng);
         Length { from: LengthEnd::Target(from), to: LengthEnd::Target(to), length, sigma: Some(NOISE) }
@@ -272,7 +272,7 @@ fn lengths_alone_identify_the_robot() {
 }
 
 /// Configurations that put the target into one point, found by Gauss–Newton from random ones.
-fn seated(model: &ArmModel, socket: Point3<f64>, count: usize, rng: &mut rand_chacha::ChaCha8Rng) -> Vec<TargetAt> {
+fn seated(model: &Arm, socket: Point3<f64>, count: usize, rng: &mut rand_chacha::ChaCha8Rng) -> Vec<Place> {
     let arm = trupose::kinematics::ForwardKinematics::new(&model.chain);
     let mut seats = Vec::new();
     while seats.len() < count {
@@ -284,7 +284,7 @@ fn seated(model: &ArmModel, socket: Point3<f64>, count: usize, rng: &mut rand_ch
             q.iter_mut().zip(step.iter()).for_each(|(q, step)| *q += step.clamp(-0.2, 0.2));
         }
         if (arm.point_in_base(&q, &model.targets[0]) - socket).norm() < 1e-9 {
-            seats.push(TargetAt { configuration: q, target: 0 });
+            seats.push(Place { configuration: q, target: 0 });
         }
     }
     seats
@@ -294,7 +294,7 @@ fn seated(model: &ArmModel, socket: Point3<f64>, count: usize, rng: &mut rand_ch
 fn balls_in_sockets_identify_the_robot_without_an_instrument() {
     let mut rng = seeded(9);
     let mut case = PaperCase::new(Vec::new());
-    let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
+    let truth = case.problem().arm_with(&paper_deviations());
     let mut observations = Observations::default();
     for position in 0..6 {
         let angle = f64::from(position);
@@ -312,21 +312,20 @@ fn balls_in_sockets_identify_the_robot_without_an_instrument() {
         });
     }
     case.observations = observations;
-    let before =
-        DirectErrors::new(&ArmModel { chain: case.chain.clone(), targets: case.targets.clone() }, &case.observations);
+    let before = DirectErrors::new(&case.arm, &case.observations);
     let found = run(&case, &settings());
-    let after = DirectErrors::new(&found.model, &case.observations);
+    let after = DirectErrors::new(&found.arm, &case.observations);
     assert!(before.seat.unwrap().rms > 5.0 * MILLIMETRE, "{:?}", before.seat);
     assert!(after.seat.unwrap().max < 1.0 * MICROMETRE, "{:?}", after.seat);
     assert_eq!(found.observability.rank, Some(21));
     let fresh = measure(&truth, &random_configurations(200, &mut rng), 0.0, &mut rng);
     let setup = trupose::identification::verification::fit_setup(
-        &found.model,
+        &found.arm,
         &[],
         &Observations { points: fresh.clone(), ..Observations::default() },
     )
     .unwrap();
-    let errors = ModelErrors::new(&setup.model, &setup.base_from_station, &fresh).unwrap();
+    let errors = ModelErrors::new(&setup.arm, &setup.base_from_station, &fresh).unwrap();
     assert!(errors.position.rms < 0.2 * MILLIMETRE, "{:?}", errors.position);
 }
 
@@ -376,7 +375,7 @@ fn a_mistyped_joint_is_found_although_that_joint_hardly_moves() {
                 configuration[3] *= range / 360.0;
             }
             let mut case = PaperCase::new(Vec::new());
-            let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
+            let truth = case.problem().arm_with(&paper_deviations());
             case.observations.points = measure(&truth, &configurations, NOISE, &mut rng);
             let wrong = rng.random_range(0..50);
             let typed = rng.random_range(30.0..120.0_f64) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
@@ -394,9 +393,9 @@ fn a_mistyped_joint_is_found_although_that_joint_hardly_moves() {
 fn wrong_lengths_are_found_as_well() {
     let mut rng = seeded(13);
     let mut case = PaperCase::new(Vec::new());
-    let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
-    let mut place = || TargetAt { configuration: random_configurations(1, &mut rng).remove(0), target: 0 };
-    let pairs: Vec<(TargetAt, TargetAt)> = (0..120).map(|_| (place(), place())).collect();
+    let truth = case.problem().arm_with(&paper_deviations());
+    let mut place = || Place { configuration: random_configurations(1, &mut rng).remove(0), target: 0 };
+    let pairs: Vec<(Place, Place)> = (0..120).map(|_| (place(), place())).collect();
     let lengths = pairs.into_iter().enumerate().map(|(index, (from, to))| {
         let wrong = if [7, 50, 93].contains(&index) { 2.0 * MILLIMETRE } else { 0.0 };
         let length = (truth.point_in_base(&to) - truth.point_in_base(&from)).norm() + NOISE * normal(&mut rng) + wrong;
@@ -425,20 +424,20 @@ fn predicted_position_errors_are_those_of_many_calibrations() {
     const TRIALS: u64 = 150;
     const PLACES: usize = 12;
     let parameters = paper_parameters();
-    let places: Vec<TargetAt> = random_configurations(PLACES, &mut seeded(77))
+    let places: Vec<Place> = random_configurations(PLACES, &mut seeded(77))
         .into_iter()
-        .map(|configuration| TargetAt { configuration, target: 0 })
+        .map(|configuration| Place { configuration, target: 0 })
         .collect();
-    let places: Vec<&TargetAt> = places.iter().collect();
+    let places: Vec<&Place> = places.iter().collect();
     let (mut stated, mut seen) = ([0.0; PLACES], [0.0; PLACES]);
     for trial in 0..TRIALS {
         let mut rng = seeded(5000 + trial);
         let truth = drawn_deviations(&parameters, &mut rng);
         let case = PaperCase::simulated(&truth, 30, NOISE, &mut rng);
         let found = run(&case, &settings());
-        let real = ArmModel::with_deviations(&case.problem(), &truth);
+        let real = case.problem().arm_with(&truth);
         let pairs: Vec<_> =
-            places.iter().map(|at| (1.0, found.model.point_in_base(at), real.point_in_base(at))).collect();
+            places.iter().map(|at| (1.0, found.arm.point_in_base(at), real.point_in_base(at))).collect();
         let registered = register(pairs.iter().copied()).unwrap().to_from_from;
         for (place, (covariance, (_, from, to))) in position_covariances(&found, &places).iter().zip(&pairs).enumerate()
         {

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use crate::support::paper_case::{PaperCase, measure, paper_deviations, random_configurations, seeded};
 use crate::support::{root, trupose};
 use serde_json::Value;
-use trupose::identification::ArmModel;
 use trupose::kinematics::JointType;
 use trupose::session::calibration::Calibration;
 use trupose::session::measurements::{Row, read, write};
@@ -24,7 +23,7 @@ fn folder() -> PathBuf {
 /// Random poses of the paper's robot with the errors of table II and 10 µm of noise, as two tables.
 fn example() -> [(&'static str, String); 2] {
     let mut rng = seeded(2014);
-    let truth = ArmModel::with_deviations(&PaperCase::new(Vec::new()).problem(), &paper_deviations());
+    let truth = PaperCase::new(Vec::new()).problem().arm_with(&paper_deviations());
     let mut table = |poses: usize, purpose: &str| {
         let samples = measure(&truth, &random_configurations(poses, &mut rng), 10.0 * MICROMETRE, &mut rng);
         let rows: Vec<Row> = samples

@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Matrix4, Point3, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use trupose::kinematics::{
-    Axis, Convention, ForwardKinematics, IdentificationJacobian, Joint, JointType, KinematicChain, Link, LinkParameter,
-    ParameterId,
+    Arm, Axis, Convention, ForwardKinematics, IdentificationJacobian, Joint, JointType, KinematicChain, Link,
+    LinkParameter, ParameterId, Place,
 };
 use trupose::profile::{Profile, builtin, builtin_names};
 
@@ -40,7 +40,8 @@ fn random_configuration(chain: &KinematicChain, rng: &mut ChaCha8Rng) -> Vec<f64
 /// A chain whose link constants are all a little off, so that no derivative is zero by symmetry.
 fn disturbed(chain: &KinematicChain, rng: &mut ChaCha8Rng) -> KinematicChain {
     let deviations: Vec<_> = all_parameters(chain).into_iter().map(|id| (id, rng.random_range(-0.02..0.02))).collect();
-    chain.with_deviations(deviations).unwrap()
+    let arm = Arm { chain: chain.clone(), targets: vec![Point3::origin()] };
+    arm.with(deviations).unwrap().chain
 }
 
 #[test]
@@ -50,25 +51,17 @@ fn identification_jacobian_matches_difference_quotients() {
         for round in 0..10 {
             let chain = if round == 0 { profile.chain().clone() } else { disturbed(profile.chain(), &mut rng) };
             let ids = all_parameters(&chain);
-            let target = Point3::new(0.03, -0.02, 0.09);
-            let q = random_configuration(&chain, &mut rng);
+            let place = Place { configuration: random_configuration(&chain, &mut rng), target: 0 };
+            let arm = Arm { chain, targets: vec![Point3::new(0.03, -0.02, 0.09)] };
             let mut rows = vec![0.0; 3 * ids.len()];
-            let arm = ForwardKinematics::new(&chain);
-            let point = IdentificationJacobian::new(&ids).evaluate(&arm, &q, 0, &target, &mut rows);
-            assert!((point - arm.point_in_base(&q, &target)).norm() < 1e-13);
+            let point = IdentificationJacobian::new(&ids).at(&arm.prepared(), &place, &mut rows);
+            assert!((point - arm.point_in_base(&place)).norm() < 1e-13);
             for (column, id) in ids.iter().enumerate() {
-                let at = |step: f64| {
-                    let mut target = target;
-                    if let ParameterId::Target { axis, .. } = id {
-                        target[axis.index()] += step;
-                    }
-                    let moved = chain.with_deviations([(*id, step)]).unwrap();
-                    ForwardKinematics::new(&moved).point_in_base(&q, &target)
-                };
+                let at = |step: f64| arm.with([(*id, step)]).unwrap().point_in_base(&place);
                 let quotient = (at(STEP) - at(-STEP)) / (2.0 * STEP);
                 let analytic = Vector3::new(rows[column], rows[ids.len() + column], rows[2 * ids.len() + column]);
                 let error = (quotient - analytic).norm();
-                assert!(error < 1e-8, "{} {id} at {q:?}: {quotient} against {analytic}", profile.name());
+                assert!(error < 1e-8, "{} {id} at {place:?}: {quotient} against {analytic}", profile.name());
             }
         }
     }

@@ -55,7 +55,7 @@ fn deviated(profile: &Profile, seed: u64) -> KinematicChain {
     let links = free.iter().filter(|free| matches!(free.id, ParameterId::Link { .. }));
     let deviations: Vec<_> =
         links.map(|free| (free.id, 3.0 * free.expected * random.random_range(-1.0..1.0))).collect();
-    profile.chain().with_deviations(deviations).unwrap()
+    profile.arm().with(deviations).unwrap().chain
 }
 
 fn calibrated(profile: &Profile) -> CalibratedArm {

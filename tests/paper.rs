@@ -3,7 +3,7 @@
 use crate::support::paper_case::{PaperCase, measure, paper_deviations, random_configurations, seeded};
 use trupose::identification::verification::ModelErrors;
 use trupose::identification::{
-    ArmModel, Estimator, Identification, Prior, Settings, SigmaSource, TerminationReason, Weighting, identify,
+    Estimator, Identification, Prior, Settings, SigmaSource, TerminationReason, Weighting, identify,
 };
 use trupose::kinematics::{Axis, LinkParameter, ParameterId};
 use trupose::units::{MICROMETRE, to_mm};
@@ -31,7 +31,7 @@ fn run(case: &PaperCase, settings: &Settings) -> Identification {
 
 /// Mean distance error over all pairs of the identification set (mm): the paper's own in-sample figure.
 fn in_sample_distance_error(case: &PaperCase, found: &Identification) -> f64 {
-    let errors = ModelErrors::new(&found.model, &found.base_from_station, &case.observations.points).unwrap();
+    let errors = ModelErrors::new(&found.arm, &found.base_from_station, &case.observations.points).unwrap();
     to_mm(errors.distance.unwrap().mean)
 }
 
@@ -113,14 +113,14 @@ fn default_settings_reach_the_cramer_rao_bound() {
     for seed in 0..TRIALS {
         let mut rng = seeded(seed);
         let case = PaperCase::simulated(&paper_deviations(), 56, NOISE, &mut rng);
-        let truth = ArmModel::with_deviations(&case.problem(), &paper_deviations());
+        let truth = case.problem().arm_with(&paper_deviations());
         let fresh = measure(&truth, &random_configurations(100, &mut rng), 0.0, &mut rng);
         for (settings, sum) in [
             (default_settings(), &mut achieved),
             (Settings { weighting: Weighting::Uniform, ..default_settings() }, &mut uniform),
         ] {
             let found = run(&case, &settings);
-            let errors = ModelErrors::new(&found.model, &found.base_from_station, &fresh).unwrap();
+            let errors = ModelErrors::new(&found.arm, &found.base_from_station, &fresh).unwrap();
             *sum += errors.position.rms.powi(2) / TRIALS as f64;
         }
         if seed >= 20 {
@@ -136,7 +136,7 @@ fn default_settings_reach_the_cramer_rao_bound() {
                 let shifted = |sign: f64| {
                     let mut x = paper_deviations();
                     x[column] += sign * step;
-                    ArmModel::with_deviations(&problem, &x).points_in_base(points.iter().map(|s| &s.at))
+                    problem.arm_with(&x).points_in_base(points.iter().map(|s| &s.at))
                 };
                 let (plus, minus) = (shifted(1.0), shifted(-1.0));
                 for (index, (a, b)) in plus.iter().zip(&minus).enumerate() {

@@ -16,10 +16,9 @@ use nalgebra::DVector;
 use rand::seq::SliceRandom as _;
 use trupose::identification::verification::ModelErrors;
 use trupose::identification::{
-    ArmModel, Estimator, Observability, Observations, PointSample, Prior, Problem, Settings, SigmaSource, TargetAt,
-    identify,
+    Estimator, Observability, Observations, PointSample, Prior, Problem, Settings, SigmaSource, identify,
 };
-use trupose::kinematics::FreeParameter;
+use trupose::kinematics::{Arm, FreeParameter, Place};
 use trupose::planning::{
     Chosen, DesignBound, Information, Objective, PlanningError, Score, Search, SearchSettings, TradeOff, Yardstick,
     trade_off,
@@ -32,19 +31,19 @@ const FRESH: usize = 5000;
 
 /// The reference case.
 struct Reference {
-    model: ArmModel,
+    model: Arm,
     parameters: Vec<FreeParameter>,
-    candidates: Vec<TargetAt>,
+    candidates: Vec<Place>,
     information: Information,
 }
 
-fn places(configurations: Vec<Vec<f64>>) -> Vec<TargetAt> {
-    configurations.into_iter().map(|configuration| TargetAt { configuration, target: 0 }).collect()
+fn places(configurations: Vec<Vec<f64>>) -> Vec<Place> {
+    configurations.into_iter().map(|configuration| Place { configuration, target: 0 }).collect()
 }
 
 impl Reference {
     fn new(candidates: usize) -> Self {
-        let model = ArmModel { chain: paper_chain(), targets: vec![paper_target()] };
+        let model = Arm { chain: paper_chain(), targets: vec![paper_target()] };
         let mut parameters = paper_parameters();
         for parameter in &mut parameters {
             parameter.expected = match parameter.id.quantity() {
@@ -85,14 +84,14 @@ impl Reference {
     }
 
     /// An arm with random deviations of the expected size.
-    fn truth(&self, rng: &mut rand_chacha::ChaCha8Rng) -> ArmModel {
+    fn truth(&self, rng: &mut rand_chacha::ChaCha8Rng) -> Arm {
         let deviations = self.parameters.iter().map(|parameter| normal(rng) * parameter.expected);
         let deviations = DVector::from_iterator(self.parameters.len(), deviations);
-        ArmModel::with_deviations(&self.problem(&Observations::default()), &deviations)
+        self.problem(&Observations::default()).arm_with(&deviations)
     }
 
     fn problem<'a>(&'a self, observations: &'a Observations) -> Problem<'a> {
-        Problem { chain: &self.model.chain, targets: &self.model.targets, parameters: &self.parameters, observations }
+        Problem { arm: &self.model, parameters: &self.parameters, observations }
     }
 
     /// RMS position error (in σ) at `fresh` configurations, registration included, after identification from noisy points.
@@ -108,7 +107,7 @@ impl Reference {
         let observations = Observations { points, ..Observations::default() };
         let found = identify(&self.problem(&observations), settings, &mut |_| {}).unwrap();
         let truth: Vec<PointSample> = measure(&truth, fresh, 0.0, rng);
-        ModelErrors::new(&found.model, &found.base_from_station, &truth).unwrap().position.rms / SIGMA
+        ModelErrors::new(&found.arm, &found.base_from_station, &truth).unwrap().position.rms / SIGMA
     }
 }
 

@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use trupose::identification::{PointSample, TargetAt};
+use trupose::identification::PointSample;
+use trupose::kinematics::Place;
 use trupose::procedure::identify::{IdentifyRequest, NamedSample, SampleSet, identify};
 use trupose::procedure::plan::{PlanRequest, Progress, check, plan, rows};
 use trupose::procedure::{EstimationSettings, joint_types};
@@ -29,7 +30,7 @@ fn samples(profile: &Profile) -> Vec<NamedSample> {
             pose: row.pose.clone(),
             line: row.line,
             sample: PointSample {
-                at: TargetAt { configuration: row.configuration.clone(), target: 0 },
+                at: Place { configuration: row.configuration.clone(), target: 0 },
                 station: 0,
                 point: row.point,
                 sigma: row.sigma,

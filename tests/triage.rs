@@ -12,9 +12,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal, UnitSphere};
+use trupose::identification::PointSample;
 use trupose::identification::triage::{Cause, Finding, Triage, triage};
-use trupose::identification::{PointSample, TargetAt};
-use trupose::kinematics::{Axis, ForwardKinematics, FreeParameter, KinematicChain, ParameterId};
+use trupose::kinematics::{Arm, ForwardKinematics, FreeParameter, ParameterId, Place};
 use trupose::profile::{Level, Profile, builtin};
 use trupose::units::{DEGREE, INCH, MICROMETRE, MILLIMETRE};
 
@@ -26,8 +26,7 @@ const POSES: usize = 24;
 /// A robot as it is planned and calibrated.
 struct Robot {
     name: &'static str,
-    chain: KinematicChain,
-    targets: Vec<Point3<f64>>,
+    arm: Arm,
     parameters: Vec<FreeParameter>,
     ranges: Vec<(f64, f64)>,
 }
@@ -37,8 +36,7 @@ impl Robot {
         let (profile, _) = Profile::parse(builtin(name).unwrap(), name).unwrap();
         Self {
             name,
-            chain: profile.chain().clone(),
-            targets: profile.targets().iter().map(|target| target.position_in_flange).collect(),
+            arm: profile.arm(),
             parameters: profile.free_parameters(Level::Geometric),
             ranges: profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect(),
         }
@@ -89,13 +87,7 @@ impl Session {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let deviations: Vec<(ParameterId, f64)> =
             robot.parameters.iter().map(|parameter| (parameter.id, parameter.expected * normal(rng))).collect();
-        let chain = robot.chain.with_deviations(deviations.iter().copied()).unwrap();
-        let mut targets = robot.targets.clone();
-        for (id, deviation) in &deviations {
-            if let ParameterId::Target { target, axis } = id {
-                targets[*target][Axis::index(*axis)] += deviation;
-            }
-        }
+        let truth = robot.arm.with(deviations).unwrap();
         let planned: Vec<Vec<f64>> = (0..poses)
             .map(|_| robot.ranges.iter().map(|(low, high)| rng.random_range(*low..*high)).collect())
             .collect();
@@ -103,14 +95,14 @@ impl Session {
         let tracker = Isometry3::new(place, direction(rng) * rng.random_range(0.0..3.0));
         let k = at.unwrap_or_else(|| rng.random_range(4..poses - 3));
         // Joint 1 alone has a say only through the others; any joint may slip at one pose.
-        let joint = rng.random_range(0..robot.chain.dof());
+        let joint = rng.random_range(0..robot.arm.chain.dof());
         let by = if let Fault::Joint(size) = fault { if rng.random() { size } else { -size } } else { 0.0 };
         let (bump, moved) = (direction(rng), Isometry3::new(direction(rng), direction(rng)));
-        let arm = ForwardKinematics::new(&chain);
+        let arm = ForwardKinematics::new(&truth.chain);
         let samples = (0..poses)
             .map(|index| {
                 let mut configuration = planned[index].clone();
-                let mut target = targets[0];
+                let mut target = truth.targets[0];
                 let mut offset = Vector3::zeros();
                 let mut factor = 1.0;
                 let mut frame = tracker;
@@ -134,7 +126,7 @@ impl Session {
                 for axis in 0..3 {
                     point[axis] += NOISE * normal(rng);
                 }
-                let at = TargetAt { configuration: planned[index].clone(), target: 0 };
+                let at = Place { configuration: planned[index].clone(), target: 0 };
                 PointSample { at, station: 0, point: point * factor, sigma: None }
             })
             .collect();
@@ -144,8 +136,7 @@ impl Session {
     /// What is said when `count` samples have been taken.
     fn after(&self, robot: &Robot, count: usize) -> Option<Finding> {
         triage(&Triage {
-            chain: &robot.chain,
-            targets: &robot.targets,
+            arm: &robot.arm,
             parameters: &robot.parameters,
             sigma: NOISE,
             planned: &self.planned,
@@ -364,7 +355,7 @@ fn a_measured_ur5_is_left_alone() {
                 .iter()
                 .zip(&planned)
                 .map(|(row, configuration)| PointSample {
-                    at: TargetAt { configuration: configuration.clone(), target: 0 },
+                    at: Place { configuration: configuration.clone(), target: 0 },
                     station: 0,
                     point: Point3::new(row[COLUMN_X], row[COLUMN_X + 1], row[COLUMN_X + 2]) * MILLIMETRE,
                     sigma: Some(sigma),

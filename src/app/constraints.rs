@@ -11,17 +11,15 @@ use crate::cli::ConstraintsArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{DirectErrors, FittedSetup, fit_setup};
 use crate::identification::{
-    ArmModel, Identification, Length, LengthEnd, Observations, Problem, Settings, SharedPoint, TargetAt, Weighting,
-    identify,
+    Identification, Length, LengthEnd, Observations, Problem, Settings, SharedPoint, Weighting, identify,
 };
-use crate::kinematics::FreeParameter;
+use crate::kinematics::{Arm, FreeParameter, Place};
 use crate::procedure::assess::{direct_summary, joint_summaries};
 use crate::procedure::identify::calibration;
 use crate::procedure::result::{self, Context};
 use crate::procedure::summary::{Finished, SampleName, Special};
 use crate::procedure::{
-    EstimationSettings, checks, identification_failure, input_file, joint_types, nominal_targets, target_parameters,
-    warning,
+    EstimationSettings, checks, identification_failure, input_file, joint_types, target_parameters, warning,
 };
 use crate::session::constraints::{Constraints, SharedPoints, read_constraints_bytes};
 use crate::session::filter::Filter;
@@ -74,7 +72,7 @@ pub(super) fn run<O: Write, E: Write>(
                 let mut named = Named::default();
                 for row in &lengths.rows {
                     if keep(filter.as_ref(), columns, &row.fields, row.line, wanted)? {
-                        let end = |q: &Vec<f64>| LengthEnd::Target(TargetAt { configuration: q.clone(), target: 0 });
+                        let end = |q: &Vec<f64>| LengthEnd::Target(Place { configuration: q.clone(), target: 0 });
                         let (from, to) = (end(&row.from), end(&row.to));
                         named.observations.lengths.push(Length { from, to, length: row.length, sigma: row.sigma });
                         let name = |side: &str| SampleName { pose: side.to_owned(), line: row.line };
@@ -201,7 +199,7 @@ fn shared_points(
         let mut at = Vec::new();
         for row in &group.samples {
             if keep(&row.fields, row.line)? {
-                at.push(TargetAt { configuration: row.configuration.clone(), target: 0 });
+                at.push(Place { configuration: row.configuration.clone(), target: 0 });
                 let pose = format!("{}/{}", group.position, group.socket);
                 named.names.push(SampleName { pose, line: row.line });
             }
@@ -243,7 +241,7 @@ struct Setup<'a> {
     loaded: &'a LoadedProfile,
     estimation: EstimationSettings,
     parameters: Vec<FreeParameter>,
-    targets: Vec<nalgebra::Point3<f64>>,
+    arm: Arm,
     settings: Settings,
 }
 
@@ -253,19 +251,14 @@ impl<'a> Setup<'a> {
         Self {
             loaded,
             parameters: estimation.parameters(&loaded.profile),
-            targets: nominal_targets(&loaded.profile),
+            arm: loaded.profile.arm(),
             settings: estimation.solver(&loaded.profile, None),
             estimation,
         }
     }
 
     fn problem<'b>(&'b self, observations: &'b Observations) -> Problem<'b> {
-        Problem {
-            chain: self.loaded.profile.chain(),
-            targets: &self.targets,
-            parameters: &self.parameters,
-            observations,
-        }
+        Problem { arm: &self.arm, parameters: &self.parameters, observations }
     }
 
     fn identify<O: Write, E: Write>(
@@ -280,8 +273,7 @@ impl<'a> Setup<'a> {
 
     /// The nominal arm with its target fitted.
     fn nominal(&self, observations: &Observations) -> Result<FittedSetup, Failure> {
-        let model = ArmModel { chain: self.loaded.profile.chain().clone(), targets: self.targets.clone() };
-        fit_setup(&model, &target_parameters(&self.parameters), observations)
+        fit_setup(&self.arm, &target_parameters(&self.parameters), observations)
             .map_err(|error| identification_failure(&error))
     }
 
@@ -291,8 +283,8 @@ impl<'a> Setup<'a> {
         rest: &Observations,
         found: &Identification,
     ) -> Result<VerificationSummary, Failure> {
-        let nominal = DirectErrors::new(&self.nominal(identification)?.model, rest);
-        let identified = DirectErrors::new(&found.model, rest);
+        let nominal = DirectErrors::new(&self.nominal(identification)?.arm, rest);
+        let identified = DirectErrors::new(&found.arm, rest);
         Ok(self.summary(&nominal, &identified, rest, "the rows that '--use' leaves out".to_owned()))
     }
 
@@ -316,8 +308,8 @@ impl<'a> Setup<'a> {
             let kept = all.observations.of_shared(|index| all.positions.get(index) != Some(*position));
             let left_out = all.observations.of_shared(|index| all.positions.get(index) == Some(*position));
             let found = self.identify(&kept, console)?;
-            let nominal = DirectErrors::new(&self.nominal(&kept)?.model, &left_out);
-            let identified = DirectErrors::new(&found.model, &left_out);
+            let nominal = DirectErrors::new(&self.nominal(&kept)?.arm, &left_out);
+            let identified = DirectErrors::new(&found.arm, &left_out);
             if positions.len() > 4 && index + 1 < positions.len() {
                 console.remark(&format!("left out {} of {} positions", index + 1, positions.len()));
             }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::error::{ExitStatus, Failure};
-use crate::identification::{PointSample, TargetAt};
+use crate::identification::PointSample;
+use crate::kinematics::Place;
 use crate::procedure::{input_file, joint_types};
 use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
 use crate::session::export::simulation_of_table;
@@ -120,7 +121,7 @@ pub(super) fn samples(rows: &[&Row], profile: &Profile) -> Result<Vec<PointSampl
                 })?,
             };
             Ok(PointSample {
-                at: TargetAt { configuration: row.configuration.clone(), target },
+                at: Place { configuration: row.configuration.clone(), target },
                 station: 0,
                 point: row.point,
                 sigma: row.sigma,

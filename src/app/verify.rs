@@ -9,11 +9,11 @@ use super::{Console, load, to_json};
 use crate::cli::{RefitArg, VerifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{ArmModel, Observations, Places, PointSample, Problem, TargetAt};
-use crate::kinematics::{FreeParameter, ParameterId};
+use crate::identification::{Observations, Places, PointSample, Problem};
+use crate::kinematics::{Arm, FreeParameter, ParameterId, Place};
 use crate::procedure::assess::{point_verification, verdict};
 use crate::procedure::checks;
-use crate::procedure::{identification_failure, input_file, nominal_targets, provenance, warning};
+use crate::procedure::{identification_failure, input_file, provenance, warning};
 use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
@@ -46,7 +46,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let models = Models::new(&calibration, profile, &file)?;
     let (nominal, identified) = models.set_up(args.refit, profile, &samples, &file)?;
     let errors = |setup: &FittedSetup| {
-        ModelErrors::new(&setup.model, &setup.base_from_station, &samples)
+        ModelErrors::new(&setup.arm, &setup.base_from_station, &samples)
             .ok_or_else(|| Failure::new(ExitStatus::Numerical, "the frame of the instrument could not be fitted"))
     };
     let (nominal_errors, identified_errors) = (errors(&nominal)?, errors(&identified)?);
@@ -66,7 +66,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         }
     };
     let joints = profile.chain().joints();
-    let tested: Vec<TargetAt> = samples.iter().map(|sample| sample.at.clone()).collect();
+    let tested: Vec<Place> = samples.iter().map(|sample| sample.at.clone()).collect();
     let poses = Places::new(joints, &tested).distinct();
     if fitted > 0 && 3 * poses < 4 * fitted {
         let noun = if poses == 1 { "pose" } else { "poses" };
@@ -113,10 +113,8 @@ fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) ->
         parameters.retain(|parameter| matches!(parameter.id, ParameterId::Link { .. }));
         parameters.extend(remounted_targets(profile, samples));
     }
-    let targets = nominal_targets(profile);
     let observations = Observations::default();
-    let problem =
-        Problem { chain: profile.chain(), targets: &targets, parameters: &parameters, observations: &observations };
+    let problem = Problem { arm: &profile.arm(), parameters: &parameters, observations: &observations };
     checks::check_verification(&problem, samples)
 }
 
@@ -149,7 +147,7 @@ fn carried_over(calibration: &Calibration) -> Option<Warning> {
 }
 
 /// The configurations and targets that the calibration was identified from.
-fn identification_places(calibration: &Calibration, profile: &Profile, file: &str) -> Result<Vec<TargetAt>, Failure> {
+fn identification_places(calibration: &Calibration, profile: &Profile, file: &str) -> Result<Vec<Place>, Failure> {
     let joints = profile.chain().joints();
     let place = |(index, sample): (usize, &SampleText)| {
         if sample.joints.len() != joints.len() || sample.target >= profile.targets().len() {
@@ -158,15 +156,15 @@ fn identification_places(calibration: &Calibration, profile: &Profile, file: &st
         }
         let values = sample.joints.iter().zip(joints);
         let configuration = values.map(|(value, joint)| joint.joint_type.quantity().from_edge(*value)).collect();
-        Ok(TargetAt { configuration, target: sample.target })
+        Ok(Place { configuration, target: sample.target })
     };
     calibration.samples.iter().enumerate().map(place).collect()
 }
 
 /// Nominal and identified arm of a calibration with the set-up of its identification.
 struct Models {
-    nominal: ArmModel,
-    identified: ArmModel,
+    nominal: Arm,
+    identified: Arm,
     nominal_station: Option<Isometry3<f64>>,
     station: Option<Isometry3<f64>>,
 }
@@ -175,7 +173,6 @@ impl Models {
     fn new(calibration: &Calibration, profile: &Profile, file: &str) -> Result<Self, Failure> {
         let known: Vec<ParameterId> = profile.free_parameters(Level::Geometric).iter().map(|p| p.id).collect();
         let mut deviations = Vec::new();
-        let mut targets: Vec<Point3<f64>> = profile.targets().iter().map(|target| target.position_in_flange).collect();
         for parameter in &calibration.parameters {
             let id = known.iter().copied().find(|id| id.to_string() == parameter.name).ok_or_else(|| {
                 Failure::new(
@@ -185,27 +182,20 @@ impl Models {
             })?;
             let deviation = id.quantity().from_edge(parameter.deviation);
             deviations.push((id, deviation));
-            if let ParameterId::Target { target, axis } = id
-                && let Some(point) = targets.get_mut(target)
-            {
-                point[axis.index()] += deviation;
-            }
         }
-        let chain = profile
-            .chain()
-            .with_deviations(deviations)
-            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-        let nominal_targets = calibration
+        let identified =
+            profile.arm().with(deviations).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        let targets = calibration
             .nominal_targets_mm
             .iter()
             .map(|&(x, y, z)| Point3::new(from_mm(x), from_mm(y), from_mm(z)))
             .collect::<Vec<_>>();
-        if nominal_targets.len() != targets.len() {
+        if targets.len() != identified.targets.len() {
             return Err(Failure::new(ExitStatus::Usage, format!("'{file}': the targets do not match its profile")));
         }
         Ok(Self {
-            nominal: ArmModel { chain: profile.chain().clone(), targets: nominal_targets },
-            identified: ArmModel { chain, targets },
+            nominal: Arm { chain: profile.chain().clone(), targets },
+            identified,
             nominal_station: calibration.nominal_base_from_station.as_ref().map(Into::into),
             station: calibration.base_from_station.as_ref().map(Into::into),
         })
@@ -221,12 +211,12 @@ impl Models {
     ) -> Result<(FittedSetup, FittedSetup), Failure> {
         let free = match refit {
             RefitArg::None => {
-                let known = |model, station: Option<Isometry3<f64>>| {
+                let known = |arm, station: Option<Isometry3<f64>>| {
                     let base_from_station = vec![station.ok_or_else(|| {
                         Failure::new(ExitStatus::Usage, format!("'{file}' knows no place of a tracker"))
                             .hint("use '--refit frame' or '--refit frame+target'")
                     })?];
-                    Ok(FittedSetup { model, base_from_station })
+                    Ok(FittedSetup { arm, base_from_station })
                 };
                 return Ok((known(self.nominal, self.nominal_station)?, known(self.identified, self.station)?));
             }
@@ -234,8 +224,7 @@ impl Models {
             RefitArg::FrameAndTarget => remounted_targets(profile, samples),
         };
         let observations = Observations { points: samples.to_vec(), ..Observations::default() };
-        let fit =
-            |model: &ArmModel| fit_setup(model, &free, &observations).map_err(|error| identification_failure(&error));
+        let fit = |arm: &Arm| fit_setup(arm, &free, &observations).map_err(|error| identification_failure(&error));
         Ok((fit(&self.nominal)?, fit(&self.identified)?))
     }
 }

@@ -5,48 +5,10 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, SymmetricEigen, Vector3};
 
-use super::problem::{LengthEnd, Problem, TargetAt};
+use super::problem::{LengthEnd, Problem};
 use crate::geometry::register;
-use crate::kinematics::{ForwardKinematics, IdentificationJacobian, KinematicChain, ParameterId};
+use crate::kinematics::{Arm, IdentificationJacobian};
 use crate::units::MICROMETRE;
-
-/// An arm and its targets at some value of the parameters.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ArmModel {
-    /// The arm.
-    pub chain: KinematicChain,
-    /// Target coordinates in the flange frame (m).
-    pub targets: Vec<Point3<f64>>,
-}
-
-impl ArmModel {
-    /// The nominal model of `problem` with the deviations `x` ((m) or (rad)) added.
-    pub fn with_deviations(problem: &Problem<'_>, x: &DVector<f64>) -> Self {
-        let deviations = || problem.parameters.iter().map(|parameter| parameter.id).zip(x.iter().copied());
-        // The problem was checked: every parameter exists.
-        let chain = problem.chain.with_deviations(deviations()).unwrap_or_else(|_| problem.chain.clone());
-        let mut targets = problem.targets.to_vec();
-        for (id, deviation) in deviations() {
-            if let ParameterId::Target { target, axis } = id
-                && let Some(point) = targets.get_mut(target)
-            {
-                point[axis.index()] += deviation;
-            }
-        }
-        Self { chain, targets }
-    }
-
-    /// Predicted position in the base of one observed target (m).
-    pub fn point_in_base(&self, at: &TargetAt) -> Point3<f64> {
-        ForwardKinematics::new(&self.chain).point_in_base(&at.configuration, &self.targets[at.target])
-    }
-
-    /// Predicted positions in the base (m), in the order of `places`.
-    pub fn points_in_base<'a>(&self, places: impl Iterator<Item = &'a TargetAt>) -> Vec<Point3<f64>> {
-        let arm = ForwardKinematics::new(&self.chain);
-        places.map(|at| arm.point_in_base(&at.configuration, &self.targets[at.target])).collect()
-    }
-}
 
 /// Predicted points and Jacobians of all places.
 #[derive(Clone, Debug)]
@@ -60,17 +22,15 @@ pub(crate) struct Evaluation {
 }
 
 impl Evaluation {
-    pub(crate) fn new(problem: &Problem<'_>, model: &ArmModel) -> Self {
-        let arm = ForwardKinematics::new(&model.chain);
+    pub(crate) fn new(problem: &Problem<'_>, arm: &Arm) -> Self {
+        let arm = arm.prepared();
         let n = problem.parameters.len();
         let mut jacobian = IdentificationJacobian::new(&problem.parameter_ids());
         let places = problem.observations.places().count();
         let mut rows = vec![0.0; 3 * n * places];
         let mut points = Vec::with_capacity(places);
         for (index, at) in problem.observations.places().enumerate() {
-            let target = &model.targets[at.target];
-            let place_rows = &mut rows[3 * n * index..3 * n * (index + 1)];
-            points.push(jacobian.evaluate(&arm, &at.configuration, at.target, target, place_rows));
+            points.push(jacobian.at(&arm, at, &mut rows[3 * n * index..3 * n * (index + 1)]));
         }
         Self { n, points, rows }
     }

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::linearise::{ArmModel, Evaluation, Weights, point_residuals, project};
+use super::linearise::{Evaluation, Weights, point_residuals, project};
 use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
 use crate::kinematics::ParameterId;
@@ -60,8 +60,7 @@ pub struct BlindGroup {
 impl Observability {
     /// Analyses `problem` at its nominal model.
     pub fn new(problem: &Problem<'_>) -> Self {
-        let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
-        let evaluation = Evaluation::new(problem, &model);
+        let evaluation = Evaluation::new(problem, problem.arm);
         Self::of_evaluation(problem, evaluation, &Weights::uniform(problem, 1.0))
     }
 

@@ -7,12 +7,12 @@
 
 use nalgebra::Point3;
 
-use super::linearise::{ArmModel, Evaluation, Weights, point_residuals, project};
-use super::problem::{Observations, PointSample, Problem, TargetAt};
+use super::linearise::{Evaluation, Weights, point_residuals, project};
+use super::problem::{Observations, PointSample, Problem};
 use super::robust::gross_trust;
 use super::{Estimator, Identification, IdentificationError, Observability, Settings, SigmaSource, identify};
 use crate::geometry::principal_spread;
-use crate::kinematics::{FreeParameter, JointType, ParameterId};
+use crate::kinematics::{FreeParameter, JointType, ParameterId, Place};
 use crate::units::{DEGREE, INCH, MILLIMETRE, to_deg, to_mm};
 
 /// Nominal residuals beyond this many expected ones are not explained by a robot with its expected deviations.
@@ -143,8 +143,7 @@ pub fn compare_with_nominal(problem: &Problem<'_>) -> Result<Plausibility, Ident
 /// Root mean square residual (m) that the expected deviations predict once frame and target are fitted. Readings must not have
 /// standard deviations of their own.
 fn expected_residual(problem: &Problem<'_>) -> f64 {
-    let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
-    let evaluation = Evaluation::new(problem, &model);
+    let evaluation = Evaluation::new(problem, problem.arm);
     let weights = Weights::uniform(problem, 1.0);
     let residuals = point_residuals(problem, &evaluation.points, &weights);
     let gram = project(problem, evaluation, &residuals, &weights, &weights).normal_equations().gram;
@@ -169,8 +168,7 @@ impl<'a, 'p> Trial<'a, 'p> {
     fn fit(&self, points: &[PointSample]) -> TrialFit {
         let observations = Observations { points: points.to_vec(), ..Observations::default() };
         let problem = Problem { parameters: &self.target_parameters, observations: &observations, ..*self.problem };
-        let mut model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
-        let mut predicted = model.points_in_base(observations.places());
+        let mut predicted = problem.arm.points_in_base(observations.places());
         if !self.target_parameters.is_empty() {
             let settings = Settings {
                 iterations: 20,
@@ -179,8 +177,7 @@ impl<'a, 'p> Trial<'a, 'p> {
                 ..Settings::default()
             };
             if let Ok(found) = identify(&problem, &settings, &mut |_| {}) {
-                model = found.model;
-                predicted = model.points_in_base(observations.places());
+                predicted = found.arm.points_in_base(observations.places());
             }
         }
         let trust = gross_trust(&problem, &predicted);
@@ -215,8 +212,7 @@ impl<'a, 'p> Trial<'a, 'p> {
             (INCH / MILLIMETRE, "millimetres were read as inches; name the columns 'x_mm', 'y_mm', 'z_mm'"),
             (1e-3 / INCH, "metres were read as inches; name the columns 'x_m', 'y_m', 'z_m'"),
         ];
-        let model = ArmModel { chain: self.problem.chain.clone(), targets: self.problem.targets.to_vec() };
-        let predicted = model.points_in_base(points.iter().map(|sample| &sample.at));
+        let predicted = self.problem.arm.points_in_base(points.iter().map(|sample| &sample.at));
         let measured: Vec<Point3<f64>> = points.iter().map(|sample| sample.point).collect();
         let ratio = extent(&measured) / extent(&predicted);
         STORIES
@@ -230,7 +226,7 @@ impl<'a, 'p> Trial<'a, 'p> {
     }
 
     fn joint_mistakes(&self, points: &[PointSample]) -> Vec<(Mistake, Vec<PointSample>)> {
-        let joints = self.problem.chain.joints();
+        let joints = self.problem.arm.chain.joints();
         let turning = |joint: &usize| joints[*joint].joint_type == JointType::Revolute;
         let scaled = |factor: f64| {
             alter(points, |sample| {
@@ -360,7 +356,7 @@ fn structural_rank(problem: &Problem<'_>) -> usize {
     const POSES: usize = 60;
     /// Primes, whose square roots are independent.
     const IRRATIONAL: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
-    let joints = problem.chain.joints();
+    let joints = problem.arm.chain.joints();
     let points = (0..POSES)
         .map(|pose| {
             // Multiples of independent irrational numbers spread evenly (Weyl); any generic set of poses shows the same rank.
@@ -369,7 +365,7 @@ fn structural_rank(problem: &Problem<'_>) -> usize {
                 JointType::Revolute => 4.0 * place(joint),
                 JointType::Prismatic => 0.5 * place(joint),
             });
-            let at = TargetAt { configuration: configuration.collect(), target: pose % problem.targets.len().max(1) };
+            let at = Place { configuration: configuration.collect(), target: pose % problem.arm.targets.len().max(1) };
             PointSample { at, station: 0, point: Point3::origin(), sigma: None }
         })
         .collect();
@@ -384,7 +380,7 @@ pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec
     let problem = &Problem { observations: &accepted, ..*problem };
     let (observability, sigma) = (&identification.observability, identification.sigma.used);
     let mut found = Vec::new();
-    let once = problem.observations.without_repetitions(problem.chain.joints());
+    let once = problem.observations.without_repetitions(problem.arm.chain.joints());
     let (values, all) = (once.independent_values(), problem.observations.independent_values());
     // A handful of samples cannot show the rank that the robot has: what could be found sets the demand.
     let combinations = if values < VALUES_PER_COMBINATION * problem.parameters.len() {
@@ -395,7 +391,7 @@ pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec
     if values < VALUES_PER_COMBINATION * combinations {
         found.push(Weakness::TooFewData { values, combinations, repeats: values < all });
     }
-    for (joint, definition) in problem.chain.joints().iter().enumerate() {
+    for (joint, definition) in problem.arm.chain.joints().iter().enumerate() {
         let values = || problem.observations.places().map(|place| place.configuration[joint]);
         let range = values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
         let still = match definition.joint_type {

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, Matrix3};
 
-use super::{ArmModel, Identification, TargetAt};
-use crate::kinematics::{ForwardKinematics, IdentificationJacobian, ParameterId};
+use super::Identification;
+use crate::kinematics::{Arm, IdentificationJacobian, ParameterId, Place};
 
 /// Coordinates of a rigid motion.
 const MOTIONS: usize = 6;
@@ -12,9 +12,9 @@ const MOTIONS: usize = 6;
 /// these very places: what only moves the whole arm is no error of it.
 ///
 /// `J' Σ J'ᵀ` with the Jacobian of all places freed from rigid motions, `J' = J − Q Qᵀ J`, where Q spans the motions.
-pub fn position_covariances(found: &Identification, places: &[&TargetAt]) -> Vec<Matrix3<f64>> {
+pub fn position_covariances(found: &Identification, places: &[&Place]) -> Vec<Matrix3<f64>> {
     let ids: Vec<ParameterId> = found.estimates.iter().map(|estimate| estimate.id).collect();
-    let free = without_motions(jacobian(&found.model, &ids, places), &found.model, places);
+    let free = without_motions(jacobian(&found.arm, &ids, places), &found.arm, places);
     (0..places.len())
         .map(|place| {
             let rows = free.rows(3 * place, 3);
@@ -25,24 +25,22 @@ pub fn position_covariances(found: &Identification, places: &[&TargetAt]) -> Vec
 }
 
 /// Derivatives of all positions by the parameters, three rows per place.
-fn jacobian(model: &ArmModel, ids: &[ParameterId], places: &[&TargetAt]) -> DMatrix<f64> {
-    let arm = ForwardKinematics::new(&model.chain);
+fn jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
+    let arm = arm.prepared();
     let mut evaluated = IdentificationJacobian::new(ids);
     let mut rows = vec![0.0; 3 * ids.len() * places.len()];
     if ids.is_empty() {
         return DMatrix::zeros(3 * places.len(), 0);
     }
-    for (at, rows) in places.iter().zip(rows.chunks_mut(3 * ids.len())) {
-        if let Some(target) = model.targets.get(at.target) {
-            evaluated.evaluate(&arm, &at.configuration, at.target, target, rows);
-        }
+    for (place, rows) in places.iter().zip(rows.chunks_mut(3 * ids.len())) {
+        evaluated.at(&arm, place, rows);
     }
     DMatrix::from_row_slice(3 * places.len(), ids.len(), &rows)
 }
 
 /// The part of `jacobian` that no rigid motion of all places explains.
-fn without_motions(jacobian: DMatrix<f64>, model: &ArmModel, places: &[&TargetAt]) -> DMatrix<f64> {
-    let points = model.points_in_base(places.iter().copied());
+fn without_motions(jacobian: DMatrix<f64>, arm: &Arm, places: &[&Place]) -> DMatrix<f64> {
+    let points = arm.points_in_base(places.iter().copied());
     let count = points.len().max(1) as f64;
     let centre = points.iter().fold(nalgebra::Vector3::zeros(), |sum, point| sum + point.coords) / count;
     let mut motions = DMatrix::zeros(3 * points.len(), MOTIONS);

@@ -1,24 +1,15 @@
 //! What identification is given: the nominal arm, the free parameters and the observations.
 
-use nalgebra::Point3;
+use nalgebra::{DVector, Point3};
 
 use super::{IdentificationError, Places, Rejected, SampleIndex};
-use crate::kinematics::{FreeParameter, Joint, KinematicChain, ParameterId};
-
-/// A configuration and the target that was observed there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TargetAt {
-    /// Pendant configuration (rad) or (m).
-    pub configuration: Vec<f64>,
-    /// Index of the target.
-    pub target: usize,
-}
+use crate::kinematics::{Arm, FreeParameter, Joint, ParameterId, Place};
 
 /// One measured point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointSample {
     /// Where the arm stood and what was measured.
-    pub at: TargetAt,
+    pub at: Place,
     /// Index of the instrument station: points of one station share an unknown frame.
     pub station: usize,
     /// Coordinates in the frame of the station (m).
@@ -31,14 +22,14 @@ pub struct PointSample {
 #[derive(Clone, Debug, PartialEq)]
 pub struct SharedPoint {
     /// The configurations.
-    pub at: Vec<TargetAt>,
+    pub at: Vec<Place>,
 }
 
 /// One end of a measured length.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LengthEnd {
     /// The target at a configuration.
-    Target(TargetAt),
+    Target(Place),
     /// The shared point with this index.
     SharedPoint(usize),
 }
@@ -151,7 +142,7 @@ impl Observations {
     }
 
     /// All places where the target was observed, in a fixed order: points, shared points, lengths.
-    pub fn places(&self) -> impl Iterator<Item = &TargetAt> {
+    pub fn places(&self) -> impl Iterator<Item = &Place> {
         let lengths = self.lengths.iter().flat_map(|length| [&length.from, &length.to]).filter_map(|end| match end {
             LengthEnd::Target(at) => Some(at),
             LengthEnd::SharedPoint(_) => None,
@@ -168,9 +159,7 @@ impl Observations {
 #[derive(Clone, Debug)]
 pub struct Problem<'a> {
     /// Nominal arm.
-    pub chain: &'a KinematicChain,
-    /// Nominal target coordinates in the flange frame (m), one per target.
-    pub targets: &'a [Point3<f64>],
+    pub arm: &'a Arm,
     /// Parameters to identify, in the order of all vectors and matrices.
     pub parameters: &'a [FreeParameter],
     /// What was observed.
@@ -183,17 +172,20 @@ impl Problem<'_> {
         self.parameters.iter().map(|parameter| parameter.id).collect()
     }
 
+    /// The arm with the deviations `x` ((m) or (rad)) of the parameters, in order.
+    pub fn arm_with(&self, x: &DVector<f64>) -> Arm {
+        let deviations = self.parameters.iter().map(|parameter| parameter.id).zip(x.iter().copied());
+        // The problem was checked: the arm has every parameter.
+        self.arm.with(deviations).unwrap_or_else(|_| self.arm.clone())
+    }
+
     /// Checks sizes, indices and finiteness.
     ///
     /// # Errors
     /// The first thing that is wrong.
     pub fn check(&self) -> Result<(), IdentificationError> {
         for parameter in self.parameters {
-            let known = match parameter.id {
-                ParameterId::Target { target, .. } => target < self.targets.len(),
-                ParameterId::Link { .. } => self.chain.parameter(parameter.id).is_some(),
-            };
-            if !known {
+            if self.arm.value(parameter.id).is_none() {
                 return Err(IdentificationError::UnknownParameter { parameter: parameter.id.to_string() });
             }
             if !(parameter.expected.is_finite() && parameter.expected > 0.0) {
@@ -204,18 +196,18 @@ impl Problem<'_> {
             }
         }
         for (index, place) in self.observations.places().enumerate() {
-            if place.configuration.len() != self.chain.dof() {
+            if place.configuration.len() != self.arm.chain.dof() {
                 return Err(IdentificationError::Joints {
                     sample: index,
                     given: place.configuration.len(),
-                    joints: self.chain.dof(),
+                    joints: self.arm.chain.dof(),
                 });
             }
-            if place.target >= self.targets.len() {
+            if place.target >= self.arm.targets.len() {
                 return Err(IdentificationError::Target {
                     sample: index,
                     target: place.target,
-                    targets: self.targets.len(),
+                    targets: self.arm.targets.len(),
                 });
             }
             if !place.configuration.iter().all(|value| value.is_finite()) {

@@ -1,7 +1,6 @@
 //! Which samples show a configuration and target again. A repetition tells about noise, nothing about the arm.
 
-use super::TargetAt;
-use crate::kinematics::Joint;
+use crate::kinematics::{Joint, Place};
 
 /// Joint values closer than this (deg, sliding joints mm) are the same configuration, written down once more.
 const SAME_JOINT_VALUE: f64 = 0.01;
@@ -10,14 +9,14 @@ const SAME_JOINT_VALUE: f64 = 0.01;
 /// by joint.
 #[derive(Clone, Debug)]
 pub struct Places<'a> {
-    sorted: Vec<(f64, usize, &'a TargetAt)>,
+    sorted: Vec<(f64, usize, &'a Place)>,
     /// What joint values may differ by ((rad) or (m)).
     tolerances: Vec<f64>,
 }
 
 impl<'a> Places<'a> {
     /// Of an arm with these joints; every configuration has a value for each.
-    pub fn new(joints: &[Joint], places: impl IntoIterator<Item = &'a TargetAt>) -> Self {
+    pub fn new(joints: &[Joint], places: impl IntoIterator<Item = &'a Place>) -> Self {
         let tolerances = joints.iter().map(|joint| joint.joint_type.quantity().from_edge(SAME_JOINT_VALUE)).collect();
         let mut found = Self { sorted: Vec::new(), tolerances };
         let listed = places.into_iter().enumerate();
@@ -27,14 +26,14 @@ impl<'a> Places<'a> {
     }
 
     /// Whether one of them is the same as `at`.
-    pub fn contains(&self, at: &TargetAt) -> bool {
+    pub fn contains(&self, at: &Place) -> bool {
         self.same(at).next().is_some()
     }
 
     /// For every one, in the order in which they were given, the index of the first that is the same: its own if it is no
     /// repetition.
     pub fn first_of_each(&self) -> Vec<usize> {
-        let mut in_order: Vec<(usize, &TargetAt)> = self.sorted.iter().map(|(_, index, at)| (*index, *at)).collect();
+        let mut in_order: Vec<(usize, &Place)> = self.sorted.iter().map(|(_, index, at)| (*index, *at)).collect();
         in_order.sort_by_key(|(index, _)| *index);
         let mut first = Vec::with_capacity(in_order.len());
         for (index, at) in in_order {
@@ -51,12 +50,12 @@ impl<'a> Places<'a> {
     }
 
     /// Joint values in tolerances, with weights between 1 and 2 that no regular grid of configurations has.
-    fn key(&self, at: &TargetAt) -> f64 {
+    fn key(&self, at: &Place) -> f64 {
         let values = at.configuration.iter().zip(&self.tolerances).enumerate();
         values.map(|(joint, (value, size))| value / size * weight(joint)).sum()
     }
 
-    fn same<'b>(&'b self, at: &'b TargetAt) -> impl Iterator<Item = usize> + 'b {
+    fn same<'b>(&'b self, at: &'b Place) -> impl Iterator<Item = usize> + 'b {
         let reach: f64 = (0..self.tolerances.len()).map(weight).sum();
         let key = self.key(at);
         let first = self.sorted.partition_point(|(other, ..)| *other < key - reach);
@@ -64,7 +63,7 @@ impl<'a> Places<'a> {
         near.filter(|(_, _, other)| self.is_same(other, at)).map(|(_, index, _)| *index)
     }
 
-    fn is_same(&self, a: &TargetAt, b: &TargetAt) -> bool {
+    fn is_same(&self, a: &Place, b: &Place) -> bool {
         let mut values = a.configuration.iter().zip(&b.configuration).zip(&self.tolerances);
         a.target == b.target && values.all(|((a, b), size)| (a - b).abs() <= *size)
     }
@@ -89,7 +88,7 @@ mod tests {
             coupling: Vec::new(),
         };
         let joints = [joint(JointType::Revolute), joint(JointType::Prismatic)];
-        let at = |degrees: f64, millimetres: f64, target| TargetAt {
+        let at = |degrees: f64, millimetres: f64, target| Place {
             configuration: vec![degrees.to_radians(), 1e-3 * millimetres],
             target,
         };

@@ -2,10 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
-use super::linearise::ArmModel;
 use super::observability::Observability;
 use super::settings::{Iteration, SigmaSource, TerminationReason};
-use crate::kinematics::ParameterId;
+use crate::kinematics::{Arm, ParameterId};
 
 /// The measurement σ of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,7 +79,7 @@ pub struct Rejected {
 #[derive(Clone, Debug)]
 pub struct Identification {
     /// The identified arm and targets.
-    pub model: ArmModel,
+    pub arm: Arm,
     /// Every free parameter.
     pub estimates: Vec<Estimate>,
     /// Covariance of the deviations, n × n ((m) and (rad)).

@@ -78,7 +78,7 @@ pub(crate) fn judge(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, f
 /// As [`judge`], with the frames fitted to the samples that `weights` trusts and the parameters known from those of `counting`.
 fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, counting: &Weights, floor: f64) -> Judgement {
     let problem = solve.problem;
-    let evaluation = Evaluation::new(problem, &at.model);
+    let evaluation = Evaluation::new(problem, &at.arm);
     let residuals = point_residuals(problem, &evaluation.points, weights);
     let full = Weights::uniform(problem, weights.sigma);
     let rows = project(problem, evaluation, &residuals, weights, &full);

@@ -9,11 +9,12 @@ use std::ops::ControlFlow;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::linearise::length_rows;
-use super::linearise::{ArmModel, Evaluation, NormalEquations, PointResiduals, Weights, point_residuals, project};
+use super::linearise::{Evaluation, NormalEquations, PointResiduals, Weights, point_residuals, project};
 use super::observability::{Observability, raw_unit};
 use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
 use super::{IdentificationError, Iteration, Prior, TerminationReason, Weighting};
+use crate::kinematics::Arm;
 
 /// What is left to go, in expected deviations, that ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-7;
@@ -82,7 +83,7 @@ impl Basis {
 pub(crate) struct Linearised {
     pub(crate) z: DVector<f64>,
     pub(crate) x: DVector<f64>,
-    pub(crate) model: ArmModel,
+    pub(crate) arm: Arm,
     pub(crate) points: PointResiduals,
     pub(crate) normal: NormalEquations,
     /// `normal.cost` plus the prior's share.
@@ -102,8 +103,8 @@ impl Solve<'_, '_> {
     /// Linearises at `z`.
     pub(crate) fn linearise(&self, z: DVector<f64>) -> Linearised {
         let x = &self.basis.transform * &z;
-        let model = ArmModel::with_deviations(self.problem, &x);
-        let evaluation = Evaluation::new(self.problem, &model);
+        let arm = self.problem.arm_with(&x);
+        let evaluation = Evaluation::new(self.problem, &arm);
         let points = point_residuals(self.problem, &evaluation.points, self.weights);
         let normal = match self.weighting {
             Weighting::Covariance => {
@@ -112,7 +113,7 @@ impl Solve<'_, '_> {
             Weighting::Uniform => self.uniform_pairs(&evaluation),
         };
         let cost = normal.cost + self.basis.prior_weight * z.norm_squared();
-        Linearised { z, x, model, points, normal, cost }
+        Linearised { z, x, arm, points, normal, cost }
     }
 
     /// All pairs of each station alike. Each pair weighs `3 / (M σ²)`, so that the pairs together carry as much information

@@ -20,13 +20,11 @@ mod slips;
 mod tests;
 mod words;
 
-use nalgebra::Point3;
-
 use super::PointSample;
 use super::linearise::SMALLEST_SIGMA;
-use crate::kinematics::{FreeParameter, KinematicChain, ParameterId};
+use crate::kinematics::{Arm, FreeParameter};
 use crate::units::Quantity;
-use fit::{Arm, Item};
+use fit::{Item, Nominal};
 pub use words::Names;
 
 /// Shots that scatter by more than this many times what the instrument states show a target that moves.
@@ -38,9 +36,7 @@ const FIRST_CHECK: usize = 4;
 #[derive(Clone, Copy, Debug)]
 pub struct Triage<'a> {
     /// Nominal arm.
-    pub chain: &'a KinematicChain,
-    /// Nominal target coordinates in the flange frame (m).
-    pub targets: &'a [Point3<f64>],
+    pub arm: &'a Arm,
     /// Free parameters with their expected deviations (m) or (rad).
     pub parameters: &'a [FreeParameter],
     /// Standard deviation of a coordinate (m) where a sample has none.
@@ -159,7 +155,7 @@ pub fn triage(triage: &Triage<'_>) -> Option<Finding> {
     if let Some(finding) = not_at_rest(triage, newest) {
         return Some(finding);
     }
-    let arm = Arm::new(triage.chain, triage.targets, triage.parameters);
+    let nominal = Nominal::new(triage.arm, triage.parameters);
     if triage.excluded.contains(&newest) || !fits_together(triage) {
         return None;
     }
@@ -168,16 +164,16 @@ pub fn triage(triage: &Triage<'_>) -> Option<Finding> {
     if active.len() < FIRST_CHECK {
         return None;
     }
-    let full = alarm::raised(&arm, active.clone())?;
-    let excess = alarm::excess(&arm, &full);
+    let full = alarm::raised(&nominal, active.clone())?;
+    let excess = alarm::excess(&nominal, &full);
     if excess <= 1.0 {
-        return explain::explain(triage, &arm, &items, &full);
+        return explain::explain(triage, &nominal, &items, &full);
     }
     // The arm itself is not as good as the instrument: judged by what it shows.
     let widened =
         |items: Vec<Item>| items.into_iter().map(|item| Item { sigma: item.sigma * excess, ..item }).collect();
-    let full = alarm::raised(&arm, widened(active))?;
-    explain::explain(triage, &arm, &widened(items), &full)
+    let full = alarm::raised(&nominal, widened(active))?;
+    explain::explain(triage, &nominal, &widened(items), &full)
 }
 
 fn not_at_rest(triage: &Triage<'_>, newest: usize) -> Option<Finding> {
@@ -195,25 +191,21 @@ fn not_at_rest(triage: &Triage<'_>, newest: usize) -> Option<Finding> {
 
 fn fits_together(triage: &Triage<'_>) -> bool {
     let sample_ok = |sample: &PointSample| {
-        sample.at.configuration.len() == triage.chain.dof()
-            && sample.at.target < triage.targets.len()
+        sample.at.configuration.len() == triage.arm.chain.dof()
+            && sample.at.target < triage.arm.targets.len()
             && sample.at.configuration.iter().chain(sample.point.coords.iter()).all(|value| value.is_finite())
     };
-    let parameter_ok = |parameter: &FreeParameter| match parameter.id {
-        ParameterId::Target { target, .. } => target < triage.targets.len(),
-        ParameterId::Link { .. } => triage.chain.parameter(parameter.id).is_some(),
-    };
+    let parameter_ok = |parameter: &FreeParameter| triage.arm.value(parameter.id).is_some();
     triage.samples.iter().all(sample_ok)
         && triage.parameters.iter().all(parameter_ok)
         && triage.excluded.iter().all(|sample| *sample < triage.samples.len())
-        && triage.planned.iter().all(|configuration| configuration.len() == triage.chain.dof())
+        && triage.planned.iter().all(|configuration| configuration.len() == triage.arm.chain.dof())
 }
 
 fn items(triage: &Triage<'_>, excess: f64) -> Vec<Item> {
     let item = |(sample, given): (usize, &PointSample)| Item {
         sample,
-        configuration: given.at.configuration.clone(),
-        target: given.at.target,
+        at: given.at.clone(),
         station: given.station,
         point: given.point,
         sigma: given.sigma.unwrap_or(triage.sigma).max(SMALLEST_SIGMA) * excess,

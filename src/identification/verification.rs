@@ -5,10 +5,10 @@
 
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 
-use super::linearise::{ArmModel, Weights, point_residuals};
+use super::linearise::{Weights, point_residuals};
 use super::problem::{LengthEnd, Observations, PointSample, Problem};
 use super::{Estimator, IdentificationError, Places, Prior, Settings, Weighting, identify};
-use crate::kinematics::{FreeParameter, Joint, JointType};
+use crate::kinematics::{Arm, FreeParameter, Joint, JointType};
 use crate::units::MILLIMETRE;
 
 /// Above this many points the distances are taken between evenly picked ones: 2000 points have two million pairs.
@@ -67,8 +67,8 @@ pub struct ModelErrors {
 
 impl ModelErrors {
     /// Errors of `model` on `samples` with the instrument at `base_from_station`; `None` without samples.
-    pub fn new(model: &ArmModel, base_from_station: &[Isometry3<f64>], samples: &[PointSample]) -> Option<Self> {
-        let predicted = model.points_in_base(samples.iter().map(|sample| &sample.at));
+    pub fn new(arm: &Arm, base_from_station: &[Isometry3<f64>], samples: &[PointSample]) -> Option<Self> {
+        let predicted = arm.points_in_base(samples.iter().map(|sample| &sample.at));
         let vectors: Vec<Vector3<f64>> = samples
             .iter()
             .zip(&predicted)
@@ -80,7 +80,7 @@ impl ModelErrors {
         };
         let axis_mean = over_axes(&|sum, value| sum + value).map(|sum| sum / vectors.len() as f64);
         let axis_max = over_axes(&f64::max);
-        let distance = distance_errors(model.chain.joints(), samples, &predicted);
+        let distance = distance_errors(arm.chain.joints(), samples, &predicted);
         Some(Self { vectors, position, axis_mean, axis_max, distance })
     }
 }
@@ -117,11 +117,11 @@ pub struct DirectErrors {
 
 impl DirectErrors {
     /// Errors of `model` on shared points and lengths.
-    pub fn new(model: &ArmModel, observations: &Observations) -> Self {
+    pub fn new(arm: &Arm, observations: &Observations) -> Self {
         let mut means = Vec::with_capacity(observations.shared.len());
         let mut seats = Vec::new();
         for shared in &observations.shared {
-            let points = model.points_in_base(shared.at.iter());
+            let points = arm.points_in_base(shared.at.iter());
             let sum = points.iter().fold(Vector3::zeros(), |sum, point| sum + point.coords);
             let mean = Point3::from(sum / points.len().max(1) as f64);
             means.push(mean);
@@ -130,7 +130,7 @@ impl DirectErrors {
             }
         }
         let end = |end: &LengthEnd| match end {
-            LengthEnd::Target(at) => Some(model.point_in_base(at)),
+            LengthEnd::Target(at) => Some(arm.point_in_base(at)),
             LengthEnd::SharedPoint(index) => means.get(*index).copied(),
         };
         let lengths: Vec<f64> = observations
@@ -281,8 +281,8 @@ pub fn coverage_gaps(joints: &[Joint], identification: &[&[f64]], verification: 
 /// A model with the set-up (instrument frame, and target where it is free) fitted to some samples.
 #[derive(Clone, Debug)]
 pub struct FittedSetup {
-    /// The model; only its targets may differ from what was given.
-    pub model: ArmModel,
+    /// The arm; only its targets may differ from what was given.
+    pub arm: Arm,
     /// Pose of each station in the base.
     pub base_from_station: Vec<Isometry3<f64>>,
 }
@@ -294,17 +294,17 @@ pub struct FittedSetup {
 /// # Errors
 /// Sizes or indices that do not fit, or a mirrored frame.
 pub fn fit_setup(
-    model: &ArmModel,
+    arm: &Arm,
     free: &[FreeParameter],
     observations: &Observations,
 ) -> Result<FittedSetup, IdentificationError> {
-    let problem = Problem { chain: &model.chain, targets: &model.targets, parameters: free, observations };
+    let problem = Problem { arm, parameters: free, observations };
     problem.check()?;
     if free.is_empty() {
-        let predicted = model.points_in_base(observations.places());
+        let predicted = arm.points_in_base(observations.places());
         let weights = Weights::uniform(&problem, MILLIMETRE);
         let residuals = point_residuals(&problem, &predicted, &weights);
-        return Ok(FittedSetup { model: model.clone(), base_from_station: residuals.base_from_station });
+        return Ok(FittedSetup { arm: arm.clone(), base_from_station: residuals.base_from_station });
     }
     // The prior keeps directions in which the data do not show the target (a wrist that never turns) at their nominal value.
     let settings = Settings {
@@ -314,5 +314,5 @@ pub fn fit_setup(
         ..Settings::default()
     };
     let fitted = identify(&problem, &settings, &mut |_| {})?;
-    Ok(FittedSetup { model: fitted.model, base_from_station: fitted.base_from_station })
+    Ok(FittedSetup { arm: fitted.arm, base_from_station: fitted.base_from_station })
 }

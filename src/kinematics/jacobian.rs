@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6xX, Point3, Vector3};
 
 use super::forward::LinkAxes;
-use super::{ForwardKinematics, JointType, LinkParameter, ParameterId};
+use super::{ForwardKinematics, JointType, LinkParameter, ParameterId, Place, PreparedArm};
 
 /// Evaluates `B = ∂p/∂(parameters)`, equations (17)–(20) of the method paper, for a fixed list of parameters.
 ///
@@ -29,6 +29,12 @@ impl IdentificationJacobian {
     /// Whether there is no parameter at all.
     pub fn is_empty(&self) -> bool {
         self.parameters.is_empty()
+    }
+
+    /// Position in the base of the target at a place (m), and its derivatives: see [`Self::evaluate`].
+    #[inline]
+    pub fn at(&mut self, arm: &PreparedArm<'_>, place: &Place, rows: &mut [f64]) -> Point3<f64> {
+        self.evaluate(&arm.forward, &place.configuration, place.target, &arm.targets[place.target], rows)
     }
 
     /// Position of the target in the base (m) at configuration `q`, and its derivatives.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Convention, JointType, KinematicChain, KinematicsError};
+use super::{Convention, JointType, KinematicChain, Link};
 use crate::units::Quantity;
 
 /// One of the five constants of a link.
@@ -143,46 +143,31 @@ impl fmt::Display for ParameterId {
     }
 }
 
-impl KinematicChain {
-    /// Value of a link constant ((m) or (rad)); `None` for a target coordinate or a joint that the arm does not have.
-    pub fn parameter(&self, id: ParameterId) -> Option<f64> {
-        let ParameterId::Link { joint, parameter } = id else { return None };
-        let link = self.joints().get(joint)?.link;
-        Some(match parameter {
-            LinkParameter::Alpha => link.alpha,
-            LinkParameter::A => link.a,
-            LinkParameter::D => link.d,
-            LinkParameter::Theta => link.theta,
-            LinkParameter::Beta => link.beta,
-        })
-    }
-
-    /// The same arm with deviations ((m) or (rad)) added to its link constants. Target coordinates are not the chain's and are
-    /// passed over.
-    ///
-    /// # Errors
-    /// A joint that the arm does not have.
-    pub fn with_deviations(
-        &self,
-        deviations: impl IntoIterator<Item = (ParameterId, f64)>,
-    ) -> Result<Self, KinematicsError> {
-        let mut chain = self.clone();
-        for (id, deviation) in deviations {
-            let ParameterId::Link { joint, parameter } = id else { continue };
-            let link =
-                chain.link_mut(joint).ok_or_else(|| KinematicsError::UnknownParameter { parameter: id.to_string() })?;
-            let constant = match parameter {
-                LinkParameter::Alpha => &mut link.alpha,
-                LinkParameter::A => &mut link.a,
-                LinkParameter::D => &mut link.d,
-                LinkParameter::Theta => &mut link.theta,
-                LinkParameter::Beta => &mut link.beta,
-            };
-            *constant += deviation;
+impl Link {
+    /// A constant (m) or (rad).
+    pub const fn value(&self, parameter: LinkParameter) -> f64 {
+        match parameter {
+            LinkParameter::Alpha => self.alpha,
+            LinkParameter::A => self.a,
+            LinkParameter::D => self.d,
+            LinkParameter::Theta => self.theta,
+            LinkParameter::Beta => self.beta,
         }
-        Ok(chain)
     }
 
+    /// A constant (m) or (rad), to be changed.
+    pub const fn value_mut(&mut self, parameter: LinkParameter) -> &mut f64 {
+        match parameter {
+            LinkParameter::Alpha => &mut self.alpha,
+            LinkParameter::A => &mut self.a,
+            LinkParameter::D => &mut self.d,
+            LinkParameter::Theta => &mut self.theta,
+            LinkParameter::Beta => &mut self.beta,
+        }
+    }
+}
+
+impl KinematicChain {
     /// Pairs of neighbouring joints whose axes are parallel or antiparallel at the nominal geometry, within `tolerance` (rad):
     /// index of the first joint of each pair. Between such axes the common normal is undefined and plain DH is singular.
     ///

@@ -158,7 +158,7 @@ impl SimulatedCell {
     /// A configuration by seed, inside the limits.
     fn elsewhere(&self, of: Use) -> Vec<f64> {
         let mut random = Random::new(self.seed, of);
-        let joints = self.truth.chain.joints().iter().zip(&self.joints);
+        let joints = self.truth.arm.chain.joints().iter().zip(&self.joints);
         joints
             .map(|(joint, range)| {
                 let reach = of_type(joint.joint_type, DEFAULT_REACH);
@@ -170,13 +170,13 @@ impl SimulatedCell {
 
     /// The SMR in the tracker frame (m), without noise.
     fn true_point(&self, request: &MeasureRequest) -> Option<Point3<f64>> {
-        let mut target = *self.truth.targets.get(request.target)?;
+        let mut target = *self.truth.arm.targets.get(request.target)?;
         for (kind, number) in self.faults(request.number) {
             if let FaultKind::TargetBumped { by_mm } = kind {
                 target += self.direction(kind, number) * from_mm(by_mm);
             }
         }
-        let arm = ForwardKinematics::new(&self.truth.chain);
+        let arm = ForwardKinematics::new(&self.truth.arm.chain);
         Some(self.tracker_from_base * arm.point_in_base(&self.standing(request), &target))
     }
 
@@ -222,7 +222,7 @@ impl SimulatedCell {
     /// Time of a measurement and of the move onward (s).
     pub(super) fn time(&self, request: &MeasureRequest, shots: u32) -> f64 {
         let onward = request.following.as_deref().unwrap_or(&request.configuration);
-        let joints = self.truth.chain.joints().iter().zip(&self.joints);
+        let joints = self.truth.arm.chain.joints().iter().zip(&self.joints);
         let slowest = joints.zip(request.configuration.iter().zip(onward)).fold(
             0.0_f64,
             |slowest, ((joint, range), (from, to))| {
@@ -235,7 +235,7 @@ impl SimulatedCell {
     }
 
     fn check(&self, request: &MeasureRequest) -> Result<(), LinkError> {
-        let joints = self.truth.chain.dof();
+        let joints = self.truth.arm.chain.dof();
         let poses = [Some(&request.configuration), request.following.as_ref()];
         for configuration in poses.into_iter().flatten() {
             if configuration.len() != joints || !configuration.iter().all(|value| value.is_finite()) {

@@ -13,8 +13,8 @@
 use nalgebra::{DMatrix, DMatrixView, DVector, Point3};
 
 use super::PlanningError;
-use crate::identification::{ArmModel, Observability, Observations, PointSample, Problem, TargetAt};
-use crate::kinematics::{ForwardKinematics, FreeParameter, IdentificationJacobian};
+use crate::identification::{Observability, Observations, PointSample, Problem};
+use crate::kinematics::{Arm, FreeParameter, IdentificationJacobian, Place};
 use crate::units::MILLIMETRE;
 
 /// Parameters of the instrument frame: three translations, three rotations.
@@ -47,21 +47,21 @@ pub const fn fewest_poses(rank: usize) -> usize {
 
 /// Number of combinations of `parameters` that distances can find by measuring at all of `places`; `None` if it is not clear, or
 /// the sizes do not fit.
-pub fn findable(model: &ArmModel, parameters: &[FreeParameter], places: &[TargetAt]) -> Option<usize> {
-    check(model, parameters, places).ok()?;
-    observe(model, parameters, places).rank
+pub fn findable(arm: &Arm, parameters: &[FreeParameter], places: &[Place]) -> Option<usize> {
+    check(arm, parameters, places).ok()?;
+    observe(arm, parameters, places).rank
 }
 
 impl Information {
-    /// Of `candidates` for identifying `parameters` of `model`, judged by the error at `fresh` poses.
+    /// Of `candidates` for identifying `parameters` of `arm`, judged by the error at `fresh` poses.
     ///
     /// # Errors
     /// Sizes that do not fit, no free parameter, no fresh pose, or a pool from which the rank is not clear.
     pub fn new(
-        model: &ArmModel,
+        arm: &Arm,
         parameters: &[FreeParameter],
-        candidates: &[TargetAt],
-        fresh: &[TargetAt],
+        candidates: &[Place],
+        fresh: &[Place],
     ) -> Result<Self, PlanningError> {
         if parameters.is_empty() {
             return Err(PlanningError::NoParameters);
@@ -69,9 +69,9 @@ impl Information {
         if fresh.len() < FEWEST_FRESH {
             return Err(PlanningError::FreshPoses { given: fresh.len(), needed: FEWEST_FRESH });
         }
-        check(model, parameters, fresh)?;
-        check(model, parameters, candidates)?;
-        let observability = observe(model, parameters, candidates);
+        check(arm, parameters, fresh)?;
+        check(arm, parameters, candidates)?;
+        let observability = observe(arm, parameters, candidates);
         let rank = observability.rank.ok_or(PlanningError::RankUnclear { gap: observability.gap })?;
         if rank == 0 {
             return Err(PlanningError::NothingIdentifiable { parameters: parameters.len() });
@@ -79,7 +79,7 @@ impl Information {
         let scale = DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.expected));
         let visible = complement(&observability.blind, rank);
         let basis = DMatrix::from_diagonal(&scale) * visible;
-        let reduction = Reduction { model, parameters, basis: &basis };
+        let reduction = Reduction { arm, parameters, basis: &basis };
         let (points, jacobians) = reduction.jacobians(candidates);
         // The rank is relative to the largest singular value: where that one is a rounding error, nothing was seen at all.
         let seen = observability.singular_values.first().map_or(0.0, |value| value * MILLIMETRE);
@@ -173,25 +173,25 @@ impl Information {
     }
 }
 
-/// Checks that `places` fit the model.
-fn check(model: &ArmModel, parameters: &[FreeParameter], places: &[TargetAt]) -> Result<(), PlanningError> {
+/// Checks that `places` fit the arm.
+fn check(arm: &Arm, parameters: &[FreeParameter], places: &[Place]) -> Result<(), PlanningError> {
     let observations = observed_at(places, std::iter::repeat(Point3::origin()));
-    problem(model, parameters, &observations).check().map_err(PlanningError::Candidates)
+    problem(arm, parameters, &observations).check().map_err(PlanningError::Candidates)
 }
 
 /// What measuring at all of `places` could tell.
-fn observe(model: &ArmModel, parameters: &[FreeParameter], places: &[TargetAt]) -> Observability {
-    let observations = observed_at(places, model.points_in_base(places.iter()).into_iter());
-    Observability::new(&problem(model, parameters, &observations))
+fn observe(arm: &Arm, parameters: &[FreeParameter], places: &[Place]) -> Observability {
+    let observations = observed_at(places, arm.points_in_base(places).into_iter());
+    Observability::new(&problem(arm, parameters, &observations))
 }
 
-fn problem<'a>(model: &'a ArmModel, parameters: &'a [FreeParameter], observations: &'a Observations) -> Problem<'a> {
-    Problem { chain: &model.chain, targets: &model.targets, parameters, observations }
+fn problem<'a>(arm: &'a Arm, parameters: &'a [FreeParameter], observations: &'a Observations) -> Problem<'a> {
+    Problem { arm, parameters, observations }
 }
 
 /// Places as if measured at `points`.
-fn observed_at(places: &[TargetAt], points: impl Iterator<Item = Point3<f64>>) -> Observations {
-    let sample = |(at, point): (&TargetAt, _)| PointSample { at: at.clone(), station: 0, point, sigma: None };
+fn observed_at(places: &[Place], points: impl Iterator<Item = Point3<f64>>) -> Observations {
+    let sample = |(at, point): (&Place, _)| PointSample { at: at.clone(), station: 0, point, sigma: None };
     Observations { points: places.iter().zip(points).map(sample).collect(), ..Observations::default() }
 }
 
@@ -210,25 +210,23 @@ fn complement(blind: &DMatrix<f64>, rank: usize) -> DMatrix<f64> {
 
 /// How Jacobians are reduced to the identifiable directions.
 struct Reduction<'a> {
-    model: &'a ArmModel,
+    arm: &'a Arm,
     parameters: &'a [FreeParameter],
     basis: &'a DMatrix<f64>,
 }
 
 impl Reduction<'_> {
     /// Predicted points (m) and `B S V` of `places`: the rows x, y, z of each as columns of a rank × 3N matrix.
-    fn jacobians(&self, places: &[TargetAt]) -> (Vec<Point3<f64>>, DMatrix<f64>) {
+    fn jacobians(&self, places: &[Place]) -> (Vec<Point3<f64>>, DMatrix<f64>) {
         let n = self.parameters.len();
-        let arm = ForwardKinematics::new(&self.model.chain);
+        let arm = self.arm.prepared();
         let ids: Vec<_> = self.parameters.iter().map(|parameter| parameter.id).collect();
         let mut jacobian = IdentificationJacobian::new(&ids);
         let mut rows = DMatrix::zeros(n, 3 * places.len());
         let points = places
             .iter()
             .zip(rows.as_mut_slice().chunks_mut(3 * n))
-            .map(|(at, rows)| {
-                jacobian.evaluate(&arm, &at.configuration, at.target, &self.model.targets[at.target], rows)
-            })
+            .map(|(place, rows)| jacobian.at(&arm, place, rows))
             .collect();
         (points, self.basis.tr_mul(&rows))
     }
@@ -262,22 +260,20 @@ pub(super) mod tests {
     use crate::kinematics::{LinkParameter, ParameterId};
     use crate::profile::{Level, Profile, builtin};
 
-    fn soochow() -> (ArmModel, Vec<FreeParameter>, JointBox) {
+    fn soochow() -> (Arm, Vec<FreeParameter>, JointBox) {
         let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "").unwrap();
-        let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
-        let model = ArmModel { chain: profile.chain().clone(), targets };
         let joint_box = JointBox::new(profile.joints().iter().map(|j| j.planning_limits.unwrap()).collect()).unwrap();
-        (model, profile.free_parameters(Level::Geometric), joint_box)
+        (profile.arm(), profile.free_parameters(Level::Geometric), joint_box)
     }
 
-    fn places(joint_box: &JointBox, count: usize, seed: u64) -> Vec<TargetAt> {
-        random(joint_box, seed).take(count).map(|configuration| TargetAt { configuration, target: 0 }).collect()
+    fn places(joint_box: &JointBox, count: usize, seed: u64) -> Vec<Place> {
+        random(joint_box, seed).take(count).map(|configuration| Place { configuration, target: 0 }).collect()
     }
 
     /// A pool of random candidates of the paper's robot.
     pub(in super::super) fn pool(candidates: usize) -> Information {
-        let (model, parameters, joint_box) = soochow();
-        Information::new(&model, &parameters, &places(&joint_box, candidates, 1), &places(&joint_box, 300, 2)).unwrap()
+        let (arm, parameters, joint_box) = soochow();
+        Information::new(&arm, &parameters, &places(&joint_box, candidates, 1), &places(&joint_box, 300, 2)).unwrap()
     }
 
     #[test]
@@ -293,10 +289,10 @@ pub(super) mod tests {
 
     #[test]
     fn unusable_pools_are_refused() {
-        let (model, parameters, joint_box) = soochow();
+        let (arm, parameters, joint_box) = soochow();
         let some = places(&joint_box, 60, 1);
-        let new = |parameters: &[FreeParameter], candidates: &[TargetAt], fresh: &[TargetAt]| {
-            Information::new(&model, parameters, candidates, fresh).unwrap_err()
+        let new = |parameters: &[FreeParameter], candidates: &[Place], fresh: &[Place]| {
+            Information::new(&arm, parameters, candidates, fresh).unwrap_err()
         };
         assert_eq!(new(&[], &some, &some), PlanningError::NoParameters);
         assert_eq!(new(&parameters, &some, &some[..2]), PlanningError::FreshPoses { given: 2, needed: 3 });

@@ -7,8 +7,8 @@ use super::{identification_failure, warning};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::plausibility::compare_with_nominal;
 use crate::identification::verification::{CoverageGap, coverage_gaps};
-use crate::identification::{Observations, Places, PointSample, Problem, TargetAt};
-use crate::kinematics::Joint;
+use crate::identification::{Observations, Places, PointSample, Problem};
+use crate::kinematics::{Joint, Place};
 use crate::profile::Profile;
 use crate::report::number;
 use crate::session::TableProblem;
@@ -85,7 +85,7 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
     if plausibility.is_plausible() {
         return Ok(Compared { expected, warning: None });
     }
-    let joints = problem.chain.joints();
+    let joints = problem.arm.chain.joints();
     let gap = format!(
         "{what}the measured points are typically {} mm off the nominal robot, {} mm can be expected",
         number(to_mm(plausibility.nominal), 1),
@@ -136,7 +136,7 @@ pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &
 }
 
 /// What is doubtful about a pair of identification and verification sets.
-pub(crate) fn set_warnings(joints: &[Joint], known: &[TargetAt], tested: &[TargetAt]) -> Vec<Warning> {
+pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let places = Places::new(joints, known);
     let shared = tested.iter().filter(|at| places.contains(at)).count();

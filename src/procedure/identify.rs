@@ -5,12 +5,11 @@ use std::ops::ControlFlow;
 use super::assess::point_verification;
 use super::result::{self, Context};
 use super::summary::{Finished, SampleName, Special};
-use super::{EstimationSettings, checks, identification_failure, nominal_targets, target_parameters};
+use super::{EstimationSettings, checks, identification_failure, target_parameters};
 use crate::error::Failure;
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{
-    ArmModel, Identification, Iteration, Observations, Places, PointSample, Problem, TargetAt, identify_while,
-};
+use crate::identification::{Identification, Iteration, Observations, Places, PointSample, Problem, identify_while};
+use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
 use crate::session::calibration::{self, Calibration, MountedText, SampleText};
 use crate::session::summary::{IdentificationSummary, InputFile, VerificationMode, VerificationSummary, Warning};
@@ -109,10 +108,9 @@ pub fn identify(
     let IdentifyRequest { identification, verification, mounted, .. } = request;
     let profile = &mounted.map_or_else(|| request.profile.clone(), |mounted| mounted.on(&request.profile));
     let parameters = request.settings.parameters(profile);
-    let targets = nominal_targets(profile);
+    let arm = profile.arm();
     let observations = Observations { points: identification.points(), ..Observations::default() };
-    let problem =
-        Problem { chain: profile.chain(), targets: &targets, parameters: &parameters, observations: &observations };
+    let problem = Problem { arm: &arm, parameters: &parameters, observations: &observations };
 
     let file = identification.file.as_deref();
     let mut warnings = identification.warnings.clone();
@@ -190,8 +188,8 @@ fn nominal_setup(problem: &Problem<'_>, found: &Identification) -> Result<Fitted
         .map(|(_, sample)| sample.clone())
         .collect();
     let accepted = Observations { points, ..problem.observations.clone() };
-    let model = ArmModel { chain: problem.chain.clone(), targets: problem.targets.to_vec() };
-    fit_setup(&model, &target_parameters(problem.parameters), &accepted).map_err(|error| identification_failure(&error))
+    fit_setup(problem.arm, &target_parameters(problem.parameters), &accepted)
+        .map_err(|error| identification_failure(&error))
 }
 
 fn verify(
@@ -201,8 +199,8 @@ fn verify(
     samples: &[PointSample],
     basis: String,
 ) -> Option<(VerificationSummary, ModelErrors)> {
-    let nominal = ModelErrors::new(&nominal.model, &nominal.base_from_station, samples)?;
-    let identified = ModelErrors::new(&found.model, &found.base_from_station, samples)?;
+    let nominal = ModelErrors::new(&nominal.arm, &nominal.base_from_station, samples)?;
+    let identified = ModelErrors::new(&found.arm, &found.base_from_station, samples)?;
     let summary = point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, "none");
     Some((summary, identified))
 }
@@ -217,8 +215,8 @@ pub(crate) fn calibration(
     found: Option<&Identification>,
 ) -> Calibration {
     let station = found.and_then(|found| found.base_from_station.first());
-    let joints = problem.chain.joints();
-    let sample = |at: &TargetAt| {
+    let joints = problem.arm.chain.joints();
+    let sample = |at: &Place| {
         let values = at.configuration.iter().zip(joints);
         SampleText::new(at.target, values.map(|(value, joint)| joint.joint_type.quantity().to_edge(*value)))
     };
@@ -234,7 +232,7 @@ pub(crate) fn calibration(
         base_from_station: station.map(Into::into),
         nominal_base_from_station: nominal.base_from_station.first().map(Into::into),
         nominal_targets_mm: nominal
-            .model
+            .arm
             .targets
             .iter()
             .map(|point| (to_mm(point.x), to_mm(point.y), to_mm(point.z)))

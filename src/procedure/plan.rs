@@ -11,8 +11,7 @@ use history::History;
 use super::cell::cell;
 use super::{joint_types, warning};
 use crate::error::{ExitStatus, Failure};
-use crate::identification::{ArmModel, TargetAt};
-use crate::kinematics::{FreeParameter, JointType, ParameterId};
+use crate::kinematics::{Arm, FreeParameter, JointType, ParameterId, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
@@ -108,7 +107,7 @@ struct Planner<'a> {
     profile: &'a Profile,
     profile_text: &'a str,
     request: &'a PlanRequest,
-    model: ArmModel,
+    arm: Arm,
     parameters: Vec<FreeParameter>,
     joint_types: Vec<JointType>,
     limits: Vec<(f64, f64)>,
@@ -143,7 +142,7 @@ impl<'a> Planner<'a> {
             profile,
             profile_text,
             request,
-            model: ArmModel { chain: profile.chain().clone(), targets: super::nominal_targets(profile) },
+            arm: profile.arm(),
             parameters,
             joint_types: joint_types(profile),
             limits,
@@ -169,10 +168,10 @@ impl<'a> Planner<'a> {
     }
 
     fn information(&self, pool: &[Candidate]) -> Result<Information, Failure> {
-        let at = |configuration: Vec<f64>| TargetAt { configuration, target: 0 };
-        let candidates: Vec<TargetAt> = pool.iter().map(|candidate| at(candidate.configuration.clone())).collect();
-        let fresh: Vec<TargetAt> = random(&self.joint_box()?, !self.request.seed).take(FRESH_POSES).map(at).collect();
-        Information::new(&self.model, &self.parameters, &candidates, &fresh).map_err(|error| planning_failure(&error))
+        let at = |configuration: Vec<f64>| Place { configuration, target: 0 };
+        let candidates: Vec<Place> = pool.iter().map(|candidate| at(candidate.configuration.clone())).collect();
+        let fresh: Vec<Place> = random(&self.joint_box()?, !self.request.seed).take(FRESH_POSES).map(at).collect();
+        Information::new(&self.arm, &self.parameters, &candidates, &fresh).map_err(|error| planning_failure(&error))
     }
 
     /// Candidates, those that must be in first.
@@ -221,8 +220,8 @@ impl<'a> Planner<'a> {
     }
 
     fn candidate(&self, configuration: &[f64]) -> Candidate {
-        let at = TargetAt { configuration: configuration.to_vec(), target: 0 };
-        Candidate { point_in_base: self.model.point_in_base(&at), configuration: at.configuration }
+        let at = Place { configuration: configuration.to_vec(), target: 0 };
+        Candidate { point_in_base: self.arm.point_in_base(&at), configuration: at.configuration }
     }
 
     /// Chooses, orders and scores a new plan.
@@ -388,19 +387,19 @@ impl<'a> Planner<'a> {
         ordered: &Ordered,
     ) -> Result<Option<f64>, Failure> {
         const FEWEST: usize = 3;
-        let verification: Vec<TargetAt> = ordered
+        let verification: Vec<Place> = ordered
             .stops
             .iter()
             .filter(|(kind, _)| *kind == PoseKind::Verification)
-            .map(|(_, candidate)| TargetAt { configuration: candidate.configuration.clone(), target: 0 })
+            .map(|(_, candidate)| Place { configuration: candidate.configuration.clone(), target: 0 })
             .collect();
         let Some(sigma) = self.sigma().filter(|_| verification.len() >= FEWEST) else { return Ok(None) };
-        let chosen: Vec<TargetAt> = set
+        let chosen: Vec<Place> = set
             .iter()
             .filter_map(|index| pool.get(*index))
-            .map(|candidate| TargetAt { configuration: candidate.configuration.clone(), target: 0 })
+            .map(|candidate| Place { configuration: candidate.configuration.clone(), target: 0 })
             .collect();
-        let information = Information::new(&self.model, &self.parameters, &chosen, &verification)
+        let information = Information::new(&self.arm, &self.parameters, &chosen, &verification)
             .map_err(|error| planning_failure(&error))?;
         let all: Vec<usize> = (0..chosen.len()).collect();
         let score = Score::new(&information, &all).map_err(|error| planning_failure(&error))?;

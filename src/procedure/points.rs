@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Point3};
 
 use super::identify::{Identified, NamedSample};
-use crate::identification::TargetAt;
 use crate::identification::predicted::position_covariances;
+use crate::kinematics::Place;
 use crate::session::journal::{PointErrorText, to_xyz_mm};
 use crate::units::MICROMETRE;
 
@@ -17,16 +17,16 @@ pub fn point_errors(identified: &Identified, judged: &[NamedSample], tested: &[N
         return Vec::new();
     };
     let all = || judged.iter().chain(tested).map(|named| &named.sample);
-    let places: Vec<&TargetAt> = all().map(|sample| &sample.at).collect();
+    let places: Vec<&Place> = all().map(|sample| &sample.at).collect();
     let error = |measured: Point3<f64>, predicted: Point3<f64>| to_xyz_mm(&Point3::from(measured - predicted), 6);
     all()
         .zip(position_covariances(found, &places))
         .enumerate()
         .map(|(index, (sample, covariance))| {
-            let at = found.model.point_in_base(&sample.at);
+            let at = found.arm.point_in_base(&sample.at);
             PointErrorText {
                 at_mm: to_xyz_mm(&at, 3),
-                nominal_mm: error(of_nominal * sample.point, nominal.model.point_in_base(&sample.at)),
+                nominal_mm: error(of_nominal * sample.point, nominal.arm.point_in_base(&sample.at)),
                 identified_mm: error(of_found * sample.point, at),
                 covariance_um2: text(&covariance),
                 rejected: index < judged.len() && found.is_rejected(index),

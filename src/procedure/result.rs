@@ -40,7 +40,7 @@ pub(crate) fn result_warnings(
     settings: &Settings,
     context: Context,
 ) -> Vec<Warning> {
-    let joints = problem.chain.joints();
+    let joints = problem.arm.chain.joints();
     let mut warnings: Vec<Warning> = weaknesses(problem, found)
         .iter()
         .map(|weakness| {

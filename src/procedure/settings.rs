@@ -1,7 +1,5 @@
 //! How to identify, as the operator asks for it, and what that means to the solver.
 
-use nalgebra::Point3;
-
 use crate::identification::{Estimator, Prior, Settings, SigmaSource, Weighting};
 use crate::kinematics::{FreeParameter, ParameterId};
 use crate::profile::{ExpectedDeviation, Level, Profile};
@@ -79,9 +77,4 @@ impl EstimationSettings {
 /// The target coordinates among `parameters`.
 pub(crate) fn target_parameters(parameters: &[FreeParameter]) -> Vec<FreeParameter> {
     parameters.iter().filter(|parameter| matches!(parameter.id, ParameterId::Target { .. })).copied().collect()
-}
-
-/// Nominal target coordinates (m).
-pub(crate) fn nominal_targets(profile: &Profile) -> Vec<Point3<f64>> {
-    profile.targets().iter().map(|target| target.position_in_flange).collect()
 }

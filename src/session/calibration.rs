@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::summary::{IdentificationSettings, ParameterSummary, Provenance, SigmaSummary, Verdict, Warning};
-use crate::kinematics::{KinematicChain, ParameterId};
+use crate::kinematics::{Arm, KinematicChain, ParameterId};
 use crate::profile::{Level, Profile, Target};
 use crate::units::{from_mm, to_mm};
 
@@ -224,14 +224,14 @@ impl Calibration {
     /// `None`: a parameter that this robot does not have.
     pub fn identified_chain(&self, profile: &Profile) -> Option<KinematicChain> {
         let deviations: Vec<f64> = self.parameters.iter().map(|parameter| parameter.deviation).collect();
-        self.arm_with(profile, &deviations).map(|(chain, _)| chain)
+        self.arm_with(profile, &deviations).map(|arm| arm.chain)
     }
 
     /// The robot of `profile` with other deviations than the identified ones: its arm and the targets in its flange (m).
     /// `deviations` are in the order and units of [`Self::parameters`] (mm, deg).
     ///
     /// `None`: a parameter that this robot does not have.
-    pub fn arm_with(&self, profile: &Profile, deviations: &[f64]) -> Option<(KinematicChain, Vec<Point3<f64>>)> {
+    pub fn arm_with(&self, profile: &Profile, deviations: &[f64]) -> Option<Arm> {
         // A target that was left free only here has coordinates among the parameters.
         let mounted = self.mounted.map_or_else(|| profile.clone(), |mounted| mounted.on(profile));
         let known = mounted.free_parameters(Level::Geometric);
@@ -244,15 +244,7 @@ impl Calibration {
                 Some((id, id.quantity().from_edge(*deviation)))
             })
             .collect::<Option<_>>()?;
-        let mut targets: Vec<Point3<f64>> = mounted.targets().iter().map(|target| target.position_in_flange).collect();
-        for (id, deviation) in &deviations {
-            if let ParameterId::Target { target, axis } = *id
-                && let Some(point) = targets.get_mut(target)
-            {
-                point[axis.index()] += deviation;
-            }
-        }
-        Some((profile.chain().with_deviations(deviations).ok()?, targets))
+        mounted.arm().with(deviations).ok()
     }
 
     /// The text of the file.

@@ -10,9 +10,9 @@ use nalgebra::{DVector, Isometry3, Point3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
-use trupose::identification::{ArmModel, Observations, PointSample, Problem, TargetAt};
+use trupose::identification::{Observations, PointSample, Problem};
 use trupose::kinematics::{
-    Convention, FreeParameter, Joint, JointType, KinematicChain, Link, LinkParameter, ParameterId,
+    Arm, Convention, FreeParameter, Joint, JointType, KinematicChain, Link, LinkParameter, ParameterId, Place,
 };
 use trupose::units::{MILLIMETRE, from_deg, from_mm};
 
@@ -112,16 +112,11 @@ pub(crate) fn station_from_base() -> Isometry3<f64> {
 }
 
 /// Measures `truth` at configurations with `noise` [m] per coordinate.
-pub(crate) fn measure(
-    truth: &ArmModel,
-    configurations: &[Vec<f64>],
-    noise: f64,
-    rng: &mut ChaCha8Rng,
-) -> Vec<PointSample> {
+pub(crate) fn measure(truth: &Arm, configurations: &[Vec<f64>], noise: f64, rng: &mut ChaCha8Rng) -> Vec<PointSample> {
     configurations
         .iter()
         .map(|configuration| {
-            let at = TargetAt { configuration: configuration.clone(), target: 0 };
+            let at = Place { configuration: configuration.clone(), target: 0 };
             let mut point = station_from_base() * truth.point_in_base(&at);
             for axis in 0..3 {
                 point[axis] += noise * normal(rng);
@@ -134,8 +129,7 @@ pub(crate) fn measure(
 /// The paper's robot with its 25 parameters and some observations.
 #[derive(Debug)]
 pub(crate) struct PaperCase {
-    pub(crate) chain: KinematicChain,
-    pub(crate) targets: Vec<Point3<f64>>,
+    pub(crate) arm: Arm,
     pub(crate) parameters: Vec<FreeParameter>,
     pub(crate) observations: Observations,
 }
@@ -143,8 +137,7 @@ pub(crate) struct PaperCase {
 impl PaperCase {
     pub(crate) fn new(points: Vec<PointSample>) -> Self {
         Self {
-            chain: paper_chain(),
-            targets: vec![paper_target()],
+            arm: Arm { chain: paper_chain(), targets: vec![paper_target()] },
             parameters: paper_parameters(),
             observations: Observations { points, ..Observations::default() },
         }
@@ -153,18 +146,13 @@ impl PaperCase {
     /// Random poses measured on the nominal robot plus `deviations`.
     pub(crate) fn simulated(deviations: &DVector<f64>, poses: usize, noise: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut case = Self::new(Vec::new());
-        let truth = ArmModel::with_deviations(&case.problem(), deviations);
+        let truth = case.problem().arm_with(deviations);
         let configurations = random_configurations(poses, rng);
         case.observations.points = measure(&truth, &configurations, noise, rng);
         case
     }
 
     pub(crate) fn problem(&self) -> Problem<'_> {
-        Problem {
-            chain: &self.chain,
-            targets: &self.targets,
-            parameters: &self.parameters,
-            observations: &self.observations,
-        }
+        Problem { arm: &self.arm, parameters: &self.parameters, observations: &self.observations }
     }
 }

@@ -5,7 +5,9 @@ use nalgebra::{
 };
 
 use super::{CircleFit, CirclePointError, CircleSeries, TargetLocation};
-use crate::kinematics::{Axis, ForwardKinematics, FreeParameter, IdentificationJacobian, KinematicChain, ParameterId};
+use crate::kinematics::{
+    Arm, Axis, ForwardKinematics, FreeParameter, IdentificationJacobian, KinematicChain, ParameterId, Place,
+};
 
 /// Unknowns: translation, rotation, target.
 const UNKNOWNS: usize = 9;
@@ -19,11 +21,12 @@ type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type Unknowns = SVector<f64, UNKNOWNS>;
 
 /// The problem, and how far it is solved.
-struct Adjustment<'a> {
-    arm: ForwardKinematics<'a>,
-    series: [&'a CircleSeries<'a>; 2],
+struct Adjustment {
+    /// The nominal arm with one target: where the SMR is.
+    arm: Arm,
+    /// All points in the tracker frame (m), those of the first series first.
+    samples: Vec<(Place, Point3<f64>)>,
     tracker_from_base: Isometry3<f64>,
-    target: Point3<f64>,
     /// Turning is about the middle of the points: it then has little to do with shifting.
     pivot: Vector3<f64>,
 }
@@ -35,13 +38,7 @@ struct PointRows {
     by_links: Matrix3xX<f64>,
 }
 
-impl<'a> Adjustment<'a> {
-    fn samples(&self) -> impl Iterator<Item = (&'a Vec<f64>, &'a Point3<f64>)> + use<'a> {
-        let [a, b] = self.series;
-        let of = |series: &'a CircleSeries<'a>| series.configurations.iter().zip(series.points);
-        of(a).chain(of(b))
-    }
-
+impl Adjustment {
     /// All points; `links` are the parameters to differentiate by.
     fn rows(&self, links: &[ParameterId]) -> Vec<PointRows> {
         let target = Axis::ALL.map(|axis| ParameterId::Target { target: 0, axis });
@@ -50,9 +47,11 @@ impl<'a> Adjustment<'a> {
         let mut jacobian = IdentificationJacobian::new(&parameters);
         let turn = *self.tracker_from_base.rotation.to_rotation_matrix().matrix();
         let mut numbers = vec![0.0; 3 * n];
-        self.samples()
-            .map(|(q, measured)| {
-                let in_base = jacobian.evaluate(&self.arm, q, 0, &self.target, &mut numbers);
+        let prepared = self.arm.prepared();
+        self.samples
+            .iter()
+            .map(|(place, measured)| {
+                let in_base = jacobian.at(&prepared, place, &mut numbers);
                 let predicted = self.tracker_from_base * in_base;
                 let by_parameters = turn * Matrix3xX::from_row_slice(&numbers);
                 let mut by_unknowns = SMatrix::<f64, 3, UNKNOWNS>::zeros();
@@ -71,7 +70,9 @@ impl<'a> Adjustment<'a> {
         let turn = UnitQuaternion::from_scaled_axis(Vector3::from(step.fixed_rows::<3>(3)));
         let about = Isometry3::from_parts(Translation3::from(self.pivot + shift - turn * self.pivot), turn);
         self.tracker_from_base = about * self.tracker_from_base;
-        self.target += Vector3::from(step.fixed_rows::<3>(6));
+        for target in &mut self.arm.targets {
+            *target += Vector3::from(step.fixed_rows::<3>(6));
+        }
     }
 }
 
@@ -91,16 +92,21 @@ pub(super) fn adjust(
     sigma: Option<f64>,
     expected: &[FreeParameter],
 ) -> Result<TargetLocation, CirclePointError> {
-    let arm = ForwardKinematics::new(chain);
-    let mut fit =
-        Adjustment { arm, series, tracker_from_base: start, target: Point3::origin(), pivot: Vector3::zeros() };
-    let count = fit.samples().count() as f64;
-    fit.pivot = fit.samples().map(|(_, point)| point.coords).sum::<Vector3<f64>>() / count;
-    let seen = fit.samples().map(|(q, point)| {
-        let tracker_from_flange = start * fit.arm.base_from_flange(q);
+    let place = |configuration: &Vec<f64>| Place { configuration: configuration.clone(), target: 0 };
+    let of_series = |series: &CircleSeries<'_>| {
+        series.configurations.iter().map(place).zip(series.points.iter().copied()).collect::<Vec<_>>()
+    };
+    let samples = series.map(of_series).concat();
+    let count = samples.len() as f64;
+    let forward = ForwardKinematics::new(chain);
+    let seen = samples.iter().map(|(place, point)| {
+        let tracker_from_flange = start * forward.base_from_flange(&place.configuration);
         tracker_from_flange.inverse_transform_point(point).coords
     });
-    fit.target = Point3::from(seen.sum::<Vector3<f64>>() / count);
+    let target = Point3::from(seen.sum::<Vector3<f64>>() / count);
+    let pivot = samples.iter().map(|(_, point)| point.coords).sum::<Vector3<f64>>() / count;
+    let arm = Arm { chain: chain.clone(), targets: vec![target] };
+    let mut fit = Adjustment { arm, samples, tracker_from_base: start, pivot };
 
     let mut converged = false;
     for _ in 0..STEPS {
@@ -117,16 +123,17 @@ pub(super) fn adjust(
     if !converged {
         return Err(CirclePointError::NoFit);
     }
-    summarise(&fit, circles, sigma, expected)
+    summarise(&fit, series[0].points.len(), circles, sigma, expected)
 }
 
 fn summarise(
-    fit: &Adjustment<'_>,
+    fit: &Adjustment,
+    in_first_series: usize,
     circles: [CircleFit; 2],
     sigma: Option<f64>,
     expected: &[FreeParameter],
 ) -> Result<TargetLocation, CirclePointError> {
-    let first_moving = fit.arm.chain().dof().saturating_sub(2);
+    let first_moving = fit.arm.chain.dof().saturating_sub(2);
     let (links, sizes): (Vec<ParameterId>, Vec<f64>) = expected
         .iter()
         .filter(|free| matches!(free.id, ParameterId::Link { joint, .. } if joint >= first_moving))
@@ -157,10 +164,9 @@ fn summarise(
     let by_links: Matrix3<f64> = (target_answer * target_answer.transpose()).fixed_view::<3, 3>(0, 0).into_owned();
     let measured: Matrix3<f64> = inverse.fixed_view::<3, 3>(6, 6) * (reading_sigma * reading_sigma);
     let points = rows.len() as f64;
-    let [a, _] = fit.series;
-    let (of_a, of_b) = residuals.split_at(a.points.len().min(residuals.len()));
+    let (of_a, of_b) = residuals.split_at(in_first_series.min(residuals.len()));
     Ok(TargetLocation {
-        point_in_flange: fit.target,
+        point_in_flange: fit.arm.targets.first().copied().unwrap_or_else(Point3::origin),
         covariance: measured + by_links,
         measured,
         reading_sigma,

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::*;
-use crate::kinematics::{LinkParameter, ParameterId};
+use crate::kinematics::{Arm, LinkParameter, ParameterId};
 use crate::profile::{Level, Profile, builtin, builtin_names};
 
 const NOISE: f64 = 10.0 * MICROMETRE;
@@ -236,13 +236,13 @@ fn deviations_of_the_last_links_are_in_the_covariance() {
     for name in ["soochow", "ur5", "franka_panda"] {
         let mut case = Case::new(name);
         let expected = case.expected();
-        let nominal = case.profile.chain().clone();
+        let nominal = case.profile.arm();
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut square = 0.0;
         let ratio = normalised(500, || {
             let drawn: Vec<(ParameterId, f64)> =
                 expected.iter().map(|free| (free.id, free.expected * normal(&mut rng))).collect();
-            case.truth = nominal.with_deviations(drawn).unwrap();
+            case.truth = nominal.with(drawn).unwrap().chain;
             let points = case.points().map(|points| noisy(&points, NOISE, &mut rng));
             let found = case.locate(&points, Some(NOISE), &expected).unwrap();
             square += (found.rms / found.expected_rms).powi(2) / 500.0;
@@ -261,7 +261,7 @@ fn the_deviations_of_the_rest_of_the_arm_do_not_matter() {
         let parameters = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
         parameters.map(|parameter| (ParameterId::Link { joint, parameter }, 3e-3))
     };
-    case.truth = case.truth.with_deviations((0..4).flat_map(of_joint)).unwrap();
+    case.truth = Arm::from(case.truth).with((0..4).flat_map(of_joint)).unwrap().chain;
     let found = case.locate(&case.points(), None, &case.expected()).unwrap();
     assert!((found.point_in_flange - case.target).norm() < 1e-10 && found.max() < 1e-10);
 }

@@ -3,7 +3,7 @@
 //! Limits are set for one false alarm in some hundred sessions of thirty points, although every point is looked at anew with each
 //! later one. Arms that are less perfect than the instrument (gravity, gear harmonics) are judged by what they show: see [`excess`].
 
-use super::fit::{Arm, Fit, Item};
+use super::fit::{Fit, Item, Nominal};
 use crate::units::MILLIMETRE;
 
 /// The newest point is off: χ² of three values that is exceeded once in 12,000 times.
@@ -26,8 +26,8 @@ const BY_CHANCE: f64 = 1.5;
 const UNMODELLED: f64 = 0.3 * MILLIMETRE;
 
 /// The fit of all items, if something is wrong with them.
-pub(super) fn raised<'a>(arm: &'a Arm<'a>, items: Vec<Item>) -> Option<Fit<'a>> {
-    let full = Fit::new(arm, items)?;
+pub(super) fn raised<'a>(nominal: &'a Nominal<'a>, items: Vec<Item>) -> Option<Fit<'a>> {
+    let full = Fit::new(nominal, items)?;
     let (newest, earlier) =
         full.gains().split_last().map(|(newest, earlier)| (*newest, earlier.iter().copied().fold(0.0, f64::max)))?;
     let moved = full.moved_gains(SHIFT).iter().skip(1).copied().fold(0.0, f64::max);
@@ -44,7 +44,7 @@ pub(super) fn limit_of_sum(values: usize) -> f64 {
 
 /// How many times worse than stated the points scatter about the arm, by the median over all but the newest and the worst one;
 /// 1 where they do not, where too few points tell, or where no arm is that bad.
-pub(super) fn excess(arm: &Arm<'_>, full: &Fit<'_>) -> f64 {
+pub(super) fn excess(nominal: &Nominal<'_>, full: &Fit<'_>) -> f64 {
     let gains = full.gains();
     // Bad points only make the others look worse: if those look good, no more need be asked.
     if excess_of(gains.clone()) <= BY_CHANCE {
@@ -57,7 +57,7 @@ pub(super) fn excess(arm: &Arm<'_>, full: &Fit<'_>) -> f64 {
     if others.len() < ENOUGH {
         return 1.0;
     }
-    let Some(fit) = Fit::new(arm, others) else { return 1.0 };
+    let Some(fit) = Fit::new(nominal, others) else { return 1.0 };
     let excess = excess_of(fit.gains());
     let sigma = fit.items.iter().map(|item| item.sigma).fold(0.0, f64::max);
     if excess > BY_CHANCE && excess * sigma < UNMODELLED { excess } else { 1.0 }

@@ -9,11 +9,11 @@ use nalgebra::Point3;
 use super::super::robust::gross_trust;
 use super::super::{Observations, Problem};
 use super::alarm::{EARLIER, SHIFT, limit_of_sum};
-use super::fit::{Arm, Fit, Item, Step};
+use super::fit::{Fit, Item, Nominal, Step};
 use super::slips::{Slip, outlier_energy, slips};
 use super::{Cause, Explanation, Finding, PairDeviation, Triage};
 use crate::geometry::principal_spread;
-use crate::kinematics::ForwardKinematics;
+use crate::kinematics::Place;
 use crate::units::{INCH, MILLIMETRE, MILLIRADIAN};
 
 /// Samples among the earlier ones that may be set aside as bad.
@@ -67,7 +67,7 @@ struct Hypothesis {
 
 struct Case<'a, 't> {
     triage: &'a Triage<'t>,
-    arm: &'a Arm<'a>,
+    nominal: &'a Nominal<'a>,
     /// All samples, those that the operator has left out too: they do not count, but they may help to explain.
     items: &'a [Item],
     /// Fit of all samples that count.
@@ -82,10 +82,10 @@ struct Case<'a, 't> {
 
 /// Names the fault that explains the data best; `None` if no fault is better than chance. `full` is the fit of the `items` that
 /// are not left out.
-pub(super) fn explain(triage: &Triage<'_>, arm: &Arm<'_>, items: &[Item], full: &Fit<'_>) -> Option<Finding> {
+pub(super) fn explain(triage: &Triage<'_>, nominal: &Nominal<'_>, items: &[Item], full: &Fit<'_>) -> Option<Finding> {
     let newest = items.len() - 1;
-    let (base, aside) = set_aside(triage, arm, items)?;
-    let mut case = Case { triage, arm, items, full, newest, aside, base, found: Vec::new() };
+    let (base, aside) = set_aside(triage, nominal, items)?;
+    let mut case = Case { triage, nominal, items, full, newest, aside, base, found: Vec::new() };
     case.single_samples();
     case.units();
     case.joint_signs();
@@ -96,11 +96,11 @@ pub(super) fn explain(triage: &Triage<'_>, arm: &Arm<'_>, items: &[Item], full: 
 }
 
 /// The fit of the earlier samples that fit together, and the others among the earlier ones: left out before, or bad.
-fn set_aside<'a>(triage: &Triage<'_>, arm: &'a Arm<'a>, items: &[Item]) -> Option<(Fit<'a>, Vec<usize>)> {
+fn set_aside<'a>(triage: &Triage<'_>, nominal: &'a Nominal<'a>, items: &[Item]) -> Option<(Fit<'a>, Vec<usize>)> {
     let (_, earlier) = items.split_last()?;
     let without = |aside: &[usize], start: Option<&Fit<'a>>| {
         let kept = earlier.iter().filter(|item| !aside.contains(&item.sample)).cloned().collect();
-        Fit::from(arm, kept, None, start)
+        Fit::from(nominal, kept, None, start)
     };
     let mut aside: Vec<usize> =
         earlier.iter().map(|item| item.sample).filter(|sample| triage.excluded.contains(sample)).collect();
@@ -141,11 +141,9 @@ fn gross(triage: &Triage<'_>, earlier: &[Item], left_out: &[usize]) -> Vec<usize
     let kept: Vec<&Item> = earlier.iter().filter(|item| !left_out.contains(&item.sample)).collect();
     let points = kept.iter().map(|item| triage.samples[item.sample].clone()).collect();
     let observations = Observations { points, ..Observations::default() };
-    let Triage { chain, targets, parameters, .. } = *triage;
-    let problem = Problem { chain, targets, parameters, observations: &observations };
-    let arm = ForwardKinematics::new(chain);
-    let predicted: Vec<Point3<f64>> =
-        kept.iter().map(|item| arm.point_in_base(&item.configuration, &targets[item.target])).collect();
+    let Triage { arm, parameters, .. } = *triage;
+    let problem = Problem { arm, parameters, observations: &observations };
+    let predicted = arm.points_in_base(kept.iter().map(|item| &item.at));
     let trust = gross_trust(&problem, &predicted);
     let impossible: Vec<usize> =
         kept.iter().zip(trust).filter(|(_, trust)| *trust <= 0.0).map(|(item, _)| item.sample).collect();
@@ -161,7 +159,7 @@ impl<'a> Case<'a, '_> {
             change(&mut item);
             item
         });
-        Fit::from(self.arm, changed.collect(), step, Some(&self.base))
+        Fit::from(self.nominal, changed.collect(), step, Some(&self.base))
     }
 
     /// Energy of all samples that count, each changed by `change`: a fault from the first sample on, of which the other fits know
@@ -172,7 +170,7 @@ impl<'a> Case<'a, '_> {
             change(&mut item);
             item
         });
-        let fit = Fit::new(self.arm, changed.collect())?;
+        let fit = Fit::new(self.nominal, changed.collect())?;
         Some(fit.energy + self.outliers(&fit, self.triage.excluded, None))
     }
 
@@ -245,10 +243,10 @@ impl<'a> Case<'a, '_> {
             self.add(sample, Cause::TargetMoved { since: sample, by }, unexplained + COMMON);
         }
         self.poses(&item, others, energy);
-        for Slip { joint, by, energy: own, price } in slips(self.triage.chain, others, &item) {
-            let quantity = self.triage.chain.joints()[joint].joint_type.quantity();
+        for Slip { joint, by, energy: own, price } in slips(&self.triage.arm.chain, others, &item) {
+            let quantity = self.triage.arm.chain.joints()[joint].joint_type.quantity();
             let mut altered = item.clone();
-            altered.configuration[joint] += by;
+            altered.at.configuration[joint] += by;
             self.found.push(Hypothesis {
                 sample,
                 cause: Cause::MistypedJoint { joint, by, quantity },
@@ -260,12 +258,12 @@ impl<'a> Case<'a, '_> {
 
     /// Another planned pose, or that of the sample before.
     fn poses(&mut self, item: &Item, others: &Fit<'_>, energy: f64) {
-        let before = item.sample.checked_sub(1).map(|sample| self.items[sample].configuration.as_slice());
-        let before = before.filter(|configuration| !same(configuration, &item.configuration));
+        let before = item.sample.checked_sub(1).map(|sample| self.items[sample].at.configuration.as_slice());
+        let before = before.filter(|configuration| !same(configuration, &item.at.configuration));
         let planned = self.triage.planned;
-        let own = planned.iter().position(|configuration| same(configuration, &item.configuration));
+        let own = planned.iter().position(|configuration| same(configuration, &item.at.configuration));
         let is_other = |configuration: &[f64]| {
-            !same(configuration, &item.configuration) && before.is_none_or(|before| !same(configuration, before))
+            !same(configuration, &item.at.configuration) && before.is_none_or(|before| !same(configuration, before))
         };
         let poses: Vec<usize> = (0..planned.len()).filter(|&pose| is_other(&planned[pose])).collect();
         let many = 2.0 * (poses.len().max(1) as f64).ln();
@@ -284,7 +282,8 @@ impl<'a> Case<'a, '_> {
             scored.push((probe.at(before).energy(0.0) + COMMON, Cause::StayedAtPrevious, before, COMMON));
         }
         for (own, cause, configuration, price) in scored {
-            let altered = Item { configuration: configuration.to_vec(), ..item.clone() };
+            let at = Place { configuration: configuration.to_vec(), target: item.at.target };
+            let altered = Item { at, ..item.clone() };
             let altered = Some((altered, price));
             self.found.push(Hypothesis { sample: item.sample, cause, energy: energy + own, altered });
         }
@@ -293,10 +292,9 @@ impl<'a> Case<'a, '_> {
     /// Another unit, from the first sample on or from some later one on.
     fn units(&mut self) {
         let extent = |points: Vec<Point3<f64>>| principal_spread(points.iter())[0];
-        let arm = ForwardKinematics::new(self.triage.chain);
-        let predicted = |item: &Item| arm.point_in_base(&item.configuration, &self.triage.targets[item.target]);
+        let predicted = extent(self.triage.arm.points_in_base(self.full.items.iter().map(|item| &item.at)));
         let measured = extent(self.full.items.iter().map(|item| item.point).collect());
-        let ratio = extent(self.full.items.iter().map(predicted).collect()) / measured.max(f64::MIN_POSITIVE);
+        let ratio = predicted / measured.max(f64::MIN_POSITIVE);
         for factor in FACTORS {
             if !self.is_settled()
                 && (0.5..2.0).contains(&(ratio / factor))
@@ -327,9 +325,9 @@ impl<'a> Case<'a, '_> {
         if self.is_settled() {
             return;
         }
-        let joints = self.triage.chain.dof();
+        let joints = self.triage.arm.chain.dof();
         for joint in 0..joints {
-            let reversed = self.energy_of_all(|item| item.configuration[joint] *= -1.0);
+            let reversed = self.energy_of_all(|item| item.at.configuration[joint] *= -1.0);
             if let Some(energy) = reversed {
                 self.add(self.newest, Cause::JointSign { joint }, energy + UNCOMMON + 2.0 * (joints as f64).ln());
             }
@@ -387,19 +385,20 @@ impl<'a> Case<'a, '_> {
         let own: Vec<usize> = self.aside.iter().copied().filter(|&sample| !self.left_out(sample)).collect();
         for sample in own.into_iter().chain([self.newest]) {
             let item = &self.items[sample];
-            let differs = |other: &&Item| other.sample != sample && !same(&other.configuration, &item.configuration);
+            let differs =
+                |other: &&Item| other.sample != sample && !same(&other.at.configuration, &item.at.configuration);
             let mut probe = self.base.probe(item);
             let squares =
-                self.items.iter().filter(differs).map(|other| (probe.at(&other.configuration).square(), other));
+                self.items.iter().filter(differs).map(|other| (probe.at(&other.at.configuration).square(), other));
             let best = squares.min_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, with)) = best.filter(|(square, _)| *square < ABSURD) else { continue };
             let pair = [sample, with.sample];
             let without: Vec<usize> = self.aside.iter().copied().filter(|aside| !pair.contains(aside)).collect();
             let exchanged = self.energy(&without, None, |changed| {
                 if changed.sample == sample {
-                    changed.configuration.clone_from(&with.configuration);
+                    changed.at.configuration.clone_from(&with.at.configuration);
                 } else if changed.sample == with.sample {
-                    changed.configuration.clone_from(&item.configuration);
+                    changed.at.configuration.clone_from(&item.at.configuration);
                 }
             });
             if let Some((energy, _)) = exchanged {
@@ -422,7 +421,7 @@ impl<'a> Case<'a, '_> {
             let without: Vec<usize> = self.aside.iter().copied().filter(|&other| other != sample).collect();
             let changed = self.energy(&without, None, |item| {
                 if item.sample == sample {
-                    item.configuration.clone_from(&altered.configuration);
+                    item.at.configuration.clone_from(&altered.at.configuration);
                 }
             });
             if let Some((energy, _)) = changed {

@@ -7,7 +7,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::register;
-use crate::kinematics::{Axis, ForwardKinematics, FreeParameter, IdentificationJacobian, KinematicChain, ParameterId};
+use crate::kinematics::{Arm, Axis, ForwardKinematics, FreeParameter, IdentificationJacobian, ParameterId, Place};
 
 /// Steps of a fit at most: from the nominal arm it takes four or five.
 const STEPS: usize = 12;
@@ -18,20 +18,19 @@ const HALVINGS: i32 = 5;
 /// Eigenvalues of `1 − leverage` are not taken below this.
 const FULL_LEVERAGE: f64 = 1e-9;
 
-/// What does not change from fit to fit.
-pub(super) struct Arm<'a> {
-    pub(super) chain: &'a KinematicChain,
-    pub(super) targets: &'a [Point3<f64>],
+/// The nominal arm with the expected deviations of its parameters: what does not change from fit to fit.
+pub(super) struct Nominal<'a> {
+    pub(super) arm: &'a Arm,
     pub(super) parameters: &'a [FreeParameter],
     /// The parameters, then all target axes: the latter give the direction of the flange.
     ids: Vec<ParameterId>,
 }
 
-impl<'a> Arm<'a> {
-    pub(super) fn new(chain: &'a KinematicChain, targets: &'a [Point3<f64>], parameters: &'a [FreeParameter]) -> Self {
-        let axes = (0..targets.len()).flat_map(|target| Axis::ALL.map(|axis| ParameterId::Target { target, axis }));
+impl<'a> Nominal<'a> {
+    pub(super) fn new(arm: &'a Arm, parameters: &'a [FreeParameter]) -> Self {
+        let axes = (0..arm.targets.len()).flat_map(|target| Axis::ALL.map(|axis| ParameterId::Target { target, axis }));
         let ids = parameters.iter().map(|parameter| parameter.id).chain(axes).collect();
-        Self { chain, targets, parameters, ids }
+        Self { arm, parameters, ids }
     }
 }
 
@@ -58,8 +57,7 @@ impl Step {
 pub(super) struct Item {
     /// Index of the sample in the session.
     pub(super) sample: usize,
-    pub(super) configuration: Vec<f64>,
-    pub(super) target: usize,
+    pub(super) at: Place,
     pub(super) station: usize,
     /// Measured (m).
     pub(super) point: Point3<f64>,
@@ -80,9 +78,9 @@ struct State {
 
 /// A fit and what it is made of.
 pub(super) struct Fit<'a> {
-    arm: &'a Arm<'a>,
-    chain: KinematicChain,
-    targets: Vec<Point3<f64>>,
+    nominal: &'a Nominal<'a>,
+    /// The arm at the estimate.
+    arm: Arm,
     state: State,
     step: Option<Step>,
     centroids: Vec<Point3<f64>>,
@@ -133,18 +131,22 @@ struct Linear {
 
 impl<'a> Fit<'a> {
     /// Fits `items`; `None` without any, or where the numbers break down.
-    pub(super) fn new(arm: &'a Arm<'a>, items: Vec<Item>) -> Option<Self> {
-        Self::from(arm, items, None, None)
+    pub(super) fn new(nominal: &'a Nominal<'a>, items: Vec<Item>) -> Option<Self> {
+        Self::from(nominal, items, None, None)
     }
 
     /// Fits `items` with something that has moved, beginning at the estimates of another fit.
-    pub(super) fn from(arm: &'a Arm<'a>, items: Vec<Item>, step: Option<Step>, start: Option<&Self>) -> Option<Self> {
+    pub(super) fn from(
+        nominal: &'a Nominal<'a>,
+        items: Vec<Item>,
+        step: Option<Step>,
+        start: Option<&Self>,
+    ) -> Option<Self> {
         let stations = items.iter().map(|item| item.station + 1).max()?;
-        let n = arm.parameters.len();
+        let n = nominal.parameters.len();
         let mut fit = Self {
-            arm,
-            chain: arm.chain.clone(),
-            targets: arm.targets.to_vec(),
+            nominal,
+            arm: nominal.arm.clone(),
             state: State {
                 z: DVector::zeros(n),
                 step: DVector::zeros(step.map_or(0, Step::columns)),
@@ -200,17 +202,12 @@ impl<'a> Fit<'a> {
     }
 
     fn frame_column(&self, station: usize) -> usize {
-        self.arm.parameters.len() + self.state.step.len() + 6 * station
+        self.nominal.parameters.len() + self.state.step.len() + 6 * station
     }
 
     /// Frames by registration of the nominal predictions.
     fn register(&mut self) {
-        let arm = ForwardKinematics::new(self.arm.chain);
-        let predicted: Vec<Point3<f64>> = self
-            .items
-            .iter()
-            .map(|item| arm.point_in_base(&item.configuration, &self.arm.targets[item.target]))
-            .collect();
+        let predicted = self.nominal.arm.points_in_base(self.items.iter().map(|item| &item.at));
         for station in 0..self.centroids.len() {
             let pairs = self
                 .items
@@ -227,20 +224,12 @@ impl<'a> Fit<'a> {
 
     /// The model at the state.
     fn apply(&mut self) {
-        let deviations = || {
-            let deviation = self.arm.parameters.iter().zip(self.state.z.iter());
-            deviation.map(|(parameter, z)| (parameter.id, z * parameter.expected))
-        };
-        if let Ok(chain) = self.arm.chain.with_deviations(deviations()) {
-            self.chain = chain;
+        let deviations = self.nominal.parameters.iter().zip(self.state.z.iter());
+        let deviations = deviations.map(|(parameter, z)| (parameter.id, z * parameter.expected));
+        // Triage has checked that the arm has every parameter.
+        if let Ok(arm) = self.nominal.arm.with(deviations) {
+            self.arm = arm;
         }
-        let mut targets = self.arm.targets.to_vec();
-        for (id, deviation) in deviations() {
-            if let ParameterId::Target { target, axis } = id {
-                targets[target][axis.index()] += deviation;
-            }
-        }
-        self.targets = targets;
     }
 
     fn move_by(&mut self, from: &State, step: &DVector<f64>, fraction: f64) {
@@ -270,13 +259,13 @@ impl<'a> Fit<'a> {
         scratch: &mut [f64],
         rows: &mut [f64],
     ) -> (Vector3<f64>, Matrix3<f64>) {
-        let (n, all, columns) = (self.arm.parameters.len(), self.arm.ids.len(), self.columns());
-        let mut target = self.targets[item.target];
+        let (n, all, columns) = (self.nominal.parameters.len(), self.nominal.ids.len(), self.columns());
+        let mut target = self.arm.targets[item.at.target];
         if item.moved {
             target += self.shift();
         }
-        let predicted = jacobian.evaluate(arm, &item.configuration, item.target, &target, scratch);
-        let first_axis = n + 3 * item.target;
+        let predicted = jacobian.evaluate(arm, &item.at.configuration, item.at.target, &target, scratch);
+        let first_axis = n + 3 * item.at.target;
         let axes = Matrix3::from_fn(|row, axis| scratch[row * all + first_axis + axis]);
         let measured = self.measured(item);
         let lever = measured - self.centroids[item.station];
@@ -286,7 +275,7 @@ impl<'a> Fit<'a> {
         for row in 0..3 {
             let into = &mut rows[row * columns..(row + 1) * columns];
             into.fill(0.0);
-            for (column, parameter) in self.arm.parameters.iter().enumerate() {
+            for (column, parameter) in self.nominal.parameters.iter().enumerate() {
                 into[column] = -scratch[row * all + column] * parameter.expected;
             }
             match self.step.filter(|_| item.moved) {
@@ -313,10 +302,10 @@ impl<'a> Fit<'a> {
 
     fn linearise(&mut self) -> Linear {
         self.apply();
-        let arm = ForwardKinematics::new(&self.chain);
-        let mut jacobian = IdentificationJacobian::new(&self.arm.ids);
+        let arm = ForwardKinematics::new(&self.arm.chain);
+        let mut jacobian = IdentificationJacobian::new(&self.nominal.ids);
         let columns = self.columns();
-        let mut scratch = vec![0.0; 3 * self.arm.ids.len()];
+        let mut scratch = vec![0.0; 3 * self.nominal.ids.len()];
         let mut rows = DMatrix::zeros(columns, 3 * self.items.len());
         let mut residuals = DVector::zeros(3 * self.items.len());
         let mut axes = Vec::with_capacity(self.items.len());
@@ -432,16 +421,16 @@ impl<'a> Fit<'a> {
 
     /// `item`, not one of those fitted, against its prediction.
     pub(super) fn innovation(&self, item: &Item) -> Innovation {
-        self.probe(item).at(&item.configuration)
+        self.probe(item).at(&item.at.configuration)
     }
 
     /// The point of `item`, not one of those fitted, to be compared with predictions for any configuration.
     pub(super) fn probe<'f>(&'f self, item: &Item) -> Probe<'f, 'a> {
         Probe {
             fit: self,
-            arm: ForwardKinematics::new(&self.chain),
-            jacobian: IdentificationJacobian::new(&self.arm.ids),
-            scratch: vec![0.0; 3 * self.arm.ids.len()],
+            arm: ForwardKinematics::new(&self.arm.chain),
+            jacobian: IdentificationJacobian::new(&self.nominal.ids),
+            scratch: vec![0.0; 3 * self.nominal.ids.len()],
             rows: DMatrix::zeros(self.columns(), 3),
             item: item.clone(),
         }
@@ -449,10 +438,10 @@ impl<'a> Fit<'a> {
 
     /// Predicted distance between two items (m), and the standard deviation (m) of the measured one about it.
     pub(super) fn distance(&self, from: &Item, to: &Item) -> (f64, f64) {
-        let arm = ForwardKinematics::new(&self.chain);
-        let mut jacobian = IdentificationJacobian::new(&self.arm.ids);
+        let arm = ForwardKinematics::new(&self.arm.chain);
+        let mut jacobian = IdentificationJacobian::new(&self.nominal.ids);
         let columns = self.columns();
-        let mut scratch = vec![0.0; 3 * self.arm.ids.len()];
+        let mut scratch = vec![0.0; 3 * self.nominal.ids.len()];
         let mut blocks = [DMatrix::zeros(columns, 3), DMatrix::zeros(columns, 3)];
         let mut points = [Vector3::zeros(); 2];
         for ((item, rows), point) in [from, to].into_iter().zip(&mut blocks).zip(&mut points) {
@@ -484,8 +473,8 @@ pub(super) struct Probe<'f, 'a> {
 impl Probe<'_, '_> {
     /// The point against its prediction at a configuration.
     pub(super) fn at(&mut self, configuration: &[f64]) -> Innovation {
-        self.item.configuration.clear();
-        self.item.configuration.extend_from_slice(configuration);
+        self.item.at.configuration.clear();
+        self.item.at.configuration.extend_from_slice(configuration);
         let rows = &mut self.rows;
         let (error, _) =
             self.fit.block(&mut self.jacobian, &self.arm, &self.item, &mut self.scratch, rows.as_mut_slice());
@@ -496,7 +485,7 @@ impl Probe<'_, '_> {
 
     /// Change of the error from one configuration to another (m).
     pub(super) fn change(&self, from: &[f64], to: &[f64]) -> Vector3<f64> {
-        let target = &self.fit.targets[self.item.target];
+        let target = &self.fit.arm.targets[self.item.at.target];
         self.arm.point_in_base(from, target) - self.arm.point_in_base(to, target)
     }
 }

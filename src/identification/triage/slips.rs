@@ -49,7 +49,7 @@ pub(super) fn slips(chain: &KinematicChain, fit: &Fit<'_>, item: &Item) -> Vec<S
 }
 
 fn shifted(item: &Item, joint: usize, by: f64) -> Vec<f64> {
-    let mut configuration = item.configuration.clone();
+    let mut configuration = item.at.configuration.clone();
     configuration[joint] += by;
     configuration
 }

@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::{Cause, Explanation, Finding, Names, Triage, triage};
-use crate::identification::{PointSample, TargetAt};
-use crate::kinematics::{ForwardKinematics, FreeParameter, KinematicChain};
+use crate::identification::PointSample;
+use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, Place};
 use crate::profile::{Level, Profile, builtin};
 use crate::units::{INCH, MICROMETRE, MILLIMETRE, from_deg, from_mm};
 
@@ -17,10 +17,9 @@ const NOISE: f64 = 10.0 * MICROMETRE;
 
 /// A session with twenty good samples.
 struct Session {
-    chain: KinematicChain,
-    targets: Vec<Point3<f64>>,
+    arm: Arm,
     parameters: Vec<FreeParameter>,
-    truth: KinematicChain,
+    truth: Arm,
     planned: Vec<Vec<f64>>,
     samples: Vec<PointSample>,
     excluded: Vec<usize>,
@@ -35,15 +34,14 @@ impl Session {
         let draw = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
         let deviations: Vec<_> =
             parameters.iter().map(|parameter| (parameter.id, parameter.expected * draw(rng))).collect();
-        let truth = profile.chain().with_deviations(deviations).unwrap();
+        let arm = profile.arm();
+        let truth = Arm { targets: arm.targets.clone(), ..arm.with(deviations).unwrap() };
         let ranges = profile.joints().iter().map(|joint| joint.planning_limits.unwrap());
         let ranges: Vec<(f64, f64)> = ranges.collect();
         let planned: Vec<Vec<f64>> =
             (0..20).map(|_| ranges.iter().map(|(low, high)| rng.random_range(*low..*high)).collect()).collect();
-        let targets = vec![profile.targets()[0].position_in_flange];
         let mut session = Self {
-            chain: profile.chain().clone(),
-            targets,
+            arm,
             parameters,
             truth,
             planned: planned.clone(),
@@ -57,7 +55,7 @@ impl Session {
                 point[axis] += NOISE * draw(rng);
             }
             session.samples.push(PointSample {
-                at: TargetAt { configuration, target: 0 },
+                at: Place { configuration, target: 0 },
                 station: 0,
                 point,
                 sigma: None,
@@ -69,7 +67,7 @@ impl Session {
     /// What a perfect tracker sees of a target that has moved in the flange (m).
     fn measured(&self, configuration: &[f64], moved: Vector3<f64>) -> Point3<f64> {
         let frame = Isometry3::new(Vector3::new(2.9, -1.1, 0.6), Vector3::new(0.3, -0.2, 2.1));
-        frame * ForwardKinematics::new(&self.truth).point_in_base(configuration, &(self.targets[0] + moved))
+        frame * ForwardKinematics::new(&self.truth.chain).point_in_base(configuration, &(self.truth.targets[0] + moved))
     }
 
     /// The sample is taken elsewhere than shown.
@@ -79,8 +77,7 @@ impl Session {
 
     fn after(&self, count: usize) -> Option<Finding> {
         triage(&Triage {
-            chain: &self.chain,
-            targets: &self.targets,
+            arm: &self.arm,
             parameters: &self.parameters,
             sigma: NOISE,
             planned: &self.planned,

@@ -54,7 +54,7 @@ fn off_by_mm(faults: &[&str], count: u64) -> Vec<f64> {
 /// The true point of an arm that stands somewhere.
 fn standing_at(cell: &SimulatedCell, configuration: &[f64]) -> Point3<f64> {
     let truth = cell.truth();
-    let point = ForwardKinematics::new(&truth.chain).point_in_base(configuration, &truth.targets[0]);
+    let point = ForwardKinematics::new(&truth.arm.chain).point_in_base(configuration, &truth.arm.targets[0]);
     truth.base_from_tracker.inverse() * point
 }
 
@@ -69,13 +69,13 @@ fn distances_are_those_of_the_true_arm() {
     let truth = cell.truth().clone();
     let deviation = |joint, parameter| {
         let id = ParameterId::Link { joint, parameter };
-        truth.chain.parameter(id).unwrap() - profile("soochow").chain().parameter(id).unwrap()
+        truth.arm.value(id).unwrap() - profile("soochow").arm().value(id).unwrap()
     };
     assert!((deviation(1, LinkParameter::Beta) - 0.155_f64.to_radians()).abs() < 1e-12);
     assert!((deviation(0, LinkParameter::A) + from_mm(3.885)).abs() < 1e-12);
-    let arm = ForwardKinematics::new(&truth.chain);
+    let arm = ForwardKinematics::new(&truth.arm.chain);
     let predicted: Vec<Point3<f64>> =
-        (1..=20).map(|number| arm.point_in_base(&configuration(number), &truth.targets[0])).collect();
+        (1..=20).map(|number| arm.point_in_base(&configuration(number), &truth.arm.targets[0])).collect();
     for j in 0..20 {
         for k in 0..j {
             let difference = (measured[j] - measured[k]).norm() - (predicted[j] - predicted[k]).norm();

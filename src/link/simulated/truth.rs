@@ -1,9 +1,9 @@
 //! The arm that hides in a simulated cell.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 
 use super::random::{Random, Use};
-use crate::kinematics::{Convention, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{Arm, Convention, JointType, KinematicChain, LinkParameter, ParameterId};
 use crate::link::LinkError;
 use crate::profile::{Level, Profile};
 use crate::session::simulation::Truth;
@@ -45,10 +45,8 @@ const COLUMNS: [LinkParameter; 4] = [LinkParameter::Alpha, LinkParameter::A, Lin
 /// What a simulated cell is really like, and what an identification should find.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HiddenArm {
-    /// The arm.
-    pub chain: KinematicChain,
-    /// Target coordinates in the flange frame (m), before any bump.
-    pub targets: Vec<Point3<f64>>,
+    /// The arm, with its targets before any bump.
+    pub arm: Arm,
     /// Where the tracker stands.
     pub base_from_tracker: Isometry3<f64>,
 }
@@ -105,7 +103,7 @@ fn is_paper_arm(chain: &KinematicChain) -> Result<(), String> {
         }
         for (parameter, value) in COLUMNS.into_iter().zip(row) {
             let id = ParameterId::Link { joint: index, parameter };
-            let here = chain.parameter(id).unwrap_or(f64::NAN);
+            let here = joint.link.value(parameter);
             let quantity = parameter.quantity();
             let excess = (here - quantity.from_edge(value)).abs();
             if excess.is_nan() || excess > SAME_GEOMETRY {
@@ -132,17 +130,6 @@ pub(super) fn hidden_arm(
     base_from_tracker: Isometry3<f64>,
 ) -> Result<HiddenArm, LinkError> {
     let deviations = deviations(profile, truth, seed)?;
-    let chain = profile
-        .chain()
-        .with_deviations(deviations.iter().copied())
-        .map_err(|error| LinkError::SetUp(error.to_string()))?;
-    let mut targets: Vec<Point3<f64>> = profile.targets().iter().map(|target| target.position_in_flange).collect();
-    for (id, deviation) in deviations {
-        if let ParameterId::Target { target, axis } = id
-            && let Some(point) = targets.get_mut(target)
-        {
-            point.coords[axis.index()] += deviation;
-        }
-    }
-    Ok(HiddenArm { chain, targets, base_from_tracker })
+    let arm = profile.arm().with(deviations).map_err(|error| LinkError::SetUp(error.to_string()))?;
+    Ok(HiddenArm { arm, base_from_tracker })
 }

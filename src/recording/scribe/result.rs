@@ -176,28 +176,27 @@ fn arrow_style(color: Color) -> Arrows3D {
 fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Calibration, enlarged: f64) {
     let deviations: Vec<f64> = calibration.parameters.iter().map(|parameter| parameter.deviation).collect();
     let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * enlarged).collect();
-    let (Some((chain, targets)), Some((bent, bent_targets))) =
-        (calibration.arm_with(profile, &deviations), calibration.arm_with(profile, &larger))
+    let (Some(arm), Some(bent)) = (calibration.arm_with(profile, &deviations), calibration.arm_with(profile, &larger))
     else {
         return;
     };
     cell::enlarged_style(canvas, profile);
-    if let Some(target) = bent_targets.first() {
+    if let Some(target) = bent.targets.first() {
         // Before the first pose, and while the search goes on.
-        let posture = Posture::new(&bent, target, &cell::rest(profile));
+        let posture = Posture::new(&bent.chain, target, &cell::rest(profile));
         cell::enlarged(canvas, profile, &posture, Moment::pose(0));
         cell::enlarged(canvas, profile, &posture, Moment::search(0));
     }
     for sample in &session.samples {
         let target = sample.noted.target;
-        let (Some(at), Some(bent_at)) = (targets.get(target), bent_targets.get(target)) else { continue };
+        let (Some(at), Some(bent_at)) = (arm.targets.get(target), bent.targets.get(target)) else { continue };
         let moment = Moment::pose(sample.noted.number);
         let q = session.configuration_of(sample);
-        let posture = Posture::new(&chain, at, &q);
+        let posture = Posture::new(&arm.chain, at, &q);
         for (index, frame) in posture.frames.iter().enumerate() {
             canvas.draw(moment, names::IDENTIFIED_FRAMES, &layout::frame(frame, &names::frame("identified", index)));
         }
-        cell::enlarged(canvas, profile, &Posture::new(&bent, bent_at, &q), moment);
+        cell::enlarged(canvas, profile, &Posture::new(&bent.chain, bent_at, &q), moment);
     }
 }
 
@@ -381,14 +380,16 @@ fn solver(
             }
         }
         let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * scales.arm).collect();
-        let Some((bent, bent_targets)) = calibration.arm_with(profile, &larger) else { continue };
-        if let Some(target) = bent_targets.first() {
-            cell::enlarged(canvas, profile, &Posture::new(&bent, target, &rest), moment);
+        let Some(bent) = calibration.arm_with(profile, &larger) else { continue };
+        if let Some(target) = bent.targets.first() {
+            cell::enlarged(canvas, profile, &Posture::new(&bent.chain, target, &rest), moment);
         }
-        let Some((chain, targets)) = calibration.arm_with(profile, deviations) else { continue };
+        let Some(arm) = calibration.arm_with(profile, deviations) else { continue };
         let predicted: Vec<Point3<f64>> = judged
             .iter()
-            .filter_map(|one| Some(Posture::new(&chain, targets.get(one.sample.noted.target)?, &one.q).reflector))
+            .filter_map(|one| {
+                Some(Posture::new(&arm.chain, arm.targets.get(one.sample.noted.target)?, &one.q).reflector)
+            })
             .collect();
         let pairs = judged.iter().map(|one| one.measured).zip(predicted.iter().copied());
         let trusted = judged.iter().map(|one| if one.text.rejected { 0.0 } else { 1.0 });

@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use proptest::prelude::*;
 
 use super::*;
-use crate::identification::{PointSample, TargetAt};
+use crate::identification::PointSample;
+use crate::kinematics::Place;
 use crate::procedure::EstimationSettings;
 use crate::procedure::identify::{IdentifyRequest, NamedSample, identify};
 use crate::profile::{Profile, builtin};
@@ -139,7 +140,7 @@ fn identified() -> IdentifiedText {
             pose: row.pose.clone(),
             line: row.line,
             sample: PointSample {
-                at: TargetAt { configuration: row.configuration.clone(), target: 0 },
+                at: Place { configuration: row.configuration.clone(), target: 0 },
                 station: 0,
                 point: row.point,
                 sigma: row.sigma,

@@ -1,7 +1,8 @@
 //! Identify and Verify: from samples to a result, and what it is worth on points that it never saw.
 
 use super::{Action, Cx, StepMachine};
-use crate::identification::{PointSample, TargetAt};
+use crate::identification::PointSample;
+use crate::kinematics::Place;
 use crate::procedure::EstimationSettings;
 use crate::procedure::identify::{IdentifyRequest, NamedSample, SampleSet};
 use crate::procedure::points::point_errors;
@@ -45,7 +46,7 @@ pub(super) fn samples(session: &Session, kind: PoseKind) -> Vec<NamedSample> {
             pose: session.pose_of(sample).to_owned(),
             line: usize::try_from(sample.noted.number).unwrap_or(usize::MAX),
             sample: PointSample {
-                at: TargetAt { configuration: session.configuration_of(sample), target: sample.noted.target },
+                at: Place { configuration: session.configuration_of(sample), target: sample.noted.target },
                 station: 0,
                 point: session.point_of(sample),
                 sigma: session.sigma_of(sample),

@@ -61,7 +61,7 @@ static TRUE_ARM: LazyLock<KinematicChain> = LazyLock::new(|| {
         deviation(2, LinkParameter::A, 0.3 * MILLIMETRE),
         deviation(4, LinkParameter::Theta, -0.03 * DEGREE),
     ];
-    PROFILE.chain().with_deviations(deviations).unwrap()
+    PROFILE.arm().with(deviations).unwrap().chain
 });
 
 /// The n-th of evenly spread configurations within the planning limits (rad).

@@ -1,7 +1,8 @@
 //! What the checks say about a new point: live triage by distance, and drift where a pose is measured again.
 
+use crate::identification::PointSample;
 use crate::identification::triage::{Cause, Finding, Names, PairDeviation, Triage, triage};
-use crate::identification::{PointSample, TargetAt};
+use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
 use crate::session::journal::{Correction, FindingText, MeasuredText, PairText, from_edge, to_edge, to_length_mm};
 use crate::session::plan::PoseKind;
@@ -63,7 +64,7 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
     // A sample of the same row is about to be superseded.
     let earlier: Vec<&Sample> = session.counted().filter(|sample| sample.row != noted.row).collect();
     let point_sample = |configuration: Vec<f64>, point, sigma| PointSample {
-        at: TargetAt { configuration, target: noted.target },
+        at: Place { configuration, target: noted.target },
         station: 0,
         point,
         sigma,
@@ -87,10 +88,8 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
         .collect();
     let planned: Vec<Vec<f64>> =
         rows.iter().filter_map(|row| session.rows.get(*row)).map(|row| row.planned.configuration.clone()).collect();
-    let targets: Vec<_> = profile.targets().iter().map(|target| target.position_in_flange).collect();
     let found = triage(&Triage {
-        chain: profile.chain(),
-        targets: &targets,
+        arm: &profile.arm(),
         parameters: &profile.free_parameters(Level::Geometric),
         sigma: stated_sigma(profile),
         planned: &planned,

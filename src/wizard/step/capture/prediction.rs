@@ -1,6 +1,6 @@
 //! How good a calibration from the samples so far would be, and whether more of them are worth the time.
 
-use crate::identification::{ArmModel, TargetAt};
+use crate::kinematics::Place;
 use crate::planning::{Information, JointBox, fewest_poses, findable, random};
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
@@ -30,16 +30,16 @@ impl Prediction {
 
     fn try_of(session: &Session) -> Option<Self> {
         let profile = &session.mounted_profile()?;
-        let measured: Vec<TargetAt> =
+        let measured: Vec<Place> =
             session.counted_of(PoseKind::Identification).map(|sample| at(session.configuration_of(sample))).collect();
         let open = session
             .open_rows()
             .filter_map(|row| session.rows.get(row))
             .filter(|row| row.planned.kind == PoseKind::Identification)
             .map(|row| at(row.planned.configuration.clone()));
-        let pool: Vec<TargetAt> = measured.iter().cloned().chain(open).collect();
+        let pool: Vec<Place> = measured.iter().cloned().chain(open).collect();
         let parameters = profile.free_parameters(Level::Geometric);
-        let information = Information::new(&model(profile), &parameters, &pool, &fresh(profile)?).ok()?;
+        let information = Information::new(&profile.arm(), &parameters, &pool, &fresh(profile)?).ok()?;
         let of_first = |count: usize| information.predicted_error(&(0..count).collect::<Vec<_>>());
         let curve = (information.fewest_poses()..=measured.len()).filter_map(|n| Some((n, of_first(n)?))).collect();
         Some(Self { curve, with_all: of_first(pool.len()) })
@@ -64,21 +64,16 @@ impl Prediction {
 pub(in crate::wizard::step) fn fewest_samples(session: &Session) -> Option<usize> {
     let profile = &session.mounted_profile()?;
     let parameters = profile.free_parameters(Level::Geometric);
-    let rank = fresh(profile).and_then(|fresh| findable(&model(profile), &parameters, &fresh));
+    let rank = fresh(profile).and_then(|fresh| findable(&profile.arm(), &parameters, &fresh));
     Some(fewest_poses(rank.unwrap_or(parameters.len())))
 }
 
-fn at(configuration: Vec<f64>) -> TargetAt {
-    TargetAt { configuration, target: 0 }
-}
-
-fn model(profile: &Profile) -> ArmModel {
-    let targets = profile.targets().iter().map(|target| target.position_in_flange).collect();
-    ArmModel { chain: profile.chain().clone(), targets }
+fn at(configuration: Vec<f64>) -> Place {
+    Place { configuration, target: 0 }
 }
 
 /// Poses all over the range in which the robot is to be accurate.
-fn fresh(profile: &Profile) -> Option<Vec<TargetAt>> {
+fn fresh(profile: &Profile) -> Option<Vec<Place>> {
     Some(random(&joint_box(profile)?, FRESH_SEED).take(FRESH_POSES).map(at).collect())
 }
 
