@@ -1,5 +1,6 @@
 //! Runs a command: loads its files, has the procedure done, writes the results.
 
+mod advice;
 mod compensate;
 mod constraints;
 mod export;

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fmt;
 use std::process::ExitCode;
 
-use crate::text::printable;
+use crate::text::{causes, printable};
 
 /// How a command ended, with the exit code of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,13 +68,7 @@ impl Failure {
 
     /// A failure from an error and its sources, joined by colons.
     pub fn from_error(status: ExitStatus, error: &dyn Error) -> Self {
-        let mut message = error.to_string();
-        let mut source = error.source();
-        while let Some(cause) = source {
-            message = format!("{message}: {cause}");
-            source = cause.source();
-        }
-        Self::new(status, message)
+        Self::new(status, causes(error))
     }
 
     /// Adds what to do about it.

@@ -41,6 +41,15 @@ pub enum ModelError {
     /// A geometry that cannot be built.
     #[error(transparent)]
     Geometry(#[from] KinematicsError),
+    /// A flange that the UR kinematics file cannot carry.
+    #[error(
+        "the file has no place for the flange beside axis 6: {offset} (alpha6, a6). Let the tool take it, or fix alpha6 and a6 \
+         in the profile and identify again"
+    )]
+    FlangeOffset {
+        /// Pose of the flange beside axis 6, in words.
+        offset: String,
+    },
     /// The arm does not fit the format.
     #[error("{0}")]
     Unsuitable(String),

@@ -6,6 +6,7 @@
 //! This module reads no file and no clock, and never estimates anything. All defects of a table are reported together
 //! ([`TableErrors`]), each with its place and what to do about it.
 
+pub mod advice;
 pub mod calibration;
 pub mod constraints;
 pub mod export;

@@ -21,7 +21,8 @@
 #![warn(missing_docs)]
 #![warn(clippy::wildcard_enum_match_arm)]
 
-pub mod effect;
+pub mod advice;
+mod effect;
 pub mod intent;
 mod live;
 pub mod notice;

@@ -23,7 +23,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "kinematics", "profile", "session"]),
     ("recording", &["units", "geometry", "kinematics", "profile", "session", "store"]),
-    ("error", &["session"]),
+    ("error", &[]),
     (
         "procedure",
         &[
@@ -37,11 +37,10 @@ const LAYERS: &[(&str, &[&str])] = &[
             "search",
             "model",
             "report",
-            "error",
         ],
     ),
     ("wizard", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "procedure"]),
-    ("runtime", &["profile", "session", "procedure", "error", "link", "store", "recording", "wizard"]),
+    ("runtime", &["profile", "session", "procedure", "link", "store", "recording", "wizard"]),
     ("script", &["session", "wizard", "runtime"]),
     ("tui", &["units", "geometry", "kinematics", "profile", "session", "wizard", "runtime"]),
     ("cli", &["units", "kinematics", "identification", "planning", "profile", "session", "program", "model"]),
@@ -192,6 +191,29 @@ fn pure_modules_touch_nothing_outside() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Modules that people use directly: they name options, keys and exit codes.
+const EDGES: &[&str] = &["app", "cli", "error", "script", "tui"];
+
+/// How options, keys and exit codes begin in a message.
+const EDGE_WORDS: &[&str] = &["'--", "exit code", "Ctrl", "[Esc", "[Enter", "'Esc'", "'Enter'", "ExitStatus"];
+
+#[test]
+fn only_the_edges_name_options_keys_and_exit_codes() {
+    let mut wrong = Vec::new();
+    for (path, top, text) in modules() {
+        if EDGES.contains(&top.as_str()) || is_test_file(&path) {
+            continue;
+        }
+        for (number, line) in shipped(&text).lines().enumerate() {
+            let is_comment = line.trim_start().starts_with("//");
+            if let Some(word) = EDGE_WORDS.iter().find(|word| line.contains(**word) && !is_comment) {
+                wrong.push(format!("{}:{}: {word}", path.display(), number + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "return a typed error or `Advice` instead:\n{}", wrong.join("\n"));
 }
 
 #[test]

@@ -304,14 +304,9 @@ fn of_many_samples_the_worst_are_listed_and_some_are_drawn() {
                 PointErrorText { identified_mm: (x + worse * x.signum(), y, z), ..*point }
             }));
         }
-        let warning =
-            Warning { code: "tested".to_owned(), message: "a remark of a row".to_owned(), blocks_acceptance: false };
+        let warning = Warning::new("tested", "a remark of a row", false);
         identified.summary.warnings = vec![warning.clone(); 700];
-        identified.summary.warnings.push(Warning {
-            message: "what blocks".to_owned(),
-            blocks_acceptance: true,
-            ..warning
-        });
+        identified.summary.warnings.push(Warning::new("tested", "what blocks", true));
         let rejected = [RejectedSummary {
             pose: "1".to_owned(),
             line: 1,

@@ -253,7 +253,7 @@ impl Cell {
             }
             Request::Identify(request) => match identify(request, &mut |_| ControlFlow::Continue(())) {
                 Ok(identified) => Answer::Identified(Box::new(identified)),
-                Err(error) => Answer::Failed(Problem { message: error.message, hints: error.hints }),
+                Err(error) => Answer::Failed(error.into()),
             },
             Request::Model(request) => Answer::Modelled(Box::new(models(request))),
             Request::Deliver { files, left_out } => {

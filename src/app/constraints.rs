@@ -6,7 +6,7 @@ use std::io::Write;
 use super::identify::deliver;
 use super::load::{self, LoadedProfile};
 use super::progress::Progress;
-use super::{Console, estimation_settings, record};
+use super::{Console, advice, estimation_settings, record};
 use crate::cli::ConstraintsArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{DirectErrors, FittedSetup, fit_setup};
@@ -19,11 +19,11 @@ use crate::procedure::identify::calibration;
 use crate::procedure::result::{self, Context};
 use crate::procedure::summary::{Finished, SampleName, Special};
 use crate::procedure::{
-    EstimationSettings, checks, identification_failure, input_file, joint_types, target_parameters, warning,
+    EstimationSettings, ProcedureError, checks, input_file, joint_types, target_parameters,
 };
 use crate::session::constraints::{Constraints, SharedPoints, read_constraints_bytes};
 use crate::session::filter::Filter;
-use crate::session::summary::{ModelSummary, VerificationMode, VerificationSummary};
+use crate::session::summary::{ModelSummary, VerificationMode, VerificationSummary, Warning};
 use crate::store;
 use crate::units::from_mm;
 
@@ -86,7 +86,7 @@ pub(super) fn run<O: Write, E: Write>(
     };
     if matches!(table, Constraints::SharedPoints(_)) && identification.observations.lengths.is_empty() {
         let message = "shared points without any known length leave the size of the robot to the prior; give '--socket-distance-mm'";
-        warnings.push(warning("no_scale", message.to_owned(), true));
+        warnings.push(Warning::new("no_scale", message.to_owned(), true));
     }
 
     let setup = Setup::new(args, &loaded);
@@ -133,7 +133,9 @@ pub(super) fn run<O: Write, E: Write>(
         warnings,
         verification,
     };
-    let summary = finished.summary();
+    let mut summary = finished.summary();
+    summary.warnings.iter_mut().for_each(|warning| warning.put_into_words(advice::words));
+    summary.verdict.put_into_words(advice::words);
     let calibration =
         (!unusable).then(|| calibration(&summary, &loaded.text, &nominal, &problem, of_identification, None));
     let session = estimation
@@ -268,13 +270,13 @@ impl<'a> Setup<'a> {
     ) -> Result<Identification, Failure> {
         let mut progress = Progress::new(&mut console.err);
         identify(&self.problem(observations), &self.settings, &mut |iteration| progress.step(iteration))
-            .map_err(|error| identification_failure(&error))
+            .map_err(|error| ProcedureError::from(error).into())
     }
 
     /// The nominal arm with its target fitted.
     fn nominal(&self, observations: &Observations) -> Result<FittedSetup, Failure> {
         fit_setup(&self.arm, &target_parameters(&self.parameters), observations)
-            .map_err(|error| identification_failure(&error))
+            .map_err(|error| ProcedureError::from(error).into())
     }
 
     fn verify(

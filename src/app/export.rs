@@ -28,6 +28,9 @@ pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O
     let done = export(&arm, format, &options).map_err(|error| match (&error, &args.into) {
         (ModelError::Urdf(_), Some(path)) => Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display())),
         (ModelError::Differs { .. } | ModelError::ReadBack(_), _) => Failure::from_error(ExitStatus::Internal, &error),
+        (ModelError::FlangeOffset { .. }, _) => {
+            Failure::from_error(ExitStatus::Usage, &error).hint("'--with-tool-offset' lets the tool take it")
+        }
         _ => Failure::from_error(ExitStatus::Usage, &error),
     })?;
     store::replace(&args.out, &done.text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;

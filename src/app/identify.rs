@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::load::now;
 use super::progress::Progress;
-use super::{Console, estimation_settings, load, record, to_json};
+use super::{Console, advice, estimation_settings, load, record, to_json};
 use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::checks;
@@ -71,10 +71,11 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         layout: Some(args.layout.to_string()),
     };
     let mut progress = Progress::new(&mut console.err);
-    let identified = identify(&request, &mut |iteration| {
+    let mut identified = identify(&request, &mut |iteration| {
         progress.step(iteration);
         ControlFlow::Continue(())
     })?;
+    identified.put_into_words(advice::words);
     if let Some(path) = &args.record.record {
         record::identification(path, &estimation.profile, &request, &identified)?;
     }

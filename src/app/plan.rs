@@ -11,13 +11,13 @@ use std::thread;
 
 use super::load::{self, LoadedProfile, now};
 use super::progress::{Progress, Stopwatch};
-use super::{Console, record, to_json};
+use super::{Console, advice, record, to_json};
 use crate::cli::PlanArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::planning::Stage;
 use crate::planning::order::Pace;
 use crate::procedure::plan::{self as procedure, PlanRequest};
-use crate::procedure::{checks, input_file, joint_types, warning};
+use crate::procedure::{checks, input_file, joint_types};
 use crate::profile::Profile;
 use crate::report;
 use crate::session::plan::{self, PlannedPose, PoseKind};
@@ -53,6 +53,7 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
         choose(&loaded, &request, &keep_going, console)?
     };
     warnings.append(&mut summary.warnings);
+    warnings.iter_mut().for_each(|warning| warning.put_into_words(advice::words));
     summary.warnings = warnings;
     summary.elapsed_s = clock.seconds();
     if let Some(file) = &args.out {
@@ -133,7 +134,7 @@ fn included(file: &Path, profile: &Profile) -> Result<(Vec<PlannedPose>, Vec<War
             all - included.len(),
             file.display()
         );
-        warnings.push(warning("not_included", text, false));
+        warnings.push(Warning::new("not_included", text, false));
     }
     Ok((included, warnings))
 }
@@ -166,7 +167,7 @@ fn choose<O: Write, E: Write>(
             }
         }
         // A panic of the search is a defect: let it be seen where it happened.
-        worker.join().map_err(|panic| std::panic::resume_unwind(panic))?
+        Ok(worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?)
     })
 }
 

@@ -5,7 +5,7 @@ use std::io::Write;
 use nalgebra::{Isometry3, Point3};
 
 use super::identify::exit_status;
-use super::{Console, load, to_json};
+use super::{Console, advice, load, to_json};
 use crate::cli::{RefitArg, VerifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
@@ -13,7 +13,7 @@ use crate::identification::{Observations, Places, PointSample, Problem};
 use crate::kinematics::{Arm, FreeParameter, ParameterId, Place};
 use crate::procedure::assess::{point_verification, verdict};
 use crate::procedure::checks;
-use crate::procedure::{identification_failure, input_file, provenance, warning};
+use crate::procedure::{ProcedureError, input_file, provenance};
 use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
@@ -73,7 +73,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         let message = format!(
             "{fitted} numbers of the set-up were fitted to only {poses} {noun}: the position errors are too small to be believed"
         );
-        warnings.push(warning("few_data", message, true));
+        warnings.push(Warning::new("few_data", message, true));
     }
     let known = identification_places(&calibration, profile, &file)?;
     warnings.extend(checks::set_warnings(joints, &known, &tested));
@@ -93,6 +93,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     if args.refit == RefitArg::None {
         warnings.splice(0..0, moved_set_up(&verification.identified));
     }
+    warnings.iter_mut().for_each(|warning| warning.put_into_words(advice::words));
     let inputs = vec![input_file("calibration", file, text.as_bytes()), measured.input];
     let report = VerificationReport {
         schema: SCHEMA,
@@ -115,7 +116,7 @@ fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) ->
     }
     let observations = Observations::default();
     let problem = Problem { arm: &profile.arm(), parameters: &parameters, observations: &observations };
-    checks::check_verification(&problem, samples)
+    Ok(checks::check_verification(&problem, samples)?)
 }
 
 /// Distances do not feel where the tracker stands, positions do.
@@ -127,7 +128,7 @@ fn moved_set_up(identified: &ModelSummary) -> Option<Warning> {
             report::number(distance, 4),
             report::number(position, 4)
         );
-        warning("another_set_up", message, true)
+        Warning::new("another_set_up", message, true)
     })
 }
 
@@ -143,7 +144,7 @@ fn carried_over(calibration: &Calibration) -> Option<Warning> {
         "the calibration itself was not acceptable: {}; a good figure here does not mend it. Identify again from better data",
         codes.join(", ")
     );
-    (!codes.is_empty()).then(|| warning("calibration_not_acceptable", message, true))
+    (!codes.is_empty()).then(|| Warning::new("calibration_not_acceptable", message, true))
 }
 
 /// The configurations and targets that the calibration was identified from.
@@ -211,7 +212,7 @@ impl Models {
     ) -> Result<(FittedSetup, FittedSetup), Failure> {
         let free = match refit {
             RefitArg::None => {
-                let known = |arm, station: Option<Isometry3<f64>>| {
+                let known = |arm, station: Option<Isometry3<f64>>| -> Result<FittedSetup, Failure> {
                     let base_from_station = vec![station.ok_or_else(|| {
                         Failure::new(ExitStatus::Usage, format!("'{file}' knows no place of a tracker"))
                             .hint("use '--refit frame' or '--refit frame+target'")
@@ -224,7 +225,7 @@ impl Models {
             RefitArg::FrameAndTarget => remounted_targets(profile, samples),
         };
         let observations = Observations { points: samples.to_vec(), ..Observations::default() };
-        let fit = |arm: &Arm| fit_setup(arm, &free, &observations).map_err(|error| identification_failure(&error));
+        let fit = |arm: &Arm| fit_setup(arm, &free, &observations).map_err(ProcedureError::from);
         Ok((fit(&self.nominal)?, fit(&self.identified)?))
     }
 }

@@ -266,10 +266,7 @@ fn ur_kinematics(
     let is_small =
         rest.translation.vector.norm() <= proof::EXPORT.position && rest.rotation.angle() <= proof::EXPORT.angle;
     if !is_small && !options.with_tool_offset {
-        return Err(ModelError::Unsuitable(format!(
-            "the file has no place for the flange beside axis 6: {offset} (alpha6, a6). Let the tool take it \
-             ('--with-tool-offset'), or fix alpha6 and a6 in the profile and identify again"
-        )));
+        return Err(ModelError::FlangeOffset { offset });
     }
     if !is_small {
         remarks.push(format!("the tool must take what the file cannot say: in front of every tool {offset}"));

@@ -5,6 +5,7 @@ use crate::identification::verification::{DirectErrors, ErrorStatistics, ModelEr
 use crate::kinematics::Joint;
 use crate::profile::Acceptance;
 use crate::report::number;
+use crate::session::advice::Advice;
 use crate::session::summary::{
     AxisSummary, JointBin, JointSummary, LimitCheck, ModelSummary, StatisticsSummary, Verdict, VerdictStatus,
     VerificationSummary, Warning,
@@ -91,10 +92,11 @@ pub(crate) fn verdict(
     verification: Option<&VerificationSummary>,
     warnings: &[Warning],
 ) -> Verdict {
-    let decided = |status, reasons: Vec<String>, checks| Verdict { status, reasons, checks };
+    let decided = |status, reasons: Vec<String>, checks| Verdict { status, reasons, checks, advice: None };
     let Some(verification) = verification else {
-        let reason = "there are no verification samples; give '--verify FILE', or '--use CONDITION --verify-rest'";
-        return decided(VerdictStatus::NotEvaluated, vec![reason.to_owned()], Vec::new());
+        let reasons = vec!["there are no verification samples".to_owned()];
+        let advice = Some(Advice::VerifyPoints);
+        return Verdict { advice, ..decided(VerdictStatus::NotEvaluated, reasons, Vec::new()) };
     };
     let checks = limit_checks(acceptance, &verification.identified);
     let mut reasons: Vec<String> = checks
@@ -167,7 +169,6 @@ fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck
 
 #[cfg(test)]
 mod tests {
-    use super::super::warning;
     use super::*;
 
     fn of(distance_mm: Option<f64>) -> VerificationSummary {
@@ -196,7 +197,7 @@ mod tests {
         assert_eq!(status(None, &[]), VerdictStatus::NotEvaluated);
         assert_eq!(status(Some(0.3), &[]), VerdictStatus::NotAccepted);
         assert_eq!(status(Some(f64::NAN), &[]), VerdictStatus::NotAccepted);
-        let twice = [warning("poor_data", String::new(), true), warning("poor_data", String::new(), true)];
+        let twice = [Warning::new("poor_data", "", true), Warning::new("poor_data", "", true)];
         let found = verdict(&acceptance, Some(&of(None)), &twice);
         assert_eq!(found.status, VerdictStatus::NotAccepted);
         assert_eq!(found.reasons, ["see the warning 'poor_data'", "these data do not tell: distance rms"]);

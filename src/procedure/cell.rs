@@ -1,6 +1,6 @@
 //! The cell of a profile as planning sees it.
 
-use crate::error::{ExitStatus, Failure};
+use super::ProcedureError;
 use crate::planning::{Body, BoxInBase, Cell, KeepOutBox, MountedTarget, TrackerStand};
 use crate::profile::Profile;
 
@@ -8,16 +8,13 @@ use crate::profile::Profile;
 ///
 /// # Errors
 /// A joint without limits.
-pub fn planning_limits(profile: &Profile) -> Result<Vec<(f64, f64)>, Failure> {
+pub fn planning_limits(profile: &Profile) -> Result<Vec<(f64, f64)>, ProcedureError> {
     let joints = profile.chain().joints().iter().zip(profile.joints());
     joints
         .map(|(joint, range)| {
-            range.planning_limits.or(range.limits).ok_or_else(|| {
-                Failure::new(
-                    ExitStatus::Usage,
-                    format!("joint '{}' has no limits in profile '{}'", joint.name, profile.name()),
-                )
-                .hint("poses are drawn from the joint ranges: give 'limits_deg' (or 'limits_mm') in the profile")
+            range.planning_limits.or(range.limits).ok_or_else(|| ProcedureError::NoLimits {
+                joint: joint.name.clone(),
+                profile: profile.name().to_owned(),
             })
         })
         .collect()
@@ -29,9 +26,8 @@ pub(crate) fn cell(
     limits: Vec<(f64, f64)>,
     region: Option<BoxInBase>,
     filters: bool,
-) -> Result<Cell, Failure> {
-    let target =
-        profile.targets().first().ok_or_else(|| Failure::new(ExitStatus::Usage, "the profile has no target"))?;
+) -> Result<Cell, ProcedureError> {
+    let target = profile.targets().first().ok_or(ProcedureError::NoTarget)?;
     let target = MountedTarget { position_in_flange: target.position_in_flange, axis_in_flange: target.axis_in_flange };
     if !filters {
         return Ok(Cell {

@@ -3,8 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::{identification_failure, warning};
-use crate::error::{ExitStatus, Failure};
+use super::ProcedureError;
 use crate::identification::plausibility::compare_with_nominal;
 use crate::identification::verification::{CoverageGap, coverage_gaps};
 use crate::identification::{Observations, Places, PointSample, Problem};
@@ -12,6 +11,7 @@ use crate::kinematics::{Joint, Place};
 use crate::profile::Profile;
 use crate::report::number;
 use crate::session::TableProblem;
+use crate::session::advice::Advice;
 use crate::session::summary::Warning;
 use crate::units::{MICROMETRE, Quantity, to_mm};
 
@@ -31,7 +31,7 @@ const SHOWN: usize = 3;
 /// What the reader of a table found odd; `file` names it where there are several.
 pub(crate) fn table_warnings(file: Option<&str>, problems: &[TableProblem]) -> Vec<Warning> {
     let place = file.map_or_else(String::new, |file| format!("'{file}', "));
-    problems.iter().map(|problem| warning("table", format!("{place}{problem}"), false)).collect()
+    problems.iter().map(|problem| Warning::new("table", format!("{place}{problem}"), false)).collect()
 }
 
 /// Rows, as line and configuration, whose joints are outside the limits of the profile.
@@ -66,7 +66,7 @@ pub(crate) fn limit_warning<'a>(
     let message = format!(
         "joint values outside the limits of the profile{place} (degrees and radians mixed up, or another robot?): {list}{tail}"
     );
-    (!outside.is_empty()).then(|| warning("joint_limits", message, false))
+    (!outside.is_empty()).then(|| Warning::new("joint_limits", message, false))
 }
 
 /// What a comparison with the nominal robot says.
@@ -79,8 +79,8 @@ pub(crate) struct Compared {
 
 /// Refuses points that a known mistake explains better than this robot does. `problem` frees all that the robot may deviate in,
 /// whatever is to be identified; `what` comes before the message.
-pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Compared, Failure> {
-    let plausibility = compare_with_nominal(problem).map_err(|error| identification_failure(&error))?;
+pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Compared, ProcedureError> {
+    let plausibility = compare_with_nominal(problem)?;
     let expected = plausibility.expected;
     if plausibility.is_plausible() {
         return Ok(Compared { expected, warning: None });
@@ -92,17 +92,17 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
         number(to_mm(expected), 1)
     );
     if let Some(mistake) = &plausibility.mistake {
-        let text = mistake.describe(|joint| joints[joint].name.clone());
-        return Err(Failure::new(ExitStatus::Usage, format!("{gap}: {text}")));
+        let mistake = mistake.describe(|joint| joints[joint].name.clone());
+        return Err(ProcedureError::Mistaken { gap, mistake });
     }
     let message =
         format!("{gap}, and no single mistake explains it (rows in another order, another robot, two joints wrong?)");
-    Ok(Compared { expected, warning: Some(warning("implausible", message, true)) })
+    Ok(Compared { expected, warning: Some(Warning::new("implausible", message, true)) })
 }
 
 /// Looks for the same mistakes in the verification points of a table. Too few to tell are left to other checks. The other
 /// observations of `problem` do not matter.
-pub(crate) fn check_verification(problem: &Problem<'_>, tested: &[PointSample]) -> Result<Option<Warning>, Failure> {
+pub(crate) fn check_verification(problem: &Problem<'_>, tested: &[PointSample]) -> Result<Option<Warning>, ProcedureError> {
     if tested.len() < ENOUGH_TO_COMPARE {
         return Ok(None);
     }
@@ -131,7 +131,7 @@ pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &
             number(to_mm(typical), 3),
             worst.join(", ")
         );
-        warning("far_verification_samples", message, false)
+        Warning::new("far_verification_samples", message, false)
     })
 }
 
@@ -143,10 +143,10 @@ pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) 
     if shared > 0 {
         let verb = if shared == 1 { "is" } else { "are" };
         let message = format!(
-            "{shared} of {} {verb} of a pose that is also in the identification set: the figures below say nothing about other poses and are no independent verification; '--use' picks rows, such as \"kind == 'verification'\"",
+            "{shared} of {} {verb} of a pose that is also in the identification set: the figures below say nothing about other poses and are no independent verification",
             counted(tested.len())
         );
-        warnings.push(warning(NOT_INDEPENDENT, message, true));
+        warnings.push(Warning::new(NOT_INDEPENDENT, message, true).with_advice(Advice::SeparateVerification));
     }
     let known: Vec<&[f64]> = known.iter().map(|at| at.configuration.as_slice()).collect();
     let tested: Vec<&[f64]> = tested.iter().map(|at| at.configuration.as_slice()).collect();
@@ -168,7 +168,7 @@ pub(crate) fn few_warning(samples: usize, poses: usize) -> Option<Warning> {
             what = format!("{poses} {noun} in {what}");
         }
         let message = format!("only {what}: the largest error is hardly known");
-        warning("few_verification_samples", message, poses < TOO_FEW_POSES)
+        Warning::new("few_verification_samples", message, poses < TOO_FEW_POSES)
     })
 }
 
@@ -192,5 +192,5 @@ fn coverage_warning(joints: &[Joint], gap: &CoverageGap) -> Warning {
             joint.name
         )
     };
-    warning("coverage", message, false)
+    Warning::new("coverage", message, false)
 }

@@ -1,8 +1,8 @@
 //! Where to stand for a circle-point analysis: a configuration from which the last two joints can turn far without touching
 //! anything.
 
+use super::ProcedureError;
 use super::cell::{cell, planning_limits};
-use crate::error::{ExitStatus, Failure};
 use crate::identification::circle_point::{circle_plan, fit_circle};
 use crate::kinematics::ForwardKinematics;
 use crate::planning::collision::ArmShape;
@@ -28,14 +28,13 @@ pub type Circle = (usize, Vec<Vec<f64>>);
 ///
 /// # Errors
 /// The arm cannot turn its last two joints freely anywhere, or they do not turn at all.
-pub fn plan(profile: &Profile) -> Result<Vec<Circle>, Failure> {
+pub fn plan(profile: &Profile) -> Result<Vec<Circle>, ProcedureError> {
     let limits = planning_limits(profile)?;
-    let usage = |error: &dyn std::error::Error| Failure::from_error(ExitStatus::Usage, error);
     let cell = cell(profile, limits.clone(), None, true)?;
-    let shape = ArmShape::new(profile.chain(), &cell, CLEARANCE).map_err(|error| usage(&error))?;
+    let shape = ArmShape::new(profile.chain(), &cell, CLEARANCE)?;
     let joints = profile.chain().dof();
     let turned = [joints.saturating_sub(1), joints.saturating_sub(2)];
-    let joint_box = JointBox::new(limits.clone()).map_err(|error| usage(&error))?;
+    let joint_box = JointBox::new(limits.clone())?;
     // The middle of the limits first: nobody wants to measure in a corner.
     let middle: Vec<f64> = limits.iter().map(|(low, high)| f64::midpoint(*low, *high)).collect();
     let bases = || std::iter::once(middle.clone()).chain(low_discrepancy(&joint_box, SEED).take(TRIES));
@@ -47,9 +46,7 @@ pub fn plan(profile: &Profile) -> Result<Vec<Circle>, Failure> {
             .collect();
         let circle =
             |joint: usize| circle_plan(profile.chain(), &around, joint, &base, POINTS).map(|plan| (joint, plan));
-        let circles = turned.iter().map(|joint| circle(*joint)).collect::<Result<Vec<_>, _>>().map_err(|error| {
-            usage(&error).hint("say where the SMR is, or leave it free: it is then identified with the arm")
-        })?;
+        let circles = turned.iter().map(|joint| circle(*joint)).collect::<Result<Vec<_>, _>>()?;
         let visited: Vec<&Vec<f64>> = circles.iter().flat_map(|(_, plan)| plan).collect();
         let is_free = visited.iter().all(|q| shape.check(q).is_ok())
             && visited.windows(2).all(|pair| shape.check_move(pair[0], pair[1]).is_ok());
@@ -58,26 +55,18 @@ pub fn plan(profile: &Profile) -> Result<Vec<Circle>, Failure> {
             return Ok(circles);
         }
     }
-    Err(Failure::new(
-        ExitStatus::Usage,
-        "the arm cannot turn its last two joints far enough anywhere in its cell without touching something",
-    )
-    .hint("say where the SMR is, or leave it free: it is then identified with the arm"))
+    Err(ProcedureError::NoFreeCircles)
 }
 
 /// The SMR must be beside the axes that are turned, or there is no circle: known before anything is measured.
-fn check_offset(profile: &Profile, circles: &[Circle]) -> Result<(), Failure> {
+fn check_offset(profile: &Profile, circles: &[Circle]) -> Result<(), ProcedureError> {
     let Some(target) = profile.targets().first() else { return Ok(()) };
     let kinematics = ForwardKinematics::new(profile.chain());
     for (joint, plan) in circles {
         let points: Vec<_> = plan.iter().map(|q| kinematics.point_in_base(q, &target.position_in_flange)).collect();
-        if let Err(error) = fit_circle(&points, None) {
-            let name = profile.chain().joints().get(*joint).map_or("?", |joint| joint.name.as_str());
-            return Err(Failure::new(
-                ExitStatus::Usage,
-                format!("where the profile has the SMR, turning {name} gives no circle: {error}"),
-            )
-            .hint("mount the SMR beside the axis and say roughly where, say where it is, or leave it free"));
+        if let Err(source) = fit_circle(&points, None) {
+            let joint = profile.chain().joints().get(*joint).map_or("?", |joint| joint.name.as_str()).to_owned();
+            return Err(ProcedureError::NoCircle { joint, source });
         }
     }
     Ok(())
@@ -109,8 +98,8 @@ mod tests {
     fn an_smr_on_the_axis_is_known_before_it_is_measured() {
         for name in ["franka_panda", "ur5"] {
             let (profile, _) = Profile::parse(builtin(name).unwrap(), name).unwrap();
-            let failure = plan(&profile).unwrap_err();
-            assert!(failure.message.contains("gives no circle"), "{}", failure.message);
+            let error = plan(&profile).unwrap_err();
+            assert!(matches!(error, ProcedureError::NoCircle { .. }), "{error}");
             // Beside the axis it can be found.
             let target = &profile.targets()[0];
             let mut beside = target.clone();

@@ -5,12 +5,12 @@ use std::ops::ControlFlow;
 use super::assess::point_verification;
 use super::result::{self, Context};
 use super::summary::{Finished, SampleName, Special};
-use super::{EstimationSettings, checks, identification_failure, target_parameters};
-use crate::error::Failure;
+use super::{EstimationSettings, ProcedureError, checks, target_parameters};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{Identification, Iteration, Observations, Places, PointSample, Problem, identify_while};
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
+use crate::session::advice::Advice;
 use crate::session::calibration::{self, Calibration, MountedText, SampleText};
 use crate::session::summary::{IdentificationSummary, InputFile, VerificationMode, VerificationSummary, Warning};
 use crate::units::to_mm;
@@ -97,6 +97,19 @@ pub struct Identified {
     pub nominal: FittedSetup,
 }
 
+impl Identified {
+    /// Puts all advice into `words`, in the summary and in what the calibration keeps of it.
+    pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
+        let Self { summary, calibration, .. } = self;
+        let of_calibration = calibration.iter_mut().flat_map(|calibration| &mut calibration.warnings);
+        summary.warnings.iter_mut().chain(of_calibration).for_each(|warning| warning.put_into_words(&words));
+        summary.verdict.put_into_words(&words);
+        if let Some(calibration) = calibration {
+            calibration.verdict.put_into_words(&words);
+        }
+    }
+}
+
 /// Identifies the arm and verifies it. `progress` sees every step of the solver and may ask to stop there.
 ///
 /// # Errors
@@ -104,7 +117,7 @@ pub struct Identified {
 pub fn identify(
     request: &IdentifyRequest,
     progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
-) -> Result<Identified, Failure> {
+) -> Result<Identified, ProcedureError> {
     let IdentifyRequest { identification, verification, mounted, .. } = request;
     let profile = &mounted.map_or_else(|| request.profile.clone(), |mounted| mounted.on(&request.profile));
     let parameters = request.settings.parameters(profile);
@@ -123,7 +136,7 @@ pub fn identify(
     let distance = observations.points.iter().map(|sample| sample.point.coords.norm()).sum::<f64>()
         / observations.points.len().max(1) as f64;
     let settings = request.settings.solver(profile, Some(distance));
-    let found = identify_while(&problem, &settings, progress).map_err(|error| identification_failure(&error))?;
+    let found = identify_while(&problem, &settings, progress)?;
     let context = Context { level: request.settings.level, expected: Some(compared.expected) };
     warnings.extend(result::result_warnings(&problem, &found, &settings, context));
 
@@ -178,7 +191,7 @@ pub fn identify(
 }
 
 /// The nominal arm with frame and free target fitted to the accepted identification samples.
-fn nominal_setup(problem: &Problem<'_>, found: &Identification) -> Result<FittedSetup, Failure> {
+fn nominal_setup(problem: &Problem<'_>, found: &Identification) -> Result<FittedSetup, ProcedureError> {
     let points: Vec<PointSample> = problem
         .observations
         .points
@@ -188,8 +201,7 @@ fn nominal_setup(problem: &Problem<'_>, found: &Identification) -> Result<Fitted
         .map(|(_, sample)| sample.clone())
         .collect();
     let accepted = Observations { points, ..problem.observations.clone() };
-    fit_setup(problem.arm, &target_parameters(problem.parameters), &accepted)
-        .map_err(|error| identification_failure(&error))
+    Ok(fit_setup(problem.arm, &target_parameters(problem.parameters), &accepted)?)
 }
 
 fn verify(

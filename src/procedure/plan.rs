@@ -9,13 +9,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use history::History;
 
 use super::cell::cell;
-use super::{joint_types, warning};
-use crate::error::{ExitStatus, Failure};
+use super::{ProcedureError, joint_types};
 use crate::kinematics::{Arm, FreeParameter, JointType, ParameterId, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
-    Chosen, Information, JointBox, Objective, PlanningError, Score, Search, SearchSettings, Stage, low_discrepancy,
+    Chosen, Information, JointBox, Objective, Score, Search, SearchSettings, Stage, low_discrepancy,
     random, verification_set,
 };
 use crate::profile::Profile;
@@ -54,7 +53,7 @@ pub fn plan(
     request: &PlanRequest,
     keep_going: &(dyn Fn() -> bool + Sync),
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<PlanSummary, Failure> {
+) -> Result<PlanSummary, ProcedureError> {
     Planner::new(profile, profile_text, request)?.choose(keep_going, progress)
 }
 
@@ -69,7 +68,7 @@ pub fn check(
     request: &PlanRequest,
     listed: &[PlannedPose],
     name: &str,
-) -> Result<PlanSummary, Failure> {
+) -> Result<PlanSummary, ProcedureError> {
     Planner::new(profile, profile_text, request)?.check(listed, name)
 }
 
@@ -78,7 +77,7 @@ pub fn check(
 ///
 /// # Errors
 /// It does not.
-pub fn check_request(profile: &Profile, request: &PlanRequest) -> Result<(), Failure> {
+pub fn check_request(profile: &Profile, request: &PlanRequest) -> Result<(), ProcedureError> {
     Planner::new(profile, "", request).map(drop)
 }
 
@@ -123,11 +122,10 @@ struct Ordered {
 }
 
 impl<'a> Planner<'a> {
-    fn new(profile: &'a Profile, profile_text: &'a str, request: &'a PlanRequest) -> Result<Self, Failure> {
+    fn new(profile: &'a Profile, profile_text: &'a str, request: &'a PlanRequest) -> Result<Self, ProcedureError> {
         let limits = request.limits.clone().map_or_else(|| limits(profile), Ok)?;
         let cell = cell(profile, limits.clone(), request.region, request.filters)?;
-        let filter = CandidateFilter::new(profile.chain(), &cell, request.clearance)
-            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        let filter = CandidateFilter::new(profile.chain(), &cell, request.clearance)?;
         // The poses are for the first target: coordinates of others cannot be seen with it.
         let is_seen = |parameter: &FreeParameter| match parameter.id {
             ParameterId::Target { target, .. } => target == 0,
@@ -163,26 +161,25 @@ impl<'a> Planner<'a> {
         Pace { max_speeds, ..self.request.pace.clone() }
     }
 
-    fn joint_box(&self) -> Result<JointBox, Failure> {
-        JointBox::new(self.limits.clone()).map_err(|error| planning_failure(&error))
+    fn joint_box(&self) -> Result<JointBox, ProcedureError> {
+        Ok(JointBox::new(self.limits.clone())?)
     }
 
-    fn information(&self, pool: &[Candidate]) -> Result<Information, Failure> {
+    fn information(&self, pool: &[Candidate]) -> Result<Information, ProcedureError> {
         let at = |configuration: Vec<f64>| Place { configuration, target: 0 };
         let candidates: Vec<Place> = pool.iter().map(|candidate| at(candidate.configuration.clone())).collect();
         let fresh: Vec<Place> = random(&self.joint_box()?, !self.request.seed).take(FRESH_POSES).map(at).collect();
-        Information::new(&self.arm, &self.parameters, &candidates, &fresh).map_err(|error| planning_failure(&error))
+        Ok(Information::new(&self.arm, &self.parameters, &candidates, &fresh)?)
     }
 
     /// Candidates, those that must be in first.
-    fn candidates(&self, needed: usize, included: &[PlannedPose]) -> Result<Candidates, Failure> {
+    fn candidates(&self, needed: usize, included: &[PlannedPose]) -> Result<Candidates, ProcedureError> {
         let count = self.request.candidates;
         let joint_box = self.joint_box()?;
         let stream = low_discrepancy(&joint_box, self.request.seed).take(count.saturating_mul(TRIES_PER_CANDIDATE));
         let mut candidates = self
             .filter
-            .collect_at_least(stream, count, needed)
-            .map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+            .collect_at_least(stream, count, needed)?;
         let mut kept: Vec<Candidate> = included.iter().map(|row| self.candidate(&row.configuration)).collect();
         kept.append(&mut candidates.kept);
         candidates.kept = kept;
@@ -195,7 +192,7 @@ impl<'a> Planner<'a> {
         let outside: Vec<String> =
             included.filter(|row| self.is_outside(&row.configuration)).map(|row| row.pose.clone()).collect();
         let text = || format!("measured poses outside the joint limits of the profile: {}", shortened(&outside));
-        (!outside.is_empty()).then(|| warning("joint_limits", text(), false))
+        (!outside.is_empty()).then(|| Warning::new("joint_limits", text(), false))
     }
 
     /// Whether a configuration is outside the limits that the arm itself has.
@@ -209,12 +206,12 @@ impl<'a> Planner<'a> {
     /// What makes a plan unfit to be run as it is.
     fn safety_warnings(&self) -> Vec<Warning> {
         if !self.request.filters {
-            let text = "no check of collisions and sight was made ('--no-filters'): such a plan is for comparison, do not run it on a robot";
-            return vec![warning("not_checked", text.to_owned(), false)];
+            let text = "collision and line-of-sight checks were skipped: the plan is for comparison only, do not run it on a robot";
+            return vec![Warning::new("not_checked", text, false)];
         }
         if self.profile.bodies().is_empty() {
             let text = "the profile has no bodies, so the arm was not checked against itself, the floor or keep-out boxes: add 'bodies', or check every move by hand";
-            return vec![warning("not_checked", text.to_owned(), false)];
+            return vec![Warning::new("not_checked", text, false)];
         }
         Vec::new()
     }
@@ -229,7 +226,7 @@ impl<'a> Planner<'a> {
         &self,
         keep_going: &(dyn Fn() -> bool + Sync),
         progress: &(dyn Fn(Progress) + Sync),
-    ) -> Result<PlanSummary, Failure> {
+    ) -> Result<PlanSummary, ProcedureError> {
         let request = self.request;
         let required = request.included.len();
         let mut candidates = self.candidates(request.poses + request.verification, &request.included)?;
@@ -253,12 +250,7 @@ impl<'a> Planner<'a> {
                         !unreachable.contains(&(index - 1))
                     });
                 }
-                Err(_) => {
-                    return Err(Failure::new(ExitStatus::Usage, "the poses cannot be visited without a collision")
-                        .hint(
-                            "narrow the joint ranges with '--limit' to one side of the cell, or lower '--clearance-mm'",
-                        ));
-                }
+                Err(_) => return Err(ProcedureError::Unreachable),
             }
         };
         let set = &ordered.chosen.set;
@@ -295,7 +287,7 @@ impl<'a> Planner<'a> {
         required: usize,
         keep_going: &(dyn Fn() -> bool + Sync),
         progress: &(dyn Fn(Progress) + Sync),
-    ) -> Result<Chosen, Failure> {
+    ) -> Result<Chosen, ProcedureError> {
         let settings = SearchSettings {
             poses: self.request.poses + required,
             required: (0..required).collect(),
@@ -304,7 +296,7 @@ impl<'a> Planner<'a> {
             ..SearchSettings::default()
         };
         let starts = settings.starts;
-        let search = Search::new(information, settings).map_err(|error| planning_failure(&error))?;
+        let search = Search::new(information, settings)?;
         let threads = self.request.threads.unwrap_or_else(available_threads);
         // Starts run side by side: what each has done says nothing about the whole.
         let (predicted, optimised) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -315,7 +307,7 @@ impl<'a> Planner<'a> {
             progress(Progress::Sweep { found: *found, done, sweeps, starts });
         };
         progress(Progress::Searching);
-        plan_in_parallel(&search, threads, keep_going, &told).map_err(|error| planning_failure(&error))
+        Ok(plan_in_parallel(&search, threads, keep_going, &told)?)
     }
 
     /// Orders the chosen poses that are not measured yet and the verification poses; the inner error names candidates
@@ -325,7 +317,7 @@ impl<'a> Planner<'a> {
         pool: &[Candidate],
         required: usize,
         chosen: Chosen,
-    ) -> Result<Result<Ordered, Vec<usize>>, Failure> {
+    ) -> Result<Result<Ordered, Vec<usize>>, ProcedureError> {
         let verification = verification_set::choose(pool, &chosen.set, &self.limits, self.request.verification);
         let new = chosen.set.iter().copied().filter(|index| *index >= required);
         let stops: Vec<(PoseKind, usize)> = new
@@ -335,7 +327,7 @@ impl<'a> Planner<'a> {
         let poses: Vec<Vec<f64>> = stops.iter().map(|(_, index)| pool[*index].configuration.clone()).collect();
         let shape = self.filter.shape();
         let Some(home) = home_pose(shape, pool.iter().map(|candidate| candidate.configuration.as_slice())) else {
-            return Err(Failure::new(ExitStatus::Usage, "the arm cannot stand anywhere in its planning limits"));
+            return Err(ProcedureError::NoHome);
         };
         let spread = (pool.len() / VIAS).max(1);
         let vias: Vec<Vec<f64>> =
@@ -347,7 +339,7 @@ impl<'a> Planner<'a> {
                 Ok(Ok(Ordered { chosen, stops, route }))
             }
             Err(OrderError::Unreachable { poses }) => Ok(Err(poses.iter().map(|order| stops[*order].1).collect())),
-            Err(error) => Err(Failure::from_error(ExitStatus::Usage, &error)),
+            Err(error) => Err(error.into()),
         }
     }
 
@@ -385,7 +377,7 @@ impl<'a> Planner<'a> {
         pool: &[Candidate],
         set: &[usize],
         ordered: &Ordered,
-    ) -> Result<Option<f64>, Failure> {
+    ) -> Result<Option<f64>, ProcedureError> {
         const FEWEST: usize = 3;
         let verification: Vec<Place> = ordered
             .stops
@@ -399,10 +391,9 @@ impl<'a> Planner<'a> {
             .filter_map(|index| pool.get(*index))
             .map(|candidate| Place { configuration: candidate.configuration.clone(), target: 0 })
             .collect();
-        let information = Information::new(&self.arm, &self.parameters, &chosen, &verification)
-            .map_err(|error| planning_failure(&error))?;
+        let information = Information::new(&self.arm, &self.parameters, &chosen, &verification)?;
         let all: Vec<usize> = (0..chosen.len()).collect();
-        let score = Score::new(&information, &all).map_err(|error| planning_failure(&error))?;
+        let score = Score::new(&information, &all)?;
         // Three coordinates of a reading scatter by σ each on top of what the robot misses.
         Ok(Some(to_mm(sigma * (score.predicted_error.powi(2) + 3.0).sqrt())))
     }
@@ -420,15 +411,11 @@ impl<'a> Planner<'a> {
     }
 
     /// Scores the poses of the list `name`.
-    fn check(&self, rows: &[PlannedPose], name: &str) -> Result<PlanSummary, Failure> {
+    fn check(&self, rows: &[PlannedPose], name: &str) -> Result<PlanSummary, ProcedureError> {
         let scored: Vec<&PlannedPose> = rows.iter().filter(|row| row.kind == PoseKind::Identification).collect();
         let count = scored.len();
         if count == 0 {
-            return Err(Failure::new(
-                ExitStatus::Usage,
-                format!("none of the {} rows of '{name}' is of kind 'identification'", rows.len()),
-            )
-            .hint("a plain list needs no 'kind' column: all its rows are then scored"));
+            return Err(ProcedureError::NothingToScore { rows: rows.len(), name: name.to_owned() });
         }
         let mut candidates = self.candidates(count, &[])?;
         let mut pool: Vec<Candidate> = scored.iter().map(|row| self.candidate(&row.configuration)).collect();
@@ -460,7 +447,7 @@ impl<'a> Planner<'a> {
             .map(|pose| format!("pose {}: {}", pose.pose, pose.problems.join(", ")))
             .collect();
         if !bad.is_empty() {
-            warnings.push(warning("not_measurable", shortened(&bad), true));
+            warnings.push(Warning::new("not_measurable", shortened(&bad), true));
         }
         let blocked: Vec<String> = rows
             .windows(2)
@@ -473,7 +460,7 @@ impl<'a> Planner<'a> {
         if !blocked.is_empty() {
             let text =
                 format!("moves that are not free (joint moves in the order of the file): {}", shortened(&blocked));
-            warnings.push(warning("blocked_move", text, true));
+            warnings.push(Warning::new("blocked_move", text, true));
         }
         summary.verification_poses = rows.iter().filter(|row| row.kind == PoseKind::Verification).count();
         warnings.append(&mut summary.warnings);
@@ -488,10 +475,6 @@ fn shortened(findings: &[String]) -> String {
     let more = findings.len().saturating_sub(SHOWN);
     let list = findings.iter().take(SHOWN).cloned().collect::<Vec<_>>().join("; ");
     if more > 0 { format!("{list}; and {more} more") } else { list }
-}
-
-fn planning_failure(error: &PlanningError) -> Failure {
-    Failure::from_error(ExitStatus::Usage, error)
 }
 
 /// As on the command line.

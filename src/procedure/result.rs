@@ -1,10 +1,10 @@
 //! What the result of an identification itself gives reason to warn about, and when it is of no use.
 
-use super::warning;
 use crate::identification::plausibility::weaknesses;
 use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason};
 use crate::profile::Level;
 use crate::report::number;
+use crate::session::advice::Advice;
 use crate::session::summary::Warning;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
@@ -45,23 +45,23 @@ pub(crate) fn result_warnings(
         .iter()
         .map(|weakness| {
             let text = weakness.describe(|joint| joints[joint].name.clone(), |joint| joints[joint].joint_type);
-            warning("poor_data", text, true)
+            Warning::new("poor_data", text, true)
         })
         .collect();
     let residual = found.sigma.from_residuals.unwrap_or(0.0);
     let explained = context.expected.map_or(0.0, |expected| FIXED_CONSTANTS * expected / 3.0_f64.sqrt());
     if residual > NONSENSE_RESIDUAL && context.level == Level::Offsets && residual <= explained {
         let message = format!(
-            "joint offsets alone leave {} mm per coordinate, as much as the other link constants are expected to cause; '--level geometric' identifies those too",
+            "joint offsets alone leave {} mm per coordinate, as much as the other link constants are expected to cause",
             number(to_mm(residual), 3)
         );
-        warnings.push(warning("offsets_only", message, false));
+        warnings.push(Warning::new("offsets_only", message, false).with_advice(Advice::IdentifyGeometry));
     } else if residual.is_nan() || residual > NONSENSE_RESIDUAL {
         let message = format!(
             "the identified robot misses the measured points by {} mm per coordinate: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
             number(to_mm(residual), 3)
         );
-        warnings.push(warning("does_not_fit", message, true));
+        warnings.push(Warning::new("does_not_fit", message, true));
     }
     warnings.extend(run_away(found, settings));
     if found.sigma.excess() > SIGMA_EXCESS {
@@ -71,7 +71,7 @@ pub(crate) fn result_warnings(
             number(found.sigma.excess(), 1),
             number(to_mm(found.sigma.used), if found.sigma.used < 10.0 * MICROMETRE { 6 } else { 4 })
         );
-        warnings.push(warning("sigma_excess", message, false));
+        warnings.push(Warning::new("sigma_excess", message, false));
     }
     let judged = problem.observations.places().count();
     let share = found.rejected.len() as f64 / judged.max(1) as f64;
@@ -80,16 +80,16 @@ pub(crate) fn result_warnings(
             "{} of {judged} samples were rejected: there is no consistent majority to trust; look for rows in a wrong order or a moved instrument",
             found.rejected.len()
         );
-        warnings.push(warning("many_rejected", message, true));
+        warnings.push(Warning::new("many_rejected", message, true));
     }
     match found.termination {
         TerminationReason::Converged => {}
         TerminationReason::IterationLimit => {
             let message = format!("stopped after {} solver steps without having converged", found.iterations.len());
-            warnings.push(warning(NOT_CONVERGED, message, true));
+            warnings.push(Warning::new(NOT_CONVERGED, message, true));
         }
         TerminationReason::NoImprovement | TerminationReason::NonFinite => {
-            warnings.push(warning(NOT_CONVERGED, "the solver could not improve the fit any further".to_owned(), true));
+            warnings.push(Warning::new(NOT_CONVERGED, "the solver could not improve the fit any further".to_owned(), true));
         }
     }
     warnings
@@ -119,14 +119,15 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
     let list = listed.join(", ");
     let far = found.estimates.iter().any(|estimate| estimate.deviation.abs() > FAR_AWAY * estimate.expected);
     Some(match settings.prior {
-        Prior::None => warning(
+        Prior::None => Warning::new(
             "ran_away",
             format!(
-                "parameters ran away: {list}. Without a prior, badly determined combinations take any value that lowers the residual; the robot may be worse than nominal in another part of its workspace, and a hold-out from the same series does not show it. Use '--prior expected'"
+                "parameters ran away: {list}. Without a prior, badly determined combinations take any value that lowers the residual; the robot may be worse than nominal in another part of its workspace, and a hold-out from the same series does not show it"
             ),
             true,
-        ),
-        Prior::Expected => warning(
+        )
+        .with_advice(Advice::UsePrior),
+        Prior::Expected => Warning::new(
             "large_deviation",
             format!(
                 "far from nominal: {list}. Check the profile (is it this robot?), or state larger expected deviations"

@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use super::engine::Events;
-use crate::error::Failure;
 use crate::procedure;
 use crate::profile::{Profile, builtin, builtin_names};
 use crate::session::plan;
 use crate::store;
+use crate::text::causes;
 use crate::wizard::{Answer, CircleConfigurations, Event, Problem, Progress, Request, RequestId};
 
 /// Starts a request; `false` if the system refuses a thread.
@@ -73,7 +73,7 @@ impl Job {
         let told = |progress: procedure::plan::Progress| {
             self.events.offer(Event::Progress { id: self.id, progress: Progress::Search(progress) });
         };
-        let summary = procedure::plan::plan(profile, text, request, &keep_going, &told).map_err(problem)?;
+        let summary = procedure::plan::plan(profile, text, request, &keep_going, &told).map_err(Problem::from)?;
         let rows = procedure::plan::rows(&summary, &procedure::joint_types(profile));
         // Which set a search has when it is stopped depends on the machine: the seed does not bring it back.
         let end = if self.is_cancelled() { "; the search was stopped before its end" } else { "" };
@@ -86,18 +86,13 @@ impl Job {
             self.events.offer(Event::Progress { id: self.id, progress: Progress::Solver(*iteration) });
             if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        Ok(Answer::Identified(Box::new(identified.map_err(problem)?)))
+        Ok(Answer::Identified(Box::new(identified.map_err(Problem::from)?)))
     }
-}
-
-fn problem(failure: Failure) -> Problem {
-    Problem { message: failure.message, hints: failure.hints }
 }
 
 /// The text of a file.
 fn read(path: &Path) -> Result<String, Problem> {
-    let bytes =
-        store::read(path).map_err(|error| problem(Failure::from_error(crate::error::ExitStatus::Usage, &error)))?;
+    let bytes = store::read(path).map_err(|error| Problem { message: causes(&error), hints: Vec::new() })?;
     String::from_utf8(bytes).map_err(|_error| Problem {
         message: format!("'{}' is not UTF-8 text", path.display()),
         hints: vec!["save it as UTF-8".to_owned()],
@@ -127,7 +122,7 @@ fn load_plan(file: &str, profile: &Profile) -> Result<Answer, Problem> {
 }
 
 fn circles(profile: &Profile) -> Result<Answer, Problem> {
-    let circles = procedure::circles::plan(profile).map_err(problem)?;
+    let circles = procedure::circles::plan(profile).map_err(Problem::from)?;
     let configurations = |(joint, configurations)| CircleConfigurations { joint, configurations };
     Ok(Answer::CirclesPlanned(circles.into_iter().map(configurations).collect()))
 }

@@ -6,6 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::advice::Advice;
+
 /// Version of the layout of these objects.
 pub const SCHEMA: u32 = 1;
 
@@ -212,12 +214,34 @@ pub struct Warning {
     pub message: String,
     /// Whether it rules out the verdict "accepted".
     pub blocks_acceptance: bool,
+    /// What can be done about it; taken by [`Warning::put_into_words`] before anything is shown or written.
+    #[serde(skip)]
+    pub advice: Option<Advice>,
 }
 
 impl Warning {
+    /// A warning without advice.
+    pub fn new(code: &str, message: impl Into<String>, blocks_acceptance: bool) -> Self {
+        Self { code: code.to_owned(), message: message.into(), blocks_acceptance, advice: None }
+    }
+
+    /// Adds what can be done about it.
+    #[must_use]
+    pub const fn with_advice(mut self, advice: Advice) -> Self {
+        self.advice = Some(advice);
+        self
+    }
+
+    /// Appends the advice to the message in the words of whoever shows it.
+    pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
+        if let Some(advice) = self.advice.take() {
+            self.message = format!("{}; {}", self.message, words(advice));
+        }
+    }
+
     /// That points are simulated, as `said`.
     pub fn simulated(said: &str) -> Self {
-        Self { code: SIMULATED.to_owned(), message: format!("SIMULATED: {said}"), blocks_acceptance: false }
+        Self::new(SIMULATED, format!("SIMULATED: {said}"), false)
     }
 }
 
@@ -329,6 +353,18 @@ pub struct Verdict {
     pub reasons: Vec<String>,
     /// Every limit of the profile.
     pub checks: Vec<LimitCheck>,
+    /// What can be done to get another verdict; taken by [`Verdict::put_into_words`].
+    #[serde(skip)]
+    pub advice: Option<Advice>,
+}
+
+impl Verdict {
+    /// Appends the advice to the reasons in the words of whoever shows it.
+    pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
+        if let (Some(advice), Some(reason)) = (self.advice.take(), self.reasons.last_mut()) {
+            *reason = format!("{reason}; {}", words(advice));
+        }
+    }
 }
 
 /// One step of the solver.

@@ -1,14 +1,15 @@
 //! The numbers of a planned or checked set: its score, what it is compared with, what stays weak.
 
-use super::super::{provenance, warning};
-use super::{Planner, RANDOM_SETS, SIZES, planning_failure};
-use crate::error::Failure;
+use super::super::{ProcedureError, provenance};
+use super::{Planner, RANDOM_SETS, SIZES};
 use crate::planning::candidates::Rejections;
-use crate::planning::{DesignBound, Information, PlanningError, Score, Spread, TradeOff, Yardstick, trade_off};
+use crate::planning::{DesignBound, Information, Score, Spread, TradeOff, Yardstick, trade_off};
+use crate::session::advice::Advice;
 use crate::session::plan_summary::{
     CandidateSummary, ObservabilitySummary, PlanSummary, RandomSummary, RejectionSummary, SCHEMA, SpreadSummary,
     TradeOffSummary, WeakParameterSummary,
 };
+use crate::session::summary::Warning;
 use crate::units::to_mm;
 
 impl Planner<'_> {
@@ -20,19 +21,18 @@ impl Planner<'_> {
         set: &[usize],
         required: usize,
         rejections: &Rejections,
-    ) -> Result<PlanSummary, Failure> {
-        let failure = |error: PlanningError| planning_failure(&error);
-        let score = Score::new(information, set).map_err(failure)?;
+    ) -> Result<PlanSummary, ProcedureError> {
+        let score = Score::new(information, set)?;
         let measured: Vec<usize> = (0..required).collect();
         let mut warnings = Vec::new();
-        let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.request.seed).map_err(failure)?;
+        let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.request.seed)?;
         let bound = DesignBound::new(information, &|| true);
-        let d_efficiency = bound.efficiency(information, set).map_err(failure)?;
-        let sizes = trade_off(information, &measured, &SIZES, self.request.seed, &|| true).map_err(failure)?;
+        let d_efficiency = bound.efficiency(information, set)?;
+        let sizes = trade_off(information, &measured, &SIZES, self.request.seed, &|| true)?;
         let sigma = self.sigma();
         if sigma.is_none() {
-            let text = "the sigma of the instrument is not known, so nothing is said in mm and about weak parameters: give '--sigma-mm', or 'instrument' in the profile";
-            warnings.push(warning("no_sigma", text.to_owned(), false));
+            let text = "the sigma of the instrument is not known, so there are no predictions in mm and none about weak parameters";
+            warnings.push(Warning::new("no_sigma", text, false).with_advice(Advice::StateSigma));
         }
         let spread = |spread: &Spread| SpreadSummary { median: spread.median, best: spread.best };
         let indices = &score.observability;
@@ -40,7 +40,7 @@ impl Planner<'_> {
             && score.weak(sigma).any(|weak| weak.identifiable)
         {
             let text = "some identifiable parameters stay weakly determined (listed below); more poses or wider joint ranges help";
-            warnings.push(warning("weak_parameters", text.to_owned(), false));
+            warnings.push(Warning::new("weak_parameters", text, false));
         }
         Ok(PlanSummary {
             schema: SCHEMA,

@@ -179,6 +179,7 @@ fn verdict(status: VerdictStatus) -> Verdict {
             check("position_mean", 0.0103, 0.4),
             check("position_max", if is_met { 0.0199 } else { 1.2 }, 1.0),
         ],
+        advice: None,
     }
 }
 
@@ -224,12 +225,8 @@ fn verification() -> VerificationSummary {
 }
 
 fn warning(blocks_acceptance: bool) -> Warning {
-    Warning {
-        code: "few_data".to_owned(),
-        message: "the verification poses cover 40 % of the range of J4: nothing is said about the rest of it"
-            .to_owned(),
-        blocks_acceptance,
-    }
+    let message = "the verification poses cover 40 % of the range of J4: nothing is said about the rest of it";
+    Warning::new("few_data", message, blocks_acceptance)
 }
 
 fn summary(is_good: bool) -> IdentificationSummary {

@@ -13,6 +13,7 @@ use crate::session::set_up::Step;
 use crate::session::sha256;
 use crate::session::state::{Sample, SampleState, Session};
 use crate::session::summary::{InputFile, VerificationMode, Warning};
+use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::Notice;
@@ -103,11 +104,8 @@ fn left_out(session: &Session, kind: PoseKind) -> Option<Warning> {
     // An arm that is only verified where it is good is not verified.
     let is_verification = kind == PoseKind::Verification;
     let advice = if is_verification { "; measure them again, or the verification is a choice" } else { "" };
-    Some(Warning {
-        code: "left_out".to_owned(),
-        message: format!("the operator left out {} of the {kind} poses: {}{advice}", poses.len(), poses.join(", ")),
-        blocks_acceptance: is_verification,
-    })
+    let message = format!("the operator left out {} of the {kind} poses: {}{advice}", poses.len(), poses.join(", "));
+    Some(Warning::new("left_out", message, is_verification))
 }
 
 fn result<'a>(cx: &Cx<'a>) -> Option<&'a IdentifiedText> {
@@ -141,14 +139,10 @@ impl StepMachine for IdentifyStep {
 
     fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
         let Answer::Identified(identified) = answer else { return Vec::new() };
+        let mut identified = identified;
+        identified.put_into_words(advice::words);
         let blocking = identified.summary.warnings.iter().find(|warning| warning.blocks_acceptance);
         let notice = blocking.map(|warning| Notice::attention(warning.message.clone()));
-        let mut identified = identified;
-        if identified.summary.verification.is_none() {
-            // The commands name their options; here it is the plan.
-            identified.summary.verdict.reasons =
-                vec!["no verification pose is measured: go back, plan some and measure them".to_owned()];
-        }
         let of = |kind| samples(cx.session, kind);
         let points = point_errors(&identified, &of(PoseKind::Identification), &of(PoseKind::Verification));
         let text = IdentifiedText {

@@ -6,6 +6,7 @@ use crate::session::journal::{Entry, PlanText, PlannedText};
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::Step;
+use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo, PlanSettings};
 use crate::wizard::notice::Notice;
@@ -149,7 +150,10 @@ impl StepMachine for PlanStep {
     }
 
     fn on_answer(&mut self, answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
-        let Answer::Planned { summary, rows, origin } = answer else { return Vec::new() };
+        let Answer::Planned { mut summary, rows, origin } = answer else { return Vec::new() };
+        for warning in summary.iter_mut().flat_map(|summary| &mut summary.warnings) {
+            warning.put_into_words(advice::words);
+        }
         let warnings: Vec<String> = summary
             .as_deref()
             .map(|summary| summary.warnings.iter().map(|warning| warning.message.clone()).collect())

@@ -147,7 +147,7 @@ pub(super) fn answer(request: &Request) -> Answer {
         Request::PlanCircles { .. } => Answer::CirclesPlanned(circles()),
         Request::Identify(request) => match identify(request, &mut |_| ControlFlow::Continue(())) {
             Ok(identified) => Answer::Identified(Box::new(identified)),
-            Err(error) => failure(&error.message),
+            Err(error) => failure(&error.to_string()),
         },
         Request::Model(request) => Answer::Modelled(Box::new(models(request))),
         Request::Deliver { files, left_out } => {

@@ -30,11 +30,7 @@ fn summary() -> PlanSummary {
         schema: SCHEMA,
         provenance,
         objective: None,
-        warnings: vec![Warning {
-            code: "weak".to_owned(),
-            message: "the tracker sees only one side of the flange".to_owned(),
-            blocks_acceptance: false,
-        }],
+        warnings: vec![Warning::new("weak", "the tracker sees only one side of the flange", false)],
         identification_poses: 56,
         verification_poses: 20,
         parameter_count: 25,
