@@ -18,9 +18,7 @@ use crate::procedure::assess::{direct_summary, joint_summaries};
 use crate::procedure::identify::calibration;
 use crate::procedure::result::{self, Context};
 use crate::procedure::summary::{Finished, SampleName, Special};
-use crate::procedure::{
-    EstimationSettings, ProcedureError, checks, input_file, joint_types, target_parameters,
-};
+use crate::procedure::{EstimationSettings, ProcedureError, checks, input_file, joint_types, target_parameters};
 use crate::session::constraints::{Constraints, SharedPoints, read_constraints_bytes};
 use crate::session::filter::Filter;
 use crate::session::summary::{ModelSummary, VerificationMode, VerificationSummary, Warning};

@@ -241,7 +241,9 @@ impl Served {
             check_joints(profile)?;
         }
         if listen.is_none() && matches!(protocol, WireProtocol::Emscon | WireProtocol::Rtde) {
-            return Err(LinkError::SetUp(format!("{protocol} is not spoken on serial lines: it needs a TCP address to listen on")));
+            return Err(LinkError::SetUp(format!(
+                "{protocol} is not spoken on serial lines: it needs a TCP address to listen on"
+            )));
         }
         let mut cell = SimulatedCell::new(profile, simulation)?;
         let robot_title = cell.connect()?;

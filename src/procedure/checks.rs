@@ -102,7 +102,10 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
 
 /// Looks for the same mistakes in the verification points of a table. Too few to tell are left to other checks. The other
 /// observations of `problem` do not matter.
-pub(crate) fn check_verification(problem: &Problem<'_>, tested: &[PointSample]) -> Result<Option<Warning>, ProcedureError> {
+pub(crate) fn check_verification(
+    problem: &Problem<'_>,
+    tested: &[PointSample],
+) -> Result<Option<Warning>, ProcedureError> {
     if tested.len() < ENOUGH_TO_COMPARE {
         return Ok(None);
     }

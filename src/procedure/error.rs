@@ -15,10 +15,7 @@ use crate::session::advice::Advice;
 pub enum ProcedureError {
     /// A joint without a range to plan in.
     #[error("joint '{joint}' has no limits in profile '{profile}'")]
-    NoLimits {
-        joint: String,
-        profile: String,
-    },
+    NoLimits { joint: String, profile: String },
     /// A profile without a target.
     #[error("the profile has no target")]
     NoTarget,
@@ -42,10 +39,7 @@ pub enum ProcedureError {
     Unreachable,
     /// A list without poses to score.
     #[error("none of the {rows} rows of '{name}' is of kind 'identification'")]
-    NothingToScore {
-        rows: usize,
-        name: String,
-    },
+    NothingToScore { rows: usize, name: String },
     /// No circle of this joint can be planned.
     #[error(transparent)]
     Circles(#[from] CirclePointError),
@@ -88,7 +82,9 @@ impl ProcedureError {
     pub const fn kind(&self) -> ErrorKind {
         match self {
             Self::Identification(
-                IdentificationError::RankUnclear { .. } | IdentificationError::Diverged | IdentificationError::Cancelled,
+                IdentificationError::RankUnclear { .. }
+                | IdentificationError::Diverged
+                | IdentificationError::Cancelled,
             ) => ErrorKind::Numerical,
             _ => ErrorKind::Input,
         }

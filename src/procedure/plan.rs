@@ -14,8 +14,8 @@ use crate::kinematics::{Arm, FreeParameter, JointType, ParameterId, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
-    Chosen, Information, JointBox, Objective, Score, Search, SearchSettings, Stage, low_discrepancy,
-    random, verification_set,
+    Chosen, Information, JointBox, Objective, Score, Search, SearchSettings, Stage, low_discrepancy, random,
+    verification_set,
 };
 use crate::profile::Profile;
 use crate::search::{available_threads, plan_in_parallel};
@@ -177,9 +177,7 @@ impl<'a> Planner<'a> {
         let count = self.request.candidates;
         let joint_box = self.joint_box()?;
         let stream = low_discrepancy(&joint_box, self.request.seed).take(count.saturating_mul(TRIES_PER_CANDIDATE));
-        let mut candidates = self
-            .filter
-            .collect_at_least(stream, count, needed)?;
+        let mut candidates = self.filter.collect_at_least(stream, count, needed)?;
         let mut kept: Vec<Candidate> = included.iter().map(|row| self.candidate(&row.configuration)).collect();
         kept.append(&mut candidates.kept);
         candidates.kept = kept;

@@ -89,7 +89,11 @@ pub(crate) fn result_warnings(
             warnings.push(Warning::new(NOT_CONVERGED, message, true));
         }
         TerminationReason::NoImprovement | TerminationReason::NonFinite => {
-            warnings.push(Warning::new(NOT_CONVERGED, "the solver could not improve the fit any further".to_owned(), true));
+            warnings.push(Warning::new(
+                NOT_CONVERGED,
+                "the solver could not improve the fit any further".to_owned(),
+                true,
+            ));
         }
     }
     warnings

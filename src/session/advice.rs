@@ -44,7 +44,9 @@ impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::StateSigma => "state 'instrument' in the profile",
-            Self::StateLimits => "state 'limits_deg' (or 'limits_mm') in the profile: poses are drawn from these ranges",
+            Self::StateLimits => {
+                "state 'limits_deg' (or 'limits_mm') in the profile: poses are drawn from these ranges"
+            }
             Self::NarrowRanges => "narrow 'planning_limits_deg' in the profile to one side of the cell",
             Self::OmitKind => "a plain list needs no 'kind' column: all its rows are then scored",
             Self::PlanPoses => "measure a planned pose set",
