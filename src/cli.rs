@@ -353,7 +353,7 @@ pub struct PlanArgs {
     pub candidates: usize,
     /// What to choose for
     #[arg(long, value_enum, default_value_t)]
-    pub objective: ObjectiveArg,
+    pub objective: Objective,
     /// Seed of all random decisions: the same seed gives the same plan
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -434,46 +434,6 @@ pub struct ProgramArgs {
     /// Folder for the program's files [default: print them]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-}
-
-/// `--objective`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum ObjectiveArg {
-    /// Lowest condition number among sets that predict within 4 % of the best
-    #[default]
-    Balanced,
-    /// Lowest condition number; predicts worse than random poses
-    Condition,
-    /// Lowest predicted error
-    Prediction,
-    /// D-optimal: largest determinant of the information
-    D,
-    /// Observability index O1
-    O1,
-    /// Observability index O2
-    O2,
-    /// Observability index O3
-    O3,
-    /// Observability index O4
-    O4,
-    /// Observability index O5
-    O5,
-}
-
-impl From<ObjectiveArg> for Objective {
-    fn from(argument: ObjectiveArg) -> Self {
-        match argument {
-            ObjectiveArg::Balanced => Self::Balanced,
-            ObjectiveArg::Condition => Self::Condition,
-            ObjectiveArg::Prediction => Self::Prediction,
-            ObjectiveArg::D => Self::D,
-            ObjectiveArg::O1 => Self::O1,
-            ObjectiveArg::O2 => Self::O2,
-            ObjectiveArg::O3 => Self::O3,
-            ObjectiveArg::O4 => Self::O4,
-            ObjectiveArg::O5 => Self::O5,
-        }
-    }
 }
 
 /// `--limit`: a joint by name or number with a range in degrees or mm.

@@ -56,7 +56,7 @@ mod yardstick;
 
 pub use bound::DesignBound;
 pub use cell::{Body, BoxInBase, Cell, CellError, KeepOutBox, MountedTarget, TrackerStand};
-pub use choice::{Chosen, Objective, Progress, Search, SearchSettings, Stage};
+pub use choice::{Chosen, Figures, Objective, Progress, Search, SearchSettings, Stage};
 pub use error::PlanningError;
 pub use information::{Information, fewest_poses, findable};
 pub use sampling::{JointBox, low_discrepancy, random};

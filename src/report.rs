@@ -11,7 +11,7 @@ mod tables;
 mod text;
 
 pub use document::{
-    Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, NotCounted, NotePart, ParameterNote, PlanPart,
+    Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, NotCounted, NotePart, ParameterNote,
     PointOrigin, PointPart, PredictionPart, RefusedPart, ResultState, RobotPart, SessionPart, TemperaturePart,
 };
 pub use html::report_html;

@@ -4,10 +4,15 @@
 
 #![warn(missing_docs)]
 
+mod names;
+
 use std::borrow::Borrow;
 use std::error::Error;
 
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
+
+pub use names::UnknownName;
+pub(crate) use names::{names, names_of_option, written_as_text};
 
 /// Marks a place where text was cut off.
 const ELLIPSIS: char = '…';

@@ -67,8 +67,8 @@ impl Reference {
             "{:>10} {:>4} poses: condition number {:6.2}, predicted error {:.4} sigma, {:5.2} s",
             format!("{:?}", search.settings().objective),
             chosen.set.len(),
-            chosen.condition_number,
-            chosen.predicted_error,
+            chosen.figures.condition_number,
+            chosen.figures.predicted_error,
             begin.elapsed().as_secs_f64()
         );
         chosen
@@ -127,26 +127,26 @@ fn random_sets_score_as_the_prototype_found() {
     let of_40 = Yardstick::new(&reference.information, 40, 500, 1).unwrap();
     println!("random 56: {of_56:?}\nrandom 40: {of_40:?}");
     let near = |value: f64, expected: f64, share: f64| (value / expected - 1.0).abs() < share;
-    assert!(near(of_56.condition_number.median, 92.0, 0.05));
-    assert!(near(of_56.condition_number.best, 82.0, 0.05));
-    assert!(near(of_56.predicted_error.median, 0.75, 0.03));
-    assert!(near(of_40.predicted_error.median, 0.93, 0.03));
+    assert!(near(of_56.conditions.median, 92.0, 0.05));
+    assert!(near(of_56.conditions.best, 82.0, 0.05));
+    assert!(near(of_56.errors.median, 0.75, 0.03));
+    assert!(near(of_40.errors.median, 0.93, 0.03));
 }
 
 #[test]
 fn the_objectives_reach_what_they_must() {
     let reference = Reference::new(CANDIDATES);
     let balanced = reference.objective(Objective::Balanced);
-    assert!(balanced.predicted_error <= 0.68 && balanced.condition_number <= 68.0, "{balanced:?}");
+    assert!(balanced.figures.predicted_error <= 0.68 && balanced.figures.condition_number <= 68.0, "{balanced:?}");
     let prediction = reference.objective(Objective::Prediction);
-    assert!(prediction.predicted_error <= 0.65, "{prediction:?}");
-    assert!(balanced.predicted_error <= 1.045 * prediction.predicted_error);
+    assert!(prediction.figures.predicted_error <= 0.65, "{prediction:?}");
+    assert!(balanced.figures.predicted_error <= 1.045 * prediction.figures.predicted_error);
     let condition = reference.objective(Objective::Condition);
-    assert!(condition.condition_number <= 32.0, "{condition:?}");
+    assert!(condition.figures.condition_number <= 32.0, "{condition:?}");
     // That is the trap: the best condition number predicts worse than random poses.
-    assert!(condition.predicted_error > 1.0, "{condition:?}");
+    assert!(condition.figures.predicted_error > 1.0, "{condition:?}");
     let d = reference.objective(Objective::D);
-    assert!(d.predicted_error <= 0.68, "{d:?}");
+    assert!(d.figures.predicted_error <= 0.68, "{d:?}");
 
     // Every index is best served by its own objective, up to what so short a search leaves to chance.
     let score = |set: &Chosen| Score::new(&reference.information, &set.set).unwrap().observability;
@@ -242,7 +242,7 @@ fn required_poses_stay_and_help() {
     assert!(required.iter().all(|pose| chosen.set.contains(pose)));
     assert_eq!(chosen.set.len(), 40);
     let random = Yardstick::new(&reference.information, 40, 100, 1).unwrap();
-    assert!(chosen.predicted_error < random.predicted_error.best);
+    assert!(chosen.figures.predicted_error < random.errors.best);
     let all = SearchSettings { required: required.clone(), poses: 30, sweeps: 2, ..SearchSettings::default() };
     assert_eq!(reference.plan(all).set, required);
     let table = trade_off(&reference.information, &required, &[20, 30, 40], 1, &|| true).unwrap();
@@ -261,8 +261,8 @@ fn an_interrupted_search_gives_the_best_so_far() {
             let chosen = plan_in_parallel(&search, 2, &keep_going, &|_| {}).unwrap();
             assert!(chosen.interrupted && chosen.set.len() == 56);
             let score = Score::new(&reference.information, &chosen.set).unwrap();
-            assert!((score.condition_number / chosen.condition_number - 1.0).abs() < 1e-9);
-            assert!((score.predicted_error / chosen.predicted_error - 1.0).abs() < 1e-9);
+            assert!((score.condition_number / chosen.figures.condition_number - 1.0).abs() < 1e-9);
+            assert!((score.predicted_error / chosen.figures.predicted_error - 1.0).abs() < 1e-9);
         }
     }
 }
@@ -277,8 +277,8 @@ fn progress_never_gets_worse() {
     let chosen = search.run(&|| true, &|progress| seen.lock().unwrap().push(*progress)).unwrap();
     let seen = seen.into_inner().unwrap();
     assert_eq!(seen.iter().map(|progress| progress.sweep).collect::<Vec<_>>(), [1, 2, 3, 4, 5]);
-    assert!(seen.windows(2).all(|pair| pair[1].condition_number <= pair[0].condition_number));
-    assert!((seen[4].condition_number / chosen.condition_number - 1.0).abs() < 1e-9);
+    assert!(seen.windows(2).all(|pair| pair[1].figures.condition_number <= pair[0].figures.condition_number));
+    assert!((seen[4].figures.condition_number / chosen.figures.condition_number - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -318,7 +318,7 @@ fn the_smallest_set_is_found_and_a_smaller_one_refused() {
     let information = &reference.information;
     assert_eq!(information.fewest_poses(), 9);
     let smallest = reference.plan(SearchSettings { poses: 9, sweeps: 2, starts: 1, ..SearchSettings::default() });
-    assert!(smallest.condition_number.is_finite() && smallest.predicted_error.is_finite());
+    assert!(smallest.figures.condition_number.is_finite() && smallest.figures.predicted_error.is_finite());
     let refused = |settings| Search::new(information, settings).unwrap_err();
     let default = SearchSettings::default;
     let five = refused(SearchSettings { poses: 5, ..default() });
@@ -382,7 +382,7 @@ fn planned_poses_identify_better_than_random_ones() {
         println!(
             "{objective:?} {poses} poses: {error:.4} sigma ({:+.1} %), condition number {:.1}",
             100.0 * (error / random_56 - 1.0),
-            chosen.condition_number
+            chosen.figures.condition_number
         );
         error / random_56
     };

@@ -89,7 +89,7 @@ fn request(args: &PlanArgs, profile: &Profile) -> Result<PlanRequest, Failure> {
         poses: args.poses,
         verification: args.verification,
         candidates: args.candidates,
-        objective: args.objective.into(),
+        objective: args.objective,
         seed: args.seed,
         limits,
         region: args.region.map(Into::into),
@@ -189,8 +189,8 @@ fn sweep_text(found: &crate::planning::Progress, bar: &str, starts: usize) -> St
     format!(
         "{stage} [{bar}] start {} of {starts}, condition {:.1}, predicted error {:.3} sigma",
         found.start + 1,
-        found.condition_number,
-        found.predicted_error
+        found.figures.condition_number,
+        found.figures.predicted_error
     )
 }
 

@@ -317,14 +317,8 @@ pub(super) fn plan(
     let types = joint_types(profile);
     let rows = crate::procedure::plan::rows(summary, &types);
     let mut lines = Lines::new(path, source, profile_text);
-    lines.push(Entry::Plan(PlanText {
-        origin: summary.objective.clone().unwrap_or_else(|| "a list that was checked".to_owned()),
-        condition_number: Some(summary.condition_number),
-        predicted_error_sigma: Some(summary.predicted_error_sigma),
-        minutes: summary.time.as_ref().map(|time| time.total_min),
-        search: summary.search.clone(),
-        rows: rows.iter().map(|row| PlannedText::new(row, &types)).collect(),
-    }));
+    let origin = summary.objective.map_or_else(|| "a list that was checked".to_owned(), |objective| objective.to_string());
+    lines.push(Entry::Plan(PlanText::new(origin, Some(summary), &rows, &types)));
     recording::write(path, &lines.lines, true).map_err(|error| failure(&error))
 }
 

@@ -6,35 +6,42 @@
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
+use clap::ValueEnum;
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use super::descent::Descent;
 use super::information::Information;
 use super::{PlanningError, check_count, check_members};
 
-/// What a set is chosen for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+/// The figure that a search improves. The indices O1 to O5 are those of [`super::ObservabilityIndices`].
+//
+// The first line of each variant is the help of `--objective`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Objective {
-    /// Lowest condition number among sets whose predicted error is near the best found.
+    /// Lowest condition number among sets that predict within 4 % of the best
     #[default]
     Balanced,
-    /// Lowest condition number. Predicts worse than random sets: for comparison with the literature.
+    /// Lowest condition number; predicts worse than random poses
     Condition,
-    /// Lowest predicted error.
+    /// Lowest predicted error
     Prediction,
-    /// Largest determinant of the information (D-optimal).
+    /// D-optimal: largest determinant of the information
     D,
-    /// Largest O1, see [`super::ObservabilityIndices`].
+    /// Observability index O1
     O1,
-    /// Largest O2: the same as [`Self::Condition`].
+    /// Observability index O2
     O2,
-    /// Largest O3.
+    /// Observability index O3
     O3,
-    /// Largest O4.
+    /// Observability index O4
     O4,
-    /// Largest O5.
+    /// Observability index O5
     O5,
 }
+
+crate::text::names_of_option!(Objective);
 
 impl Objective {
     /// Whether it looks at the singular values of the pair rows (else at the information matrix).
@@ -102,6 +109,18 @@ pub enum Stage {
     },
 }
 
+/// Figures of merit of a set during the search, for progress and for the curve of the search.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Condition number of `A·S`; infinite for a singular set.
+    pub condition_number: f64,
+    /// Observability index O1 (m), see [`super::ObservabilityIndices`].
+    pub o1: f64,
+    /// Predicted error (σ).
+    #[serde(rename = "predicted_error_sigma")]
+    pub predicted_error: f64,
+}
+
 /// A chosen set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chosen {
@@ -109,10 +128,8 @@ pub struct Chosen {
     pub set: Vec<usize>,
     /// What the stage minimised: condition number, predicted error, −ln det M or −O.
     pub cost: f64,
-    /// Condition number of `A·S`; infinite for a singular set.
-    pub condition_number: f64,
-    /// Predicted error (σ).
-    pub predicted_error: f64,
+    /// Its figures of merit.
+    pub figures: Figures,
     /// Whether the search was cut short; the set is the best so far.
     pub interrupted: bool,
 }
@@ -126,12 +143,8 @@ pub struct Progress {
     pub stage: Stage,
     /// Sweeps done, of [`SearchSettings::sweeps_of`].
     pub sweep: usize,
-    /// Condition number of the best set of this start.
-    pub condition_number: f64,
-    /// Its observability index O1 (m), see [`super::ObservabilityIndices`].
-    pub o1: f64,
-    /// Its predicted error (σ).
-    pub predicted_error: f64,
+    /// Figures of merit of the best set of this start.
+    pub figures: Figures,
 }
 
 /// A search, checked.
@@ -181,7 +194,7 @@ impl<'a> Search<'a> {
     pub fn next_stage(&self, stage: Stage, best: &Chosen) -> Option<Stage> {
         match stage {
             Stage::Prediction if self.settings.objective == Objective::Balanced && !best.interrupted => {
-                Some(Stage::Objective { limit: best.predicted_error * (1.0 + self.settings.prediction_slack) })
+                Some(Stage::Objective { limit: best.figures.predicted_error * (1.0 + self.settings.prediction_slack) })
             }
             Stage::Prediction | Stage::Objective { .. } => None,
         }
@@ -237,8 +250,8 @@ impl<'a> Search<'a> {
             let Some(next) = self.next_stage(stage, &best) else { return Ok(best) };
             stage = next;
             if let Stage::Objective { limit } = stage {
-                // A start that came out above the limit goes on from the best set.
-                for result in results.iter_mut().filter(|result| result.predicted_error > limit) {
+                // A start that ended above the limit continues from the best set.
+                for result in results.iter_mut().filter(|result| result.figures.predicted_error > limit) {
                     result.clone_from(&best);
                 }
             }

@@ -8,7 +8,7 @@ use rand::RngExt as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::choice::{Chosen, Objective, Progress, SearchSettings, Stage};
+use super::choice::{Chosen, Figures, Objective, Progress, SearchSettings, Stage};
 use super::exchange::{Merit, Prediction, add_pose};
 use super::information::Information;
 use super::pair_exchange::{Vacancy, spectral_cost};
@@ -48,13 +48,14 @@ impl State {
         Self { set, matrix, gram, cost, merit }
     }
 
-    /// Eigenvalues of the Gram matrix of the pair rows (m²).
-    fn eigenvalues(&self, information: &Information) -> Vec<f64> {
-        pair_gram(information, &self.set).symmetric_eigenvalues().as_slice().to_vec()
-    }
-
-    fn condition_number(&self, information: &Information) -> f64 {
-        condition_number(&self.eigenvalues(information)).unwrap_or(f64::INFINITY)
+    fn figures(&self, information: &Information) -> Figures {
+        // Eigenvalues of the Gram matrix of the pair rows (m²).
+        let eigenvalues = pair_gram(information, &self.set).symmetric_eigenvalues();
+        Figures {
+            condition_number: condition_number(eigenvalues.as_slice()).unwrap_or(f64::INFINITY),
+            o1: ObservabilityIndices::new(eigenvalues.as_slice(), self.set.len()).o1,
+            predicted_error: self.merit.predicted_error(),
+        }
     }
 }
 
@@ -155,15 +156,7 @@ impl<'a> Descent<'a> {
                 interrupted = true;
                 break;
             };
-            let values = self.best.eigenvalues(self.information);
-            progress(&Progress {
-                start,
-                stage: self.stage,
-                sweep,
-                condition_number: condition_number(&values).unwrap_or(f64::INFINITY),
-                o1: ObservabilityIndices::new(&values, self.best.set.len()).o1,
-                predicted_error: self.best.merit.predicted_error(),
-            });
+            progress(&Progress { start, stage: self.stage, sweep, figures: self.best.figures(self.information) });
             // Nothing is left only when every place has seen the whole pool.
             unmoved = if moved { 0 } else { unmoved + self.window };
             if unmoved >= self.pool.len() {
@@ -175,13 +168,7 @@ impl<'a> Descent<'a> {
         // The numbers are those of the set whatever way it was found.
         set.sort_unstable();
         let best = State::new(self.information, self.objective, set);
-        Chosen {
-            condition_number: best.condition_number(self.information),
-            predicted_error: best.merit.predicted_error(),
-            cost: best.cost,
-            set: best.set,
-            interrupted,
-        }
+        Chosen { figures: best.figures(self.information), cost: best.cost, set: best.set, interrupted }
     }
 
     /// Visits every place once, in random order. Returns whether a pose changed; `None` when interrupted.

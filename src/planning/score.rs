@@ -1,6 +1,7 @@
 //! How good a set of poses is.
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 use super::information::Information;
 use super::pairs::pair_gram;
@@ -14,9 +15,13 @@ use crate::units::MILLIMETRE;
 const WEAK_SHARE: f64 = 1.0 / 3.0;
 
 /// The figures of merit of one set. σ is the standard deviation of a measured coordinate.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// Serialised, it is a part of the summary of a plan: without the number of poses, which has its place there, and without what
+/// is in SI units.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Score {
     /// Number of poses.
+    #[serde(skip)]
     pub poses: usize,
     /// Number of combinations of parameters that distances can find.
     pub rank: usize,
@@ -27,10 +32,13 @@ pub struct Score {
     /// Observability indices of `A·S`.
     pub observability: ObservabilityIndices,
     /// RMS position error at fresh poses per unit of σ (a length over a length).
+    #[serde(rename = "predicted_error_sigma")]
     pub predicted_error: f64,
     /// `ln det M` of parameters and frame, with expected deviations, 1 mm and 1 mrad as units and σ = 1 mm (D-criterion).
+    #[serde(skip)]
     pub log_det: f64,
-    /// What becomes of each parameter, in order.
+    /// Precision of each parameter, in order.
+    #[serde(skip)]
     pub precision: Vec<ParameterPrecision>,
 }
 
@@ -38,7 +46,7 @@ pub struct Score {
 /// are in metres, parameters in expected deviations.
 ///
 /// Numbering and formulas: Sun & Hollerbach, "Observability index selection for robot calibration", ICRA 2008.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ObservabilityIndices {
     /// `(σ_1 ⋯ σ_r)^(1/r) / √M` (m): the volume of the ellipsoid (Borm & Menq 1989).
     pub o1: f64,

@@ -3,6 +3,7 @@
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 
 use super::exchange::Merit;
 use super::information::Information;
@@ -11,7 +12,7 @@ use super::score::condition_number;
 use super::{PlanningError, check_count};
 
 /// Median and best of a figure that is better when small; infinite for sets that determine nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
     /// Half of the sets do better.
     pub median: f64,
@@ -20,14 +21,16 @@ pub struct Spread {
 }
 
 /// Random sets of one size.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Yardstick {
     /// Number of sets drawn.
     pub sets: usize,
-    /// Condition number of `A·S`.
-    pub condition_number: Spread,
-    /// Predicted error (σ).
-    pub predicted_error: Spread,
+    /// Condition numbers of `A·S`.
+    #[serde(rename = "condition_number")]
+    pub conditions: Spread,
+    /// Predicted errors (σ).
+    #[serde(rename = "predicted_error_sigma")]
+    pub errors: Spread,
 }
 
 impl Yardstick {
@@ -51,7 +54,7 @@ impl Yardstick {
                 (condition, Merit::new(information, information.sum(set)).predicted_error())
             })
             .unzip();
-        Ok(Self { sets, condition_number: Spread::new(conditions), predicted_error: Spread::new(errors) })
+        Ok(Self { sets, conditions: Spread::new(conditions), errors: Spread::new(errors) })
     }
 }
 

@@ -14,7 +14,7 @@ use crate::kinematics::{Arm, FreeParameter, JointType, ParameterId, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
-    Chosen, Information, JointBox, Objective, Score, Search, SearchSettings, Stage, low_discrepancy, random,
+    Chosen, Information, JointBox, Score, Search, SearchSettings, Stage, low_discrepancy, random,
     verification_set,
 };
 use crate::profile::Profile;
@@ -88,7 +88,7 @@ pub fn rows(summary: &PlanSummary, joint_types: &[JointType]) -> Vec<PlannedPose
         .iter()
         .map(|row| PlannedPose {
             pose: row.pose.clone(),
-            kind: row.kind.parse().unwrap_or(PoseKind::Via),
+            kind: row.kind,
             configuration: joint_types
                 .iter()
                 .zip(&row.configuration)
@@ -258,7 +258,7 @@ impl<'a> Planner<'a> {
         warnings.append(&mut summary.warnings);
         summary.warnings = warnings;
         summary.predicted_verification_rms_mm = self.predicted_verification(&candidates.kept, set, &ordered)?;
-        summary.objective = Some(objective_name(request.objective).to_owned());
+        summary.objective = Some(request.objective);
         summary.interrupted = ordered.chosen.interrupted;
         summary.search = history.steps();
         let minutes = |seconds: f64| seconds / 60.0;
@@ -401,7 +401,7 @@ impl<'a> Planner<'a> {
         let point = self.candidate(configuration).point_in_base;
         PoseSummary {
             pose,
-            kind: kind.name().to_owned(),
+            kind,
             configuration: self.joint_types.iter().zip(configuration).map(edge).collect(),
             point_in_base_mm: Some([to_mm(point.x), to_mm(point.y), to_mm(point.z)]),
             problems,
@@ -473,19 +473,4 @@ fn shortened(findings: &[String]) -> String {
     let more = findings.len().saturating_sub(SHOWN);
     let list = findings.iter().take(SHOWN).cloned().collect::<Vec<_>>().join("; ");
     if more > 0 { format!("{list}; and {more} more") } else { list }
-}
-
-/// As on the command line.
-const fn objective_name(objective: Objective) -> &'static str {
-    match objective {
-        Objective::Balanced => "balanced",
-        Objective::Condition => "condition",
-        Objective::Prediction => "prediction",
-        Objective::D => "d",
-        Objective::O1 => "o1",
-        Objective::O2 => "o2",
-        Objective::O3 => "o3",
-        Objective::O4 => "o4",
-        Objective::O5 => "o5",
-    }
 }

@@ -7,9 +7,10 @@
 mod build;
 mod decisions;
 
-use serde::Serialize;
+use serde::ser::SerializeStruct as _;
+use serde::{Serialize, Serializer};
 
-use crate::session::plan_summary::SearchStepSummary;
+use crate::session::journal::PlanText;
 use crate::session::set_up::About;
 use crate::session::summary::IdentificationSummary;
 
@@ -85,8 +86,9 @@ pub struct Details {
     pub points: Vec<PointPart>,
     /// Links of the nominal arm at the pose that the views show, base to SMR, in the base (mm).
     pub arm_mm: Vec<[f64; 3]>,
-    /// The plan; none before one was accepted.
-    pub plan: Option<PlanPart>,
+    /// The plan without its rows; none before one was accepted.
+    #[serde(serialize_with = "plan")]
+    pub plan: Option<PlanText>,
     /// Predicted error against the number of identification samples, as measured.
     pub prediction: Vec<PredictionPart>,
     /// The pose that was measured again and again.
@@ -103,6 +105,20 @@ pub struct Details {
     pub notes: Vec<NotePart>,
     /// Files beside the report.
     pub files: Vec<FilePart>,
+}
+
+/// Writes a plan with its search, which the journal leaves out where it is empty, and without its rows.
+fn plan<S: Serializer>(plan: &Option<PlanText>, serializer: S) -> Result<S::Ok, S::Error> {
+    let Some(PlanText { origin, condition_number, predicted_error_sigma, minutes, search, rows: _ }) = plan else {
+        return serializer.serialize_none();
+    };
+    let mut fields = serializer.serialize_struct("PlanText", 5)?;
+    fields.serialize_field("origin", origin)?;
+    fields.serialize_field("condition_number", condition_number)?;
+    fields.serialize_field("predicted_error_sigma", predicted_error_sigma)?;
+    fields.serialize_field("minutes", minutes)?;
+    fields.serialize_field("search", search)?;
+    fields.end()
 }
 
 /// The session; all but the program empty or zero for a result from tables.
@@ -219,21 +235,6 @@ pub struct PointPart {
     pub nominal_mm: [f64; 3],
     /// Measured − predicted by the identified arm.
     pub identified_mm: [f64; 3],
-}
-
-/// The plan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PlanPart {
-    /// Where it comes from, in words.
-    pub origin: String,
-    /// Condition number of its identification poses.
-    pub condition_number: Option<f64>,
-    /// Predicted RMS position error, per σ.
-    pub predicted_error_sigma: Option<f64>,
-    /// Time that it takes.
-    pub minutes: Option<f64>,
-    /// How the search went on, sweep by sweep.
-    pub search: Vec<SearchStepSummary>,
 }
 
 /// What so many samples promise.

@@ -24,12 +24,12 @@ pub fn plan_text(summary: &PlanSummary) -> String {
 }
 
 fn figures(summary: &PlanSummary) -> String {
-    let objective = summary.objective.as_deref().map_or(String::new(), |objective| format!(", objective {objective}"));
+    let objective = summary.objective.map_or_else(String::new, |objective| format!(", objective {objective}"));
     let mut text = paragraph(
         "",
         &format!(
             "{} poses to identify {} parameters (rank {}), {} to verify{objective}",
-            summary.identification_poses, summary.parameter_count, summary.rank, summary.verification_poses
+            summary.identification_poses, summary.parameter_count, summary.score.rank, summary.verification_poses
         ),
     );
     if let Some(rms) = summary.predicted_rms_mm {
@@ -64,8 +64,8 @@ fn comparison(summary: &PlanSummary) -> String {
     let mut text = String::new();
     let random = &summary.random;
     push_line(&mut text, &format!("  {:<34}{:>12}{:>16}{:>14}", "", "this set", "random median", "random best"));
-    let error = (summary.predicted_error_sigma, random.predicted_error_sigma);
-    let condition = (summary.condition_number, random.condition_number);
+    let error = (summary.score.predicted_error, random.errors);
+    let condition = (summary.score.condition_number, random.conditions);
     for (name, (own, random), decimals) in
         [("predicted error (sigma)", error, 3), ("condition number (expected dev.)", condition, 1)]
     {
@@ -74,9 +74,9 @@ fn comparison(summary: &PlanSummary) -> String {
     }
     push_line(
         &mut text,
-        &format!("  {:<34}{:>12}", "condition number (mm, rad)", fixed(summary.condition_number_raw, 0)),
+        &format!("  {:<34}{:>12}", "condition number (mm, rad)", fixed(summary.score.condition_number_raw, 0)),
     );
-    let o = &summary.observability;
+    let o = &summary.score.observability;
     push_line(
         &mut text,
         &format!("  observability O1 {:.3e}  O2 {:.3e}  O3 {:.3e}  O4 {:.3e}  O5 {:.3e}", o.o1, o.o2, o.o3, o.o4, o.o5),

@@ -1,49 +1,16 @@
 //! The numbers of a plan as they leave the program: plain data in mm and degree, the same for the text and the JSON object.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+use super::plan::PoseKind;
 use super::summary::{Provenance, Warning};
+use crate::planning::{Figures, Objective, Score, Yardstick};
 
 /// Version of the layout of these objects.
 pub const SCHEMA: u32 = 1;
 
-/// Observability indices (Sun & Hollerbach 2008), larger is better.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ObservabilitySummary {
-    /// Geometric mean of the singular values over √M (m).
-    pub o1: f64,
-    /// Inverse condition number.
-    pub o2: f64,
-    /// Smallest singular value (m).
-    pub o3: f64,
-    /// Noise amplification index (m).
-    pub o4: f64,
-    /// Harmonic combination (m).
-    pub o5: f64,
-}
-
-/// A figure of random sets that is better when small.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SpreadSummary {
-    /// Half of the sets do better.
-    pub median: f64,
-    /// The best of them.
-    pub best: f64,
-}
-
-/// Random sets of the same size from the same candidates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RandomSummary {
-    /// How many sets.
-    pub sets: usize,
-    /// Condition number of `A·S`.
-    pub condition_number: SpreadSummary,
-    /// Predicted error per σ.
-    pub predicted_error_sigma: SpreadSummary,
-}
-
 /// What some number of poses predicts, and what it costs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TradeOffSummary {
     /// Number of identification poses.
     pub poses: usize,
@@ -56,7 +23,7 @@ pub struct TradeOffSummary {
 }
 
 /// A parameter that stays weak.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WeakParameterSummary {
     /// Its name.
     pub name: String,
@@ -69,7 +36,7 @@ pub struct WeakParameterSummary {
 }
 
 /// What a rule rejected.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RejectionSummary {
     /// The rule.
     pub rule: String,
@@ -79,19 +46,8 @@ pub struct RejectionSummary {
     pub alone: usize,
 }
 
-/// A set of poses during the search: the best one after a sweep.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SearchStepSummary {
-    /// Condition number of `A·S`.
-    pub condition_number: f64,
-    /// Observability index O1 (m).
-    pub o1: f64,
-    /// Predicted error per σ.
-    pub predicted_error_sigma: f64,
-}
-
 /// Candidates and what became of the others.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CandidateSummary {
     /// Configurations tried.
     pub tried: usize,
@@ -102,7 +58,7 @@ pub struct CandidateSummary {
 }
 
 /// Time that the program takes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimeSummary {
     /// Whole program.
     pub total_min: f64,
@@ -113,30 +69,30 @@ pub struct TimeSummary {
 }
 
 /// One row of the plan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PoseSummary {
     /// Name.
     pub pose: String,
-    /// `identification`, `verification`, `home`, `drift` or `via`.
-    pub kind: String,
+    /// What is done there.
+    pub kind: PoseKind,
     /// Pendant joint values: degree, sliding joints mm.
     pub configuration: Vec<f64>,
     /// Predicted place of the reflector in the base.
     pub point_in_base_mm: Option<[f64; 3]>,
     /// Why it cannot be measured; empty for a good pose. Only filled when a plan is checked.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub problems: Vec<String>,
 }
 
 /// Everything about a plan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanSummary {
     /// Version of this layout.
     pub schema: u32,
     /// Where the numbers come from.
     pub provenance: Provenance,
-    /// What the set was chosen for; none for a plan that was only checked.
-    pub objective: Option<String>,
+    /// Figure that the search improved; none for a plan that was only checked.
+    pub objective: Option<Objective>,
     /// What must be known before the plan is used.
     pub warnings: Vec<Warning>,
     /// Number of identification poses.
@@ -145,16 +101,9 @@ pub struct PlanSummary {
     pub verification_poses: usize,
     /// Free parameters.
     pub parameter_count: usize,
-    /// Independent combinations that distances can find.
-    pub rank: usize,
-    /// Condition number of `A·S` on the identifiable subspace.
-    pub condition_number: f64,
-    /// The same with parameters in mm and rad.
-    pub condition_number_raw: f64,
-    /// Observability indices of `A·S`.
-    pub observability: ObservabilitySummary,
-    /// RMS position error at fresh poses per unit of measurement σ.
-    pub predicted_error_sigma: f64,
+    /// Figures of merit of the identification poses.
+    #[serde(flatten)]
+    pub score: Score,
     /// σ of a coordinate that the prediction is for.
     pub sigma_mm: Option<f64>,
     /// Predicted RMS position error of the identified robot over its joint ranges, from the instrument alone.
@@ -162,14 +111,14 @@ pub struct PlanSummary {
     /// RMS position error that the verification poses of the plan will show, tracker noise included.
     pub predicted_verification_rms_mm: Option<f64>,
     /// Random sets of the same size.
-    pub random: RandomSummary,
+    pub random: Yardstick,
     /// D-efficiency against the upper bound for these candidates, 0 … 1.
     pub d_efficiency: f64,
     /// How far the bound may lie above the true optimum, relative.
     pub d_bound_gap: f64,
-    /// How the search went on, sweep by sweep; empty for a plan that was only checked.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub search: Vec<SearchStepSummary>,
+    /// Progress of the search, sweep by sweep; empty for a plan that was only checked.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub search: Vec<Figures>,
     /// Prediction against number of poses.
     pub trade_off: Vec<TradeOffSummary>,
     /// Parameters that stay weak.

@@ -257,12 +257,12 @@ impl Session {
                     row.active = false;
                 }
                 self.rows.extend(rows);
-                self.plan = Some(PlanText { rows: Vec::new(), ..plan.clone() });
+                self.plan = Some(plan.without_rows());
             }
             Entry::PlanExtended(plan) => {
                 let rows = self.planned_rows(&plan.rows).ok_or_else(|| misfit("poses that do not fit the robot"))?;
                 self.rows.extend(rows);
-                self.plan = Some(PlanText { rows: Vec::new(), ..plan.clone() });
+                self.plan = Some(plan.without_rows());
             }
             Entry::Sample(noted) => self.add_sample(noted, line).map_err(misfit)?,
             Entry::Refused { number, pose, reason, .. } => {

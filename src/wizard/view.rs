@@ -7,9 +7,10 @@ use serde::Serialize;
 use super::intent::{IntentInfo, PlanSettings};
 use super::notice::{Notice, Severity};
 use super::{Progress, Wizard};
-use crate::planning::Stage;
+use crate::planning::{Figures, Stage};
 use crate::procedure::plan;
 use crate::profile::{Level, Profile};
+use crate::session::journal::PlanText;
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{About, Step};
@@ -110,10 +111,8 @@ pub struct BusyView {
     pub progress: Option<String>,
     /// Part done, 0 … 1, where it can be told.
     pub part: Option<f64>,
-    /// Condition number of the pose set that a search has just looked at.
-    pub condition_number: Option<f64>,
-    /// Its predicted error, per σ.
-    pub predicted_error: Option<f64>,
+    /// Figures of merit of the best pose set so far, while a search runs.
+    pub figures: Option<Figures>,
     /// It is being cancelled.
     pub is_cancelled: bool,
 }
@@ -306,18 +305,13 @@ pub struct PlanView {
 /// A plan in short.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanFigures {
-    /// Where it comes from.
-    pub origin: String,
+    /// The plan without its rows.
+    #[serde(flatten)]
+    pub plan: PlanText,
     /// Poses to identify from.
     pub identification: usize,
     /// Poses to verify with.
     pub verification: usize,
-    /// Condition number of the identification poses.
-    pub condition_number: Option<f64>,
-    /// Predicted RMS position error per σ.
-    pub predicted_error_sigma: Option<f64>,
-    /// Time it takes.
-    pub minutes: Option<f64>,
 }
 
 /// The capture step.
@@ -544,8 +538,7 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
             what: busy.what,
             progress: busy.progress.as_ref().map(progress_text),
             part: busy.progress.as_ref().and_then(part_done),
-            condition_number: busy.progress.as_ref().and_then(sweep).map(|found| found.condition_number),
-            predicted_error: busy.progress.as_ref().and_then(sweep).map(|found| found.predicted_error),
+            figures: busy.progress.as_ref().and_then(figures),
             is_cancelled: busy.cancelled,
         }),
         notice: wizard.notice.clone(),
@@ -581,8 +574,8 @@ fn progress_text(progress: &Progress) -> String {
             format!(
                 "{stage}, start {} of {starts}: condition {:.1}, predicted error {:.3} sigma",
                 found.start + 1,
-                found.condition_number,
-                found.predicted_error
+                found.figures.condition_number,
+                found.figures.predicted_error
             )
         }
         Progress::Solver(iteration) => {
@@ -591,10 +584,10 @@ fn progress_text(progress: &Progress) -> String {
     }
 }
 
-/// What a search has just looked at.
-const fn sweep(progress: &Progress) -> Option<&crate::planning::Progress> {
+/// Figures of merit of the best pose set after a sweep of a search.
+const fn figures(progress: &Progress) -> Option<Figures> {
     match progress {
-        Progress::Search(plan::Progress::Sweep { found, .. }) => Some(found),
+        Progress::Search(plan::Progress::Sweep { found, .. }) => Some(found.figures),
         Progress::Search(_) | Progress::Solver(_) => None,
     }
 }

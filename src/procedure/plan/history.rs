@@ -1,10 +1,9 @@
-//! How a search went on.
+//! The progress of a search, sweep by sweep.
 
 use std::sync::{Mutex, PoisonError};
 
 use super::request::Progress;
-use crate::planning::{self, Stage};
-use crate::session::plan_summary::SearchStepSummary;
+use crate::planning::{self, Figures, Stage};
 
 /// The sweeps of a search, told from any thread in any order.
 #[derive(Debug, Default)]
@@ -24,12 +23,12 @@ impl History {
     }
 
     /// The best start after every sweep, in order: whatever the threads did, the same for the same search.
-    pub(super) fn steps(&self) -> Vec<SearchStepSummary> {
+    pub(super) fn steps(&self) -> Vec<Figures> {
         let mut sweeps = self.sweeps.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let stage = |found: &planning::Progress| u8::from(matches!(found.stage, Stage::Objective { .. }));
         let merit = |found: &planning::Progress| match found.stage {
-            Stage::Prediction => found.predicted_error,
-            Stage::Objective { .. } => found.condition_number,
+            Stage::Prediction => found.figures.predicted_error,
+            Stage::Objective { .. } => found.figures.condition_number,
         };
         sweeps.sort_by(|one, other| {
             (stage(one), one.sweep)
@@ -41,10 +40,10 @@ impl History {
         let rounded = |value: f64| format!("{value:.6e}").parse().unwrap_or(value);
         sweeps
             .iter()
-            .map(|found| SearchStepSummary {
-                condition_number: rounded(found.condition_number),
-                o1: rounded(found.o1),
-                predicted_error_sigma: rounded(found.predicted_error),
+            .map(|found| Figures {
+                condition_number: rounded(found.figures.condition_number),
+                o1: rounded(found.figures.o1),
+                predicted_error: rounded(found.figures.predicted_error),
             })
             .filter(|step| step.condition_number.is_finite() && step.o1.is_finite())
             .collect()
@@ -61,9 +60,7 @@ mod tests {
             start,
             stage,
             sweep,
-            condition_number: 100.0 * value,
-            o1: 1e-3,
-            predicted_error: value,
+            figures: Figures { condition_number: 100.0 * value, o1: 1e-3, predicted_error: value },
         };
         Progress::Sweep { found, done: sweep, sweeps: 6, starts: 2 }
     }
@@ -88,7 +85,7 @@ mod tests {
         let found = steps(&[0, 1, 2, 3, 4, 5]);
         assert_eq!(found, steps(&[5, 3, 1, 4, 2, 0]));
         // The best start of every sweep, one stage after the other.
-        let errors: Vec<f64> = found.iter().map(|step| step.predicted_error_sigma).collect();
+        let errors: Vec<f64> = found.iter().map(|step| step.predicted_error).collect();
         assert_eq!(errors, [0.8, 0.7, 0.71]);
     }
 
@@ -103,6 +100,6 @@ mod tests {
         let steps = history.steps();
         // A set that determines nothing is no point of a plot.
         assert_eq!(steps.len(), 1);
-        assert!((steps[0].predicted_error_sigma - 0.5).abs() < 1e-12);
+        assert!((steps[0].predicted_error - 0.5).abs() < 1e-12);
     }
 }

@@ -3,11 +3,10 @@
 use super::super::{ProcedureError, provenance};
 use super::{Planner, RANDOM_SETS, SIZES};
 use crate::planning::candidates::Rejections;
-use crate::planning::{DesignBound, Information, Score, Spread, TradeOff, Yardstick, trade_off};
+use crate::planning::{DesignBound, Information, Score, TradeOff, Yardstick, trade_off};
 use crate::session::advice::Advice;
 use crate::session::plan_summary::{
-    CandidateSummary, ObservabilitySummary, PlanSummary, RandomSummary, RejectionSummary, SCHEMA, SpreadSummary,
-    TradeOffSummary, WeakParameterSummary,
+    CandidateSummary, PlanSummary, RejectionSummary, SCHEMA, TradeOffSummary, WeakParameterSummary,
 };
 use crate::session::summary::Warning;
 use crate::units::to_mm;
@@ -34,8 +33,6 @@ impl Planner<'_> {
             let text = "the sigma of the instrument is not known, so there are no predictions in mm and none about weak parameters";
             warnings.push(Warning::new("no_sigma", text, false).with_advice(Advice::StateSigma));
         }
-        let spread = |spread: &Spread| SpreadSummary { median: spread.median, best: spread.best };
-        let indices = &score.observability;
         if let Some(sigma) = sigma
             && score.weak(sigma).any(|weak| weak.identifiable)
         {
@@ -50,25 +47,10 @@ impl Planner<'_> {
             identification_poses: set.len(),
             verification_poses: 0,
             parameter_count: self.parameters.len(),
-            rank: score.rank,
-            condition_number: score.condition_number,
-            condition_number_raw: score.condition_number_raw,
-            observability: ObservabilitySummary {
-                o1: indices.o1,
-                o2: indices.o2,
-                o3: indices.o3,
-                o4: indices.o4,
-                o5: indices.o5,
-            },
-            predicted_error_sigma: score.predicted_error,
             sigma_mm: sigma.map(to_mm),
             predicted_verification_rms_mm: None,
             predicted_rms_mm: sigma.map(|sigma| to_mm(score.predicted_rms(sigma))),
-            random: RandomSummary {
-                sets: yardstick.sets,
-                condition_number: spread(&yardstick.condition_number),
-                predicted_error_sigma: spread(&yardstick.predicted_error),
-            },
+            random: yardstick,
             d_efficiency,
             d_bound_gap: bound.gap,
             search: Vec::new(),
@@ -76,6 +58,7 @@ impl Planner<'_> {
             weak_parameters: sigma.map_or_else(Vec::new, |sigma| weak_parameters(&score, sigma)),
             blind_groups: information.observability().groups.iter().map(|group| group.description.clone()).collect(),
             candidates: candidate_summary(rejections),
+            score,
             time: None,
             poses: Vec::new(),
             elapsed_s: 0.0,

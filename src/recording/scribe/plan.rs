@@ -4,19 +4,19 @@ use nalgebra::Point3;
 use rerun::{Points3D, Radius, Scalars};
 
 use super::Posture;
+use crate::planning::Figures;
 use crate::recording::canvas::{Canvas, Moment};
 use crate::recording::{layout, names};
-use crate::session::plan_summary::SearchStepSummary;
 use crate::session::state::{SampleState, Session};
 use crate::units::to_mm;
 
-/// The search, sweep by sweep.
-pub(super) fn search(canvas: &Canvas, steps: &[SearchStepSummary]) {
+/// Draws the progress of the search, sweep by sweep.
+pub(super) fn search(canvas: &Canvas, steps: &[Figures]) {
     for (index, step) in steps.iter().enumerate() {
         let moment = Moment::search(index + 1);
         canvas.draw(moment, names::CONDITION, &Scalars::new([step.condition_number]));
         canvas.draw(moment, names::OBSERVABILITY, &Scalars::new([to_mm(step.o1)]));
-        canvas.draw(moment, names::SEARCH_PREDICTED, &Scalars::new([step.predicted_error_sigma]));
+        canvas.draw(moment, names::SEARCH_PREDICTED, &Scalars::new([step.predicted_error]));
     }
 }
 

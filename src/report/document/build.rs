@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::decisions::{corrections, findings, not_counted};
 use super::{
-    Counts, Details, Document, DriftPart, FilePart, Found, NotePart, ParameterNote, PlanPart, PointOrigin, PointPart,
+    Counts, Details, Document, DriftPart, FilePart, Found, NotePart, ParameterNote, PointOrigin, PointPart,
     PredictionPart, RefusedPart, ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
 };
 use crate::kinematics::ForwardKinematics;
@@ -58,13 +58,7 @@ impl Document {
             parameter_notes: parameters.iter().map(|parameter| note(parameter, session)).collect(),
             points: points(session),
             arm_mm: arm(session),
-            plan: session.plan.as_ref().map(|plan| PlanPart {
-                origin: plan.origin.clone(),
-                condition_number: plan.condition_number,
-                predicted_error_sigma: plan.predicted_error_sigma,
-                minutes: plan.minutes,
-                search: plan.search.clone(),
-            }),
+            plan: session.plan.clone(),
             prediction: prediction(session),
             drift: drift(session),
             not_counted: not_counted(session),

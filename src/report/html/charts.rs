@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::markup::{counted, number};
 use super::plot::{Mark, Plot, Scale, WIDTH};
 use crate::report::document::{Details, DriftPart, PointPart, PredictionPart, RobotPart};
-use crate::session::plan_summary::SearchStepSummary;
+use crate::planning::Figures;
 
 /// Bars of a histogram.
 const BINS: usize = 12;
@@ -129,8 +129,8 @@ pub(super) fn against_joints(robot: &RobotPart, points: &[PointPart]) -> String 
 }
 
 /// Condition number and predicted error over the sweeps of the search.
-pub(super) fn search(steps: &[SearchStepSummary]) -> String {
-    let drawn = |title: &str, label: &str, pick: fn(&SearchStepSummary) -> f64| {
+pub(super) fn search(steps: &[Figures]) -> String {
+    let drawn = |title: &str, label: &str, pick: fn(&Figures) -> f64| {
         let x = Scale::linear(0.0, steps.len().saturating_sub(1).max(1) as f64);
         let y = Scale::around(steps.iter().map(pick));
         let mut plot = Plot::new((WIDTH, 160.0), (x, "sweep of the search"), (y, label));
@@ -147,7 +147,7 @@ pub(super) fn search(steps: &[SearchStepSummary]) -> String {
         plot.figure(title, &caption)
     };
     drawn("Condition number over the search", "condition number", |step| step.condition_number)
-        + &drawn("Predicted error over the search", "× sigma", |step| step.predicted_error_sigma)
+        + &drawn("Predicted error over the search", "× sigma", |step| step.predicted_error)
 }
 
 /// What more and more samples promise.

@@ -2,8 +2,9 @@
 
 use super::charts::{MOST, drift, norm, prediction, search};
 use super::markup::{Column, add, counted, escape, facts, number, optional, paragraph, table, time};
-use crate::report::document::{Details, Document, PlanPart};
+use crate::report::document::{Details, Document};
 use crate::report::text::{gap, sigma_origin, termination};
+use crate::session::journal::PlanText;
 use crate::session::summary::{EstimatorName, IdentificationSummary, RejectedSummary};
 
 /// Plan, fit and drift.
@@ -73,7 +74,7 @@ fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
     ]
 }
 
-fn plan_facts(plan: &PlanPart, report: &Details) -> Vec<(&'static str, String)> {
+fn plan_facts(plan: &PlanText, report: &Details) -> Vec<(&'static str, String)> {
     let mut missing = Vec::new();
     if report.counts.open > 0 {
         missing.push(counted(report.counts.open, "pose was not measured", "poses were not measured"));

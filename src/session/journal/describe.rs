@@ -77,13 +77,12 @@ fn sample_text(sample: &MeasuredText) -> String {
 }
 
 fn plan_text(plan: &PlanText) -> String {
-    let count = |kind: PoseKind| plan.rows.iter().filter(|row| row.kind == kind).count();
     let condition = plan.condition_number.map(|condition| format!(", condition number {condition:.1}"));
     let error = plan.predicted_error_sigma.map(|error| format!(", predicted error {error:.3} sigma"));
     format!(
         "{} identification and {} verification poses, {}{}{}",
-        count(PoseKind::Identification),
-        count(PoseKind::Verification),
+        plan.count(PoseKind::Identification),
+        plan.count(PoseKind::Verification),
         plan.origin,
         condition.unwrap_or_default(),
         error.unwrap_or_default()

@@ -4,9 +4,10 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use crate::kinematics::JointType;
+use crate::planning::Figures;
 use crate::session::calibration::Calibration;
 use crate::session::plan::{PlannedPose, PoseKind};
-use crate::session::plan_summary::SearchStepSummary;
+use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{About, InstrumentChoice, Step, TargetChoice};
 use crate::session::summary::IdentificationSummary;
 use crate::units::{from_mm, to_mm};
@@ -139,11 +140,36 @@ pub struct PlanText {
     pub predicted_error_sigma: Option<f64>,
     /// Time that the program takes.
     pub minutes: Option<f64>,
-    /// How the search for it went on.
+    /// Progress of the search for it, sweep by sweep.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub search: Vec<SearchStepSummary>,
+    pub search: Vec<Figures>,
     /// The rows, in the order of the program.
     pub rows: Vec<PlannedText>,
+}
+
+impl PlanText {
+    /// A plan for an arm with these joints; without a summary, of poses that were not scored.
+    pub fn new(origin: String, summary: Option<&PlanSummary>, rows: &[PlannedPose], joints: &[JointType]) -> Self {
+        Self {
+            origin,
+            condition_number: summary.map(|summary| summary.score.condition_number),
+            predicted_error_sigma: summary.map(|summary| summary.score.predicted_error),
+            minutes: summary.and_then(|summary| summary.time).map(|time| time.total_min),
+            search: summary.map(|summary| summary.search.clone()).unwrap_or_default(),
+            rows: rows.iter().map(|row| PlannedText::new(row, joints)).collect(),
+        }
+    }
+
+    /// The plan without its rows, for those that keep the rows elsewhere.
+    #[must_use]
+    pub fn without_rows(&self) -> Self {
+        Self { origin: self.origin.clone(), search: self.search.clone(), rows: Vec::new(), ..*self }
+    }
+
+    /// Number of rows of a kind.
+    pub fn count(&self, kind: PoseKind) -> usize {
+        self.rows.iter().filter(|row| row.kind == kind).count()
+    }
 }
 
 /// A row of a plan.

@@ -7,12 +7,12 @@ use proptest::prelude::*;
 use super::*;
 use crate::identification::PointSample;
 use crate::kinematics::Place;
+use crate::planning::Figures;
 use crate::procedure::EstimationSettings;
 use crate::procedure::identify::{IdentifyRequest, NamedSample, identify};
 use crate::profile::{Profile, builtin};
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
-use crate::session::plan_summary::SearchStepSummary;
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, Step, TargetChoice};
 use crate::session::simulation::{Fault, SimulatedWire, Simulation, Truth};
 use crate::session::summary::VerificationMode;
@@ -118,7 +118,7 @@ fn plan() -> PlanText {
         condition_number: Some(69.25),
         predicted_error_sigma: None,
         minutes: Some(0.1),
-        search: vec![SearchStepSummary { condition_number: 61.5, o1: 0.25, predicted_error_sigma: 0.7 }],
+        search: vec![Figures { condition_number: 61.5, o1: 0.25, predicted_error: 0.7 }],
         rows: PoseKind::ALL
             .into_iter()
             .map(|kind| row(kind, Some((1.0, 2.0, -3.001))))

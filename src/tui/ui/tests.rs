@@ -42,8 +42,7 @@ fn crowded() -> ViewModel {
         what: "planning",
         progress: Some("choosing, start 2 of 3: condition 69.1, predicted error 0.680 sigma".to_owned()),
         part: Some(0.58),
-        condition_number: Some(69.1),
-        predicted_error: Some(0.680),
+        figures: None,
         is_cancelled: false,
     });
     let notice = Notice::attention("the reflector at pose 12 is 3.2 mm from where it should be: \u{1b}[31m bumped?");

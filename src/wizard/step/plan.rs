@@ -2,7 +2,7 @@
 
 use super::{Action, Cx, StepMachine};
 use crate::procedure::plan::PlanRequest;
-use crate::session::journal::{Entry, PlanText, PlannedText};
+use crate::session::journal::{Entry, PlanText};
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::Step;
@@ -23,31 +23,17 @@ pub(in crate::wizard) struct PlanStep {
 
 #[derive(Clone, Debug)]
 struct Proposal {
+    plan: PlanText,
+    /// All its numbers, if poses were chosen.
     summary: Option<Box<PlanSummary>>,
-    rows: Vec<PlannedPose>,
-    origin: String,
 }
 
-impl Proposal {
-    fn text(&self, cx: &Cx<'_>) -> PlanText {
-        plan_text(cx, self.summary.as_deref(), &self.rows, self.origin.clone())
-    }
-}
-
-/// A plan as the journal has it.
+/// A plan for the journal.
 pub(super) fn plan_text(cx: &Cx<'_>, summary: Option<&PlanSummary>, rows: &[PlannedPose], origin: String) -> PlanText {
-    let joint_types = cx.robot().map_or(&[][..], |robot| &robot.joint_types);
-    PlanText {
-        origin,
-        condition_number: summary.map(|summary| summary.condition_number),
-        predicted_error_sigma: summary.map(|summary| summary.predicted_error_sigma),
-        minutes: summary.and_then(|summary| summary.time.as_ref()).map(|time| time.total_min),
-        search: summary.map(|summary| summary.search.clone()).unwrap_or_default(),
-        rows: rows.iter().map(|row| PlannedText::new(row, joint_types)).collect(),
-    }
+    PlanText::new(origin, summary, rows, cx.robot().map_or(&[][..], |robot| &robot.joint_types))
 }
 
-/// Poses that are measured and count, for a plan that goes on from them.
+/// Poses that are measured and count, for a plan that continues from them.
 pub(super) fn measured_poses(cx: &Cx<'_>) -> Vec<PlannedPose> {
     let session = cx.session;
     session
@@ -82,7 +68,7 @@ pub(super) fn plan_request(cx: &Cx<'_>, settings: &PlanSettings) -> Option<Reque
     })
 }
 
-/// The highest number that a pose of any plan has as its name: new poses go on from there.
+/// The highest number that is the name of a pose in any plan: new poses continue from there.
 fn highest_pose_number(cx: &Cx<'_>) -> u64 {
     cx.session.rows.iter().filter_map(|row| row.planned.pose.parse().ok()).max().unwrap_or(0)
 }
@@ -135,13 +121,12 @@ impl StepMachine for PlanStep {
             Intent::PlanFromRecording => {
                 let Some(connection) = cx.connection else { return Vec::new() };
                 let origin = "the poses of the recorded measurements".to_owned();
-                self.proposal = Some(Proposal { summary: None, rows: connection.recorded.clone(), origin });
+                let plan = plan_text(cx, None, &connection.recorded, origin);
+                self.proposal = Some(Proposal { plan, summary: None });
                 Vec::new()
             }
             Intent::AcceptPlan => {
-                let Some(proposal) = &self.proposal else { return Vec::new() };
-                let plan = proposal.text(cx);
-                self.proposal = None;
+                let Some(Proposal { plan, .. }) = self.proposal.take() else { return Vec::new() };
                 vec![Action::Write(vec![Entry::Plan(plan), Entry::Step(Step::Capture)])]
             }
             Intent::Next => vec![Action::go(Step::Capture)],
@@ -149,7 +134,7 @@ impl StepMachine for PlanStep {
         }
     }
 
-    fn on_answer(&mut self, answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
+    fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
         let Answer::Planned { mut summary, rows, origin } = answer else { return Vec::new() };
         for warning in summary.iter_mut().flat_map(|summary| &mut summary.warnings) {
             warning.put_into_words(advice::words);
@@ -158,7 +143,8 @@ impl StepMachine for PlanStep {
             .as_deref()
             .map(|summary| summary.warnings.iter().map(|warning| warning.message.clone()).collect())
             .unwrap_or_default();
-        self.proposal = Some(Proposal { summary, rows, origin });
+        let plan = plan_text(cx, summary.as_deref(), &rows, origin);
+        self.proposal = Some(Proposal { plan, summary });
         match warnings.split_first() {
             None => Vec::new(),
             Some((first, rest)) => {
@@ -171,24 +157,14 @@ impl StepMachine for PlanStep {
 
     fn content(&self, cx: &Cx<'_>) -> Content {
         let accepted = cx.session.plan.as_ref().map(|plan| PlanFigures {
-            origin: plan.origin.clone(),
+            plan: plan.clone(),
             identification: count(cx, PoseKind::Identification),
             verification: count(cx, PoseKind::Verification),
-            condition_number: plan.condition_number,
-            predicted_error_sigma: plan.predicted_error_sigma,
-            minutes: plan.minutes,
         });
-        let proposal = self.proposal.as_ref().map(|proposal| {
-            let count = |kind| proposal.rows.iter().filter(|row| row.kind == kind).count();
-            let text = proposal.text(cx);
-            PlanFigures {
-                origin: text.origin,
-                identification: count(PoseKind::Identification),
-                verification: count(PoseKind::Verification),
-                condition_number: text.condition_number,
-                predicted_error_sigma: text.predicted_error_sigma,
-                minutes: text.minutes,
-            }
+        let proposal = self.proposal.as_ref().map(|Proposal { plan, .. }| PlanFigures {
+            plan: plan.without_rows(),
+            identification: plan.count(PoseKind::Identification),
+            verification: plan.count(PoseKind::Verification),
         });
         let summary = self.proposal.as_ref().and_then(|proposal| proposal.summary.clone());
         Content::Plan(PlanView {

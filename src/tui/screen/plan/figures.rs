@@ -66,21 +66,21 @@ fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>, is_narrow: bool
         return in_short(figures, summary);
     }
     if let (Some(summary), Some(condition), Some(sigma)) =
-        (summary, figures.condition_number, figures.predicted_error_sigma)
+        (summary, figures.plan.condition_number, figures.plan.predicted_error_sigma)
     {
         return compared(figures, summary, condition, sigma);
     }
     let mut lines = vec![named("poses", &format!("{} + {} to verify", figures.identification, figures.verification))];
-    if let Some(condition) = figures.condition_number {
+    if let Some(condition) = figures.plan.condition_number {
         lines.push(named("condition number", &format!("{condition:.1}")));
     }
-    if let Some(sigma) = figures.predicted_error_sigma {
+    if let Some(sigma) = figures.plan.predicted_error_sigma {
         lines.push(named("predicted error", &format!("{sigma:.4} sigma")));
     }
-    if let Some(minutes) = figures.minutes {
+    if let Some(minutes) = figures.plan.minutes {
         lines.push(named("time", &format!("about {}", time(minutes))));
     }
-    lines.push((Role::Dim, figures.origin.clone()));
+    lines.push((Role::Dim, figures.plan.origin.clone()));
     lines
 }
 
@@ -88,18 +88,18 @@ fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>, is_narrow: bool
 fn in_short(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, String)> {
     let line = |name: &str, value: &str| (Role::Plain, format!("{name:<SHORT_NAMES$} {value}"));
     let mut lines = vec![line("poses", &format!("{} + {}", figures.identification, figures.verification))];
-    lines.extend(figures.condition_number.map(|condition| line("condition", &format!("{condition:.1}"))));
+    lines.extend(figures.plan.condition_number.map(|condition| line("condition", &format!("{condition:.1}"))));
     let mm = summary.and_then(|summary| summary.predicted_rms_mm).map(|mm| format!("{mm:.4} mm"));
-    let sigma = figures.predicted_error_sigma.map(|sigma| format!("{sigma:.4} sigma"));
+    let sigma = figures.plan.predicted_error_sigma.map(|sigma| format!("{sigma:.4} sigma"));
     lines.extend(mm.or(sigma).map(|error| line("error", &error)));
     if let Some(summary) = summary {
         let best = &summary.random;
         lines.push((Role::Dim, format!("best of {} random:", best.sets)));
-        let scale = summary.predicted_rms_mm.map_or(1.0, |mm| mm / summary.predicted_error_sigma);
-        let error = best.predicted_error_sigma.best * scale;
-        lines.push((Role::Dim, format!("{:<SHORT_NAMES$} {:.1}, {error:.4}", "", best.condition_number.best)));
+        let scale = summary.predicted_rms_mm.map_or(1.0, |mm| mm / summary.score.predicted_error);
+        let error = best.errors.best * scale;
+        lines.push((Role::Dim, format!("{:<SHORT_NAMES$} {:.1}, {error:.4}", "", best.conditions.best)));
     }
-    lines.extend(figures.minutes.map(|minutes| line("time", &time(minutes))));
+    lines.extend(figures.plan.minutes.map(|minutes| line("time", &time(minutes))));
     lines
 }
 
@@ -111,8 +111,8 @@ fn compared(figures: &PlanFigures, summary: &PlanSummary, condition: f64, sigma:
     let (factor, unit) = mm.map_or((1.0, "sigma"), |mm| (mm, "mm"));
     let row = |name: &str, [plan, median, best]: [String; 3]| format!("{name:<NAMES$}{plan:>7}{median:>7}{best:>12}");
     let head = ["plan".to_owned(), "random".to_owned(), format!("best of {}", random.sets)];
-    let of_condition = [condition, random.condition_number.median, random.condition_number.best];
-    let error = &random.predicted_error_sigma;
+    let of_condition = [condition, random.conditions.median, random.conditions.best];
+    let error = &random.errors;
     let of_error = [sigma, error.median, error.best].map(|sigma| format!("{:.4}", sigma * factor));
     let mut lines = vec![
         named("poses", &format!("{} + {} to verify", figures.identification, figures.verification)),
@@ -120,7 +120,7 @@ fn compared(figures: &PlanFigures, summary: &PlanSummary, condition: f64, sigma:
         (Role::Plain, row("condition number", of_condition.map(|value| format!("{value:.1}")))),
         (Role::Plain, row(&format!("predicted, {unit}"), of_error)),
     ];
-    lines.extend(figures.minutes.map(|minutes| named("time", &format!("about {}", time(minutes)))));
+    lines.extend(figures.plan.minutes.map(|minutes| named("time", &format!("about {}", time(minutes)))));
     lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
     let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
     if weak + warnings > 0 {

@@ -30,12 +30,11 @@ impl Search {
         if !self.is_running {
             *self = Self { is_running: true, ..Self::default() };
         }
-        let Some(condition) = busy.condition_number.filter(|condition| condition.is_finite()) else { return };
-        let error = busy.predicted_error.filter(|error| error.is_finite());
-        self.best_error = match (self.best_error, error) {
-            (Some(best), Some(error)) => Some(best.min(error)),
-            (best, error) => best.or(error),
-        };
+        let Some(found) = busy.figures.filter(|found| found.condition_number.is_finite()) else { return };
+        let condition = found.condition_number;
+        if found.predicted_error.is_finite() {
+            self.best_error = Some(self.best_error.map_or(found.predicted_error, |best| best.min(found.predicted_error)));
+        }
         if self.conditions.last().is_none_or(|last| last.1.to_bits() != condition.to_bits())
             && self.conditions.len() < MOST
         {

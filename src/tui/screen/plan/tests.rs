@@ -1,9 +1,10 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::planning::{Figures, ObservabilityIndices, Score, Spread, Yardstick};
+use crate::session::journal::PlanText;
 use crate::session::plan_summary::{
-    CandidateSummary, ObservabilitySummary, PlanSummary, RandomSummary, RejectionSummary, SCHEMA, SpreadSummary,
-    TimeSummary, TradeOffSummary, WeakParameterSummary,
+    CandidateSummary, PlanSummary, RejectionSummary, SCHEMA, TimeSummary, TradeOffSummary, WeakParameterSummary,
 };
 use crate::session::set_up::Step;
 use crate::session::summary::{Provenance, Warning};
@@ -34,18 +35,23 @@ fn summary() -> PlanSummary {
         identification_poses: 56,
         verification_poses: 20,
         parameter_count: 25,
-        rank: 25,
-        condition_number: 69.12,
-        condition_number_raw: 812.0,
-        observability: ObservabilitySummary { o1: 1.0, o2: 1.0, o3: 1.0, o4: 1.0, o5: 1.0 },
-        predicted_error_sigma: 0.68,
+        score: Score {
+            poses: 56,
+            rank: 25,
+            condition_number: 69.12,
+            condition_number_raw: 812.0,
+            observability: ObservabilityIndices { o1: 1.0, o2: 1.0, o3: 1.0, o4: 1.0, o5: 1.0 },
+            predicted_error: 0.68,
+            log_det: 1.0,
+            precision: Vec::new(),
+        },
         sigma_mm: Some(0.015),
         predicted_rms_mm: Some(0.0102),
         predicted_verification_rms_mm: Some(0.028),
-        random: RandomSummary {
+        random: Yardstick {
             sets: 200,
-            condition_number: SpreadSummary { median: 131.4, best: 98.2 },
-            predicted_error_sigma: SpreadSummary { median: 0.91, best: 0.80 },
+            conditions: Spread { median: 131.4, best: 98.2 },
+            errors: Spread { median: 0.91, best: 0.80 },
         },
         d_efficiency: 0.934,
         d_bound_gap: 0.001,
@@ -73,12 +79,16 @@ fn summary() -> PlanSummary {
 
 fn figures() -> PlanFigures {
     PlanFigures {
-        origin: "chosen among 5000 candidates, seed 1".to_owned(),
+        plan: PlanText {
+            origin: "chosen among 5000 candidates, seed 1".to_owned(),
+            condition_number: Some(69.12),
+            predicted_error_sigma: Some(0.68),
+            minutes: Some(146.0),
+            search: Vec::new(),
+            rows: Vec::new(),
+        },
         identification: 56,
         verification: 20,
-        condition_number: Some(69.12),
-        predicted_error_sigma: Some(0.68),
-        minutes: Some(146.0),
     }
 }
 
@@ -125,8 +135,7 @@ pub(in crate::tui::screen) fn searching(condition: f64) -> ViewModel {
         what: "planning",
         progress: Some(format!("choosing, start 2 of 3: condition {condition:.1}, predicted error 0.680 sigma")),
         part: Some(0.58),
-        condition_number: Some(condition),
-        predicted_error: Some(0.68),
+        figures: Some(Figures { condition_number: condition, o1: 0.1, predicted_error: 0.68 }),
         is_cancelled: false,
     });
     view

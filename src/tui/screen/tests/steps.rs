@@ -12,8 +12,7 @@ fn busy(mut view: ViewModel, what: &'static str, progress: Option<&str>) -> View
         what,
         progress: progress.map(str::to_owned),
         part: None,
-        condition_number: None,
-        predicted_error: None,
+        figures: None,
         is_cancelled: false,
     });
     for info in &mut view.intents {
