@@ -110,10 +110,10 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
 /// How to identify, as the command line asks for it.
 fn estimation_settings(args: &EstimationArgs, weighting: Weighting) -> EstimationSettings {
     EstimationSettings {
-        level: args.level.into(),
+        level: args.level,
         weighting,
-        prior: args.prior.into(),
-        estimator: args.estimator.into(),
+        prior: args.prior,
+        estimator: args.estimator,
         iterations: args.iterations,
         sigma: args.sigma_mm.map(from_mm),
         expected_deviation: args.expected_deviation,
@@ -138,7 +138,7 @@ mod tests {
     fn without_options_the_command_identifies_by_default() {
         let words = ["trupose", "identify", "--profile", "soochow", "--measurements", "points.csv"];
         let Some(Command::Identify(args)) = Cli::parse_from(words).command else { panic!("not the command") };
-        let asked = estimation_settings(&args.estimation, args.weighting.into());
+        let asked = estimation_settings(&args.estimation, args.weighting);
         assert_eq!(asked, EstimationSettings::default());
     }
 }

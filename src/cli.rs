@@ -10,7 +10,7 @@ pub mod compensate;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use nalgebra::Point3;
 
 use crate::identification::{Estimator, Prior, Weighting};
@@ -18,6 +18,7 @@ use crate::planning::{BoxInBase, Objective};
 use crate::profile::{ExpectedDeviation, Level};
 use crate::program::{DEFAULT_DWELL, Dialect, MAX_SPEED};
 use crate::session::measurements::Layout;
+use crate::session::summary::Refit;
 use crate::units::from_mm;
 
 use link::wires;
@@ -234,13 +235,13 @@ pub struct EstimationArgs {
     pub filter: Option<String>,
     /// How samples are trusted
     #[arg(long, value_enum, default_value_t)]
-    pub estimator: EstimatorArg,
+    pub estimator: Estimator,
     /// What is assumed about deviations: those the profile expects, or nothing (the paper's minimum-norm solution)
     #[arg(long, value_enum, default_value_t)]
-    pub prior: PriorArg,
+    pub prior: Prior,
     /// What is identified: joint offsets only, or all geometric parameters
     #[arg(long, value_enum, default_value_t)]
-    pub level: LevelArg,
+    pub level: Level,
     /// Largest number of solver steps; 1 is the paper's single linear step
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=100_000))]
     pub iterations: usize,
@@ -281,7 +282,7 @@ pub struct IdentifyArgs {
     pub verify_rest: bool,
     /// Weighting of the distances: with their true covariance, or all pairs alike as in the paper
     #[arg(long, value_enum, default_value_t)]
-    pub weighting: WeightingArg,
+    pub weighting: Weighting,
 }
 
 /// Arguments of `verify`.
@@ -301,7 +302,7 @@ pub struct VerifyArgs {
     pub filter: Option<String>,
     /// What to fit to these points because the set-up changed: nothing, the tracker's place, or also the SMR's mounting
     #[arg(long, value_enum, default_value_t)]
-    pub refit: RefitArg,
+    pub refit: Refit,
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
@@ -383,7 +384,7 @@ pub struct PlanArgs {
     pub expected_deviation: Option<ExpectedDeviation>,
     /// What will be identified
     #[arg(long, value_enum, default_value_t)]
-    pub level: LevelArg,
+    pub level: Level,
     /// Standard deviation of a measured coordinate [default: of the profile's instrument]
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub sigma_mm: Option<f64>,
@@ -513,95 +514,6 @@ fn speed_percent(text: &str) -> Result<f64, String> {
         Ok(value) if value > 0.0 && value <= 100.0 * MAX_SPEED => Ok(value),
         _ => Err(format!("'{text}' is not a speed between 0 and {:.0} percent", 100.0 * MAX_SPEED)),
     }
-}
-
-/// `--estimator`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum EstimatorArg {
-    /// Find outliers, name them and leave them out
-    #[default]
-    Robust,
-    /// Every sample counts
-    LeastSquares,
-}
-
-impl From<EstimatorArg> for Estimator {
-    fn from(argument: EstimatorArg) -> Self {
-        match argument {
-            EstimatorArg::Robust => Self::Robust,
-            EstimatorArg::LeastSquares => Self::LeastSquares,
-        }
-    }
-}
-
-/// `--prior`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PriorArg {
-    /// Deviations as the profile expects them
-    #[default]
-    Expected,
-    /// Nothing; badly determined parameters may run away
-    None,
-}
-
-impl From<PriorArg> for Prior {
-    fn from(argument: PriorArg) -> Self {
-        match argument {
-            PriorArg::Expected => Self::Expected,
-            PriorArg::None => Self::None,
-        }
-    }
-}
-
-/// `--level`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum LevelArg {
-    /// Level 1: joint offsets
-    Offsets,
-    /// Level 2: all link constants
-    #[default]
-    Geometric,
-}
-
-impl From<LevelArg> for Level {
-    fn from(argument: LevelArg) -> Self {
-        match argument {
-            LevelArg::Offsets => Self::Offsets,
-            LevelArg::Geometric => Self::Geometric,
-        }
-    }
-}
-
-/// `--weighting`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum WeightingArg {
-    /// With the covariance that distances really have
-    #[default]
-    Covariance,
-    /// All pairs alike, as in the paper
-    Uniform,
-}
-
-impl From<WeightingArg> for Weighting {
-    fn from(argument: WeightingArg) -> Self {
-        match argument {
-            WeightingArg::Covariance => Self::Covariance,
-            WeightingArg::Uniform => Self::Uniform,
-        }
-    }
-}
-
-/// `--refit`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum RefitArg {
-    /// Same tracker position and SMR mounting as at the identification
-    #[default]
-    None,
-    /// The tracker was moved
-    Frame,
-    /// The tracker was moved and the SMR mounted anew
-    #[value(name = "frame+target")]
-    FrameAndTarget,
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -17,6 +17,7 @@ mod syntax;
 mod text;
 pub mod wire;
 
+use clap::ValueEnum;
 use nalgebra::{Point3, Unit, Vector3};
 
 pub use builtin::{builtin, builtin_names};
@@ -28,6 +29,7 @@ pub use text::{check_text, list_text, show_text};
 use wire::LinkSettings;
 
 use crate::kinematics::{Arm, Axis, FreeParameter, KinematicChain, LinkParameter, ParameterId};
+use crate::text::{names_of_option, written_as_text};
 
 /// Angle below which neighbouring axes count as parallel (rad): 1°, far above any assembly error and far below any design angle.
 pub const PARALLEL_TOLERANCE: f64 = crate::units::DEGREE;
@@ -106,15 +108,19 @@ pub struct Acceptance {
     pub distance_max: Option<f64>,
 }
 
-/// Which parameters are identified.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+/// Which parameters are identified: θ of revolute and d of prismatic joints alone, or all link constants, with β where the profile
+/// has it. The comments on the values are the help of `--level`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
 pub enum Level {
-    /// Level 1: joint offsets (θ of revolute, d of prismatic joints).
+    /// Level 1: joint offsets
     Offsets,
-    /// Level 2: all link constants, with β where the profile has it.
+    /// Level 2: all link constants
     #[default]
     Geometric,
 }
+
+names_of_option!(Level);
+written_as_text!(Level);
 
 impl Profile {
     /// Reads a profile. `file_name` stands in the messages only.

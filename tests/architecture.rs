@@ -42,7 +42,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("wizard", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "procedure"]),
     ("runtime", &["profile", "session", "procedure", "link", "store", "recording", "wizard"]),
     ("script", &["session", "wizard", "runtime"]),
-    ("tui", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "wizard", "runtime"]),
+    (
+        "tui",
+        &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "wizard", "runtime"],
+    ),
     ("cli", &["units", "kinematics", "identification", "planning", "profile", "session", "program", "model"]),
     (
         "app",

@@ -145,7 +145,7 @@ fn the_next_best_poses_follow_those_already_measured() {
     assert!(new.iter().all(|row| included.iter().all(|known| known.configuration != row.configuration)));
 
     let before = check(&profile, &text, &request, &included, "measured").unwrap();
-    assert!(summary.predicted_error_sigma < before.predicted_error_sigma);
+    assert!(summary.score.predicted_error < before.score.predicted_error);
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::procedure::summary::{Finished, SampleName, Special};
 use crate::procedure::{EstimationSettings, ProcedureError, checks, input_file, joint_types, target_parameters};
 use crate::session::constraints::{Constraints, SharedPoints, read_constraints_bytes};
 use crate::session::filter::Filter;
-use crate::session::summary::{ModelSummary, VerificationMode, VerificationSummary, Warning};
+use crate::session::summary::{InputRole, ModelSummary, Refit, VerificationMode, VerificationSummary, Warning};
 use crate::store;
 use crate::units::from_mm;
 
@@ -123,7 +123,7 @@ pub(super) fn run<O: Write, E: Write>(
         profile: &loaded.profile,
         profile_text: &loaded.text,
         created: load::now(),
-        inputs: vec![input_file("identification", file, &bytes)],
+        inputs: vec![input_file(InputRole::Identification, file, &bytes)],
         settings: &setup.estimation,
         special,
         found: &found,
@@ -343,7 +343,7 @@ impl<'a> Setup<'a> {
             samples: identified.seats.len() + identified.lengths.len(),
             basis,
             independent: true,
-            refit: "none".to_owned(),
+            refit: Refit::None,
             nominal,
             identified: identified_summary,
             residual_by_joint: if configurations.is_empty() {

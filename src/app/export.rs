@@ -19,7 +19,7 @@ const LONGEST_ARM: f64 = 20.0;
 pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let arm = calibrated_arm(&args.calibration, console)?;
     let given = args.into.as_deref().map(load::text).transpose()?;
-    let format = Format::from(args.format);
+    let format = args.format;
     if given.is_some() && format != Format::Urdf {
         return Err(Failure::new(ExitStatus::Usage, "'--into' is for '--format urdf'"));
     }
@@ -76,7 +76,7 @@ pub(super) fn import_urdf<O: Write, E: Write>(
     let unusable = |error: &dyn std::error::Error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}"));
     let urdf = Urdf::parse(&text).map_err(|error| unusable(&error))?;
     let chain = urdf.chain(&args.base, &args.tip).map_err(|error| unusable(&error))?;
-    let arm = import(&chain, args.convention.into()).map_err(|error| unusable(&error))?;
+    let arm = import(&chain, args.convention).map_err(|error| unusable(&error))?;
     let mut comments = vec![format!("From a URDF: links '{}' to '{}'.", args.base, args.tip)];
     comments.extend(arm.notes.iter().cloned());
     let heading = Heading {

@@ -18,7 +18,7 @@ use crate::session::TableProblem;
 use crate::session::calibration::Calibration;
 use crate::session::measurements::Row;
 use crate::session::state::Session;
-use crate::session::summary::{IdentificationSummary, VerdictStatus, VerificationMode};
+use crate::session::summary::{IdentificationSummary, InputRole, VerdictStatus, VerificationMode};
 use crate::store;
 
 pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
@@ -29,11 +29,14 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         console.remark(&diagnostic.to_string());
     }
     args.record.record.as_deref().map_or(Ok(()), record::check_target)?;
-    let identification = load::measurements(&args.measurements, args.layout, profile, "identification")?;
+    let identification = load::measurements(&args.measurements, args.layout, profile, InputRole::Identification)?;
     let filter = load::filter(estimation.filter.as_deref(), &identification.table.columns)?;
     let (rows, rest) = load::split(&identification.table, filter.as_ref())?;
-    let verification =
-        args.verify.as_ref().map(|path| load::measurements(path, args.layout, profile, "verification")).transpose()?;
+    let verification = args
+        .verify
+        .as_ref()
+        .map(|path| load::measurements(path, args.layout, profile, InputRole::Verification))
+        .transpose()?;
     let (verification_rows, basis, verification_mode) = match &verification {
         Some(loaded) => {
             let basis = format!("'{}', same set-up", loaded.input.file);
@@ -63,12 +66,12 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         profile_text: loaded.text,
         created: now(),
         inputs,
-        settings: estimation_settings(estimation, args.weighting.into()),
+        settings: estimation_settings(estimation, args.weighting),
         identification: set,
         verification: verification_set,
         basis,
         verification_mode,
-        layout: Some(args.layout.to_string()),
+        layout: Some(args.layout),
     };
     let mut progress = Progress::new(&mut console.err);
     let mut identified = identify(&request, &mut |iteration| {

@@ -10,7 +10,7 @@ use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
 use crate::session::export::simulation_of_table;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, Measurements, Row, read_bytes_as};
-use crate::session::summary::{InputFile, Warning};
+use crate::session::summary::{InputFile, InputRole, Warning};
 use crate::store;
 
 /// A profile with the text it came from.
@@ -68,7 +68,12 @@ pub(super) struct LoadedTable {
 }
 
 /// A measurement table for the robot of a profile.
-pub(super) fn measurements(path: &Path, layout: Layout, profile: &Profile, role: &str) -> Result<LoadedTable, Failure> {
+pub(super) fn measurements(
+    path: &Path,
+    layout: Layout,
+    profile: &Profile,
+    role: InputRole,
+) -> Result<LoadedTable, Failure> {
     let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = path.display().to_string();
     let table = read_bytes_as(layout, &bytes, &file, &joint_types(profile))

@@ -22,7 +22,7 @@ use crate::profile::Profile;
 use crate::report;
 use crate::session::plan::{self, PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
-use crate::session::summary::{InputFile, Warning};
+use crate::session::summary::{InputFile, InputRole, Warning};
 use crate::store;
 use crate::units::from_mm;
 
@@ -98,7 +98,7 @@ fn request(args: &PlanArgs, profile: &Profile) -> Result<PlanRequest, Failure> {
         filters: !args.no_filters,
         clearance: from_mm(args.clearance_mm),
         expected_deviation: args.expected_deviation,
-        level: args.level.into(),
+        level: args.level,
         sigma: args.sigma_mm.map(from_mm),
         drift_every: args.drift_every,
         pace: Pace { speed: args.speed_percent / 100.0, settle: args.settle_s, shots: args.shots, ..Pace::default() },
@@ -120,7 +120,7 @@ fn listed_poses(file: &Path, profile: &Profile) -> Result<Listed, Failure> {
     let listed = plan::read_bytes(&bytes, &name, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     let warnings = checks::table_warnings(None, &listed.warnings);
-    Ok(Listed { rows: listed.rows, warnings, input: input_file("plan", name, &bytes) })
+    Ok(Listed { rows: listed.rows, warnings, input: input_file(InputRole::Plan, name, &bytes) })
 }
 
 /// The identification poses that are already measured, and what to say about the file.

@@ -317,7 +317,8 @@ pub(super) fn plan(
     let types = joint_types(profile);
     let rows = crate::procedure::plan::rows(summary, &types);
     let mut lines = Lines::new(path, source, profile_text);
-    let origin = summary.objective.map_or_else(|| "a list that was checked".to_owned(), |objective| objective.to_string());
+    let origin =
+        summary.objective.map_or_else(|| "a list that was checked".to_owned(), |objective| objective.to_string());
     lines.push(Entry::Plan(PlanText::new(origin, Some(summary), &rows, &types)));
     recording::write(path, &lines.lines, true).map_err(|error| failure(&error))
 }

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::identify::exit_status;
 use super::{Console, advice, load, to_json};
-use crate::cli::{RefitArg, VerifyArgs};
+use crate::cli::VerifyArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{Observations, Places, PointSample, Problem};
@@ -17,7 +17,7 @@ use crate::procedure::{ProcedureError, input_file, provenance};
 use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
-use crate::session::summary::{ModelSummary, SCHEMA, SIMULATED, VerificationReport, Warning};
+use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
 use crate::units::{MICROMETRE, MILLIMETRE, from_mm, to_mm};
 
 /// How freely a target that was mounted anew is fitted (m).
@@ -34,7 +34,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     })?;
     let loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
     let profile = &calibration.mounted.map_or_else(|| loaded.profile.clone(), |mounted| mounted.on(&loaded.profile));
-    let measured = load::measurements(&args.measurements, args.layout, profile, "verification")?;
+    let measured = load::measurements(&args.measurements, args.layout, profile, InputRole::Verification)?;
     let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;
     let (rows, _) = load::split(&measured.table, filter.as_ref())?;
     let samples = load::samples(&rows, profile)?;
@@ -57,12 +57,12 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let of_calibration = calibration.warnings.iter().find(|warning| warning.code == SIMULATED);
     warnings.extend(measured.simulated.as_ref().or(of_calibration).cloned());
     warnings.extend(plausible);
-    let (refit, basis, fitted) = match args.refit {
-        RefitArg::None => ("none", "same set-up as the identification", 0),
-        RefitArg::Frame => ("frame", "another set-up: the place of the tracker was fitted to these very points", 6),
-        RefitArg::FrameAndTarget => {
+    let (basis, fitted) = match args.refit {
+        Refit::None => ("same set-up as the identification", 0),
+        Refit::Frame => ("another set-up: the place of the tracker was fitted to these very points", 6),
+        Refit::FrameAndTarget => {
             let basis = "another set-up: the place of the tracker and the SMR were fitted to these very points";
-            ("frame+target", basis, 6 + remounted_targets(profile, &samples).len())
+            (basis, 6 + remounted_targets(profile, &samples).len())
         }
     };
     let joints = profile.chain().joints();
@@ -87,14 +87,14 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         &nominal_errors,
         &identified_errors,
         format!("'{}', {basis}", measured.input.file),
-        refit,
+        args.refit,
     );
     verification.independent = checks::is_independent(&warnings);
-    if args.refit == RefitArg::None {
+    if args.refit == Refit::None {
         warnings.splice(0..0, moved_set_up(&verification.identified));
     }
     warnings.iter_mut().for_each(|warning| warning.put_into_words(advice::words));
-    let inputs = vec![input_file("calibration", file, text.as_bytes()), measured.input];
+    let inputs = vec![input_file(InputRole::Calibration, file, text.as_bytes()), measured.input];
     let report = VerificationReport {
         schema: SCHEMA,
         provenance: provenance(profile, &calibration.profile, load::now(), inputs),
@@ -110,7 +110,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
 /// Looks for mistakes in the whole table, as `identify` does.
 fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) -> Result<Option<Warning>, Failure> {
     let mut parameters = profile.free_parameters(Level::Geometric);
-    if args.refit == RefitArg::FrameAndTarget {
+    if args.refit == Refit::FrameAndTarget {
         parameters.retain(|parameter| matches!(parameter.id, ParameterId::Link { .. }));
         parameters.extend(remounted_targets(profile, samples));
     }
@@ -205,13 +205,13 @@ impl Models {
     /// Both models with the set-up in which `samples` were measured.
     fn set_up(
         self,
-        refit: RefitArg,
+        refit: Refit,
         profile: &Profile,
         samples: &[PointSample],
         file: &str,
     ) -> Result<(FittedSetup, FittedSetup), Failure> {
         let free = match refit {
-            RefitArg::None => {
+            Refit::None => {
                 let known = |arm, station: Option<Isometry3<f64>>| -> Result<FittedSetup, Failure> {
                     let base_from_station = vec![station.ok_or_else(|| {
                         Failure::new(ExitStatus::Usage, format!("'{file}' knows no place of a tracker"))
@@ -221,8 +221,8 @@ impl Models {
                 };
                 return Ok((known(self.nominal, self.nominal_station)?, known(self.identified, self.station)?));
             }
-            RefitArg::Frame => Vec::new(),
-            RefitArg::FrameAndTarget => remounted_targets(profile, samples),
+            Refit::Frame => Vec::new(),
+            Refit::FrameAndTarget => remounted_targets(profile, samples),
         };
         let observations = Observations { points: samples.to_vec(), ..Observations::default() };
         let fit = |arm: &Arm| fit_setup(arm, &free, &observations).map_err(ProcedureError::from);

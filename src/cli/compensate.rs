@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr as _;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use crate::kinematics::Convention;
 use crate::model::Format;
@@ -46,7 +46,7 @@ pub struct ExportArgs {
     pub calibration: PathBuf,
     /// Format of the model
     #[arg(long, value_enum)]
-    pub format: FormatArg,
+    pub format: Format,
     /// URDF that is to take the geometry; only the origins of its chain change
     #[arg(long, value_name = "URDF")]
     pub into: Option<PathBuf>,
@@ -64,33 +64,6 @@ pub struct ExportArgs {
     pub out: PathBuf,
 }
 
-/// `--format`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum FormatArg {
-    /// Robot profile with the identified geometry
-    CorrectedProfile,
-    /// URDF
-    Urdf,
-    /// default_kinematics.yaml of the ROS description of Universal Robots
-    UrKinematics,
-    /// Table of link constants
-    DhCsv,
-    /// Link constants for programs
-    Json,
-}
-
-impl From<FormatArg> for Format {
-    fn from(format: FormatArg) -> Self {
-        match format {
-            FormatArg::CorrectedProfile => Self::CorrectedProfile,
-            FormatArg::Urdf => Self::Urdf,
-            FormatArg::UrKinematics => Self::UrKinematics,
-            FormatArg::DhCsv => Self::DhCsv,
-            FormatArg::Json => Self::Json,
-        }
-    }
-}
-
 /// Arguments of `profile import-urdf`.
 #[derive(Args, Debug)]
 pub struct ImportUrdfArgs {
@@ -104,27 +77,8 @@ pub struct ImportUrdfArgs {
     pub tip: String,
     /// Order of the link constants
     #[arg(long, value_enum, default_value_t)]
-    pub convention: ConventionArg,
+    pub convention: Convention,
     /// File for the profile [default: print it]
     #[arg(long, value_name = "RON")]
     pub out: Option<PathBuf>,
-}
-
-/// `--convention`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum ConventionArg {
-    /// Denavit and Hartenberg: theta, d, a, alpha
-    #[default]
-    Standard,
-    /// Craig: alpha, a, theta, d
-    Modified,
-}
-
-impl From<ConventionArg> for Convention {
-    fn from(convention: ConventionArg) -> Self {
-        match convention {
-            ConventionArg::Standard => Self::Standard,
-            ConventionArg::Modified => Self::Modified,
-        }
-    }
 }

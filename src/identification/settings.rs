@@ -1,37 +1,51 @@
-//! How an identification is asked for, and what its steps and its end look like.
+//! Settings of an identification, and what its steps and its end look like.
+//!
+//! The comments on the values of [`Weighting`], [`Prior`] and [`Estimator`] are the help of their options on the command line.
 
-/// How pairs of points are weighted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+use crate::text::{names_of_option, written_as_text};
+
+/// Weighting of the pairs of points. The covariance costs O(M) and gives about 10 % better parameters than uniform weights, which
+/// cost O(M²).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Weighting {
-    /// With the covariance that pairs really have: cost O(M), about 10 % better parameters.
+    /// With the covariance that distances really have
     #[default]
     Covariance,
-    /// All pairs alike, as the paper has it: cost O(M²).
+    /// All pairs alike, as in the paper
     Uniform,
 }
 
-/// What is assumed about the deviations before measuring.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Prior on the deviations: zero mean with the expected deviations as standard deviations, or the minimum-norm solution in rad and
+/// mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Prior {
-    /// Zero mean, expected deviations as standard deviations.
+    /// Deviations as the profile expects them
     #[default]
     Expected,
-    /// Nothing: the minimum-norm solution in rad and mm, as in the paper. Badly determined parameters may run away.
+    /// Nothing; badly determined parameters may run away
     None,
 }
 
-/// How samples are trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+names_of_option!(Weighting, Prior);
+written_as_text!(Weighting, Prior);
+
+/// Treatment of outliers: a robust loss finds them, or there is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// Outliers are found with a robust loss, named and removed.
+    /// Find outliers, name them and leave them out
     #[default]
     Robust,
-    /// Every sample counts.
+    /// Every sample counts
     LeastSquares,
 }
 
-/// Where the measurement σ comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Origin of the measurement σ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SigmaSource {
     /// Every reading has its own.
     Readings,
@@ -86,7 +100,8 @@ pub struct Iteration {
 }
 
 /// Why the solver stopped. In every case but [`Self::NonFinite`] the parameters are the best found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum TerminationReason {
     /// The step or the expected decrease of the cost became negligible.
     Converged,

@@ -1,16 +1,22 @@
 //! The geometry of a serial arm: links, joints, couplings and the two fixed frames around them.
 
+use clap::ValueEnum;
 use nalgebra::Isometry3;
 
 use super::KinematicsError;
 use crate::units::Quantity;
 
-/// Order of the elementary transforms of a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Order of the elementary transforms of a link, with β as Hayati added it. The comments on the values are the help of
+/// `--convention`.
+///
+/// - standard: `Rot(z,θ) Trans(z,d) Trans(x,a) Rot(x,α) Rot(y,β)`, equations (1)–(3) of the method paper.
+/// - modified: `Rot(x,α) Trans(x,a) Rot(y,β) Rot(z,θ) Trans(z,d)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Convention {
-    /// `Rot(z,θ) Trans(z,d) Trans(x,a) Rot(x,α) Rot(y,β)`: Denavit–Hartenberg with Hayati's β, equations (1)–(3) of the method paper.
+    /// Denavit and Hartenberg: theta, d, a, alpha
+    #[default]
     Standard,
-    /// `Rot(x,α) Trans(x,a) Rot(y,β) Rot(z,θ) Trans(z,d)`: Craig's modified form, with Hayati's β before the joint.
+    /// Craig: alpha, a, theta, d
     Modified,
 }
 

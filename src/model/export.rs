@@ -1,5 +1,6 @@
 //! The identified arm in each format, with the proof.
 
+use clap::ValueEnum;
 use nalgebra::{Isometry3, Vector3};
 
 use super::profile_text::{Heading, complete};
@@ -14,36 +15,22 @@ use crate::session::calibration::Calibration;
 use crate::session::summary::{SIMULATED, VerdictStatus};
 use crate::units::{from_mm, to_deg, to_mm};
 
-/// A format of a model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+/// A format of a model. The comments on the values are the help of `--format`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
 pub enum Format {
-    /// A robot profile with the identified geometry.
+    /// Robot profile with the identified geometry
     CorrectedProfile,
-    /// URDF.
+    /// URDF
     Urdf,
-    /// Parameter file of the ROS description of Universal Robots.
+    /// default_kinematics.yaml of the ROS description of Universal Robots
     UrKinematics,
-    /// Table of link constants.
+    /// Table of link constants
     DhCsv,
-    /// Link constants for programs.
+    /// Link constants for programs
     Json,
 }
 
 impl Format {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::CorrectedProfile, Self::Urdf, Self::UrKinematics, Self::DhCsv, Self::Json];
-
-    /// Name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::CorrectedProfile => "corrected-profile",
-            Self::Urdf => "urdf",
-            Self::UrKinematics => "ur-kinematics",
-            Self::DhCsv => "dh-csv",
-            Self::Json => "json",
-        }
-    }
-
     /// Usual name of the file.
     pub const fn file_name(self) -> &'static str {
         match self {

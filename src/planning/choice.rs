@@ -4,9 +4,9 @@
 //! that the result does not depend on who runs them or in which order. The balanced objective takes two stages: the first
 //! finds how well a set can predict, the second lowers the condition number without giving much of that away.
 
+use clap::ValueEnum;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
-use clap::ValueEnum;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 

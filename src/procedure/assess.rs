@@ -7,8 +7,8 @@ use crate::profile::Acceptance;
 use crate::report::number;
 use crate::session::advice::Advice;
 use crate::session::summary::{
-    AxisSummary, JointBin, JointSummary, LimitCheck, ModelSummary, StatisticsSummary, Verdict, VerdictStatus,
-    VerificationSummary, Warning,
+    AxisSummary, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, StatisticsSummary, Verdict,
+    VerdictStatus, VerificationSummary, Warning,
 };
 use crate::units::to_mm;
 
@@ -72,14 +72,14 @@ pub(crate) fn point_verification(
     nominal: &ModelErrors,
     identified: &ModelErrors,
     basis: String,
-    refit: &str,
+    refit: Refit,
 ) -> VerificationSummary {
     let configurations: Vec<&[f64]> = samples.iter().map(|sample| sample.at.configuration.as_slice()).collect();
     VerificationSummary {
         samples: samples.len(),
         basis,
         independent: true,
-        refit: refit.to_owned(),
+        refit,
         nominal: model_summary(nominal),
         identified: model_summary(identified),
         residual_by_joint: joint_summaries(joints, &configurations, &identified.vectors),
@@ -103,7 +103,7 @@ pub(crate) fn verdict(
         .iter()
         .filter(|check| check.met == Some(false))
         .map(|check| {
-            let (name, limit) = (check.quantity.replace('_', " "), number(check.limit_mm, 3));
+            let (name, limit) = (check.quantity.words(), number(check.limit_mm, 3));
             match check.value_mm {
                 Some(value) if value.is_finite() => {
                     format!("{name} {} mm is above the limit of {limit} mm", number(value, 3))
@@ -124,7 +124,7 @@ pub(crate) fn verdict(
         return decided(VerdictStatus::NotEvaluated, reasons, checks);
     }
     let open: Vec<String> =
-        checks.iter().filter(|check| check.met.is_none()).map(|check| check.quantity.replace('_', " ")).collect();
+        checks.iter().filter(|check| check.met.is_none()).map(|check| check.quantity.words()).collect();
     let refused = !reasons.is_empty();
     if !open.is_empty() {
         reasons.push(format!("these data do not tell: {}", open.join(", ")));
@@ -150,19 +150,19 @@ fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck
     let position = |pick: fn(&StatisticsSummary) -> f64| position_errors.map(pick);
     let distance = |pick: fn(&StatisticsSummary) -> f64| found.distance_mm.as_ref().map(pick);
     [
-        ("position_mean", acceptance.position_mean, position(|s| s.mean)),
-        ("position_rms", acceptance.position_rms, position(|s| s.rms)),
-        ("position_max", acceptance.position_max, position(|s| s.max)),
-        ("distance_mean", acceptance.distance_mean, distance(|s| s.mean)),
-        ("distance_rms", acceptance.distance_rms, distance(|s| s.rms)),
-        ("distance_max", acceptance.distance_max, distance(|s| s.max)),
+        (LimitedQuantity::PositionMean, acceptance.position_mean, position(|s| s.mean)),
+        (LimitedQuantity::PositionRms, acceptance.position_rms, position(|s| s.rms)),
+        (LimitedQuantity::PositionMax, acceptance.position_max, position(|s| s.max)),
+        (LimitedQuantity::DistanceMean, acceptance.distance_mean, distance(|s| s.mean)),
+        (LimitedQuantity::DistanceRms, acceptance.distance_rms, distance(|s| s.rms)),
+        (LimitedQuantity::DistanceMax, acceptance.distance_max, distance(|s| s.max)),
     ]
     .into_iter()
     .filter_map(|(quantity, limit, value_mm)| {
         let limit_mm = to_mm(limit?);
         // Not a number is not met.
         let met = value_mm.map(|value| value <= limit_mm);
-        Some(LimitCheck { quantity: quantity.to_owned(), value_mm, limit_mm, met })
+        Some(LimitCheck { quantity, value_mm, limit_mm, met })
     })
     .collect()
 }
@@ -182,7 +182,7 @@ mod tests {
             samples: 9,
             basis: String::new(),
             independent: true,
-            refit: "none".to_owned(),
+            refit: Refit::None,
             nominal: identified.clone(),
             identified,
             residual_by_joint: Vec::new(),

@@ -12,7 +12,10 @@ use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
 use crate::session::advice::Advice;
 use crate::session::calibration::{self, Calibration, MountedText, SampleText};
-use crate::session::summary::{IdentificationSummary, InputFile, VerificationMode, VerificationSummary, Warning};
+use crate::session::measurements::Layout;
+use crate::session::summary::{
+    IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
+};
 use crate::units::to_mm;
 
 /// A sample with the place where it was written down.
@@ -81,7 +84,7 @@ pub struct IdentifyRequest {
     /// The same as a setting of the summary.
     pub verification_mode: VerificationMode,
     /// Layout of the tables, where there was a choice.
-    pub layout: Option<String>,
+    pub layout: Option<Layout>,
 }
 
 /// An identified arm.
@@ -172,11 +175,7 @@ pub fn identify(
         created: request.created.clone(),
         inputs: request.inputs.clone(),
         settings: &request.settings,
-        special: Special {
-            layout: request.layout.clone(),
-            verification: request.verification_mode,
-            ..Special::default()
-        },
+        special: Special { layout: request.layout, verification: request.verification_mode, ..Special::default() },
         found: &found,
         names: &names,
         warnings,
@@ -213,7 +212,7 @@ fn verify(
 ) -> Option<(VerificationSummary, ModelErrors)> {
     let nominal = ModelErrors::new(&nominal.arm, &nominal.base_from_station, samples)?;
     let identified = ModelErrors::new(&found.arm, &found.base_from_station, samples)?;
-    let summary = point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, "none");
+    let summary = point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, Refit::None);
     Some((summary, identified))
 }
 

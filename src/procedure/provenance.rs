@@ -2,11 +2,11 @@
 
 use crate::profile::Profile;
 use crate::session::sha256;
-use crate::session::summary::{InputFile, Provenance};
+use crate::session::summary::{InputFile, InputRole, Provenance};
 
-/// The record of an input that was read from `file` in the role of `identification`, `verification`, `calibration` or `plan`.
-pub fn input_file(role: &str, file: String, bytes: &[u8]) -> InputFile {
-    InputFile { role: role.to_owned(), file, sha256: sha256(bytes) }
+/// The record of an input that was read from `file` in this role.
+pub fn input_file(role: InputRole, file: String, bytes: &[u8]) -> InputFile {
+    InputFile { role, file, sha256: sha256(bytes) }
 }
 
 /// Provenance of results made at `created` (RFC 3339, UTC).

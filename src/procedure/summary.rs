@@ -1,15 +1,12 @@
 //! The summary of an identification: its numbers in mm and degree, with names and the verdict.
 
 use super::{EstimationSettings, assess, provenance};
-use crate::identification::{
-    Estimate, Estimator, Identification, Observability, Prior, RejectionReason, SampleIndex, SigmaSource,
-    TerminationReason, Weighting,
-};
-use crate::profile::{Level, Profile};
+use crate::identification::{Estimate, Identification, Observability, Prior, RejectionReason, SampleIndex, Sigma};
+use crate::profile::Profile;
+use crate::session::measurements::Layout;
 use crate::session::summary::{
-    BlindGroupSummary, CorrelationSummary, EstimatorName, IdentificationSettings, IdentificationSummary, InputFile,
-    IterationSummary, ParameterSummary, RejectedSummary, SCHEMA, SigmaOrigin, SigmaSummary, Termination, Verdict,
-    VerificationMode, VerificationSummary, Warning,
+    BlindGroupSummary, CorrelationSummary, IdentificationSettings, IdentificationSummary, InputFile, IterationSummary,
+    ParameterSummary, RejectedSummary, SCHEMA, SigmaSummary, Verdict, VerificationMode, VerificationSummary, Warning,
 };
 use crate::units::{to_deg, to_mm};
 
@@ -100,36 +97,17 @@ fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
 }
 
 fn sigma_summary(found: &Identification) -> SigmaSummary {
-    let source = match found.sigma.source {
-        SigmaSource::Readings => SigmaOrigin::Readings,
-        SigmaSource::Option => SigmaOrigin::Option,
-        SigmaSource::Instrument => SigmaOrigin::Instrument,
-        SigmaSource::Residuals => SigmaOrigin::Residuals,
-        SigmaSource::Assumed => SigmaOrigin::Assumed,
-    };
-    SigmaSummary { used_mm: to_mm(found.sigma.used), source, from_residuals_mm: found.sigma.from_residuals.map(to_mm) }
+    let Sigma { used, source, from_residuals, normalised: _ } = found.sigma;
+    SigmaSummary { used_mm: to_mm(used), source, from_residuals_mm: from_residuals.map(to_mm) }
 }
 
 fn settings_summary(asked: &EstimationSettings, special: Special) -> IdentificationSettings {
     let Special { layout, socket_distance_mm, socket_distance_sigma_mm, verification } = special;
-    let name = |text: &str| text.to_owned();
     IdentificationSettings {
-        level: name(match asked.level {
-            Level::Offsets => "offsets",
-            Level::Geometric => "geometric",
-        }),
-        weighting: name(match asked.weighting {
-            Weighting::Covariance => "covariance",
-            Weighting::Uniform => "uniform",
-        }),
-        prior: name(match asked.prior {
-            Prior::Expected => "expected",
-            Prior::None => "none",
-        }),
-        estimator: match asked.estimator {
-            Estimator::Robust => EstimatorName::Robust,
-            Estimator::LeastSquares => EstimatorName::LeastSquares,
-        },
+        level: asked.level,
+        weighting: asked.weighting,
+        prior: asked.prior,
+        estimator: asked.estimator,
         iterations: asked.iterations,
         filter: asked.filter.clone(),
         expected_length_mm: asked.expected_deviation.map(|expected| to_mm(expected.length)),
@@ -144,7 +122,7 @@ fn settings_summary(asked: &EstimationSettings, special: Special) -> Identificat
 /// Settings that only one command has.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Special {
-    pub(crate) layout: Option<String>,
+    pub(crate) layout: Option<Layout>,
     pub(crate) socket_distance_mm: Option<f64>,
     pub(crate) socket_distance_sigma_mm: Option<f64>,
     pub(crate) verification: VerificationMode,
@@ -173,12 +151,6 @@ impl Finished<'_> {
         let Observability { rank, gap, condition_number, condition_number_raw, scored_points, groups, .. } =
             &found.observability;
         let verdict: Verdict = assess::verdict(profile.acceptance(), verification.as_ref(), &warnings);
-        let termination = match found.termination {
-            TerminationReason::Converged => Termination::Converged,
-            TerminationReason::IterationLimit => Termination::IterationLimit,
-            TerminationReason::NoImprovement => Termination::NoImprovement,
-            TerminationReason::NonFinite => Termination::NonFinite,
-        };
         IdentificationSummary {
             schema: SCHEMA,
             provenance: provenance(profile, profile_text, created, inputs),
@@ -205,7 +177,7 @@ impl Finished<'_> {
                 .collect(),
             correlations: correlations(found),
             rejected: rejected(found, names),
-            termination,
+            termination: found.termination,
             iterations: found
                 .iterations
                 .iter()

@@ -10,7 +10,7 @@ mod decisions;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
-use crate::session::journal::PlanText;
+use crate::session::journal::{FindingCause, PlanText};
 use crate::session::set_up::About;
 use crate::session::summary::IdentificationSummary;
 
@@ -292,8 +292,8 @@ pub struct FindingPart {
     pub about: u64,
     /// Name of the pose of that one.
     pub pose: String,
-    /// Short name of the cause.
-    pub cause: String,
+    /// The likely cause.
+    pub cause: FindingCause,
     /// How many standard deviations off.
     pub ratio: f64,
     /// In words.

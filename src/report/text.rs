@@ -2,9 +2,10 @@
 
 use super::document::Found;
 use super::tables::{decimals_for, fixed, paragraph, push_line};
+use crate::identification::{Estimator, SigmaSource, TerminationReason};
 use crate::session::summary::{
-    EstimatorName, IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, SigmaOrigin,
-    StatisticsSummary, Termination, Verdict, VerdictStatus, VerificationReport, VerificationSummary, Warning,
+    IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict,
+    VerdictStatus, VerificationReport, VerificationSummary, Warning,
 };
 
 /// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
@@ -85,7 +86,7 @@ fn verdict(verdict: &Verdict) -> String {
             &mut text,
             &format!(
                 "  {:<16}{:>9} mm  {sign} {:>7} mm  {result}",
-                check.quantity.replace('_', " "),
+                check.quantity.words(),
                 value,
                 fixed(check.limit_mm, 3)
             ),
@@ -162,13 +163,13 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
             summary.settings.weighting,
             summary.settings.prior,
             match summary.settings.estimator {
-                EstimatorName::Robust => "robust",
-                EstimatorName::LeastSquares => "least-squares",
+                Estimator::Robust => "robust",
+                Estimator::LeastSquares => "least-squares",
             }
         ),
     );
     let residual = match sigma.from_residuals_mm {
-        Some(residual) if sigma.source != SigmaOrigin::Residuals => {
+        Some(residual) if sigma.source != SigmaSource::Residuals => {
             format!("; the residuals say {} mm", fixed(residual, 4))
         }
         _ => String::new(),
@@ -193,23 +194,23 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
 }
 
 /// Where the measurement σ comes from.
-pub(super) const fn sigma_origin(origin: SigmaOrigin) -> &'static str {
+pub(super) const fn sigma_origin(origin: SigmaSource) -> &'static str {
     match origin {
-        SigmaOrigin::Readings => "given with the readings",
-        SigmaOrigin::Option => "given on the command line",
-        SigmaOrigin::Instrument => "of the profile's instrument",
-        SigmaOrigin::Residuals => "estimated from the residuals",
-        SigmaOrigin::Assumed => "assumed, for want of data to estimate it",
+        SigmaSource::Readings => "given with the readings",
+        SigmaSource::Option => "given on the command line",
+        SigmaSource::Instrument => "of the profile's instrument",
+        SigmaSource::Residuals => "estimated from the residuals",
+        SigmaSource::Assumed => "assumed, for want of data to estimate it",
     }
 }
 
 /// Why the solver stopped.
-pub(super) const fn termination(reason: Termination) -> &'static str {
+pub(super) const fn termination(reason: TerminationReason) -> &'static str {
     match reason {
-        Termination::Converged => "converged",
-        Termination::IterationLimit => "iteration limit",
-        Termination::NoImprovement => "no improvement",
-        Termination::NonFinite => "numbers that are not finite",
+        TerminationReason::Converged => "converged",
+        TerminationReason::IterationLimit => "iteration limit",
+        TerminationReason::NoImprovement => "no improvement",
+        TerminationReason::NonFinite => "numbers that are not finite",
     }
 }
 
@@ -274,7 +275,7 @@ fn blind_lines(summary: &IdentificationSummary) -> String {
 }
 
 fn rejected_lines(summary: &IdentificationSummary) -> String {
-    if summary.settings.estimator != EstimatorName::Robust {
+    if summary.settings.estimator != Estimator::Robust {
         return String::new();
     }
     if summary.rejected.is_empty() {

@@ -24,8 +24,8 @@ use thiserror::Error;
 
 pub use describe::{correction_text, instrument_text, target_text};
 pub use entry::{
-    CirclePointText, Correction, Decision, Entry, FindingText, IdentifiedText, MeasuredText, PairText, PlanText,
-    PlannedText, PointErrorText, from_edge, from_xyz_mm, to_edge, to_length_mm, to_xyz_mm,
+    CirclePointText, Correction, Decision, Entry, FindingCause, FindingText, IdentifiedText, MeasuredText, PairText,
+    PlanText, PlannedText, PointErrorText, from_edge, from_xyz_mm, to_edge, to_length_mm, to_xyz_mm,
 };
 
 /// Version of the layout of journals.

@@ -4,9 +4,14 @@
 //! Field names are part of the interface of scripts: units are in the names, nothing is renamed or removed within a schema
 //! version.
 
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::advice::Advice;
+use super::measurements::Layout;
+use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Weighting};
+use crate::profile::Level;
+use crate::text::{names, names_of_option, written_as_text};
 
 /// Version of the layout of these objects.
 pub const SCHEMA: u32 = 1;
@@ -28,11 +33,34 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
 }
 
+/// What an input is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InputRole {
+    /// Points to identify from.
+    Identification,
+    /// Points to verify with.
+    Verification,
+    /// An earlier result.
+    Calibration,
+    /// Poses.
+    Plan,
+    /// The points of a guided session.
+    Session,
+}
+
+names!(InputRole {
+    Identification = "identification",
+    Verification = "verification",
+    Calibration = "calibration",
+    Plan = "plan",
+    Session = "session",
+});
+
 /// An input file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// What it was used for: `identification`, `verification` or `calibration`.
-    pub role: String,
+    /// What it was used for.
+    pub role: InputRole,
     /// Its path as given.
     pub file: String,
     /// SHA-256 of its bytes.
@@ -42,14 +70,14 @@ pub struct InputFile {
 /// How the identification was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentificationSettings {
-    /// `offsets` or `geometric`.
-    pub level: String,
-    /// `covariance` or `uniform`.
-    pub weighting: String,
-    /// `expected` or `none`.
-    pub prior: String,
-    /// `robust` or `least-squares`.
-    pub estimator: EstimatorName,
+    /// Which parameters.
+    pub level: Level,
+    /// Weighting of the distances.
+    pub weighting: Weighting,
+    /// Prior on the deviations.
+    pub prior: Prior,
+    /// Treatment of outliers.
+    pub estimator: Estimator,
     /// Largest number of solver steps.
     pub iterations: usize,
     /// Condition that picked the identification rows.
@@ -59,7 +87,7 @@ pub struct IdentificationSettings {
     /// The same of every angle.
     pub expected_angle_deg: Option<f64>,
     /// Layout of the tables, where there is a choice.
-    pub layout: Option<String>,
+    pub layout: Option<Layout>,
     /// Known distance between two sockets.
     pub socket_distance_mm: Option<f64>,
     /// Standard deviation of that distance.
@@ -85,46 +113,6 @@ pub enum VerificationMode {
     Session,
 }
 
-/// How samples were trusted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EstimatorName {
-    /// Outliers are found, named and left out.
-    Robust,
-    /// Every sample counts.
-    LeastSquares,
-}
-
-/// Where the measurement σ comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SigmaOrigin {
-    /// Given with the readings.
-    Readings,
-    /// The command line.
-    Option,
-    /// The instrument of the profile.
-    Instrument,
-    /// Estimated from the residuals.
-    Residuals,
-    /// Nothing was stated and the data are too few to tell: a guess.
-    Assumed,
-}
-
-/// Why the solver stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Termination {
-    /// Nothing was left to gain.
-    Converged,
-    /// The allowed number of steps was taken.
-    IterationLimit,
-    /// No step lowered the cost any further.
-    NoImprovement,
-    /// A number overflowed; the parameters are not usable.
-    NonFinite,
-}
-
 /// How a result compares with the acceptance limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -143,7 +131,7 @@ pub struct SigmaSummary {
     /// What balanced data and prior, per coordinate.
     pub used_mm: f64,
     /// Where it comes from.
-    pub source: SigmaOrigin,
+    pub source: SigmaSource,
     /// What the residuals say.
     pub from_residuals_mm: Option<f64>,
 }
@@ -312,6 +300,21 @@ pub struct JointSummary {
     pub bins: Vec<JointBin>,
 }
 
+/// What is fitted to verification samples because the set-up changed. The comments on the values are the help of `--refit`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Refit {
+    /// Same tracker position and SMR mounting as at the identification
+    #[default]
+    None,
+    /// The tracker was moved
+    Frame,
+    /// The tracker was moved and the SMR mounted anew
+    #[value(name = "frame+target")]
+    FrameAndTarget,
+}
+
+names_of_option!(Refit);
+
 /// Accuracy on verification samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerificationSummary {
@@ -321,8 +324,8 @@ pub struct VerificationSummary {
     pub basis: String,
     /// Whether the identification saw none of them.
     pub independent: bool,
-    /// What was fitted to the verification samples themselves: `none`, `frame` or `frame+target`.
-    pub refit: String,
+    /// What was fitted to the verification samples themselves.
+    pub refit: Refit,
     /// The nominal model with its own registration.
     pub nominal: ModelSummary,
     /// The identified model.
@@ -331,11 +334,45 @@ pub struct VerificationSummary {
     pub residual_by_joint: Vec<JointSummary>,
 }
 
+/// What an acceptance limit is about. For shared points the position error is the distance from the shared point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimitedQuantity {
+    /// Mean position error.
+    PositionMean,
+    /// Root mean square position error.
+    PositionRms,
+    /// Largest position error.
+    PositionMax,
+    /// Mean distance error.
+    DistanceMean,
+    /// Root mean square distance error.
+    DistanceRms,
+    /// Largest distance error.
+    DistanceMax,
+}
+
+names!(LimitedQuantity {
+    PositionMean = "position_mean",
+    PositionRms = "position_rms",
+    PositionMax = "position_max",
+    DistanceMean = "distance_mean",
+    DistanceRms = "distance_rms",
+    DistanceMax = "distance_max",
+});
+written_as_text!(InputRole, Refit, LimitedQuantity);
+
+impl LimitedQuantity {
+    /// The name in a sentence: `position rms`.
+    pub fn words(self) -> String {
+        self.name().replace('_', " ")
+    }
+}
+
 /// One comparison with an acceptance limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitCheck {
-    /// What is limited, such as `position_rms`. For shared points the position error is the distance from the shared point.
-    pub quantity: String,
+    /// What is limited.
+    pub quantity: LimitedQuantity,
     /// What was found; none where these data cannot tell.
     pub value_mm: Option<f64>,
     /// What is allowed.
@@ -419,7 +456,7 @@ pub struct IdentificationSummary {
     /// Samples left out.
     pub rejected: Vec<RejectedSummary>,
     /// Why the solver stopped.
-    pub termination: Termination,
+    pub termination: TerminationReason,
     /// Steps of the solver.
     pub iterations: Vec<IterationSummary>,
     /// Files written.

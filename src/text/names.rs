@@ -100,6 +100,7 @@ macro_rules! written_as_text {
 pub(crate) use {names, names_of_option, written_as_text};
 
 #[cfg(test)]
+#[expect(unreachable_pub, reason = "the macros make what they add public")]
 mod tests {
     #[derive(Clone, Copy, Debug, PartialEq)]
     enum Fruit {

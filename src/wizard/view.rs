@@ -10,7 +10,7 @@ use super::{Progress, Wizard};
 use crate::planning::{Figures, Stage};
 use crate::procedure::plan;
 use crate::profile::{Level, Profile};
-use crate::session::journal::PlanText;
+use crate::session::journal::{FindingCause, PlanText};
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{About, Step};
@@ -385,8 +385,8 @@ pub struct FindingView {
     pub pose: String,
     /// Number of its measurement.
     pub measurement: u64,
-    /// Short name of the cause.
-    pub cause: String,
+    /// The likely cause.
+    pub cause: FindingCause,
     /// In words.
     pub message: String,
     /// Whether a correction is proposed.

@@ -63,7 +63,7 @@ pub(super) fn findings(session: &Session) -> Vec<FindingPart> {
                 raised_at,
                 about: finding.about,
                 pose: about.map_or_else(String::new, |about| session.pose_of(about).to_owned()),
-                cause: finding.cause.clone(),
+                cause: finding.cause,
                 ratio: finding.ratio,
                 message: finding.message.clone(),
                 decision: about.map_or("", |about| decision(about, raised_at)).to_owned(),

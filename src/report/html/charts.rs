@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::markup::{counted, number};
 use super::plot::{Mark, Plot, Scale, WIDTH};
-use crate::report::document::{Details, DriftPart, PointPart, PredictionPart, RobotPart};
 use crate::planning::Figures;
+use crate::report::document::{Details, DriftPart, PointPart, PredictionPart, RobotPart};
 
 /// Bars of a histogram.
 const BINS: usize = 12;

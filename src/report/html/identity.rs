@@ -118,10 +118,7 @@ pub(super) fn origins(document: &Document) -> String {
         rows.push(("Nominal numbers".to_owned(), escape(&robot.source)));
     }
     for input in document.result.iter().flat_map(|result| &result.provenance.inputs) {
-        rows.push((
-            format!("Read: {}", escape(&input.role)),
-            format!("{}<br>{}", escape(&input.file), hash(&input.sha256)),
-        ));
+        rows.push((format!("Read: {}", input.role), format!("{}<br>{}", escape(&input.file), hash(&input.sha256))));
     }
     for file in &report.files {
         rows.push((format!("Beside this: {}", escape(&file.name)), hash(&file.sha256)));

@@ -2,10 +2,11 @@
 
 use super::charts::{MOST, drift, norm, prediction, search};
 use super::markup::{Column, add, counted, escape, facts, number, optional, paragraph, table, time};
+use crate::identification::Estimator;
 use crate::report::document::{Details, Document};
 use crate::report::text::{gap, sigma_origin, termination};
 use crate::session::journal::PlanText;
-use crate::session::summary::{EstimatorName, IdentificationSummary, RejectedSummary};
+use crate::session::summary::{IdentificationSummary, RejectedSummary};
 
 /// Plan, fit and drift.
 pub(super) fn section(document: &Document) -> String {
@@ -43,8 +44,8 @@ pub(super) fn section(document: &Document) -> String {
 fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
     let settings = &result.settings;
     let estimator = match settings.estimator {
-        EstimatorName::Robust => "robust: outliers are found, named and left out",
-        EstimatorName::LeastSquares => "least squares: every sample counts",
+        Estimator::Robust => "robust: outliers are found, named and left out",
+        Estimator::LeastSquares => "least squares: every sample counts",
     };
     let residuals = result
         .sigma
@@ -66,7 +67,7 @@ fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
             format!("{} mm per coordinate, {}", number(result.sigma.used_mm, 4), sigma_origin(result.sigma.source)),
         ),
         ("Residuals of the fit", residuals),
-        ("Weighting, prior", format!("{}, {}", escape(&settings.weighting), escape(&settings.prior))),
+        ("Weighting, prior", format!("{}, {}", settings.weighting, settings.prior)),
         ("Estimator", estimator.to_owned()),
         ("Rank", rank),
         ("Condition number", condition),
@@ -183,7 +184,7 @@ pub(super) fn samples(document: &Document) -> String {
 
 fn rejected(document: &Document) -> String {
     let Some(result) = &document.result else { return String::new() };
-    if result.settings.estimator != EstimatorName::Robust {
+    if result.settings.estimator != Estimator::Robust {
         return paragraph("The fit did not look for outliers: every identification sample counts.");
     }
     if result.rejected.is_empty() {

@@ -16,7 +16,7 @@ pub(super) fn section(document: &Document) -> String {
     html.push_str(&paragraph(&format!(
         "{} parameters (level {}), of which the data determine {rank} independent combinations. Sigma is one standard deviation of the deviation. <b>Found:</b> <i>yes</i>; <i>weakly</i>: the data say less than half of what one expects anyway; <i>only combined</i>: not by itself, see below.",
         result.parameter_count,
-        escape(&result.settings.level)
+        result.settings.level
     )));
     html.push_str(&parameter_table(document, &result.parameters));
     html.push_str(&blind(result));

@@ -5,8 +5,8 @@ use super::markup::{Column, NONE, add, counted, escape, list, number, optional, 
 use super::views::views;
 use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
 use crate::session::summary::{
-    IdentificationSummary, LimitCheck, ModelSummary, StatisticsSummary, VerdictStatus, VerificationMode,
-    VerificationSummary, Warning,
+    IdentificationSummary, LimitCheck, LimitedQuantity, ModelSummary, StatisticsSummary, VerdictStatus,
+    VerificationMode, VerificationSummary, Warning,
 };
 
 /// The verdict with every limit, and what must be known before the numbers.
@@ -61,7 +61,7 @@ fn limits(checks: &[LimitCheck]) -> String {
                 None => "– not evaluated",
             };
             vec![
-                escape(&quantity(&check.quantity)),
+                quantity(check.quantity).to_owned(),
                 optional(check.value_mm, 4),
                 number(check.limit_mm, 4),
                 met.to_owned(),
@@ -73,13 +73,14 @@ fn limits(checks: &[LimitCheck]) -> String {
     table("", &columns, &rows, true)
 }
 
-/// `position_rms` as it is read.
-fn quantity(name: &str) -> String {
-    match name.split_once('_') {
-        Some((what @ ("position" | "distance"), "mean")) => format!("{what} error, mean"),
-        Some((what @ ("position" | "distance"), "rms")) => format!("{what} error, root mean square"),
-        Some((what @ ("position" | "distance"), "max")) => format!("{what} error, largest"),
-        _ => name.replace('_', " "),
+const fn quantity(quantity: LimitedQuantity) -> &'static str {
+    match quantity {
+        LimitedQuantity::PositionMean => "position error, mean",
+        LimitedQuantity::PositionRms => "position error, root mean square",
+        LimitedQuantity::PositionMax => "position error, largest",
+        LimitedQuantity::DistanceMean => "distance error, mean",
+        LimitedQuantity::DistanceRms => "distance error, root mean square",
+        LimitedQuantity::DistanceMax => "distance error, largest",
     }
 }
 

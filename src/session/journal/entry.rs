@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
+use crate::identification::triage::Cause;
 use crate::kinematics::JointType;
 use crate::planning::Figures;
 use crate::session::calibration::Calibration;
@@ -10,6 +11,7 @@ use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{About, InstrumentChoice, Step, TargetChoice};
 use crate::session::summary::IdentificationSummary;
+use crate::text::{names, written_as_text};
 use crate::units::{from_mm, to_mm};
 
 /// Something that happened in a session.
@@ -285,8 +287,8 @@ pub struct MeasuredText {
 pub struct FindingText {
     /// Number of the measurement it is about: this one or an earlier one.
     pub about: u64,
-    /// Short name of the cause, such as `wrong_pose`.
-    pub cause: String,
+    /// The likely cause.
+    pub cause: FindingCause,
     /// How many standard deviations off.
     pub ratio: f64,
     /// In words.
@@ -297,6 +299,65 @@ pub struct FindingText {
     /// The distances that fit least, worst first. Not in journals of earlier versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub worst: Vec<PairText>,
+}
+
+/// Likely cause of a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FindingCause {
+    /// Coordinates in another unit.
+    Unit,
+    /// A joint turns the other way than the profile says.
+    JointSign,
+    /// A joint value that was noted wrongly.
+    MistypedJoint,
+    /// The robot was at another planned pose.
+    WrongPose,
+    /// The robot was still at the pose before.
+    StayedAtPrevious,
+    /// The points of two poses are exchanged.
+    SwappedRows,
+    /// The SMR has moved on the flange.
+    TargetMoved,
+    /// The tracker has moved.
+    InstrumentMoved,
+    /// The robot still moved.
+    NotAtRest,
+    /// A repeated pose is not where it was.
+    Drift,
+    /// None of the known ones.
+    Unexplained,
+}
+
+names!(FindingCause {
+    Unit = "unit",
+    JointSign = "joint_sign",
+    MistypedJoint = "mistyped_joint",
+    WrongPose = "wrong_pose",
+    StayedAtPrevious = "stayed_at_previous",
+    SwappedRows = "swapped_rows",
+    TargetMoved = "target_moved",
+    InstrumentMoved = "instrument_moved",
+    NotAtRest = "not_at_rest",
+    Drift = "drift",
+    Unexplained = "unexplained",
+});
+written_as_text!(FindingCause);
+
+impl From<&Cause> for FindingCause {
+    fn from(cause: &Cause) -> Self {
+        match cause {
+            Cause::Unit { .. } => Self::Unit,
+            Cause::JointSign { .. } => Self::JointSign,
+            Cause::MistypedJoint { .. } => Self::MistypedJoint,
+            Cause::WrongPose { .. } => Self::WrongPose,
+            Cause::StayedAtPrevious => Self::StayedAtPrevious,
+            Cause::SwappedRows { .. } => Self::SwappedRows,
+            Cause::TargetMoved { .. } => Self::TargetMoved,
+            Cause::InstrumentMoved { .. } => Self::InstrumentMoved,
+            Cause::NotAtRest { .. } => Self::NotAtRest,
+            Cause::Unexplained => Self::Unexplained,
+        }
+    }
 }
 
 /// A measured distance against what the earlier points let expect.

@@ -74,7 +74,7 @@ fn sample(number: u64) -> MeasuredText {
         findings: vec![
             FindingText {
                 about: number,
-                cause: "wrong_pose".to_owned(),
+                cause: FindingCause::WrongPose,
                 ratio: f64::INFINITY,
                 message: TRICKY.to_owned(),
                 remedy: Some(Correction::Swap { first: 1, second: 2 }),
@@ -87,7 +87,7 @@ fn sample(number: u64) -> MeasuredText {
             },
             FindingText {
                 about: 1,
-                cause: "outlier".to_owned(),
+                cause: FindingCause::Drift,
                 ratio: 7.5,
                 message: String::new(),
                 remedy: None,

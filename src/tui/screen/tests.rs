@@ -7,14 +7,15 @@ use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::profile::{Profile, builtin};
+use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Weighting};
+use crate::profile::{Level, Profile, builtin};
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, TargetChoice};
 use crate::session::state::Session;
 use crate::session::summary::Verdict;
 use crate::session::summary::{
-    AxisSummary, BlindGroupSummary, EstimatorName, IdentificationSettings, IdentificationSummary, JointBin,
-    JointSummary, LimitCheck, ModelSummary, ParameterSummary, Provenance, RejectedSummary, SigmaOrigin, SigmaSummary,
-    StatisticsSummary, Termination, VerdictStatus, VerificationMode, VerificationSummary, Warning,
+    AxisSummary, BlindGroupSummary, IdentificationSettings, IdentificationSummary, JointBin, JointSummary, LimitCheck,
+    LimitedQuantity, ModelSummary, ParameterSummary, Provenance, Refit, RejectedSummary, SigmaSummary,
+    StatisticsSummary, VerdictStatus, VerificationMode, VerificationSummary, Warning,
 };
 use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
@@ -164,8 +165,8 @@ fn parameter(name: &str, unit: &str, deviation: f64, sigma: Option<f64>, identif
 
 fn verdict(status: VerdictStatus) -> Verdict {
     let is_met = status == VerdictStatus::Accepted;
-    let check = |quantity: &str, value: f64, limit_mm: f64| LimitCheck {
-        quantity: quantity.to_owned(),
+    let check = |quantity, value: f64, limit_mm: f64| LimitCheck {
+        quantity,
         value_mm: Some(value),
         limit_mm,
         met: Some(value <= limit_mm),
@@ -176,8 +177,8 @@ fn verdict(status: VerdictStatus) -> Verdict {
             if is_met { "both limits are met" } else { "position max is 1.2000 mm, allowed is 1.000 mm" }.to_owned(),
         ],
         checks: vec![
-            check("position_mean", 0.0103, 0.4),
-            check("position_max", if is_met { 0.0199 } else { 1.2 }, 1.0),
+            check(LimitedQuantity::PositionMean, 0.0103, 0.4),
+            check(LimitedQuantity::PositionMax, if is_met { 0.0199 } else { 1.2 }, 1.0),
         ],
         advice: None,
     }
@@ -217,7 +218,7 @@ fn verification() -> VerificationSummary {
         samples: 20,
         basis: "the verification poses of this session, same set-up".to_owned(),
         independent: true,
-        refit: "none".to_owned(),
+        refit: Refit::None,
         nominal: model(980.0),
         identified: model(1.0),
         residual_by_joint: vec![joint("J1", 0.05), joint("J2", 0.62), joint("J3", 0.0)],
@@ -242,10 +243,10 @@ fn summary(is_good: bool) -> IdentificationSummary {
             inputs: Vec::new(),
         },
         settings: IdentificationSettings {
-            level: "geometric".to_owned(),
-            weighting: "covariance".to_owned(),
-            prior: "expected".to_owned(),
-            estimator: EstimatorName::Robust,
+            level: Level::Geometric,
+            weighting: Weighting::Covariance,
+            prior: Prior::Expected,
+            estimator: Estimator::Robust,
             iterations: 50,
             filter: None,
             expected_length_mm: None,
@@ -265,7 +266,7 @@ fn summary(is_good: bool) -> IdentificationSummary {
         condition_number: Some(167.8),
         condition_number_mm_rad: Some(1433.0),
         condition_number_points: 56,
-        sigma: SigmaSummary { used_mm: 0.00577, source: SigmaOrigin::Readings, from_residuals_mm: Some(0.00592) },
+        sigma: SigmaSummary { used_mm: 0.00577, source: SigmaSource::Readings, from_residuals_mm: Some(0.00592) },
         parameters: (1..=6)
             .flat_map(|n| {
                 [
@@ -292,7 +293,7 @@ fn summary(is_good: bool) -> IdentificationSummary {
                 reason: "it contradicts all others".to_owned(),
             }]
         },
-        termination: Termination::Converged,
+        termination: TerminationReason::Converged,
         iterations: Vec::new(),
         written: Vec::new(),
     }

@@ -6,7 +6,9 @@ mod show;
 
 use super::plan::{plan_request, plan_text};
 use super::{Action, Cx, StepMachine};
-use crate::session::journal::{Correction, Decision, Entry, FindingText, Line, MeasuredText, to_edge, to_xyz_mm};
+use crate::session::journal::{
+    Correction, Decision, Entry, FindingCause, FindingText, Line, MeasuredText, to_edge, to_xyz_mm,
+};
 use crate::session::plan::PoseKind;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
@@ -328,7 +330,7 @@ impl StepMachine for CaptureStep {
                 let is_settled = noted.findings.is_empty();
                 noted.findings.push(FindingText {
                     about: number,
-                    cause: "not_at_rest".to_owned(),
+                    cause: FindingCause::NotAtRest,
                     ratio: 0.0,
                     message: reason,
                     remedy: None,

@@ -12,7 +12,7 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::session::sha256;
 use crate::session::state::{Sample, SampleState, Session};
-use crate::session::summary::{InputFile, VerificationMode, Warning};
+use crate::session::summary::{InputFile, InputRole, VerificationMode, Warning};
 use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
@@ -67,7 +67,7 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
         mounted: cx.session.mounted(),
         created: cx.now.to_string(),
         inputs: vec![InputFile {
-            role: "session".to_owned(),
+            role: InputRole::Session,
             file: "measurements.csv".to_owned(),
             sha256: sha256(measurements_csv(cx.session, robot).as_bytes()),
         }],

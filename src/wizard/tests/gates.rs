@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::bench::{Bench, MANUAL, appended, blocked, failure, offers, reading, seen_at, started, texts};
-use crate::session::journal::{Entry, FindingText};
+use crate::session::journal::{Entry, FindingCause, FindingText};
 use crate::session::reading::{LiveReading, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
 use crate::session::state::SampleState;
@@ -77,7 +77,7 @@ fn shots_that_scatter_are_held_back_until_they_are_taken() {
         let effects = bench.intend(Intent::AcceptReading);
         let (_, lines) = appended(&effects);
         let Entry::Sample(noted) = &lines[0].entry else { panic!() };
-        assert_eq!((noted.number, noted.findings.len(), noted.findings[0].cause.as_str()), (2, 1, "not_at_rest"));
+        assert_eq!((noted.number, noted.findings.len(), noted.findings[0].cause), (2, 1, FindingCause::NotAtRest));
         assert!(matches!(lines[1].entry, Entry::Decision { sample: 2, .. }), "that it scatters is decided with it");
         bench.settle(effects);
         assert_eq!((bench.capture().measured, bench.capture().held), (1, None));
@@ -189,7 +189,7 @@ fn a_sample_in_question_has_to_be_decided_about() {
     let bench = in_question();
     let view = bench.capture();
     let finding = view.finding.unwrap();
-    assert_eq!((finding.pose.as_str(), finding.measurement, finding.cause.as_str()), ("13", 13, "unexplained"));
+    assert_eq!((finding.pose.as_str(), finding.measurement, finding.cause), ("13", 13, FindingCause::Unexplained));
     assert!(!finding.has_remedy);
     // The distances that fit least: to the poses before, with what was expected.
     let [first, second, ..] = finding.worst.as_slice() else { panic!("{:?}", finding.worst) };
@@ -253,7 +253,7 @@ fn one_question_after_the_other_is_asked() {
     bench.measure(3);
     let finding = |about| FindingText {
         about,
-        cause: "test".to_owned(),
+        cause: FindingCause::Unexplained,
         ratio: 9.0,
         message: format!("measurement {about} is odd"),
         remedy: None,

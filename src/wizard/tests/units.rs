@@ -1,7 +1,7 @@
 //! Readings in another unit: found, corrected, and the correction taken back.
 
 use super::bench::{Bench, MEASURED, reading, seen_at, started, texts};
-use crate::session::journal::{Correction, Entry};
+use crate::session::journal::{Correction, Entry, FindingCause};
 use crate::session::set_up::Step;
 use crate::session::state::Session;
 use crate::units::{INCH, MICROMETRE, MILLIMETRE};
@@ -27,7 +27,7 @@ fn all_are_right(session: &Session) -> bool {
     })
 }
 
-fn cause(bench: &Bench) -> Option<String> {
+fn cause(bench: &Bench) -> Option<FindingCause> {
     bench.capture().finding.map(|finding| finding.cause)
 }
 
@@ -36,7 +36,7 @@ fn one_in_inches() -> Bench {
     let mut bench = Bench::at(Step::Capture);
     bench.measure(8);
     inches(&mut bench);
-    assert_eq!(cause(&bench).as_deref(), Some("unit"));
+    assert_eq!(cause(&bench), Some(FindingCause::Unit));
     bench
 }
 
@@ -114,7 +114,7 @@ fn an_instrument_that_stays_in_the_other_unit_is_asked_about_once() {
     bench.measure(1);
     assert_eq!((cause(&bench), bench.told().as_str()), (None, ""));
     inches(&mut bench);
-    assert_eq!(cause(&bench).as_deref(), Some("unit"));
+    assert_eq!(cause(&bench), Some(FindingCause::Unit));
     corrects(&mut bench);
     assert!(all_are_right(bench.wizard.session()));
     let resumed = bench.resumed(bench.journal.len()).0;
@@ -157,7 +157,7 @@ fn a_correction_without_an_end_counts_for_all_that_follows() {
     assert_eq!(noted.factor, None, "the correction says it already");
     // In millimetres again: found once, then known.
     bench.measure(1);
-    assert_eq!(cause(&bench).as_deref(), Some("unit"));
+    assert_eq!(cause(&bench), Some(FindingCause::Unit));
     corrects(&mut bench);
     bench.measure(usize::MAX);
     assert_eq!((cause(&bench), bench.capture().measured), (None, MEASURED));

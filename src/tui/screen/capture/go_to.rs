@@ -5,6 +5,7 @@ use ratatui::layout::Rect;
 
 use super::joints;
 use super::prediction::in_short;
+use crate::session::journal::FindingCause;
 use crate::tui::glyphs::{shortened, width, wrapped};
 use crate::tui::keymap;
 use crate::tui::paint;
@@ -91,29 +92,27 @@ fn height(lines: usize) -> u16 {
     u16::try_from(lines).unwrap_or(u16::MAX)
 }
 
-/// The short name of a cause in words.
-fn in_words(cause: &str) -> String {
-    let words = match cause {
-        "unit" => "another unit",
-        "joint_sign" => "a joint turns the other way",
-        "mistyped_joint" => "one joint stood elsewhere",
-        "wrong_pose" => "taken at another pose",
-        "stayed_at_previous" => "the robot had not moved",
-        "swapped_rows" => "exchanged with another pose",
-        "target_moved" => "the SMR has moved",
-        "instrument_moved" => "the tracker has moved",
-        "not_at_rest" => "the robot still moved",
-        "unexplained" => "its reading does not fit",
-        "drift" => "it has drifted",
-        other => return other.replace('_', " "),
-    };
-    words.to_owned()
+/// The likely cause of a finding, in a few words.
+const fn in_words(cause: FindingCause) -> &'static str {
+    match cause {
+        FindingCause::Unit => "another unit",
+        FindingCause::JointSign => "a joint turns the other way",
+        FindingCause::MistypedJoint => "one joint stood elsewhere",
+        FindingCause::WrongPose => "taken at another pose",
+        FindingCause::StayedAtPrevious => "the robot had not moved",
+        FindingCause::SwappedRows => "exchanged with another pose",
+        FindingCause::TargetMoved => "the SMR has moved",
+        FindingCause::InstrumentMoved => "the tracker has moved",
+        FindingCause::NotAtRest => "the robot still moved",
+        FindingCause::Drift => "it has drifted",
+        FindingCause::Unexplained => "its reading does not fit",
+    }
 }
 
 /// Where to go, and through which poses.
 fn heading(content: &CaptureView) -> Vec<String> {
     if let Some(finding) = &content.finding {
-        let cause = in_words(&finding.cause);
+        let cause = in_words(finding.cause);
         return vec![format!("Pose {} is in question: {cause}", finding.pose), "decide before going on".to_owned()];
     }
     let Some(pose) = &content.pose else { return vec!["All poses of the plan are measured.".to_owned()] };

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::session::journal::FindingCause;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::tui::dialog::Answer;
@@ -119,7 +120,7 @@ pub(crate) fn in_question() -> ViewModel {
         finding: Some(FindingView {
             pose: "14".to_owned(),
             measurement: 16,
-            cause: "wrong_pose".to_owned(),
+            cause: FindingCause::WrongPose,
             message: message.to_owned(),
             has_remedy: true,
             worst: [(3, 1234.567, -3.125), (11, 987.654, 2.871), (1, 1502.9, 1.44), (9, 640.0, -0.903)]

@@ -1,6 +1,7 @@
 //! The pages of the identification.
 
-use crate::session::summary::{IdentificationSummary, ParameterSummary, SigmaOrigin, Termination};
+use crate::identification::{SigmaSource, TerminationReason};
+use crate::session::summary::{IdentificationSummary, ParameterSummary};
 use crate::tui::screen::page::{Page, counted, decimals_for, fixed};
 use crate::tui::theme::Role;
 use crate::wizard::view::IdentifyView;
@@ -81,21 +82,21 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
         page.pair("condition", &format!("{} in expected deviations{raw}", fixed(condition, 1)));
     }
     let source = match summary.sigma.source {
-        SigmaOrigin::Readings => "given with the readings",
-        SigmaOrigin::Option => "given on the command line",
-        SigmaOrigin::Instrument => "of the profile's instrument",
-        SigmaOrigin::Residuals => "estimated from the residuals",
-        SigmaOrigin::Assumed => "ASSUMED, for want of data to estimate it",
+        SigmaSource::Readings => "given with the readings",
+        SigmaSource::Option => "given on the command line",
+        SigmaSource::Instrument => "of the profile's instrument",
+        SigmaSource::Residuals => "estimated from the residuals",
+        SigmaSource::Assumed => "ASSUMED, for want of data to estimate it",
     };
     page.pair("sigma", &format!("{} mm per coordinate, {source}", fixed(summary.sigma.used_mm, 4)));
-    if let Some(said) = summary.sigma.from_residuals_mm.filter(|_| summary.sigma.source != SigmaOrigin::Residuals) {
+    if let Some(said) = summary.sigma.from_residuals_mm.filter(|_| summary.sigma.source != SigmaSource::Residuals) {
         page.pair("", &format!("{} mm is what the residuals say", fixed(said, 4)));
     }
     let ended = match summary.termination {
-        Termination::Converged => "converged",
-        Termination::IterationLimit => "STOPPED at the iteration limit",
-        Termination::NoImprovement => "no further improvement",
-        Termination::NonFinite => "FAILED: numbers that are not finite",
+        TerminationReason::Converged => "converged",
+        TerminationReason::IterationLimit => "STOPPED at the iteration limit",
+        TerminationReason::NoImprovement => "no further improvement",
+        TerminationReason::NonFinite => "FAILED: numbers that are not finite",
     };
     page.pair("solver", &format!("{ended} after {}", counted(summary.iterations.len(), "step")));
     page.gap();

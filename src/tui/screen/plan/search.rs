@@ -33,7 +33,8 @@ impl Search {
         let Some(found) = busy.figures.filter(|found| found.condition_number.is_finite()) else { return };
         let condition = found.condition_number;
         if found.predicted_error.is_finite() {
-            self.best_error = Some(self.best_error.map_or(found.predicted_error, |best| best.min(found.predicted_error)));
+            self.best_error =
+                Some(self.best_error.map_or(found.predicted_error, |best| best.min(found.predicted_error)));
         }
         if self.conditions.last().is_none_or(|last| last.1.to_bits() != condition.to_bits())
             && self.conditions.len() < MOST

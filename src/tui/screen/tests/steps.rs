@@ -8,13 +8,8 @@ type Shown = (&'static str, ViewModel, Vec<Key>);
 
 /// Something is under way.
 fn busy(mut view: ViewModel, what: &'static str, progress: Option<&str>) -> ViewModel {
-    view.busy = Some(BusyView {
-        what,
-        progress: progress.map(str::to_owned),
-        part: None,
-        figures: None,
-        is_cancelled: false,
-    });
+    view.busy =
+        Some(BusyView { what, progress: progress.map(str::to_owned), part: None, figures: None, is_cancelled: false });
     for info in &mut view.intents {
         info.blocked.get_or_insert_with(|| format!("{what} is under way"));
     }

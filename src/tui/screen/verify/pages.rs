@@ -63,7 +63,7 @@ fn limits(verdict: &Verdict, page: &mut Page) {
             None => ("  ", "NOT EVALUATED", Role::Warn),
         };
         let value = check.value_mm.map_or_else(|| "-".to_owned(), |value| fixed(value, 4));
-        let quantity = check.quantity.replace('_', " ");
+        let quantity = check.quantity.words();
         let line = format!("  {quantity:<16}{value:>9} mm  {sign} {:>7} mm  ", fixed(check.limit_mm, 3));
         page.line(vec![(line, Role::Plain), (result.to_owned(), role)]);
     }

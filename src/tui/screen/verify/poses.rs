@@ -1,5 +1,6 @@
 //! The identified arm's error at each verification pose: how often which size, then pose by pose.
 
+use crate::session::summary::LimitedQuantity;
 use crate::tui::glyphs::Glyphs;
 use crate::tui::preview::Scene;
 use crate::tui::screen::page::{Page, fixed};
@@ -27,7 +28,7 @@ pub(super) fn poses(content: &VerifyView, scene: Option<&Scene>, glyphs: Glyphs,
     let room = page.columns().saturating_sub(LABELS).min(48);
     histogram(&errors, largest, room, glyphs, page);
     let limit = content.verdict.as_ref().and_then(|verdict| {
-        verdict.checks.iter().find(|check| check.quantity == "position_max").map(|check| check.limit_mm)
+        verdict.checks.iter().find(|check| check.quantity == LimitedQuantity::PositionMax).map(|check| check.limit_mm)
     });
     let above = limit.map_or_else(String::new, |limit| format!("; allowed: {} mm", fixed(limit, 3)));
     page.title(&format!("Error at each verification pose, largest first{above}"));

@@ -4,7 +4,9 @@ use crate::identification::PointSample;
 use crate::identification::triage::{Cause, Finding, Names, PairDeviation, Triage, triage};
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
-use crate::session::journal::{Correction, FindingText, MeasuredText, PairText, from_edge, to_edge, to_length_mm};
+use crate::session::journal::{
+    Correction, FindingCause, FindingText, MeasuredText, PairText, from_edge, to_edge, to_length_mm,
+};
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, Session};
 use crate::units::{MILLIMETRE, to_mm};
@@ -113,7 +115,7 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
     };
     let text = FindingText {
         about: number(found.sample),
-        cause: cause_name(&found.cause).to_owned(),
+        cause: (&found.cause).into(),
         ratio: (found.ratio * 10.0).round() / 10.0,
         message: found.describe(&names),
         remedy: remedy(&found, cx, &number, &samples, &rows),
@@ -134,22 +136,6 @@ fn worst(found: &Finding, number: &dyn Fn(usize) -> u64, samples: &[PointSample]
         })
     };
     found.worst.iter().filter_map(text).collect()
-}
-
-/// Short name of a cause, stable.
-const fn cause_name(cause: &Cause) -> &'static str {
-    match cause {
-        Cause::Unit { .. } => "unit",
-        Cause::JointSign { .. } => "joint_sign",
-        Cause::MistypedJoint { .. } => "mistyped_joint",
-        Cause::WrongPose { .. } => "wrong_pose",
-        Cause::StayedAtPrevious => "stayed_at_previous",
-        Cause::SwappedRows { .. } => "swapped_rows",
-        Cause::TargetMoved { .. } => "target_moved",
-        Cause::InstrumentMoved { .. } => "instrument_moved",
-        Cause::NotAtRest { .. } => "not_at_rest",
-        Cause::Unexplained => "unexplained",
-    }
 }
 
 /// What would set it right, where something short of measuring again does.
@@ -202,7 +188,7 @@ fn drift(session: &Session, noted: &MeasuredText, profile: &Profile) -> Option<F
     let limit = (DRIFT_FACTOR * expected).max(REPEATABILITY);
     (moved > limit).then(|| FindingText {
         about: noted.number,
-        cause: "drift".to_owned(),
+        cause: FindingCause::Drift,
         ratio: (moved / expected * 10.0).round() / 10.0,
         message: format!(
             "pose {}: measured {:.3} mm away from where it was at measurement {}; up to {:.3} mm is usual. The tracker, the robot's base or the SMR has moved, or something warms up: look for it; what was measured since may have to be measured again",

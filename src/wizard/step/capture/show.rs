@@ -38,7 +38,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         finding: step.asked(session).map(|(about, finding)| FindingView {
             pose: session.pose_of(about).to_owned(),
             measurement: about.noted.number,
-            cause: finding.cause.clone(),
+            cause: finding.cause,
             message: finding.message.clone(),
             has_remedy: finding.remedy.is_some(),
             worst: finding.worst.iter().map(|pair| pair_view(session, pair)).collect(),
