@@ -1,5 +1,7 @@
 //! What was noted wrongly and is set right, and how that is taken back with the measurement that led to it.
 
+use std::collections::BTreeSet;
+
 use super::{Sample, SampleState, Session};
 use crate::session::journal::{Correction, MeasuredText, to_edge};
 
@@ -103,7 +105,12 @@ impl Session {
                 changed.settled = before.settled;
             }
         }
-        for row in corrected.changes.iter().flat_map(|change| [change.before.row, change.after.row]) {
+        // A later correction may have moved a sample on to a third row.
+        let rows = corrected.changes.iter().flat_map(|change| {
+            let now = self.samples.get(change.sample).map(|sample| sample.row);
+            [Some(change.before.row), Some(change.after.row), now]
+        });
+        for row in rows.flatten().collect::<BTreeSet<usize>>() {
             self.keep_latest(row);
         }
         Some(())

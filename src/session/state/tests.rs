@@ -167,6 +167,25 @@ proptest! {
 }
 
 #[test]
+fn a_sample_that_was_moved_twice_does_not_count_beside_another() {
+    let mut session = begun();
+    let mut apply = |entry| {
+        let next = session.lines + 1;
+        session.apply(&line(next, 0, entry)).unwrap();
+    };
+    let to_row = |sample, row| Entry::Correction(Correction::Row { sample, row });
+    apply(sample(1, 3));
+    apply(sample(2, 1));
+    apply(to_row(2, 3));
+    apply(sample(3, 0));
+    apply(to_row(1, 0));
+    let first = session.corrections[0].line;
+    session.apply(&line(session.lines + 1, 0, Entry::Correction(Correction::TakenBack { line: first }))).unwrap();
+    let counted: Vec<(u64, usize)> = session.counted().map(|sample| (sample.noted.number, sample.row)).collect();
+    assert_eq!(counted, [(2, 1), (3, 0)]);
+}
+
+#[test]
 fn a_scale_counts_for_the_measurements_it_names() {
     let mut session = begun();
     for number in 1..=4 {
