@@ -14,8 +14,7 @@ use crate::kinematics::{Arm, FreeParameter, JointType, ParameterId, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
-    Chosen, Information, JointBox, Score, Search, SearchSettings, Stage, low_discrepancy, random,
-    verification_set,
+    Chosen, Information, JointBox, Score, Search, SearchSettings, Stage, low_discrepancy, random, verification_set,
 };
 use crate::profile::Profile;
 use crate::search::{available_threads, plan_in_parallel};
