@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::thread;
 
+pub(crate) mod faulty_session;
 pub(crate) mod paper_case;
 pub(crate) mod place;
 pub(crate) mod point_cloud;
 #[cfg(target_os = "linux")]
 #[expect(dead_code, reason = "the benchmark of the terminal uses the rest")]
 pub(crate) mod pty;
+pub(crate) mod reference_case;
 #[cfg(unix)]
 pub(crate) mod small_disk;
 
