@@ -33,16 +33,16 @@ pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
 #[derive(Debug, Parser)]
 #[command(name = "trupose", version, about, max_term_width = 80, args_conflicts_with_subcommands = true)]
 pub struct Cli {
-    /// What to do.
+    /// The command; none opens the wizard.
     #[command(subcommand)]
     pub command: Option<Command>,
     /// Run a script through the wizard, without a terminal
     #[arg(long, value_name = "FILE")]
     pub script: Option<PathBuf>,
-    /// How to run it.
+    /// Options of scripts.
     #[command(flatten)]
     pub script_args: ScriptArgs,
-    /// How to use the terminal.
+    /// Options of the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
 }
@@ -62,15 +62,15 @@ pub struct WizardArgs {
     /// Write every byte of instruments on a wire to this file
     #[arg(long, value_name = "FILE")]
     pub raw_log: Option<PathBuf>,
-    /// What is recorded.
+    /// Options of recordings.
     #[command(flatten)]
     pub recording: RecordingArgs,
-    /// How to use the terminal.
+    /// Options of the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
 }
 
-/// How to run a script.
+/// Options of scripts.
 #[derive(Args, Clone, Debug)]
 pub struct ScriptArgs {
     /// Value of a placeholder '${name}' of the script; may be repeated
@@ -88,7 +88,7 @@ pub struct ScriptArgs {
     /// Write every byte of instruments on a wire to this file
     #[arg(long, value_name = "FILE")]
     pub raw_log: Option<PathBuf>,
-    /// What is recorded.
+    /// Options of recordings.
     #[command(flatten)]
     pub recording: RecordingArgs,
 }
@@ -102,7 +102,7 @@ pub struct DemoArgs {
     /// Speak to the simulated cell over wires: 'emscon', 'ascii', 'geocom', 'ndi', each also as 'serial:…' where it is spoken on serial lines; with ',rtde' the robot tells its joints
     #[arg(long, value_name = "PROTOCOL", value_parser = wires)]
     pub over: Option<Wires>,
-    /// How to run it.
+    /// Options of scripts.
     #[command(flatten)]
     pub script: ScriptArgs,
 }
@@ -113,13 +113,13 @@ pub struct ResumeArgs {
     /// Folder of the session
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Go on by a script, without a terminal
+    /// Continue by a script, without a terminal
     #[arg(long, value_name = "FILE")]
     pub script: Option<PathBuf>,
-    /// How to run it.
+    /// Options of scripts.
     #[command(flatten)]
     pub script_args: ScriptArgs,
-    /// How to use the terminal.
+    /// Options of the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
 }
@@ -139,7 +139,7 @@ pub struct ReplayArgs {
     /// Print the measurements that count there as CSV, without a terminal
     #[arg(long, conflicts_with = "print")]
     pub csv: bool,
-    /// How to use the terminal.
+    /// Options of the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
 }
@@ -165,9 +165,9 @@ pub enum Command {
     Wizard(WizardArgs),
     /// Calibrate a simulated robot from profile to result, without a terminal
     Demo(DemoArgs),
-    /// Go on with a session where it ended
+    /// Continue a session where it ended
     Resume(ResumeArgs),
-    /// Look at a session again, entry by entry; nothing of it is changed
+    /// Look at a session again, entry by entry, without changing it
     Replay(ReplayArgs),
     /// List, show or export sessions
     #[command(subcommand)]
@@ -200,12 +200,12 @@ pub struct CompletionsArgs {
 /// Arguments of `man`.
 #[derive(Args, Clone, Debug)]
 pub struct ManArgs {
-    /// Folder for the pages of all commands; made if it is missing
+    /// Folder for the pages of all commands; created if it is missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 
-/// What to do with profiles.
+/// Commands about profiles.
 #[derive(Debug, Subcommand)]
 pub enum ProfileCommand {
     /// List the profiles that come with the program
@@ -224,7 +224,7 @@ pub enum ProfileCommand {
     ImportUrdf(compensate::ImportUrdfArgs),
 }
 
-/// How to identify; shared by all commands that do.
+/// Options of the identification, shared by all commands that identify.
 #[derive(Args, Clone, Debug)]
 pub struct EstimationArgs {
     /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
@@ -251,7 +251,7 @@ pub struct EstimationArgs {
     /// Expected deviation of every length and every angle instead of the profile's, such as '1mm,0.1deg'
     #[arg(long, value_name = "LENGTH,ANGLE")]
     pub expected_deviation: Option<ExpectedDeviation>,
-    /// Folder for the results (calibration.ron, report.html, report.json); made if it is missing
+    /// Folder for the results (calibration.ron, report.html, report.json); created if it is missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print one JSON object instead of tables
@@ -262,10 +262,10 @@ pub struct EstimationArgs {
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
 pub struct IdentifyArgs {
-    /// What is recorded.
+    /// Options of recordings.
     #[command(flatten)]
     pub record: RecordArgs,
-    /// How to identify.
+    /// Options of the identification.
     #[command(flatten)]
     pub estimation: EstimationArgs,
     /// Measured points: CSV with units in the column names
@@ -311,7 +311,7 @@ pub struct VerifyArgs {
 /// Arguments of `constraints`.
 #[derive(Args, Debug)]
 pub struct ConstraintsArgs {
-    /// How to identify.
+    /// Options of the identification.
     #[command(flatten)]
     pub estimation: EstimationArgs,
     /// Shared points (position, socket, joints) or lengths (from_q1_deg …, to_q1_deg …, length_mm): CSV with units
@@ -334,7 +334,7 @@ pub struct ConstraintsArgs {
 /// Arguments of `plan`.
 #[derive(Args, Debug)]
 pub struct PlanArgs {
-    /// What is recorded.
+    /// Options of recordings.
     #[command(flatten)]
     pub record: RecordArgs,
     /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
@@ -358,7 +358,7 @@ pub struct PlanArgs {
     /// Seed of all random decisions: the same seed gives the same plan
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Stop searching after so many seconds and take the best set so far
+    /// Stop searching after this many seconds and take the best set so far
     #[arg(long, value_name = "S", value_parser = positive)]
     pub time_limit: Option<f64>,
     /// Threads to search with [default: one per core]; the result does not depend on it
@@ -370,10 +370,10 @@ pub struct PlanArgs {
     /// Keep the reflector inside a box in the robot base, such as '500..1500,-800..800,200..1600' (mm, x,y,z)
     #[arg(long = "box", value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub region: Option<BoxMm>,
-    /// Poses that must be in because they are already measured (any table with q1… columns and a pose column)
+    /// Poses that must be included because they are already measured (any table with q1… columns and a pose column)
     #[arg(long, value_name = "CSV")]
     pub include: Option<PathBuf>,
-    /// No check of collisions and sight, only joint limits
+    /// Check joint limits only, no collisions and no line of sight
     #[arg(long)]
     pub no_filters: bool,
     /// Clearance to keep from everything
@@ -388,7 +388,7 @@ pub struct PlanArgs {
     /// Standard deviation of a measured coordinate [default: of the profile's instrument]
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub sigma_mm: Option<f64>,
-    /// Measure the first pose again after so many poses, to see a drift; 0: never
+    /// Repeat the first pose after every N poses to detect drift; 0: never
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub drift_every: usize,
     /// Part of the full joint speed that the program will use

@@ -11,8 +11,8 @@ mod tables;
 mod text;
 
 pub use document::{
-    Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, NotCounted, NotePart, ParameterNote,
-    PointOrigin, PointPart, PredictionPart, RefusedPart, ResultState, RobotPart, SessionPart, TemperaturePart,
+    Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, ParameterNote, PointOrigin, PointPart,
+    PredictionPart, ResultState, RobotPart, SessionPart, TemperaturePart,
 };
 pub use html::report_html;
 pub use plan::plan_text;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!            Event ──► Wizard::update ──► Effects        intents(): what can be done now
-//!                          │                             view():    what there is to see
+//!                          │                             view():    what is shown
 //!              Session = fold of the journal
 //! ```
 //!
@@ -14,11 +14,10 @@
 //!   then does anything that depends on it happen or show. What the operator does meanwhile waits in a short queue.
 //! - **One request at a time**: planning, measuring, identifying. Its answer carries its id; an answer to anything else is
 //!   dropped. It can always be cancelled.
-//! - The session is all that survives: [`Wizard::resume`] with the fold of the journal goes on where the journal ends.
+//! - The session is all that survives: [`Wizard::resume`] with the fold of the journal continues where the journal ends.
 //!
 //! No clock, thread, file, key or terminal here, and no randomness: the same events give the same states and effects.
 
-#![warn(missing_docs)]
 #![warn(clippy::wildcard_enum_match_arm)]
 
 pub mod advice;

@@ -17,11 +17,13 @@ use crate::kinematics::{Arm, FreeParameter, Place};
 use crate::procedure::assess::{direct_summary, joint_summaries};
 use crate::procedure::identify::calibration;
 use crate::procedure::result::{self, Context};
-use crate::procedure::summary::{Finished, SampleName, Special};
+use crate::procedure::summary::{Finished, SampleName};
 use crate::procedure::{EstimationSettings, ProcedureError, checks, input_file, joint_types, target_parameters};
 use crate::session::constraints::{Constraints, SharedPoints, read_constraints_bytes};
 use crate::session::filter::Filter;
-use crate::session::summary::{InputRole, ModelSummary, Refit, VerificationMode, VerificationSummary, Warning};
+use crate::session::summary::{
+    IdentificationSettings, InputRole, ModelSummary, Refit, VerificationMode, VerificationSummary, Warning,
+};
 use crate::store;
 use crate::units::from_mm;
 
@@ -117,15 +119,13 @@ pub(super) fn run<O: Write, E: Write>(
     }
     let nominal = setup.nominal(&identification.observations)?;
     let unusable = result::is_unusable(&warnings, &found, &setup.settings);
-    let special = special(args);
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let finished = Finished {
         profile: &loaded.profile,
         profile_text: &loaded.text,
         created: load::now(),
         inputs: vec![input_file(InputRole::Identification, file, &bytes)],
-        settings: &setup.estimation,
-        special,
+        settings: settings(args, &setup.estimation),
         found: &found,
         names: &identification.names,
         warnings,
@@ -143,10 +143,9 @@ pub(super) fn run<O: Write, E: Write>(
     deliver(summary, calibration.as_ref(), session.transpose()?.as_ref(), estimation, console)
 }
 
-/// The settings that only this command has.
-fn special(args: &ConstraintsArgs) -> Special {
-    Special {
-        layout: None,
+/// The record of the settings, with those that only this command has.
+fn settings(args: &ConstraintsArgs, estimation: &EstimationSettings) -> IdentificationSettings {
+    IdentificationSettings {
         socket_distance_mm: args.socket_distance_mm,
         socket_distance_sigma_mm: args.socket_distance_mm.map(|_| args.socket_distance_sigma_mm),
         verification: match (args.verify_rest, &args.leave_one_out) {
@@ -154,6 +153,7 @@ fn special(args: &ConstraintsArgs) -> Special {
             (false, Some(_)) => VerificationMode::LeaveOneOut,
             (false, None) => VerificationMode::None,
         },
+        ..estimation.record()
     }
 }
 

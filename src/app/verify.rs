@@ -20,7 +20,7 @@ use crate::session::calibration::{Calibration, SampleText};
 use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
 use crate::units::{MICROMETRE, MILLIMETRE, from_mm, to_mm};
 
-/// How freely a target that was mounted anew is fitted (m).
+/// Prior standard deviation of a remounted target (m).
 const NEW_MOUNTING: f64 = 50.0 * MILLIMETRE;
 /// Positions this many times worse than distances are not those of the same set-up.
 const MOVED: f64 = 10.0;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::assess::point_verification;
 use super::result::{self, Context};
-use super::summary::{Finished, SampleName, Special};
+use super::summary::{Finished, SampleName};
 use super::{EstimationSettings, ProcedureError, checks, target_parameters};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{Identification, Iteration, Observations, Places, PointSample, Problem, identify_while};
@@ -14,7 +14,7 @@ use crate::session::advice::Advice;
 use crate::session::calibration::{self, Calibration, MountedText, SampleText};
 use crate::session::measurements::Layout;
 use crate::session::summary::{
-    IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
+    IdentificationSettings, IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
 };
 use crate::units::to_mm;
 
@@ -174,8 +174,11 @@ pub fn identify(
         profile_text: &request.profile_text,
         created: request.created.clone(),
         inputs: request.inputs.clone(),
-        settings: &request.settings,
-        special: Special { layout: request.layout, verification: request.verification_mode, ..Special::default() },
+        settings: IdentificationSettings {
+            layout: request.layout,
+            verification: request.verification_mode,
+            ..request.settings.record()
+        },
         found: &found,
         names: &names,
         warnings,

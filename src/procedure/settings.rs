@@ -3,6 +3,8 @@
 use crate::identification::{Estimator, Prior, Settings, SigmaSource, Weighting};
 use crate::kinematics::{FreeParameter, ParameterId};
 use crate::profile::{ExpectedDeviation, Level, Profile};
+use crate::session::summary::{IdentificationSettings, VerificationMode};
+use crate::units::{to_deg, to_mm};
 
 /// How to identify. The default is what `trupose identify` does without options.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +45,24 @@ impl Default for EstimationSettings {
 }
 
 impl EstimationSettings {
+    /// The record of these settings. What only some commands have is left empty.
+    pub(crate) fn record(&self) -> IdentificationSettings {
+        IdentificationSettings {
+            level: self.level,
+            weighting: self.weighting,
+            prior: self.prior,
+            estimator: self.estimator,
+            iterations: self.iterations,
+            filter: self.filter.clone(),
+            expected_length_mm: self.expected_deviation.map(|expected| to_mm(expected.length)),
+            expected_angle_deg: self.expected_deviation.map(|expected| to_deg(expected.angle)),
+            layout: None,
+            socket_distance_mm: None,
+            socket_distance_sigma_mm: None,
+            verification: VerificationMode::None,
+        }
+    }
+
     /// The free parameters that are asked for.
     pub(crate) fn parameters(&self, profile: &Profile) -> Vec<FreeParameter> {
         self.parameters_of(self.level, profile)

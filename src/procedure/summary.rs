@@ -1,19 +1,18 @@
 //! The summary of an identification: its numbers in mm and degree, with names and the verdict.
 
-use super::{EstimationSettings, assess, provenance};
+use super::{assess, provenance};
 use crate::identification::{Estimate, Identification, Observability, Prior, RejectionReason, SampleIndex, Sigma};
 use crate::profile::Profile;
-use crate::session::measurements::Layout;
 use crate::session::summary::{
     BlindGroupSummary, CorrelationSummary, IdentificationSettings, IdentificationSummary, InputFile, IterationSummary,
-    ParameterSummary, RejectedSummary, SCHEMA, SigmaSummary, Verdict, VerificationMode, VerificationSummary, Warning,
+    ParameterSummary, RejectedSummary, SCHEMA, SigmaSummary, Verdict, VerificationSummary, Warning,
 };
-use crate::units::{to_deg, to_mm};
+use crate::units::to_mm;
 
 /// Correlations beyond this are listed.
 const STRONG_CORRELATION: f64 = 0.9;
 
-/// Where the samples of an identification were written down.
+/// Name of a sample: its pose and where it was recorded.
 #[derive(Clone, Debug)]
 pub(crate) struct SampleName {
     pub(crate) pose: String,
@@ -21,7 +20,7 @@ pub(crate) struct SampleName {
 }
 
 impl SampleName {
-    /// As it reads in a message.
+    /// The name in a message.
     pub(crate) fn text(&self) -> String {
         format!("pose {} (line {})", self.pose, self.line)
     }
@@ -101,33 +100,6 @@ fn sigma_summary(found: &Identification) -> SigmaSummary {
     SigmaSummary { used_mm: to_mm(used), source, from_residuals_mm: from_residuals.map(to_mm) }
 }
 
-fn settings_summary(asked: &EstimationSettings, special: Special) -> IdentificationSettings {
-    let Special { layout, socket_distance_mm, socket_distance_sigma_mm, verification } = special;
-    IdentificationSettings {
-        level: asked.level,
-        weighting: asked.weighting,
-        prior: asked.prior,
-        estimator: asked.estimator,
-        iterations: asked.iterations,
-        filter: asked.filter.clone(),
-        expected_length_mm: asked.expected_deviation.map(|expected| to_mm(expected.length)),
-        expected_angle_deg: asked.expected_deviation.map(|expected| to_deg(expected.angle)),
-        layout,
-        socket_distance_mm,
-        socket_distance_sigma_mm,
-        verification,
-    }
-}
-
-/// Settings that only one command has.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Special {
-    pub(crate) layout: Option<Layout>,
-    pub(crate) socket_distance_mm: Option<f64>,
-    pub(crate) socket_distance_sigma_mm: Option<f64>,
-    pub(crate) verification: VerificationMode,
-}
-
 /// A finished identification, ready to be summed up.
 pub(crate) struct Finished<'a> {
     pub(crate) profile: &'a Profile,
@@ -135,8 +107,7 @@ pub(crate) struct Finished<'a> {
     /// RFC 3339, UTC.
     pub(crate) created: String,
     pub(crate) inputs: Vec<InputFile>,
-    pub(crate) settings: &'a EstimationSettings,
-    pub(crate) special: Special,
+    pub(crate) settings: IdentificationSettings,
     pub(crate) found: &'a Identification,
     pub(crate) names: &'a [SampleName],
     pub(crate) warnings: Vec<Warning>,
@@ -146,15 +117,13 @@ pub(crate) struct Finished<'a> {
 impl Finished<'_> {
     /// The summary with its verdict.
     pub(crate) fn summary(self) -> IdentificationSummary {
-        let Self { profile, profile_text, created, inputs, settings, special, found, names, warnings, verification } =
-            self;
+        let Self { profile, profile_text, created, inputs, settings, found, names, warnings, verification } = self;
         let Observability { rank, gap, condition_number, condition_number_raw, scored_points, groups, .. } =
             &found.observability;
         let verdict: Verdict = assess::verdict(profile.acceptance(), verification.as_ref(), &warnings);
         IdentificationSummary {
             schema: SCHEMA,
             provenance: provenance(profile, profile_text, created, inputs),
-            settings: settings_summary(settings, special),
             warnings,
             verdict,
             verification,
@@ -167,6 +136,7 @@ impl Finished<'_> {
             condition_number_points: *scored_points,
             sigma: sigma_summary(found),
             parameters: parameter_summaries(found, settings.prior),
+            settings,
             blind_groups: groups
                 .iter()
                 .map(|group| BlindGroupSummary {

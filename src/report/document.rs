@@ -1,4 +1,4 @@
-//! Everything a report says, as plain data in mm and degree. `report.json` is this object; `report.html` shows it and nothing else,
+//! Content of a report, as plain data in mm and degree. `report.json` is this object; `report.html` shows it and nothing else,
 //! so the two cannot disagree.
 //!
 //! Field names are part of the interface of scripts: units are in the names, nothing is renamed or removed within a schema
@@ -12,6 +12,7 @@ use serde::{Serialize, Serializer};
 
 use crate::session::journal::{FindingCause, PlanText};
 use crate::session::set_up::About;
+use crate::session::state::{Note, Refused};
 use crate::session::summary::IdentificationSummary;
 
 /// Version of the layout of [`Details`].
@@ -23,11 +24,11 @@ pub struct Document {
     /// The result, its fields at the top of the object; none before anything was identified.
     #[serde(flatten)]
     pub result: Option<IdentificationSummary>,
-    /// What else there is to say.
+    /// Everything besides the result.
     pub report: Details,
 }
 
-/// Whether a result can be used.
+/// State of the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ResultState {
@@ -37,50 +38,47 @@ pub enum ResultState {
     OutOfDate,
     /// There is no usable solution.
     Unusable,
-    /// It rests on exactly the samples that count.
+    /// Based on exactly the samples that count.
     Current,
 }
 
-/// Where points come from.
+/// Origin of the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PointOrigin {
     /// Typed in at the cell.
     Typed,
-    /// Told by an instrument over a wire.
+    /// Sent by a connected instrument.
     Instrument,
     /// The simulated cell: nothing was measured.
     Simulated,
-    /// Recorded on another day and played.
+    /// Replayed from an earlier recording.
     Recorded,
     /// Read from tables, or not known.
     Tables,
 }
 
-/// What a report says besides the result.
+/// Content of a report besides the result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Details {
-    /// Version of this layout.
     pub schema: u32,
     /// Whether the result can be used.
     pub state: ResultState,
-    /// Where the points come from.
     pub points_from: PointOrigin,
-    /// The session.
     pub session: SessionPart,
     /// Serial number, operator and place; empty: not given.
     pub about: About,
     /// The robot; none before one was chosen.
     pub robot: Option<RobotPart>,
-    /// What measured, in words.
+    /// The instrument, in words.
     pub instrument: Option<String>,
-    /// Where the SMR sits, in words.
+    /// Position of the SMR on the flange, in words.
     pub target: Option<String>,
     /// Temperature over the samples that count.
     pub temperature: Option<TemperaturePart>,
-    /// How many samples, and of what kind.
+    /// Numbers of samples by kind.
     pub counts: Counts,
-    /// What is known of each parameter in words, in the order of `parameters`.
+    /// Meaning of each parameter, in the order of `parameters`.
     pub parameter_notes: Vec<ParameterNote>,
     /// Every sample of the result against both models.
     pub points: Vec<PointPart>,
@@ -91,18 +89,17 @@ pub struct Details {
     pub plan: Option<PlanText>,
     /// Predicted error against the number of identification samples, as measured.
     pub prediction: Vec<PredictionPart>,
-    /// The pose that was measured again and again.
+    /// Repeated measurements of the drift pose.
     pub drift: Vec<DriftPart>,
     /// Samples that do not count, with the reason.
-    pub not_counted: Vec<NotCounted>,
+    pub not_counted: Vec<Refused>,
     /// Measurements that gave no sample.
-    pub refused: Vec<RefusedPart>,
-    /// What the checks found, and how it was decided.
+    pub refused: Vec<Refused>,
+    /// Findings of the checks, with the decisions.
     pub findings: Vec<FindingPart>,
-    /// What was set right, in words, oldest first.
+    /// Corrections in words, oldest first.
     pub corrections: Vec<String>,
-    /// Remarks of the operator.
-    pub notes: Vec<NotePart>,
+    pub notes: Vec<Note>,
     /// Files beside the report.
     pub files: Vec<FilePart>,
 }
@@ -124,36 +121,32 @@ fn plan<S: Serializer>(plan: &Option<PlanText>, serializer: S) -> Result<S::Ok, 
 /// The session; all but the program empty or zero for a result from tables.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SessionPart {
-    /// Its name.
     pub name: String,
     /// Program and version that opened it.
     pub program: String,
-    /// When it was opened (RFC 3339, UTC).
+    /// Time of opening (RFC 3339, UTC).
     pub opened: Option<String>,
     /// Time of the first sample that counts.
     pub first_sample: Option<String>,
-    /// Time of the last one.
+    /// Time of the last sample that counts.
     pub last_sample: Option<String>,
-    /// Time of work, breaks not counted.
+    /// Time of work, without breaks.
     pub worked_min: f64,
-    /// How often it was opened again.
+    /// Number of times it was resumed.
     pub resumed: usize,
-    /// Entries of the journal that this report stands on.
+    /// Number of journal entries that this report is based on.
     pub journal_entries: u64,
 }
 
 /// The robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RobotPart {
-    /// Its title.
     pub title: String,
-    /// Name of the profile.
     pub profile: String,
-    /// Where the nominal numbers come from.
+    /// Origin of the nominal numbers.
     pub source: String,
     /// SHA-256 of the profile's text.
     pub profile_sha256: String,
-    /// Names of the joints.
     pub joints: Vec<String>,
     /// Unit of each joint: `deg` or `mm`.
     pub joint_units: Vec<&'static str>,
@@ -164,20 +157,18 @@ pub struct RobotPart {
 /// Temperatures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TemperaturePart {
-    /// Lowest.
     pub lowest_degc: f64,
-    /// Highest.
     pub highest_degc: f64,
-    /// Samples that have one.
+    /// Number of samples with a temperature.
     pub samples: usize,
 }
 
-/// How many samples.
+/// Numbers of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// That count for identification.
+    /// Identification samples that count.
     pub identification: usize,
-    /// That count for verification.
+    /// Verification samples that count.
     pub verification: usize,
     /// Repetitions of the drift pose.
     pub drift: usize,
@@ -185,7 +176,7 @@ pub struct Counts {
     pub repeats: usize,
     /// Fewest shots that were averaged for a sample.
     pub fewest_shots: u32,
-    /// Most of them.
+    /// Most shots that were averaged for a sample.
     pub most_shots: u32,
     /// Poses of the plan that were not measured.
     pub open: usize,
@@ -197,7 +188,7 @@ pub struct Counts {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Found {
-    /// Well.
+    /// Well determined.
     Yes,
     /// The data say less than half of what is expected anyway.
     Weakly,
@@ -208,11 +199,9 @@ pub enum Found {
 /// A parameter in words.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ParameterNote {
-    /// Its name.
     pub name: String,
-    /// What it is.
+    /// Description of the parameter.
     pub meaning: String,
-    /// How well it was found.
     pub found: Found,
 }
 
@@ -221,7 +210,6 @@ pub struct ParameterNote {
 pub struct PointPart {
     /// Number of the measurement.
     pub number: u64,
-    /// Name of the pose.
     pub pose: String,
     /// Whether the identification did not see it. Only then its errors are an accuracy; else they are residuals of the fit.
     pub verification: bool,
@@ -229,7 +217,7 @@ pub struct PointPart {
     pub rejected: bool,
     /// Pendant joint values, in the joints' units.
     pub joints: Vec<f64>,
-    /// Where the identified arm has the SMR.
+    /// Point of the SMR according to the identified arm.
     pub at_mm: [f64; 3],
     /// Measured − predicted by the nominal arm.
     pub nominal_mm: [f64; 3],
@@ -237,10 +225,10 @@ pub struct PointPart {
     pub identified_mm: [f64; 3],
 }
 
-/// What so many samples promise.
+/// Predicted error for a number of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PredictionPart {
-    /// Number of identification samples that were there.
+    /// Number of identification samples.
     pub samples: usize,
     /// Predicted RMS position error at fresh poses, per σ of the instrument.
     pub predicted_error_sigma: f64,
@@ -251,72 +239,35 @@ pub struct PredictionPart {
 pub struct DriftPart {
     /// Number of the measurement.
     pub number: u64,
-    /// Name of the pose.
     pub pose: String,
     /// Number of the measurement that it is compared with.
     pub since: u64,
-    /// Time since that one.
+    /// Minutes since that measurement.
     pub minutes: f64,
-    /// How far the point moved in the tracker frame.
+    /// Displacement of the point in the tracker frame.
     pub moved_mm: [f64; 3],
 }
 
-/// A sample that does not count.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct NotCounted {
-    /// Number of the measurement.
-    pub number: u64,
-    /// Name of the pose.
-    pub pose: String,
-    /// Why.
-    pub reason: String,
-}
-
-/// A measurement that gave no sample.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct RefusedPart {
-    /// Number of the measurement.
-    pub number: u64,
-    /// Name of the pose.
-    pub pose: String,
-    /// Why.
-    pub reason: String,
-}
-
-/// What a check found.
+/// A finding of a check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FindingPart {
     /// Number of the measurement that raised it.
     pub raised_at: u64,
     /// Number of the measurement it is about.
     pub about: u64,
-    /// Name of the pose of that one.
+    /// Pose of the measurement it is about.
     pub pose: String,
-    /// The likely cause.
     pub cause: FindingCause,
-    /// How many standard deviations off.
+    /// Deviation in standard deviations.
     pub ratio: f64,
-    /// In words.
     pub message: String,
-    /// What became of the sample.
+    /// Decision about the sample, in words.
     pub decision: String,
-}
-
-/// A remark.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct NotePart {
-    /// When (RFC 3339, UTC).
-    pub time: String,
-    /// Name of the pose it is about.
-    pub pose: Option<String>,
-    /// What it says.
-    pub text: String,
 }
 
 /// A file beside the report.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FilePart {
-    /// Its name.
     pub name: String,
     /// SHA-256 of its bytes.
     pub sha256: String,

@@ -34,7 +34,7 @@ pub const SCHEMA: u32 = 1;
 /// Name of the file in a session's folder.
 pub const FILE_NAME: &str = "journal.ron";
 
-/// How every line begins.
+/// Start of every line.
 const BEGIN: &[u8] = b"(\"";
 
 /// Bytes of a check sum in hexadecimal.
@@ -47,7 +47,6 @@ pub struct Line {
     pub number: u64,
     /// When it was made. Clocks are set: a later line may have an earlier time.
     pub time: Timestamp,
-    /// What happened.
     pub entry: Entry,
 }
 
@@ -157,7 +156,7 @@ impl Sum {
     }
 }
 
-/// What is wrong with a line.
+/// Damage of a line.
 enum LineError {
     Text(&'static str),
     Entry(String),
@@ -194,7 +193,7 @@ fn own_again(entry: &str) -> Option<String> {
 /// A line taken to pieces.
 struct Parts<'a> {
     sum: &'a str,
-    /// What the check sum is of.
+    /// The text that the checksum covers.
     rest: &'a str,
     number: u64,
     time: Timestamp,

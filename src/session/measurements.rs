@@ -45,11 +45,11 @@ pub struct Measurements {
     /// Places in `rows` of those that repeat an earlier row in target, configuration and point, ascending. They are
     /// copies made in a spreadsheet, not readings: identification should leave them out.
     pub duplicates: Vec<usize>,
-    /// What is odd about the table but does not forbid its use, in the order of its lines.
+    /// Oddities of the table that do not forbid its use, in the order of its lines.
     pub warnings: Vec<TableProblem>,
 }
 
-/// One reading: where the robot stood and where the tracker saw the target.
+/// One reading: the configuration of the robot and the measured point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// 1-based line in the file.
@@ -136,7 +136,7 @@ pub(super) fn joint_names(prefix: &str, joints: &[JointType]) -> Vec<String> {
     joints.iter().enumerate().map(name).collect()
 }
 
-/// Where the parts of a row stand.
+/// Columns of the parts of a row.
 #[derive(Debug, Default)]
 struct Places {
     pose: Option<usize>,

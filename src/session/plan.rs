@@ -27,7 +27,7 @@ use super::table::{
 use crate::kinematics::JointType;
 use crate::units::to_mm;
 
-/// What is done at a row of a plan.
+/// Purpose of a row of a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseKind {
@@ -36,9 +36,9 @@ pub enum PoseKind {
     Identification,
     /// Measured to verify what was identified.
     Verification,
-    /// Begin and end of the program; not measured.
+    /// Start and end of the program; not measured.
     Home,
-    /// A pose that is measured again, to see whether anything has moved.
+    /// Measured again to detect drift.
     Drift,
     /// Passed through on the way to the next pose; not measured.
     Via,
@@ -92,20 +92,18 @@ impl FromStr for PoseKind {
 pub struct Plan {
     /// One per row of the file.
     pub rows: Vec<PlannedPose>,
-    /// What is odd about the plan but does not forbid its use, in the order of its lines.
+    /// Oddities of the plan that do not forbid its use, in the order of its lines.
     pub warnings: Vec<TableProblem>,
 }
 
 /// One row of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPose {
-    /// Name of the pose.
     pub pose: String,
-    /// What is done there.
     pub kind: PoseKind,
     /// Pendant joint values (rad), sliding joints (m).
     pub configuration: Vec<f64>,
-    /// Where the nominal arm has the SMR then, in the robot base (m).
+    /// Point of the SMR in the robot base (m), from the nominal arm.
     pub point_in_base: Option<Point3<f64>>,
 }
 
@@ -157,7 +155,7 @@ pub fn write(rows: &[PlannedPose], joints: &[JointType]) -> String {
     text
 }
 
-/// Where the parts of a row stand.
+/// Columns of the parts of a row.
 struct Places {
     pose: Option<usize>,
     kind: Option<usize>,

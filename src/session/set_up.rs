@@ -1,4 +1,4 @@
-//! What is chosen before measuring: instrument, target, and the steps of the wizard.
+//! Choices made before measuring: instrument, target, and the steps of the wizard.
 
 use std::fmt;
 
@@ -15,13 +15,13 @@ pub enum Step {
     /// The robot.
     #[default]
     Profile,
-    /// What measures.
+    /// Choice of the instrument.
     Instrument,
-    /// Where the SMR sits on the flange.
+    /// Position of the SMR on the flange.
     Target,
     /// Which poses to measure.
     Plan,
-    /// Measuring.
+    /// Measurement.
     Capture,
     /// Identifying the arm.
     Identify,
@@ -81,11 +81,8 @@ pub enum CoordinateUnit {
     /// Millimetre.
     #[default]
     Millimetre,
-    /// Metre.
     Metre,
-    /// Inch.
     Inch,
-    /// Micrometre.
     Micrometre,
 }
 
@@ -114,7 +111,7 @@ impl CoordinateUnit {
     }
 }
 
-/// What measures.
+/// Choice of the instrument.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum InstrumentChoice {
     /// The operator types or pastes coordinates.
@@ -139,7 +136,7 @@ pub enum InstrumentChoice {
 pub struct RecordedSet {
     /// Path of the table.
     pub file: String,
-    /// What they are for: `identification` or `verification`.
+    /// Purpose of the rows: `identification` or `verification`.
     #[serde(default)]
     pub kind: PoseKind,
     /// Which rows, such as `pose % 17 == 0`; none: all.
@@ -154,7 +151,7 @@ fn named() -> String {
     "named".to_owned()
 }
 
-/// Where the SMR sits on the flange.
+/// Position of the SMR on the flange.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TargetChoice {
     /// As the profile says.
@@ -180,15 +177,15 @@ pub enum TargetChoice {
     },
 }
 
-/// What only people know and a report should say. Empty: not given.
+/// Details for the report that only people know. Empty: not given.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct About {
     /// Serial number of the arm.
     pub serial: String,
-    /// Who measured.
+    /// Name of the person who measured.
     pub operator: String,
-    /// Where, and under which conditions.
+    /// Place and conditions of the measurement.
     pub site: String,
 }
 

@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 
 use jiff::Timestamp;
 use nalgebra::Point3;
+use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use super::calibration::MountedText;
@@ -31,25 +32,23 @@ const LONGEST_STEP: f64 = 3600.0;
 /// A session.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Session {
-    /// Its name.
     pub name: String,
     /// Program that opened it.
     pub program: String,
-    /// When it was opened, and when the last entry was made.
+    /// Time of opening.
     pub opened: Option<Timestamp>,
     /// Time of the latest entry (clocks may jump back: this is the largest).
     pub latest: Option<Timestamp>,
-    /// Time of the last entry, as its clock had it.
+    /// Time of the last entry, by its own clock.
     pub last: Option<Timestamp>,
-    /// Time of work (s): from entry to entry, without the pauses between programs, and without leaps of the clock.
+    /// Time of work (s): from entry to entry, without pauses between program runs and without jumps of the clock.
     pub worked: f64,
     /// Entries so far.
     pub lines: u64,
-    /// The robot.
     pub robot: Option<Robot>,
-    /// What measures.
+    /// Choice of the instrument.
     pub instrument: Option<InstrumentChoice>,
-    /// Where the SMR sits.
+    /// Position of the SMR on the flange.
     pub target: Option<TargetChoice>,
     /// Points of the circle-point analysis.
     pub circle_points: Vec<CirclePointText>,
@@ -63,29 +62,26 @@ pub struct Session {
     pub samples: Vec<Sample>,
     /// Measurements that gave no sample.
     pub refused: Vec<Refused>,
-    /// Who the instrument on a wire said it is; several where another one answered later.
+    /// Identities of the connected instruments, in the order of their appearance.
     pub identities: Vec<String>,
     /// Number of the last measurement.
     pub measurements: u64,
-    /// No sample has ever belonged to this row of the plan or to a later one.
+    /// First row of the plan from which on no row was ever measured.
     rows_measured: usize,
-    /// What was set right and stands, oldest first.
+    /// Corrections in force, oldest first.
     pub corrections: Vec<Corrected>,
-    /// Remarks.
     pub notes: Vec<Note>,
     /// Serial number, operator and place.
     pub about: About,
-    /// Where the wizard is.
+    /// Current step of the wizard.
     pub step: Step,
-    /// The last result.
     pub identified: Option<Box<IdentifiedText>>,
-    /// Files that were written.
     pub delivered: Vec<String>,
     /// Models that were left out of them, with the reason.
     pub left_out: Vec<String>,
-    /// How often it was opened again.
+    /// Number of times it was resumed.
     pub resumed: usize,
-    /// Whether it ended in good order.
+    /// Whether it ended normally.
     pub closed: bool,
 }
 
@@ -96,38 +92,36 @@ pub struct Robot {
     pub source: String,
     /// SHA-256 of the profile's text.
     pub sha256: String,
-    /// The text.
     pub text: String,
-    /// The profile as it stands there.
+    /// The parsed profile.
     pub profile: Profile,
-    /// The joints.
     pub joint_types: Vec<JointType>,
 }
 
 /// A row of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// What is planned.
+    /// The planned pose.
     pub planned: PlannedPose,
-    /// Whether it belongs to the present plan; a row of an earlier plan is done or dropped.
+    /// Whether it belongs to the current plan; a row of an earlier plan is done or dropped.
     pub active: bool,
-    /// The operator does not want to measure it.
+    /// Whether the operator skipped it.
     pub skipped: bool,
 }
 
 impl Row {
-    /// Whether it is to be measured, if it was not.
+    /// Whether it is to be measured, unless it already was.
     const fn is_planned(&self) -> bool {
         self.active && !self.skipped && self.planned.kind.is_measured()
     }
 }
 
-/// What has become of a sample.
+/// State of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleState {
     /// It counts.
     Counts,
-    /// A later measurement of the same row counts instead.
+    /// Replaced by a later measurement of the same row.
     Superseded,
     /// The operator left it out.
     LeftOut,
@@ -138,42 +132,43 @@ pub enum SampleState {
 /// A measured point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// As it was noted.
+    /// The record in the journal.
     pub noted: MeasuredText,
-    /// When.
     pub time: Timestamp,
     /// Row of the plan that it belongs to now.
     pub row: usize,
-    /// Where the robot stood, pendant values at the edge (deg, mm).
+    /// Configuration of the robot, pendant values at the edge (deg, mm).
     pub joints: Vec<f64>,
-    /// What has become of it.
+    /// State of the row.
     pub state: SampleState,
-    /// Whether the operator said that it counts although something was found.
+    /// Whether the operator kept it in spite of a finding.
     pub kept: bool,
-    /// Number of the last measurement when it was corrected: what was found up to then is settled. 0: never.
+    /// Number of the last measurement when it was corrected: findings up to then are settled. 0: never.
     pub settled: u64,
 }
 
-/// A measurement that gave no sample.
-#[derive(Clone, Debug, PartialEq)]
+/// A measurement that gave no sample, or whose sample does not count, with the reason.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Refused {
     /// Number of the measurement.
     pub number: u64,
-    /// Name of the pose.
     pub pose: String,
-    /// Why.
     pub reason: String,
 }
 
 /// A remark.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Note {
-    /// When.
+    /// Written in RFC 3339, UTC.
+    #[serde(serialize_with = "as_text")]
     pub time: Timestamp,
     /// Name of the pose it is about.
     pub pose: Option<String>,
-    /// What it says.
     pub text: String,
+}
+
+fn as_text<S: Serializer>(time: &Timestamp, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(time)
 }
 
 /// A journal whose entries do not fit together.
@@ -185,7 +180,6 @@ pub enum FoldError {
     Profile {
         /// Line, from 1.
         line: u64,
-        /// Why.
         message: String,
     },
     /// An entry refers to something that is not there.
@@ -193,7 +187,7 @@ pub enum FoldError {
     Misfit {
         /// Line, from 1.
         line: u64,
-        /// What does not fit.
+        /// Description of the mismatch.
         what: String,
     },
 }
@@ -211,7 +205,7 @@ impl Session {
         Ok(session)
     }
 
-    /// Goes on by one line.
+    /// Applies the next line.
     ///
     /// # Errors
     /// The entry does not fit; the session is then unchanged.
@@ -317,7 +311,7 @@ impl Session {
         Ok(())
     }
 
-    /// Where the SMR is mounted, if not where the profile has it.
+    /// Position of the SMR on the flange, if it is not that of the profile.
     pub fn mounted(&self) -> Option<MountedText> {
         match self.target? {
             TargetChoice::Profile => None,
@@ -343,7 +337,7 @@ impl Session {
         matches!(self.instrument, Some(InstrumentChoice::Simulated(_))) || self.identities.iter().any(says_so)
     }
 
-    /// What has to be said wherever points of this session go, if they are simulated.
+    /// Notice for everything that is made from the points of this session, if they are simulated.
     pub fn simulation(&self) -> Option<String> {
         let cause = match &self.instrument {
             Some(InstrumentChoice::Simulated(simulation)) => format!("the simulated cell (seed {})", simulation.seed),
@@ -368,7 +362,7 @@ impl Session {
         self.counted().filter(move |sample| self.kind_of(sample) == kind)
     }
 
-    /// What a sample is for.
+    /// Purpose of a sample.
     pub fn kind_of(&self, sample: &Sample) -> PoseKind {
         self.rows.get(sample.row).map_or(sample.noted.kind, |row| row.planned.kind)
     }
@@ -390,7 +384,7 @@ impl Session {
         self.counted().find(|sample| sample.row == row)
     }
 
-    /// Whether a row still waits to be measured.
+    /// Whether a row is still to be measured.
     pub fn is_open(&self, index: usize) -> bool {
         self.rows.get(index).is_some_and(Row::is_planned)
             && !self
@@ -399,7 +393,7 @@ impl Session {
                 .any(|sample| sample.row == index && matches!(sample.state, SampleState::Counts | SampleState::LeftOut))
     }
 
-    /// Rows that still wait to be measured, in order.
+    /// Rows still to be measured, in order.
     pub fn open_rows(&self) -> impl Iterator<Item = usize> {
         let is_measured = |sample: &&Sample| matches!(sample.state, SampleState::Counts | SampleState::LeftOut);
         // Once for all rows: large tables have as many of them as samples.
@@ -408,12 +402,12 @@ impl Session {
         rows.filter(|(_, row)| row.is_planned()).map(|(index, _)| index).filter(move |index| !measured.contains(index))
     }
 
-    /// Where the SMR of a sample was seen, in the tracker frame (m), corrections applied.
+    /// Measured point of a sample in the tracker frame (m), corrections applied.
     pub fn point_of(&self, sample: &Sample) -> Point3<f64> {
         self.point_noted(&sample.noted)
     }
 
-    /// The same of a sample that need not be in the session yet.
+    /// As for a sample, from a record that need not be in the session yet.
     pub fn point_noted(&self, noted: &MeasuredText) -> Point3<f64> {
         from_xyz_mm(noted.xyz_mm) * self.scale_noted(noted)
     }
@@ -423,7 +417,7 @@ impl Session {
         from_xyz_mm(point.xyz_mm) * self.correction_of(point.number)
     }
 
-    /// Where the robot stood at a sample: pendant values (rad, m).
+    /// Configuration of the robot at a sample: pendant values (rad, m).
     pub fn configuration_of(&self, sample: &Sample) -> Vec<f64> {
         self.robot.as_ref().map_or_else(Vec::new, |robot| from_edge(&sample.joints, &robot.joint_types))
     }
@@ -433,13 +427,12 @@ impl Session {
         self.sigma_noted(&sample.noted)
     }
 
-    /// The same of a sample that need not be in the session yet.
+    /// As for a sample, from a record that need not be in the session yet.
     pub fn sigma_noted(&self, noted: &MeasuredText) -> Option<f64> {
         Some(from_mm(noted.sigma_mm?) * self.scale_noted(noted)).filter(|sigma| *sigma > 0.0)
     }
 
-    /// What was found about samples that count and were neither kept nor corrected, oldest first: the sample it is about and
-    /// the finding.
+    /// Open findings, oldest first, with the samples they are about: those that count and were neither kept nor corrected.
     pub fn doubts(&self) -> impl Iterator<Item = (&Sample, &FindingText)> {
         let findings = self.counted().flat_map(|holder| {
             let number = holder.noted.number;
@@ -452,13 +445,13 @@ impl Session {
         })
     }
 
-    /// Numbers of the measurements that a result would rest on now.
+    /// Numbers of the measurements that a result would be based on now.
     pub fn basis(&self) -> Vec<u64> {
         let of = |kind| self.counted_of(kind).map(|sample| sample.noted.number);
         of(PoseKind::Identification).chain(of(PoseKind::Verification)).collect()
     }
 
-    /// Whether the last result rests on exactly the samples that count now.
+    /// Whether the last result is based on exactly the samples that count now.
     pub fn is_current(&self) -> bool {
         self.identified.as_ref().is_some_and(|result| result.samples == self.basis())
     }

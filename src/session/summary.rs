@@ -16,16 +16,13 @@ use crate::text::{names, names_of_option, written_as_text};
 /// Version of the layout of these objects.
 pub const SCHEMA: u32 = 1;
 
-/// Where numbers come from.
+/// Origin of the numbers of a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// Program and version.
     pub program: String,
     /// When, RFC 3339 in UTC.
     pub created: String,
-    /// Name of the profile.
     pub profile: String,
-    /// Title of the robot.
     pub robot: String,
     /// SHA-256 of the profile's text.
     pub profile_sha256: String,
@@ -33,7 +30,7 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
 }
 
-/// What an input is used for.
+/// Role of an input file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InputRole {
     /// Points to identify from.
@@ -42,7 +39,6 @@ pub enum InputRole {
     Verification,
     /// An earlier result.
     Calibration,
-    /// Poses.
     Plan,
     /// The points of a guided session.
     Session,
@@ -59,7 +55,6 @@ names!(InputRole {
 /// An input file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// What it was used for.
     pub role: InputRole,
     /// Its path as given.
     pub file: String,
@@ -67,40 +62,34 @@ pub struct InputFile {
     pub sha256: String,
 }
 
-/// How the identification was asked for.
+/// Settings of an identification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentificationSettings {
-    /// Which parameters.
     pub level: Level,
-    /// Weighting of the distances.
     pub weighting: Weighting,
-    /// Prior on the deviations.
     pub prior: Prior,
-    /// Treatment of outliers.
     pub estimator: Estimator,
-    /// Largest number of solver steps.
     pub iterations: usize,
     /// Condition that picked the identification rows.
     pub filter: Option<String>,
     /// Expected deviation of every length, where the command line replaced the profile's.
     pub expected_length_mm: Option<f64>,
-    /// The same of every angle.
+    /// Expected deviation of every angle, likewise.
     pub expected_angle_deg: Option<f64>,
     /// Layout of the tables, where there is a choice.
     pub layout: Option<Layout>,
     /// Known distance between two sockets.
     pub socket_distance_mm: Option<f64>,
-    /// Standard deviation of that distance.
+    /// Standard deviation of the known distance.
     pub socket_distance_sigma_mm: Option<f64>,
-    /// Where the verification samples came from.
     pub verification: VerificationMode,
 }
 
-/// Where verification samples come from.
+/// Origin of the verification samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum VerificationMode {
-    /// There are none.
+    /// No verification samples.
     #[default]
     None,
     /// Another file.
@@ -113,7 +102,7 @@ pub enum VerificationMode {
     Session,
 }
 
-/// How a result compares with the acceptance limits.
+/// Outcome of the comparison with the acceptance limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum VerdictStatus {
@@ -128,11 +117,11 @@ pub enum VerdictStatus {
 /// Measurement σ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SigmaSummary {
-    /// What balanced data and prior, per coordinate.
+    /// Value that balanced data and prior, per coordinate.
     pub used_mm: f64,
-    /// Where it comes from.
+    /// Origin of the value.
     pub source: SigmaSource,
-    /// What the residuals say.
+    /// Estimate from the residuals.
     pub from_residuals_mm: Option<f64>,
 }
 
@@ -143,7 +132,6 @@ pub struct ParameterSummary {
     pub name: String,
     /// `mm` or `deg`.
     pub unit: String,
-    /// Nominal value.
     pub nominal: f64,
     /// Identified − nominal.
     pub deviation: f64,
@@ -151,14 +139,13 @@ pub struct ParameterSummary {
     pub sigma: Option<f64>,
     /// Deviation expected before measuring, one standard deviation.
     pub expected: f64,
-    /// Whether it can be found on its own.
+    /// Whether the parameter can be found on its own.
     pub identifiable: bool,
 }
 
 /// Two parameters that the data tie together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CorrelationSummary {
-    /// Names of the two.
     pub parameters: [String; 2],
     /// Correlation, −1 … 1.
     pub correlation: f64,
@@ -167,42 +154,37 @@ pub struct CorrelationSummary {
 /// Parameters of which only combinations can be found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlindGroupSummary {
-    /// Their names.
     pub parameters: Vec<String>,
     /// Number of directions that the data do not see.
     pub blind: usize,
-    /// In words.
     pub description: String,
 }
 
 /// A sample that was left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RejectedSummary {
-    /// Name of the pose.
     pub pose: String,
-    /// Line of the file.
     pub line: usize,
     /// Distance from the prediction of the model fitted without it.
     pub residual_mm: f64,
     /// The same in robust standard deviations of the accepted samples.
     pub ratio: f64,
-    /// Why.
     pub reason: String,
 }
 
 /// Code of the warning that nothing was measured: the points come from a simulated cell.
 pub const SIMULATED: &str = "simulated";
 
-/// Something the reader must know before the numbers.
+/// A warning to read before the numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Warning {
     /// Stable short name of the kind, such as `few_data` or `ran_away`.
     pub code: String,
-    /// What it is and what to do.
+    /// The problem and what to do about it.
     pub message: String,
     /// Whether it rules out the verdict "accepted".
     pub blocks_acceptance: bool,
-    /// What can be done about it; taken by [`Warning::put_into_words`] before anything is shown or written.
+    /// Advice on the remedy; taken by [`Warning::put_into_words`] before anything is shown or written.
     #[serde(skip)]
     pub advice: Option<Advice>,
 }
@@ -220,7 +202,7 @@ impl Warning {
         self
     }
 
-    /// Appends the advice to the message in the words of whoever shows it.
+    /// Appends the advice to the message in the words of the module that shows it.
     pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
         if let Some(advice) = self.advice.take() {
             self.message = format!("{}; {}", self.message, words(advice));
@@ -236,15 +218,11 @@ impl Warning {
 /// Statistics of a non-negative error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StatisticsSummary {
-    /// How many values.
     pub count: usize,
-    /// Mean.
     pub mean: f64,
-    /// Root mean square.
     pub rms: f64,
     /// 95 % of the values are at most this.
     pub p95: f64,
-    /// Largest.
     pub max: f64,
 }
 
@@ -279,24 +257,19 @@ pub struct ModelSummary {
 pub struct JointBin {
     /// Lower end, in `unit` of the joint.
     pub from: f64,
-    /// Upper end.
     pub to: f64,
-    /// Samples in it.
     pub count: usize,
-    /// Mean error.
     pub mean_mm: f64,
 }
 
 /// Error of the identified model against one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointSummary {
-    /// Name of the joint.
     pub joint: String,
     /// `deg` or `mm`.
     pub unit: String,
     /// Share of the square error that follows this joint, 0 … 1.
     pub explained: f64,
-    /// Over its range.
     pub bins: Vec<JointBin>,
 }
 
@@ -308,7 +281,7 @@ pub enum Refit {
     None,
     /// The tracker was moved
     Frame,
-    /// The tracker was moved and the SMR mounted anew
+    /// The tracker was moved and the SMR remounted
     #[value(name = "frame+target")]
     FrameAndTarget,
 }
@@ -318,9 +291,8 @@ names_of_option!(Refit);
 /// Accuracy on verification samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerificationSummary {
-    /// Number of verification samples.
     pub samples: usize,
-    /// Where they come from, and what was fitted to them.
+    /// Origin of the samples, and what was fitted to them.
     pub basis: String,
     /// Whether the identification saw none of them.
     pub independent: bool,
@@ -328,7 +300,6 @@ pub struct VerificationSummary {
     pub refit: Refit,
     /// The nominal model with its own registration.
     pub nominal: ModelSummary,
-    /// The identified model.
     pub identified: ModelSummary,
     /// Error of the identified model against each joint.
     pub residual_by_joint: Vec<JointSummary>,
@@ -337,17 +308,11 @@ pub struct VerificationSummary {
 /// What an acceptance limit is about. For shared points the position error is the distance from the shared point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitedQuantity {
-    /// Mean position error.
     PositionMean,
-    /// Root mean square position error.
     PositionRms,
-    /// Largest position error.
     PositionMax,
-    /// Mean distance error.
     DistanceMean,
-    /// Root mean square distance error.
     DistanceRms,
-    /// Largest distance error.
     DistanceMax,
 }
 
@@ -371,11 +336,9 @@ impl LimitedQuantity {
 /// One comparison with an acceptance limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitCheck {
-    /// What is limited.
     pub quantity: LimitedQuantity,
-    /// What was found; none where these data cannot tell.
+    /// Value found; none where these data cannot tell.
     pub value_mm: Option<f64>,
-    /// What is allowed.
     pub limit_mm: f64,
     /// Whether it is met; none where it could not be evaluated.
     pub met: Option<bool>,
@@ -384,19 +347,16 @@ pub struct LimitCheck {
 /// The verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// `accepted`, `not_accepted` or `not_evaluated`.
     pub status: VerdictStatus,
-    /// Why, in words.
     pub reasons: Vec<String>,
-    /// Every limit of the profile.
     pub checks: Vec<LimitCheck>,
-    /// What can be done to get another verdict; taken by [`Verdict::put_into_words`].
+    /// Advice on how to get another verdict; taken by [`Verdict::put_into_words`].
     #[serde(skip)]
     pub advice: Option<Advice>,
 }
 
 impl Verdict {
-    /// Appends the advice to the reasons in the words of whoever shows it.
+    /// Appends the advice to the reasons in the words of the module that shows it.
     pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
         if let (Some(advice), Some(reason)) = (self.advice.take(), self.reasons.last_mut()) {
             *reason = format!("{reason}; {}", words(advice));
@@ -419,61 +379,49 @@ pub struct IterationSummary {
 /// Everything about an identification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentificationSummary {
-    /// Version of this layout.
     pub schema: u32,
-    /// Where the numbers come from.
+    /// Origin of the numbers.
     pub provenance: Provenance,
-    /// How it was asked for.
+    /// Settings of the identification.
     pub settings: IdentificationSettings,
-    /// What must be known before the numbers are used.
+    /// Warnings to read before the numbers are used.
     pub warnings: Vec<Warning>,
-    /// The verdict.
     pub verdict: Verdict,
     /// Accuracy on samples that the identification did not see.
     pub verification: Option<VerificationSummary>,
     /// Number of identification samples, rejected ones included.
     pub samples: usize,
-    /// Free parameters.
     pub parameter_count: usize,
     /// Independent combinations that the data determine.
     pub rank: Option<usize>,
     /// Ratio of the singular values at the rank.
     pub singular_value_gap: f64,
-    /// Of `A·S` on the identifiable subspace: parameters in units of their expected deviation.
+    /// Condition number of `A·S` on the identifiable subspace: parameters in units of their expected deviation.
     pub condition_number: Option<f64>,
-    /// Of A with parameters in mm and rad.
+    /// Condition number of A with parameters in mm and rad.
     pub condition_number_mm_rad: Option<f64>,
     /// Number of points whose pairs entered the condition numbers.
     pub condition_number_points: usize,
-    /// Measurement σ.
     pub sigma: SigmaSummary,
-    /// Every free parameter.
     pub parameters: Vec<ParameterSummary>,
-    /// What only combinations of parameters can say.
+    /// Groups of parameters of which only combinations can be found.
     pub blind_groups: Vec<BlindGroupSummary>,
     /// Pairs of identifiable parameters correlated beyond ±0.9.
     pub correlations: Vec<CorrelationSummary>,
-    /// Samples left out.
     pub rejected: Vec<RejectedSummary>,
-    /// Why the solver stopped.
     pub termination: TerminationReason,
-    /// Steps of the solver.
     pub iterations: Vec<IterationSummary>,
-    /// Files written.
     pub written: Vec<String>,
 }
 
 /// The verification of a calibration on other data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerificationReport {
-    /// Version of this layout.
     pub schema: u32,
-    /// Where the numbers come from.
+    /// Origin of the numbers.
     pub provenance: Provenance,
-    /// What must be known before the numbers are used.
+    /// Warnings to read before the numbers are used.
     pub warnings: Vec<Warning>,
-    /// The verdict.
     pub verdict: Verdict,
-    /// The errors.
     pub verification: VerificationSummary,
 }

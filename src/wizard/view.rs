@@ -1,6 +1,6 @@
-//! What there is to see: plain data, the same for screens, plain lines and script expectations.
+//! The view model: plain data, the same for screens, plain lines and script expectations.
 //!
-//! Units are in the names; nothing here is more than was measured, and no number of a fit stands as accuracy.
+//! Units are in the names. No residual of a fit is shown as an accuracy.
 
 use serde::Serialize;
 
@@ -18,102 +18,96 @@ use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummar
 use crate::session::wire::LinkChoice;
 use crate::units::to_mm;
 
-/// Everything on a screen.
+/// Content of a screen.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ViewModel {
-    /// Where one is.
+    /// Session, step and progress.
     pub header: Header,
-    /// What this step is for, in one sentence.
+    /// Purpose of the step, in one sentence.
     pub purpose: &'static str,
     /// The step's own part.
     pub content: Content,
-    /// What the instrument sees while nothing is measured, if it shows that.
+    /// Live reading of the instrument between measurements, if it has one.
     pub live: Option<LiveView>,
-    /// What is under way.
+    /// The running request, if any.
     pub busy: Option<BusyView>,
-    /// What the operator is to be told.
+    /// Message to the operator.
     pub notice: Option<Notice>,
-    /// What can be done.
+    /// Intents that can be carried out.
     pub intents: Vec<IntentInfo>,
-    /// Why the program ends, if it does.
+    /// Reason why the program ends, if it does.
     pub ended: Option<String>,
 }
 
-/// What the instrument sees while nothing is measured. Never a measurement.
+/// Live reading of the instrument between measurements. Never a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LiveView {
     /// The SMR in the frame of the instrument, if it is seen.
     pub point_mm: Option<[f64; 3]>,
-    /// The instrument shows nothing between measurements, whatever it sees.
+    /// Whether the instrument shows nothing between measurements, whatever it sees.
     pub is_blind: bool,
-    /// Nothing has been heard from the instrument for so long (s), where something is due all the time.
+    /// Time without any message (s) from an instrument that sends continuously.
     pub silent_s: Option<f64>,
-    /// How long it has rested where it is.
+    /// Time that the SMR has been still.
     pub rest_s: Option<f64>,
-    /// How much it scattered meanwhile, root mean square.
+    /// Root mean square scatter while it was still.
     pub scatter_mm: Option<f64>,
-    /// Its distance from where the pose shown should have it, once the samples tell where the tracker stands.
+    /// Distance from the predicted point of the pose shown, once the samples locate the tracker.
     pub from_predicted_mm: Option<f64>,
-    /// Joints that the robot tells: pendant values (rad).
+    /// Joints that the robot reports: pendant values (rad).
     pub joints: Option<Vec<f64>>,
     /// The joint that is farthest from the pose shown, from 0, and by how much (deg).
     pub joint_difference: Option<(usize, f64)>,
-    /// Whether the robot rests, if it tells.
+    /// Whether the robot is at rest, if it reports that.
     pub is_still: Option<bool>,
-    /// Why the instrument cannot be asked.
+    /// Reason why the instrument cannot be used.
     pub down: Option<String>,
     /// The last seconds.
     pub track: Vec<LivePoint>,
 }
 
-/// Where the SMR was.
+/// Position of the SMR some time ago.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LivePoint {
-    /// When, counted back from the last one (s).
+    /// Time before the last reading (s).
     pub seconds: f64,
     /// Distance from where it is now.
     pub offset_mm: f64,
 }
 
-/// Where one is.
+/// Session, step and progress.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Header {
-    /// Title of the robot.
     pub robot: Option<String>,
-    /// Name of the session.
     pub session: Option<String>,
-    /// Its folder.
     pub folder: Option<String>,
-    /// The step.
     pub step: Step,
     /// Its number, from 1.
     pub number: usize,
-    /// Number of steps.
     pub steps: usize,
-    /// Who measures, if it answers.
+    /// Identity of the instrument, if it is connected.
     pub instrument: Option<String>,
     /// Samples that count.
     pub samples: usize,
-    /// Minutes of work, breaks not counted.
+    /// Minutes of work, without breaks.
     pub elapsed_min: f64,
-    /// Entries of the journal that are safely on disk.
+    /// Journal entries that are safely on disk.
     pub saved_entries: u64,
     /// Whether an entry is on its way to the disk.
     pub is_saving: bool,
 }
 
-/// What is under way.
+/// The running request, if any.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BusyView {
-    /// What.
     pub what: &'static str,
-    /// How far it is, in words.
+    /// Progress in words.
     pub progress: Option<String>,
-    /// Part done, 0 … 1, where it can be told.
+    /// Completed fraction, 0 … 1, where it is known.
     pub part: Option<f64>,
     /// Figures of merit of the best pose set so far, while a search runs.
     pub figures: Option<Figures>,
-    /// It is being cancelled.
+    /// Whether it is being cancelled.
     pub is_cancelled: bool,
 }
 
@@ -121,21 +115,21 @@ pub struct BusyView {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Content {
-    /// Which robot.
+    /// Choice of the robot.
     Profile(ProfileView),
-    /// What measures.
+    /// Choice of the instrument.
     Instrument(InstrumentView),
-    /// Where the SMR sits.
+    /// Position of the SMR on the flange.
     Target(TargetView),
-    /// Which poses.
+    /// Choice of the poses.
     Plan(PlanView),
-    /// Measuring.
+    /// Measurement.
     Capture(Box<CaptureView>),
-    /// The result.
+    /// The identified arm.
     Identify(IdentifyView),
-    /// What it is worth.
+    /// Accuracy on the verification poses.
     Verify(VerifyView),
-    /// Files.
+    /// The result files.
     Deliver(DeliverView),
 }
 
@@ -144,24 +138,21 @@ pub enum Content {
 pub struct ProfileView {
     /// Names of the shipped profiles.
     pub profiles: Vec<String>,
-    /// The one that is looked at.
+    /// The selected profile.
     pub chosen: Option<ProfileCard>,
     /// Name that the session has or will have.
     pub session: String,
-    /// The robot cannot be changed any more.
+    /// Whether the robot can no longer be changed.
     pub is_fixed: bool,
 }
 
-/// A robot at a glance.
+/// Summary of a robot profile.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProfileCard {
-    /// Short name.
     pub name: String,
-    /// Name for people.
     pub title: String,
-    /// Where its numbers come from.
+    /// Origin of its numbers.
     pub source: String,
-    /// Names of the joints.
     pub joints: Vec<String>,
     /// Parameters that will be identified.
     pub free_parameters: usize,
@@ -169,7 +160,7 @@ pub struct ProfileCard {
     pub instrument: Option<String>,
     /// Nominal place of the SMR in the flange.
     pub target_mm: Option<[f64; 3]>,
-    /// What is odd about it.
+    /// Oddities found when the profile was read.
     pub warnings: Vec<String>,
 }
 
@@ -196,26 +187,26 @@ impl ProfileCard {
 pub struct InstrumentView {
     /// Instrument on a wire that the profile names.
     pub link: Option<LinkChoice>,
-    /// What was chosen.
+    /// The choice in words.
     pub choice: Option<String>,
-    /// Who answers.
+    /// Identity of the connected instrument.
     pub identity: Option<String>,
     /// Poses of recorded measurements.
     pub recorded_poses: usize,
-    /// What the profile says about the instrument's uncertainty.
+    /// Uncertainty of the instrument as the profile states it.
     pub stated_sigma: Option<String>,
 }
 
 /// The target step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TargetView {
-    /// Where the profile has the SMR, in the flange frame.
+    /// Position of the SMR in the flange frame, from the profile.
     pub nominal_mm: [f64; 3],
-    /// Its standard deviation there; zero: exact.
+    /// Standard deviation of that position; zero: exact.
     pub nominal_sigma_mm: f64,
-    /// What was chosen, in words.
+    /// The choice in words.
     pub choice: Option<String>,
-    /// The circle-point analysis, if it was begun.
+    /// The circle-point analysis, once it has begun.
     pub circles: Option<CirclesView>,
 }
 
@@ -226,15 +217,15 @@ pub struct CirclesView {
     pub joint: Option<String>,
     /// Configuration to go to.
     pub joints: Vec<JointShown>,
-    /// Points measured.
+    /// Number of points measured.
     pub measured: usize,
-    /// Points in all.
+    /// Number of points to measure.
     pub of: usize,
-    /// What each circle says.
+    /// The circle of each joint.
     pub fits: Vec<CircleView>,
-    /// Where the SMR is.
+    /// Position of the SMR.
     pub result: Option<CirclesResult>,
-    /// Why there is no result.
+    /// Reason why there is no result.
     pub problem: Option<String>,
     /// Unit of the coordinates, where they are typed in.
     pub typed_unit: Option<String>,
@@ -245,13 +236,10 @@ pub struct CirclesView {
 pub struct CircleView {
     /// Joint that was turned.
     pub joint: String,
-    /// Points.
     pub points: usize,
-    /// Centre.
     pub centre_mm: [f64; 3],
     /// Direction of the axis.
     pub axis: [f64; 3],
-    /// Radius.
     pub radius_mm: f64,
     /// Root mean square distance of the points from the circle.
     pub residual_rms_mm: f64,
@@ -259,7 +247,7 @@ pub struct CircleView {
     pub arc_deg: f64,
 }
 
-/// What the circles say about the SMR.
+/// Position of the SMR, from the circles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CirclesResult {
     /// Centre of the SMR in the flange frame.
@@ -279,9 +267,9 @@ pub struct JointShown {
     pub value: f64,
     /// `deg` or `mm`.
     pub unit: String,
-    /// How far it moves from the last sample.
+    /// Distance from the value at the last sample, in `unit`.
     pub moves: f64,
-    /// No other moves farther.
+    /// Whether no other joint moves farther.
     pub moves_most: bool,
 }
 
@@ -290,13 +278,13 @@ pub struct JointShown {
 pub struct PlanView {
     /// Settings for the next choice.
     pub settings: PlanSettings,
-    /// What is proposed.
+    /// The proposed plan.
     pub proposal: Option<PlanFigures>,
     /// All numbers of the proposal, if poses were chosen.
     pub summary: Option<Box<PlanSummary>>,
-    /// What is being measured.
+    /// The plan that is being measured.
     pub accepted: Option<PlanFigures>,
-    /// Poses that wait to be measured.
+    /// Poses still to be measured.
     pub left: usize,
     /// Samples that count.
     pub measured: usize,
@@ -319,19 +307,17 @@ pub struct PlanFigures {
 pub struct CaptureView {
     /// Row of the plan that is shown.
     pub row: Option<usize>,
-    /// Its pose.
     pub pose: Option<String>,
-    /// What it is for.
     pub kind: Option<PoseKind>,
     /// Configuration to go to, pendant convention.
     pub joints: Vec<JointShown>,
     /// Poses to pass through on the way.
     pub on_the_way: Vec<String>,
-    /// Where the nominal arm has the SMR there, in the robot base.
+    /// Point of the SMR in the robot base, from the nominal arm.
     pub predicted_point_in_base_mm: Option<[f64; 3]>,
     /// Samples that count.
     pub measured: usize,
-    /// Poses that wait to be measured.
+    /// Poses still to be measured.
     pub open: usize,
     /// Poses that are skipped.
     pub skipped: usize,
@@ -341,19 +327,18 @@ pub struct CaptureView {
     pub verification: usize,
     /// Time for the rest at the pace so far.
     pub minutes_left: Option<f64>,
-    /// The last sample.
     pub last: Option<SampleView>,
-    /// Why a reading is held back.
+    /// Reason why a reading is held back.
     pub held: Option<String>,
-    /// What is in question.
+    /// The finding to decide about.
     pub finding: Option<FindingView>,
-    /// The pose that is measured again.
+    /// Repeated measurements of the drift pose.
     pub drift: Vec<DriftView>,
-    /// How good a calibration from the samples so far would be.
+    /// Predicted quality of a calibration from the samples so far.
     pub prediction: Option<PredictionView>,
     /// Unit of the coordinates, where they are typed in.
     pub typed_unit: Option<String>,
-    /// Why it is too early to identify.
+    /// Reason why it is too early to identify.
     pub too_few: Option<String>,
     /// All measured rows of the plan.
     pub rows: Vec<RowView>,
@@ -368,26 +353,22 @@ pub struct CaptureView {
 pub struct SampleView {
     /// Number of the measurement.
     pub measurement: u64,
-    /// Its pose.
     pub pose: String,
     /// Measured point in the tracker frame.
     pub xyz_mm: [f64; 3],
     /// Scatter of its shots.
     pub scatter_mm: Option<f64>,
-    /// Whether it counts.
+    /// Whether the sample counts.
     pub counts: bool,
 }
 
-/// What is in question.
+/// The finding to decide about.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FindingView {
     /// Pose of the sample.
     pub pose: String,
-    /// Number of its measurement.
     pub measurement: u64,
-    /// The likely cause.
     pub cause: FindingCause,
-    /// In words.
     pub message: String,
     /// Whether a correction is proposed.
     pub has_remedy: bool,
@@ -400,51 +381,49 @@ pub struct FindingView {
 pub struct PairView {
     /// Pose at the other end.
     pub pose: String,
-    /// The other end is a later measurement of the pose, to see drift.
+    /// Whether the other end is a repeated measurement of its pose, to detect drift.
     pub is_drift: bool,
-    /// As it was measured.
+    /// Measured distance.
     pub measured_mm: f64,
-    /// As the nominal arm and the points before let expect.
+    /// Distance predicted from the nominal arm and the points before.
     pub predicted_mm: f64,
-    /// Measured less predicted.
+    /// Measured − predicted.
     pub difference_mm: f64,
     /// Standard deviation that the difference should have.
     pub expected_mm: f64,
 }
 
-/// How far a pose has moved since it was measured first.
+/// Distance that a pose has moved since it was first measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DriftView {
-    /// The pose.
     pub pose: String,
     /// Number of the measurement.
     pub measurement: u64,
-    /// How far.
     pub moved_mm: f64,
 }
 
-/// How good a calibration would be.
+/// Predicted quality of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PredictionView {
-    /// Predicted error per σ after so many identification samples.
+    /// Predicted error per σ against the number of identification samples.
     pub curve_sigma: Vec<(usize, f64)>,
-    /// With the samples so far, per σ.
+    /// Predicted error per σ with the samples so far.
     pub now_sigma: f64,
-    /// The same for the instrument of the profile: what it causes, without what no kinematic model can express.
+    /// The same for the instrument of the profile, without errors that no kinematic model can express.
     pub now_mm: Option<f64>,
-    /// With the rest of the plan, per σ.
+    /// Predicted error per σ with the rest of the plan.
     pub with_all_sigma: Option<f64>,
     /// The same for the instrument of the profile.
     pub with_all_mm: Option<f64>,
-    /// The rest is not worth its time.
+    /// Whether the remaining poses are not worth their time.
     pub is_enough: bool,
 }
 
-/// What has become of a row.
+/// State of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowState {
-    /// Waits.
+    /// Still to be measured.
     Open,
     /// Its sample counts.
     Measured,
@@ -459,11 +438,9 @@ pub enum RowState {
 pub struct RowView {
     /// Row of the plan, from 0.
     pub row: usize,
-    /// Its pose.
     pub pose: String,
-    /// What it is for.
     pub kind: PoseKind,
-    /// What has become of it.
+    /// State of the row.
     pub state: RowState,
 }
 
@@ -472,7 +449,7 @@ pub struct RowView {
 pub struct IdentifyView {
     /// Identification samples that count.
     pub samples: usize,
-    /// Whether the result rests on exactly the samples that count now.
+    /// Whether the result is based on exactly the samples that count now.
     pub is_current: bool,
     /// The result, without its verification.
     pub summary: Option<Box<IdentificationSummary>>,
@@ -485,34 +462,33 @@ pub struct IdentifyView {
 pub struct VerifyView {
     /// Verification samples that count.
     pub samples: usize,
-    /// Whether the result rests on exactly the samples that count now.
+    /// Whether the result is based on exactly the samples that count now.
     pub is_current: bool,
-    /// Why nothing can be said.
+    /// Reason why nothing can be verified.
     pub too_few: Option<String>,
     /// Errors on points that the identification did not see.
     pub verification: Option<Box<VerificationSummary>>,
-    /// Against the acceptance limits.
+    /// Comparison with the acceptance limits.
     pub verdict: Option<Box<Verdict>>,
-    /// What must be known before the numbers are used.
+    /// Warnings to read before the numbers are used.
     pub warnings: Vec<Warning>,
 }
 
 /// The deliver step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeliverView {
-    /// Files that were written.
     pub files: Vec<String>,
-    /// Models that this arm does not fit into, with the reason.
+    /// Models that cannot express this arm, with the reason.
     pub left_out: Vec<String>,
-    /// Against the acceptance limits.
+    /// Comparison with the acceptance limits.
     pub verdict: Option<Box<Verdict>>,
-    /// Whether the result rests on exactly the samples that count now.
+    /// Whether the result is based on exactly the samples that count now.
     pub is_current: bool,
     /// Serial number, operator and place, as the report will have them.
     pub about: About,
 }
 
-/// The view of a wizard.
+/// Builds the view of a wizard.
 pub(super) fn build(wizard: &Wizard) -> ViewModel {
     let session = &wizard.session;
     let step = wizard.phase.step();
@@ -603,7 +579,7 @@ fn part_done(progress: &Progress) -> Option<f64> {
 }
 
 impl ViewModel {
-    /// Whether the operator has to resolve something before going on.
+    /// Whether the operator has to resolve something before continuing.
     pub fn is_stopped(&self) -> bool {
         self.notice.as_ref().is_some_and(|notice| notice.severity == Severity::Stop)
     }

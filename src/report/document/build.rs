@@ -6,8 +6,8 @@ use nalgebra::Point3;
 
 use super::decisions::{corrections, findings, not_counted};
 use super::{
-    Counts, Details, Document, DriftPart, FilePart, Found, NotePart, ParameterNote, PointOrigin, PointPart,
-    PredictionPart, RefusedPart, ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
+    Counts, Details, Document, DriftPart, FilePart, Found, ParameterNote, PointOrigin, PointPart, PredictionPart,
+    ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
 };
 use crate::kinematics::ForwardKinematics;
 use crate::profile::Profile;
@@ -29,7 +29,7 @@ fn says_simulated(result: Option<&IdentificationSummary>) -> bool {
 }
 
 impl Document {
-    /// The report of a session as it stands, with the hashes of the `files` (name and text) that lie beside it.
+    /// The report of a session in its current state, with the hashes of the `files` (name and text) beside it.
     pub fn new(session: &Session, files: &[(String, String)]) -> Self {
         let result = session.identified.as_deref().map(|result| result.summary.clone());
         let parameters = result.as_ref().map_or(&[][..], |result| &result.parameters);
@@ -62,22 +62,10 @@ impl Document {
             prediction: prediction(session),
             drift: drift(session),
             not_counted: not_counted(session),
-            refused: session
-                .refused
-                .iter()
-                .map(|refused| RefusedPart {
-                    number: refused.number,
-                    pose: refused.pose.clone(),
-                    reason: refused.reason.clone(),
-                })
-                .collect(),
+            refused: session.refused.clone(),
             findings: findings(session),
             corrections: corrections(session),
-            notes: session
-                .notes
-                .iter()
-                .map(|note| NotePart { time: note.time.to_string(), pose: note.pose.clone(), text: note.text.clone() })
-                .collect(),
+            notes: session.notes.clone(),
             files: files
                 .iter()
                 .map(|(name, text)| FilePart { name: name.clone(), sha256: sha256(text.as_bytes()) })
@@ -88,7 +76,7 @@ impl Document {
 }
 
 impl Document {
-    /// The report of an identification from tables, which `session` stands for: there was no session, and no time of measuring.
+    /// The report of an identification from tables, in the form of a `session`: nothing is known about the time of measuring.
     pub fn of_tables(session: &Session, files: &[(String, String)]) -> Self {
         let mut document = Self::new(session, files);
         let program = std::mem::take(&mut document.report.session.program);
@@ -138,7 +126,7 @@ fn robot_part(robot: &Robot) -> RobotPart {
     }
 }
 
-/// Where the SMR sits; the profile's place with its coordinates.
+/// Position of the SMR on the flange, with coordinates where it is that of the profile.
 fn target(session: &Session) -> Option<String> {
     let first = session.robot.as_ref()?.profile.targets().first()?;
     Some(match &session.target {
@@ -275,7 +263,7 @@ fn drift(session: &Session) -> Vec<DriftPart> {
 }
 
 impl Found {
-    /// As it stands in a table.
+    /// The word in a table.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Yes => "yes",

@@ -1,15 +1,15 @@
-//! What became of the samples that do not count, and of what the checks found.
+//! Samples that do not count, and decisions about the findings of the checks.
 
-use super::{FindingPart, NotCounted};
+use super::FindingPart;
 use crate::session::journal::correction_text;
-use crate::session::state::{Sample, SampleState, Session};
+use crate::session::state::{Refused, Sample, SampleState, Session};
 
 /// Samples that do not count. Outliers of the identification are not among them: they count, and the identification says why it
 /// left them out.
-pub(super) fn not_counted(session: &Session) -> Vec<NotCounted> {
+pub(super) fn not_counted(session: &Session) -> Vec<Refused> {
     let without = session.samples.iter().filter(|sample| sample.state != SampleState::Counts);
     without
-        .map(|sample| NotCounted {
+        .map(|sample| Refused {
             number: sample.noted.number,
             pose: session.pose_of(sample).to_owned(),
             reason: reason(session, sample),
@@ -34,7 +34,7 @@ fn reason(session: &Session, sample: &Sample) -> String {
     }
 }
 
-/// What was set right, and which points were read in the other unit after it was.
+/// Corrections in words, with the points that were converted from the other unit because of them.
 pub(super) fn corrections(session: &Session) -> Vec<String> {
     let corrected = session.corrections.iter().map(|corrected| correction_text(&corrected.correction));
     let in_other_unit = session.samples.chunk_by(|one, next| one.noted.factor == next.noted.factor);
@@ -50,7 +50,7 @@ pub(super) fn corrections(session: &Session) -> Vec<String> {
     corrected.chain(in_other_unit).collect()
 }
 
-/// What the checks found while measuring.
+/// Findings of the checks while measuring.
 pub(super) fn findings(session: &Session) -> Vec<FindingPart> {
     let findings = session.samples.iter().flat_map(|holder| {
         let raised_at = holder.noted.number;

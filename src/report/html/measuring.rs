@@ -6,6 +6,7 @@ use crate::identification::Estimator;
 use crate::report::document::{Details, Document};
 use crate::report::text::{gap, sigma_origin, termination};
 use crate::session::journal::PlanText;
+use crate::session::state::Refused;
 use crate::session::summary::{IdentificationSummary, RejectedSummary};
 
 /// Plan, fit and drift.
@@ -133,15 +134,15 @@ pub(super) fn samples(document: &Document) -> String {
     let report = &document.report;
     let mut html = String::from("<h2>Samples left out, findings, remarks</h2>\n");
     html.push_str(&rejected(document));
-    let plain = |number: u64, pose: &str, reason: &str| vec![number.to_string(), escape(pose), escape(reason)];
     let columns = [("No.", Column::Number), ("pose", Column::Text), ("why", Column::Text)];
-    if !report.not_counted.is_empty() {
-        let rows: Vec<_> = report.not_counted.iter().map(|one| plain(one.number, &one.pose, &one.reason)).collect();
-        html.push_str(&table("Measured, but not counted", &columns, &rows, false));
-    }
-    if !report.refused.is_empty() {
-        let rows: Vec<_> = report.refused.iter().map(|one| plain(one.number, &one.pose, &one.reason)).collect();
-        html.push_str(&table("Readings that were refused", &columns, &rows, false));
+    for (title, measurements) in
+        [("Measured, but not counted", &report.not_counted), ("Readings that were refused", &report.refused)]
+    {
+        let row = |one: &Refused| vec![one.number.to_string(), escape(&one.pose), escape(&one.reason)];
+        let rows: Vec<_> = measurements.iter().map(row).collect();
+        if !rows.is_empty() {
+            html.push_str(&table(title, &columns, &rows, false));
+        }
     }
     if !report.findings.is_empty() {
         let columns = [
@@ -174,7 +175,11 @@ pub(super) fn samples(document: &Document) -> String {
             .notes
             .iter()
             .map(|note| {
-                vec![time(&note.time), note.pose.as_deref().map_or_else(String::new, escape), escape(&note.text)]
+                vec![
+                    time(&note.time.to_string()),
+                    note.pose.as_deref().map_or_else(String::new, escape),
+                    escape(&note.text),
+                ]
             })
             .collect();
         html.push_str(&table("", &columns, &rows, false));

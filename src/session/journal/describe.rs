@@ -7,7 +7,7 @@ use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictS
 use crate::session::wire::LinkChoice;
 
 impl Entry {
-    /// What happened, in one line without a full stop.
+    /// The entry in one line, without a full stop.
     pub fn describe(&self) -> String {
         match self {
             Self::Opened { program, name, .. } => format!("session '{name}' opened by {program}"),
@@ -89,7 +89,7 @@ fn plan_text(plan: &PlanText) -> String {
     )
 }
 
-/// What was set right, in one line.
+/// The correction in one line.
 pub fn correction_text(correction: &Correction) -> String {
     match correction {
         Correction::Scale { since, factor, until: None } => {
@@ -172,7 +172,7 @@ pub fn instrument_text(instrument: &InstrumentChoice) -> String {
     }
 }
 
-/// Where the SMR is said to be, in one line.
+/// The chosen position of the SMR, in one line.
 pub fn target_text(choice: &TargetChoice) -> String {
     let at = |(x, y, z): (f64, f64, f64)| format!("({x:.3}, {y:.3}, {z:.3}) mm in the flange");
     match *choice {

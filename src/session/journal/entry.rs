@@ -1,4 +1,4 @@
-//! What stands in a journal. Everything in edge units: mm, degrees (sliding joints mm), with the unit in the field's name.
+//! Entries of a journal. Everything is in edge units: mm, degrees (sliding joints mm), with the unit in the field's name.
 
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -14,16 +14,14 @@ use crate::session::summary::IdentificationSummary;
 use crate::text::{names, written_as_text};
 use crate::units::{from_mm, to_mm};
 
-/// Something that happened in a session.
+/// An entry of the journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Entry {
     /// The session begins. Always the first entry.
     Opened {
         /// Version of the layout.
         schema: u32,
-        /// Program and version.
         program: String,
-        /// Name of the session.
         name: String,
     },
     /// The robot, with the whole text of its profile.
@@ -32,19 +30,18 @@ pub enum Entry {
         source: String,
         /// SHA-256 of the text.
         sha256: String,
-        /// The profile.
         text: String,
     },
     /// The wizard went to a step.
     Step(Step),
-    /// What measures.
+    /// Choice of the instrument.
     Instrument(InstrumentChoice),
-    /// An instrument on a wire has answered.
+    /// A connected instrument has identified itself.
     Connected {
-        /// Who it says it is, with its reflector and what is odd about it.
+        /// Identity reported by the instrument, with its reflector and any oddities.
         identity: String,
     },
-    /// Where the SMR sits on the flange.
+    /// Position of the SMR on the flange.
     Target(TargetChoice),
     /// A point of the circle-point analysis.
     CirclePoint(CirclePointText),
@@ -52,7 +49,7 @@ pub enum Entry {
     CirclesDiscarded,
     /// Poses to measure; those of an earlier plan that are not measured yet are dropped.
     Plan(PlanText),
-    /// More poses after those of the plan.
+    /// Additional poses after those of the plan.
     PlanExtended(PlanText),
     /// A measured point.
     Sample(MeasuredText),
@@ -60,25 +57,22 @@ pub enum Entry {
     Refused {
         /// Number of the measurement in the session.
         number: u64,
-        /// Name of the pose.
         pose: String,
-        /// Why.
         reason: String,
         /// The reading, if there was one (mm).
         xyz_mm: Option<(f64, f64, f64)>,
     },
-    /// What the operator decided about a sample.
+    /// Decision of the operator about a sample.
     Decision {
         /// Number of the measurement.
         sample: u64,
-        /// What.
         decision: Decision,
     },
-    /// A correction of what was noted wrongly.
+    /// Correction of a wrong entry.
     Correction(Correction),
-    /// The operator went to this row of the plan, from 0.
+    /// The operator selected this row of the plan, from 0.
     Row(usize),
-    /// A row of the plan will not be measured, or will be after all.
+    /// A row of the plan is skipped, or no longer skipped.
     Skipped {
         /// Row of the plan, from 0.
         row: usize,
@@ -89,7 +83,7 @@ pub enum Entry {
     Note {
         /// Name of the pose it is about, if any.
         pose: Option<String>,
-        /// What he wrote.
+        /// The text of the note.
         text: String,
     },
     /// Serial number, operator and place, for the report.
@@ -100,22 +94,18 @@ pub enum Entry {
     Delivered {
         /// Their names in the session's folder.
         files: Vec<String>,
-        /// Models that this arm does not fit into, with the reason.
+        /// Models that cannot express this arm, with the reason.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         left_out: Vec<String>,
     },
-    /// The session was opened again.
+    /// The session was resumed.
     Resumed {
-        /// Program and version.
         program: String,
-        /// Bytes of a torn last line that were dropped.
+        /// Bytes of an incomplete last line that were dropped.
         torn_bytes: usize,
     },
-    /// The program ended in good order.
-    Closed {
-        /// Why.
-        reason: String,
-    },
+    /// The program ended normally.
+    Closed { reason: String },
 }
 
 /// A point of the circle-point analysis.
@@ -131,10 +121,10 @@ pub struct CirclePointText {
     pub xyz_mm: (f64, f64, f64),
 }
 
-/// Poses to measure and what is expected of them.
+/// Poses to measure, with the predicted quality of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanText {
-    /// Where it comes from, in words.
+    /// Origin of the plan, in words.
     pub origin: String,
     /// Condition number of the identification poses, if it was computed.
     pub condition_number: Option<f64>,
@@ -177,13 +167,11 @@ impl PlanText {
 /// A row of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedText {
-    /// Name of the pose.
     pub pose: String,
-    /// What is done there.
     pub kind: PoseKind,
     /// Pendant joint values.
     pub joints: Vec<f64>,
-    /// Where the nominal arm has the SMR then, in the robot base.
+    /// Point of the SMR in the robot base, from the nominal arm.
     pub xyz_mm: Option<(f64, f64, f64)>,
 }
 
@@ -237,16 +225,14 @@ fn rounded(value: f64, decimals: i32) -> f64 {
     (value * scale).round() / scale + 0.0
 }
 
-/// A measured point with what was known about it at the time.
+/// A measured point, as it was recorded at the time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredText {
     /// Number of the measurement in the session.
     pub number: u64,
     /// Row of the plan, from 0.
     pub row: usize,
-    /// Name of the pose.
     pub pose: String,
-    /// What it is for.
     pub kind: PoseKind,
     /// Index of the target.
     pub target: usize,
@@ -257,7 +243,7 @@ pub struct MeasuredText {
     pub reported_joints: Option<Vec<f64>>,
     /// Measured point in the tracker frame, as the instrument or the operator gave it.
     pub xyz_mm: (f64, f64, f64),
-    /// What the coordinates count times: they fit only in the other unit that the measurement before was corrected to. Not in
+    /// Factor of the coordinates: they fit only in the other unit that the measurement before was corrected to. Not in
     /// journals of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub factor: Option<f64>,
@@ -267,33 +253,30 @@ pub struct MeasuredText {
     /// Scatter of the shots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter_mm: Option<f64>,
-    /// Number of shots.
     pub shots: u32,
     /// Temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
     /// Time that the measurement took, motion included (s).
     pub seconds: f64,
-    /// Predicted RMS position error at fresh poses per σ with this sample and all before it, once they determine the arm.
+    /// Predicted RMS position error at fresh poses, per σ, from this sample and all before it, once they determine the arm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_error_sigma: Option<f64>,
-    /// What the checks said.
+    /// Findings of the checks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<FindingText>,
 }
 
-/// What a check said about a sample.
+/// Finding of a check about a sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FindingText {
     /// Number of the measurement it is about: this one or an earlier one.
     pub about: u64,
-    /// The likely cause.
     pub cause: FindingCause,
-    /// How many standard deviations off.
+    /// Deviation in standard deviations.
     pub ratio: f64,
-    /// In words.
     pub message: String,
-    /// What would set it right.
+    /// Correction that would resolve it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remedy: Option<Correction>,
     /// The distances that fit least, worst first. Not in journals of earlier versions.
@@ -360,38 +343,38 @@ impl From<&Cause> for FindingCause {
     }
 }
 
-/// A measured distance against what the earlier points let expect.
+/// A measured distance and its prediction from the earlier points.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PairText {
     /// Number of the measurement at the other end.
     pub other: u64,
-    /// The distance as it was measured.
+    /// Measured distance.
     pub measured_mm: f64,
-    /// The distance as it was predicted.
+    /// Predicted distance.
     pub predicted_mm: f64,
     /// Standard deviation that the difference should have.
     pub expected_mm: f64,
 }
 
-/// What the operator decides about a sample.
+/// Decision of the operator about a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Decision {
-    /// It counts, whatever was found.
+    /// It counts in spite of any finding.
     Keep,
     /// It does not count.
     LeaveOut,
-    /// It was taken by mistake: its pose is to be measured.
+    /// It was taken by mistake; its pose is measured again.
     Undo,
 }
 
-/// Something that was noted wrongly and is set right. What was measured stays as it was.
+/// Correction of a wrong entry. The measured values stay unchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Correction {
-    /// From a measurement on, coordinates were in another unit than was thought.
+    /// From a measurement on, coordinates were in another unit than assumed.
     Scale {
         /// First measurement.
         since: u64,
-        /// What the noted coordinates have to be multiplied by.
+        /// Factor for the recorded coordinates.
         factor: f64,
         /// Last measurement. None in journals of earlier versions: all that follow as well.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -411,21 +394,21 @@ pub enum Correction {
         /// The row, from 0.
         row: usize,
     },
-    /// The robot stood elsewhere than shown.
+    /// The robot was not at the configuration shown.
     Joints {
         /// Number of the measurement.
         sample: u64,
         /// True pendant joint values.
         joints: Vec<f64>,
     },
-    /// An earlier correction does not stand any more: the measurement that led to it is taken back.
+    /// An earlier correction is withdrawn, because the measurement that led to it is taken back.
     TakenBack {
         /// Line of the journal that has it, from 1.
         line: u64,
     },
 }
 
-/// A result with everything that is needed to deliver it.
+/// A result with everything needed to deliver it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentifiedText {
     /// Numbers of the measurements that went in, identification first, then verification.
@@ -434,7 +417,7 @@ pub struct IdentifiedText {
     pub summary: IdentificationSummary,
     /// The result file; none where there is no usable solution.
     pub calibration: Option<Calibration>,
-    /// What each sample says about both models, in the order of `samples`.
+    /// Errors of both models at each sample, in the order of `samples`.
     #[serde(default)]
     pub points: Vec<PointErrorText>,
 }
@@ -442,7 +425,7 @@ pub struct IdentifiedText {
 /// A sample against the models, in the robot base of each model's own registration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PointErrorText {
-    /// Where the identified arm has the SMR.
+    /// Point of the SMR according to the identified arm.
     pub at_mm: (f64, f64, f64),
     /// Measured − predicted by the nominal arm.
     pub nominal_mm: (f64, f64, f64),
@@ -451,6 +434,6 @@ pub struct PointErrorText {
     /// Covariance of the position that the identified arm predicts there, after registration (µm²): xx, xy, xz, yy, yz, zz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance_um2: Option<(f64, f64, f64, f64, f64, f64)>,
-    /// The identification left the sample out.
+    /// Whether the identification rejected the sample.
     pub rejected: bool,
 }

@@ -1,20 +1,20 @@
-//! What was noted wrongly and is set right, and how that is taken back with the measurement that led to it.
+//! Corrections of wrong entries, and how they are withdrawn with the measurement that led to them.
 
 use std::collections::BTreeSet;
 
 use super::{Sample, SampleState, Session};
 use crate::session::journal::{Correction, MeasuredText, to_edge};
 
-/// A correction that stands.
+/// A correction in force.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Corrected {
     /// Line of the journal that has it, from 1.
     pub line: u64,
-    /// What was set right.
+    /// The correction.
     pub correction: Correction,
     /// Number of the last measurement at that time: it, or one before, led to the correction.
     pub measurements: u64,
-    /// What became of the samples that it changed.
+    /// The samples that it changed.
     changes: Vec<Change>,
 }
 
@@ -26,7 +26,7 @@ struct Change {
     after: Standing,
 }
 
-/// What a correction may change of a sample.
+/// The part of a sample that a correction may change.
 #[derive(Clone, Debug, PartialEq)]
 struct Standing {
     row: usize,
@@ -48,7 +48,7 @@ pub(super) fn is_factor(factor: f64) -> bool {
 }
 
 impl Session {
-    /// What lengths that were noted at a measurement have to be multiplied by, as the corrections say.
+    /// Factor for the lengths recorded at a measurement, from the corrections.
     pub fn correction_of(&self, number: u64) -> f64 {
         let factors = self.corrections.iter().filter_map(|corrected| match corrected.correction {
             Correction::Scale { since, factor, until } => {
@@ -59,7 +59,7 @@ impl Session {
         factors.product()
     }
 
-    /// What the lengths of a sample have to be multiplied by in all. It need not be in the session yet.
+    /// Total factor for the lengths of a sample, which need not be in the session yet.
     pub fn scale_noted(&self, noted: &MeasuredText) -> f64 {
         self.correction_of(noted.number) * noted.factor.unwrap_or(1.0)
     }
@@ -89,7 +89,7 @@ impl Session {
         Some(())
     }
 
-    /// What the correction in a line has changed becomes as it was, but for what was decided since.
+    /// Reverts the changes of the correction in a line, except for what was decided since.
     fn take_back(&mut self, line: u64) -> Option<()> {
         let place = self.corrections.iter().position(|corrected| corrected.line == line)?;
         let corrected = self.corrections.remove(place);
@@ -178,7 +178,7 @@ impl Session {
         }
     }
 
-    /// What was found about these measurements is settled.
+    /// Settles the findings about these measurements.
     fn settle(&mut self, concerns: impl Fn(u64) -> bool) {
         let measurements = self.measurements;
         for sample in self.samples.iter_mut().filter(|sample| concerns(sample.noted.number)) {
