@@ -1,7 +1,7 @@
-//! Links to instruments: whatever can be asked for the place of the SMR.
+//! Links to instruments: anything that can return an SMR position.
 //!
-//! A link knows wires, files or a simulation, never why it is asked. It gives a reading only on an explicit success; everything
-//! else is a [`LinkError`]. Points are in the frame of the instrument (m), configurations are pendant values (rad, sliding
+//! A link knows wires, files or a simulation, but not the purpose of a reading. It returns a reading only on an explicit
+//! success; everything else is a [`LinkError`]. Points are in the frame of the instrument (m), configurations are pendant values (rad, sliding
 //! joints m).
 
 mod build;
@@ -33,45 +33,45 @@ pub use wired::Wired;
 
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 
-/// Something that measures.
+/// A source of measured points.
 pub trait Link: Send {
-    /// What answers at the other end, in one line.
+    /// Connects and describes the other end in one line.
     ///
     /// # Errors
-    /// Nothing usable answers.
+    /// The other end does not answer or cannot be used.
     fn connect(&mut self) -> Result<String, LinkError>;
 
-    /// Measures the target. Blocks; `keep_going` is asked at least ten times a second of real time and ends it with
-    /// [`LinkError::Cancelled`] once it says no.
+    /// Measures the target and blocks until it is done. Calls `keep_going` at least ten times per second of real time, and
+    /// fails with [`LinkError::Cancelled`] once it returns `false`.
     ///
     /// # Errors
-    /// There is no reading.
+    /// No reading could be taken.
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError>;
 
-    /// What there is to see while nothing is measured, and what has happened; takes up to `wait`. `None`: this link has nothing
-    /// to show between measurements, and does not wait.
-    fn watch(&mut self, _wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
+    /// The live view between measurements and the events since the last call; waits up to `wait`. A link without a live view
+    /// returns `None` at once.
+    fn watch(&mut self, _wait: Duration) -> Option<(LiveReading, Vec<LinkEvent>)> {
         None
     }
 
-    /// A look at the same while something is measured, by whoever is asked whether to go on.
-    fn eye(&self) -> Option<Look> {
+    /// Reads the live view during a measurement, for the `keep_going` callback.
+    fn live_poll(&self) -> Option<LivePoll> {
         None
     }
 }
 
-/// What there is to see now.
-pub type Look = Box<dyn Fn() -> LiveReading>;
+/// Returns the current live view.
+pub type LivePoll = Box<dyn Fn() -> LiveReading>;
 
-/// Something that happened at a link.
+/// An event of a link between measurements.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LinkNews {
-    /// It is set up, for the first time or again: who answers.
+pub enum LinkEvent {
+    /// The set-up is complete, for the first time or after a reconnect; carries the identity of the other end.
     Up(String),
-    /// It is lost and will be tried again: why.
+    /// The link was lost, with the reason; it will be retried.
     Down(String),
-    /// The operator should know.
-    Status(String),
+    /// A message for the operator.
+    Notice(String),
 }
 
 /// Why there is no reading.
@@ -81,24 +81,19 @@ pub enum LinkError {
     /// The instrument sees no reflector.
     #[error("the beam is broken: the tracker sees no SMR")]
     BeamBroken,
-    /// Recorded data have no reading for the pose.
+    /// The table has no reading for the pose.
     #[error("'{file}' has no reading for pose {pose}")]
-    NoReading {
-        /// Which file.
-        file: String,
-        /// Name of the pose.
-        pose: String,
-    },
-    /// The instrument gave no point, or cannot be asked.
+    NoReading { file: String, pose: String },
+    /// The instrument returned no point, or the link is down.
     #[error(transparent)]
     Instrument(#[from] protocol::Failure),
     /// The robot is not ready for a measurement.
     #[error("the robot: {0}")]
     Robot(String),
-    /// The robot's controller cannot be asked.
-    #[error("the robot: {}", .0.words(protocol::CONTROLLER))]
+    /// The link to the robot's controller is down.
+    #[error("the robot: {}", .0.message(protocol::CONTROLLER))]
     Controller(protocol::Failure),
-    /// The set-up cannot be simulated or played.
+    /// The link cannot be set up as requested.
     #[error("{0}")]
     SetUp(String),
     /// The operator cancelled.

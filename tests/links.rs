@@ -197,19 +197,22 @@ fn a_robot_is_tested_with_its_instrument_and_alone() {
     let alone = trupose(&["link", "test", simulator.robot.as_deref().unwrap(), "--seconds", "1.5"]);
     let output = text(&alone.stdout);
     assert!(alone.status.success(), "{output}{}", text(&alone.stderr));
-    assert!(output.contains("robot at rest at 0.000 15.000 -5.000") && output.contains("sign by sign"), "{output}");
+    assert!(
+        output.contains("robot at rest at 0.000 15.000 -5.000") && output.contains("their signs with the pendant"),
+        "{output}"
+    );
 }
 
 #[test]
 fn the_test_of_a_link_says_what_is_wrong_and_what_to_do() {
     for (protocol, fault, said, hint) in [
-        ("emscon", "metres@1x*", "the instrument is set differently: units", "connect again"),
+        ("emscon", "metres@1x*", "the instrument has a wrong setting: units", "reconnect"),
         ("emscon", "in-use@1x*", "in use by another program", "close the other program"),
         ("emscon", "lost-beam@1x*", "sees no reflector", "return the SMR to the nest"),
-        ("emscon", "scaled@1x*", "scale 1.0001 of its transformation", "transformation to 1, then connect again"),
-        ("emscon", "moved@1x*", "but not as it should", "mend what the warnings say"),
+        ("emscon", "scaled@1x*", "scale 1.0001 of its transformation", "transformation to 1, then reconnect"),
+        ("emscon", "moved@1x*", "but with warnings", "fix the warnings"),
         ("geocom", "no-target@1x*", "sees no reflector", "return the SMR to the nest"),
-        ("ascii", "wrong-unit@1x*", "farther than the 80.0 m set as the range", "settings of the instrument"),
+        ("ascii", "wrong-unit@1x*", "beyond the range of 80.0 m", "settings of the instrument"),
         ("ndi", "missing@1x*", "sees no reflector", "return the SMR to the nest"),
     ] {
         let simulator = Simulator::start(&[protocol, "--listen", "127.0.0.1:0", "--fault", fault]);

@@ -1,4 +1,4 @@
-//! `trupose link test`: is the instrument there, is it set as it should be, does it measure, and if not, why.
+//! `trupose link test`: checks the connection to an instrument, its settings and a few shots, and reports problems.
 
 use std::fs::File;
 use std::io::Write;
@@ -11,16 +11,17 @@ use super::Console;
 use crate::cli::{LinkCommand, LinkTestArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::link::protocol::CONTROLLER;
-use crate::link::{Link as _, LinkError, LinkNews, RawLog, Wired, WiredRobot};
+use crate::link::{Link as _, LinkError, LinkEvent, RawLog, Wired, WiredRobot};
 use crate::runtime::signals;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::wire::{LinkChoice, WireAddress};
 use crate::units::{to_deg, to_mm};
 
-/// Between two lines of what is seen.
-const LINE: Duration = Duration::from_millis(500);
-/// Shots that scatter more are worth a word (mm), unless the instrument states a standard deviation: then this many of it.
+/// Interval between two lines of the live view.
+const LINE_INTERVAL: Duration = Duration::from_millis(500);
+/// Scatter of the shots above which the test fails (mm).
 const SCATTER_MM: f64 = 0.1;
+/// The same limit in stated standard deviations; the larger one applies.
 const SCATTER_SIGMAS: f64 = 4.0;
 
 pub(super) fn run<O: Write, E: Write>(
@@ -42,8 +43,8 @@ pub(super) fn raw_log(path: Option<&Path>) -> Result<Option<RawLog>, Failure> {
 
 fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let ended = Arc::new(AtomicBool::new(false));
-    let told = Arc::clone(&ended);
-    signals::each(move |_signal| told.store(true, Ordering::Relaxed))
+    let signalled = Arc::clone(&ended);
+    signals::each(move |_signal| signalled.store(true, Ordering::Relaxed))
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     let keep_going = || !ended.load(Ordering::Relaxed);
     let usage = |message: String| Failure::new(ExitStatus::Usage, message);
@@ -60,23 +61,23 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
     };
     let mut wired = Wired::new(&choice, log.as_ref()).map_err(|error| usage(error.to_string()))?;
     console.print(&format!("connecting to {address}\n"))?;
-    let mut told = |news: LinkNews| console.remark(&news_text(&news));
-    let connected = wired.connect_while(&keep_going, &mut told);
+    let mut on_event = |event: LinkEvent| console.remark(&event_text(&event));
+    let connected = wired.connect_while(&keep_going, &mut on_event);
     if let Some(identity) = wired.identity() {
-        // The instrument may answer where the robot does not.
+        // The instrument may answer even if the robot does not.
         console.print(&format!("connected: {}\n", identity.name))?;
     }
-    connected.map_err(|error| problem(&error, "it does not connect"))?;
+    connected.map_err(|error| problem(&error, "cannot connect"))?;
     let identity = wired.identity().cloned().unwrap_or_default();
     for item in &identity.checked {
         console.print(&format!("checked: {item}\n"))?;
     }
     if let Some(robot) = &args.robot {
-        console.print(&format!("robot: {robot} tells its joint angles\n"))?;
+        console.print(&format!("robot: {robot} reports its joint angles\n"))?;
     }
     if let Some(reflector) = &identity.reflector {
         console.print(&format!(
-            "reflector: {} (number {}), surface offset {:.3} mm: is it the one on the robot?\n",
+            "reflector: {} (number {}), surface offset {:.3} mm; check that it is the one on the robot\n",
             reflector.name,
             reflector.id,
             to_mm(reflector.offset)
@@ -99,16 +100,16 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
         console.print("the link works\n")?;
         Ok(ExitStatus::Accepted)
     } else {
-        Err(Failure::new(ExitStatus::Instrument, "the link works, but not as it should: see the warnings above")
-            .hint("mend what the warnings say and test again; distances that are measured so may be wrong"))
+        Err(Failure::new(ExitStatus::Instrument, "the link works, but with warnings, see above")
+            .hint("fix the warnings and test again; distances measured like this may be wrong"))
     }
 }
 
 fn ended_early() -> Failure {
-    Failure::new(ExitStatus::Instrument, "the test was ended before it was complete")
+    Failure::new(ExitStatus::Instrument, "the test was stopped before it was complete")
 }
 
-/// A robot's controller alone: does it tell its joint angles, and does the robot stand.
+/// Tests a robot's controller without an instrument: whether it reports joint angles, and whether the robot is at rest.
 #[expect(clippy::disallowed_methods, reason = "the edge of the program may look at the clock")]
 fn test_robot<O: Write, E: Write>(
     args: &LinkTestArgs,
@@ -120,9 +121,8 @@ fn test_robot<O: Write, E: Write>(
     let mut robot = WiredRobot::new(address, args.options.as_deref(), log)
         .map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
     console.print(&format!("connecting to {address}\n"))?;
-    let mut told = |news: LinkNews| console.remark(&news_text(&news));
-    let identity =
-        robot.connect_while(keep_going, &mut told).map_err(|error| problem(&error, "it does not connect"))?;
+    let mut on_event = |event: LinkEvent| console.remark(&event_text(&event));
+    let identity = robot.connect_while(keep_going, &mut on_event).map_err(|error| problem(&error, "cannot connect"))?;
     console.print(&format!("connected: {}\n", identity.name))?;
     for item in &identity.checked {
         console.print(&format!("checked: {item}\n"))?;
@@ -132,29 +132,31 @@ fn test_robot<O: Write, E: Write>(
     }
     let until = Instant::now() + Duration::try_from_secs_f64(args.seconds).unwrap_or_default();
     while Instant::now() < until && keep_going() {
-        let (live, news) = robot.watch(LINE.min(until.saturating_duration_since(Instant::now())));
-        for one in news {
-            console.print(&format!("{}\n", news_text(&one)))?;
+        let (live, events) = robot.watch(LINE_INTERVAL.min(until.saturating_duration_since(Instant::now())));
+        for event in events {
+            console.print(&format!("{}\n", event_text(&event)))?;
         }
         if let Some(cause) = live.down {
             return Err(is_down(&cause));
         }
-        console
-            .print(&format!("{}\n", joints_text(&live).unwrap_or_else(|| "no joint angles for a second".to_owned())))?;
+        console.print(&format!(
+            "{}\n",
+            joints_text(&live).unwrap_or_else(|| "no joint angles for one second".to_owned())
+        ))?;
     }
     if !keep_going() {
         return Err(ended_early());
     }
-    console.print("the link works; compare the angles with the pendant, sign by sign\n")?;
+    console.print("the link works; compare the angles and their signs with the pendant\n")?;
     Ok(ExitStatus::Accepted)
 }
 
 fn is_down(cause: &str) -> Failure {
     Failure::new(ExitStatus::Instrument, format!("the link is down: {cause}"))
-        .hint("check cable, address and whether the other end is on; then test again")
+        .hint("check cable and address, and that the other end is switched on; then test again")
 }
 
-/// What is seen while nothing is measured.
+/// Prints the live view for a while.
 #[expect(clippy::disallowed_methods, reason = "the edge of the program may look at the clock")]
 fn watch<O: Write, E: Write>(
     args: &LinkTestArgs,
@@ -164,11 +166,12 @@ fn watch<O: Write, E: Write>(
 ) -> Result<(), Failure> {
     let until = Instant::now() + Duration::try_from_secs_f64(args.seconds).unwrap_or_default();
     while Instant::now() < until && keep_going() {
-        let Some((live, news)) = wired.watch(LINE.min(until.saturating_duration_since(Instant::now()))) else {
+        let Some((live, events)) = wired.watch(LINE_INTERVAL.min(until.saturating_duration_since(Instant::now())))
+        else {
             return Ok(());
         };
-        for one in news {
-            console.print(&format!("{}\n", news_text(&one)))?;
+        for event in events {
+            console.print(&format!("{}\n", event_text(&event)))?;
         }
         console.print(&format!("sees: {}\n", live_text(&live)))?;
         if let Some(cause) = live.down {
@@ -178,19 +181,19 @@ fn watch<O: Write, E: Write>(
     Ok(())
 }
 
-fn news_text(news: &LinkNews) -> String {
-    match news {
-        LinkNews::Up(identity) => format!("connected again: {identity}"),
-        LinkNews::Down(cause) => format!("lost: {cause}"),
-        LinkNews::Status(text) => format!("told: {text}"),
+fn event_text(event: &LinkEvent) -> String {
+    match event {
+        LinkEvent::Up(identity) => format!("reconnected: {identity}"),
+        LinkEvent::Down(cause) => format!("lost: {cause}"),
+        LinkEvent::Notice(text) => format!("message: {text}"),
     }
 }
 
 fn live_text(live: &LiveReading) -> String {
     let unseen = match live.silent {
-        _ if live.is_blind => "no live view: this instrument shows nothing between shots".to_owned(),
-        Some(seconds) => format!("nothing: the instrument is silent for {seconds:.0} s"),
-        None => "no SMR, or no position between shots so far".to_owned(),
+        _ if live.is_blind => "no live view: this instrument sends nothing between shots".to_owned(),
+        Some(seconds) => format!("nothing: the instrument has been silent for {seconds:.0} s"),
+        None => "no SMR, or no position between shots yet".to_owned(),
     };
     let mut parts = vec![live.point.map_or_else(
         || unseen,
@@ -206,7 +209,7 @@ fn joints_text(live: &LiveReading) -> Option<String> {
     Some(format!("robot {rests} at {} deg", joints.join(" ")))
 }
 
-/// Single shots, and how they scatter.
+/// Takes single shots and prints their scatter.
 fn shoot<O: Write, E: Write>(
     count: u32,
     wired: &mut Wired,
@@ -226,7 +229,7 @@ fn shoot<O: Write, E: Write>(
         };
         let reading = wired
             .measure(&request, keep_going)
-            .map_err(|error| problem(&error, &format!("shot {number} of {count} gave no point")))?;
+            .map_err(|error| problem(&error, &format!("shot {number} of {count} failed")))?;
         let point = reading.point;
         let sigma = reading.sigma.map_or_else(String::new, |sigma| format!(", stated sigma {:.4} mm", to_mm(sigma)));
         console.print(&format!(
@@ -249,20 +252,20 @@ fn shoot<O: Write, E: Write>(
     let stated = readings.iter().filter_map(|reading| reading.sigma).fold(0.0, f64::max);
     if readings.len() > 1 && scatter > SCATTER_MM.max(SCATTER_SIGMAS * to_mm(stated)) {
         return Err(Failure::new(ExitStatus::Instrument, format!("the shots scatter by {scatter:.3} mm"))
-            .hint("is the reflector at rest? is something warm or shaking near the beam? does every shot see the same reflector?"));
+            .hint("check that the reflector is at rest, that nothing near the beam is warm or shaking, and that every shot sees the same reflector"));
     }
     Ok(())
 }
 
-/// What an error of a link means, with what to do.
+/// The failure for a link error, with advice.
 fn problem(error: &LinkError, what: &str) -> Failure {
     let failure = Failure::new(ExitStatus::Instrument, format!("{what}: {error}"));
     match error {
         LinkError::Instrument(instrument) => failure.hint(instrument.hint()),
-        // The instrument did connect, or there is none: it is the robot's controller that does not.
+        // The instrument is connected, or there is none, so the problem is the robot's controller.
         LinkError::Controller(robot) => {
-            let told = robot.words(CONTROLLER);
-            Failure::new(ExitStatus::Instrument, format!("the robot: {told}")).hint(robot.controller_hint())
+            Failure::new(ExitStatus::Instrument, format!("the robot: {}", robot.message(CONTROLLER)))
+                .hint(robot.controller_hint())
         }
         LinkError::Robot(_) => failure.hint("bring the robot to rest and look at its pendant; then test again"),
         LinkError::Cancelled => ended_early(),

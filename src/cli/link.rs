@@ -1,17 +1,16 @@
-//! `trupose link` and `trupose simulate`: what was typed.
+//! Arguments of `trupose link` and `trupose simulate`.
 
 use std::path::PathBuf;
-use std::str::FromStr as _;
 
 use clap::{Args, Subcommand};
 
 use crate::session::simulation::SimulatedWire;
 use crate::session::wire::WireProtocol;
 
-/// What to do with a link.
+/// Subcommands of `link`.
 #[derive(Debug, Subcommand)]
 pub enum LinkCommand {
-    /// Connect to an instrument: identity, settings, what it sees, a few shots; says what is wrong
+    /// Connect to an instrument, check its settings, show its live view, take a few shots, and report problems
     Test(LinkTestArgs),
 }
 
@@ -21,19 +20,19 @@ pub struct LinkTestArgs {
     /// Address of the instrument, such as 'emscon:192.168.0.2', 'geocom:serial:/dev/ttyUSB0:9600' or 'ascii:listen:0.0.0.0:5000'
     #[arg(value_name = "ADDRESS")]
     pub address: String,
-    /// Options of the protocol: the name of a preset, or what differs from the usual, such as '(measure_ms: 2000)'
+    /// Options of the protocol: the name of a preset, or the options that differ from the defaults, such as '(measure_ms: 2000)'
     #[arg(long, value_name = "TEXT")]
     pub options: Option<String>,
     /// Address of the robot's controller, such as 'rtde:192.168.0.10'
     #[arg(long, value_name = "ADDRESS")]
     pub robot: Option<String>,
-    /// Shots to take; 0: none
+    /// Number of shots; 0 for none
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub shots: u32,
     /// How long to watch before the shots (s)
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,
-    /// File for every byte that comes and goes
+    /// Log every byte in both directions to this file
     #[arg(long, value_name = "FILE")]
     pub raw_log: Option<PathBuf>,
 }
@@ -41,16 +40,16 @@ pub struct LinkTestArgs {
 /// Arguments of `simulate`.
 #[derive(Args, Clone, Debug)]
 pub struct SimulateArgs {
-    /// What to speak
-    #[arg(value_name = "emscon|ascii|geocom|ndi|rtde", value_parser = WireProtocol::from_str)]
+    /// Protocol
+    #[arg(value_name = "PROTOCOL", value_enum)]
     pub protocol: WireProtocol,
-    /// TCP address to listen on, such as '127.0.0.1:7000'; port 0: any free one
+    /// TCP address to listen on, such as '127.0.0.1:7000'; port 0 for any free one
     #[arg(long, value_name = "HOST:PORT", required_unless_present = "pty", conflicts_with = "pty")]
     pub listen: Option<String>,
     /// Listen behind a pseudo-terminal, as on a serial line
     #[arg(long)]
     pub pty: bool,
-    /// The controller of the same robot tells its joints by RTDE at this TCP address
+    /// Let the controller of the same robot report its joints by RTDE at this TCP address
     #[arg(long, value_name = "HOST:PORT")]
     pub robot: Option<String>,
     /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
@@ -59,22 +58,22 @@ pub struct SimulateArgs {
     /// Seed of the hidden deviations and of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Fault of the instrument, such as 'cut-20@3' for the third occasion or 'drip@1x5'; may be repeated
+    /// Fault of the instrument, such as 'cut-20@3' for the third occasion or 'drip@1x5'; can be repeated
     #[arg(long = "fault", value_name = "NAME")]
     pub faults: Vec<String>,
-    /// Poses that the robot visits; without a plan it stands in the middle of its joint ranges
+    /// Poses that the robot visits; without a plan it stays in the middle of its joint ranges
     #[arg(long, value_name = "CSV")]
     pub plan: Option<PathBuf>,
-    /// Go on to the next pose after so many shots and a second without another; 0: only when told
+    /// Move to the next pose after this many shots and a second without another one; 0 to wait for 'next'
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub shots: usize,
 }
 
-/// `--over`.
+/// Value of `--over`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wires(pub Vec<SimulatedWire>);
 
-/// Wires as they are typed.
+/// Parses the value of `--over`.
 pub(super) fn wires(text: &str) -> Result<Wires, String> {
     let wire = |text: &str| match text.trim().strip_prefix("serial:") {
         Some(protocol) => protocol.parse().map(SimulatedWire::Serial),
@@ -83,7 +82,7 @@ pub(super) fn wires(text: &str) -> Result<Wires, String> {
     text.split(',').map(wire).collect::<Result<_, _>>().map(Wires)
 }
 
-/// A time from 0 on.
+/// Parses a time of at least 0 (s).
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),

@@ -1,4 +1,11 @@
-//! Protocols from their names and options.
+//! Protocols and simulators from their names and options.
+
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+use std::time::Duration;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::protocol::Protocol;
 use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Checksum, Column, Layout, Mode, Preset};
@@ -13,19 +20,14 @@ use super::simulator::geocom::GeocomSimulator;
 use super::simulator::ndi::NdiSimulator;
 use super::simulator::rtde::RtdeSimulator;
 use crate::session::wire::{Route, WireAddress, WireProtocol};
-use std::str::FromStr;
-use std::time::Duration;
 
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
+/// Allowed duration of a stationary measurement (ms).
+const MEASURE_MS: RangeInclusive<i32> = 50..=60_000;
 
-/// Shortest and longest stationary measurement (ms).
-const MEASURE_MS: (i32, i32) = (50, 60_000);
-
-/// A tracker that shows no reflector is asked for its status so often: who sees nothing is told from who is not there.
+/// Interval at which a tracker that sends no positions is asked for its status, to tell a broken beam from a lost connection.
 const KEEP_ALIVE: Duration = Duration::from_millis(700);
 
-/// Options of emScon.
+/// Options of emScon, as a profile states them.
 #[derive(Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct EmsconSettings {
@@ -42,7 +44,7 @@ impl Default for EmsconSettings {
     }
 }
 
-/// Options of RTDE.
+/// Options of RTDE, as a profile states them.
 #[derive(Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct RtdeSettings {
@@ -55,7 +57,7 @@ impl Default for RtdeSettings {
     }
 }
 
-/// Options from their text; without one the usual ones.
+/// Options from their text; the defaults without one.
 fn read<T: DeserializeOwned + Default>(options: Option<&str>) -> Result<T, String> {
     let Some(text) = options else { return Ok(T::default()) };
     ron::Options::default()
@@ -64,26 +66,26 @@ fn read<T: DeserializeOwned + Default>(options: Option<&str>) -> Result<T, Strin
         .map_err(|error| format!("the options '{}' of the link: {error}", crate::text::printable(text)))
 }
 
-/// The protocol of an address. `options` is the name of a preset or a RON struct of what differs from the usual.
+/// The protocol of an address. `options` is the name of a preset or a RON struct of the options that differ from the defaults.
 ///
 /// # Errors
-/// An option that does not exist or cannot be.
+/// An unknown option or an invalid value.
 pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<Box<dyn Protocol>, String> {
     let options = options.map(str::trim).filter(|options| !options.is_empty());
     match address.protocol {
         WireProtocol::Emscon => {
             let EmsconSettings { measure_ms, use_adm, reflector, initialize } = read(options)?;
-            if !(MEASURE_MS.0..=MEASURE_MS.1).contains(&measure_ms) {
-                return Err(format!("measure_ms is {measure_ms}: use {} to {}", MEASURE_MS.0, MEASURE_MS.1));
+            if !MEASURE_MS.contains(&measure_ms) {
+                let (shortest, longest) = (MEASURE_MS.start(), MEASURE_MS.end());
+                return Err(format!("measure_ms is {measure_ms}: use {shortest} to {longest}"));
             }
-            // Its positions are what the live display shows.
-            let reflector_positions = true;
             let options = EmsconOptions {
                 measure_ms,
                 use_adm,
                 reflector,
                 initialize,
-                reflector_positions,
+                // For the live view.
+                reflector_positions: true,
                 keep_alive: KEEP_ALIVE,
                 ..EmsconOptions::default()
             };
@@ -113,10 +115,10 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
     }
 }
 
-/// The other end of a protocol, for rehearsals; `faults` by their names, see the kinds of faults of each simulator.
+/// The simulator of a protocol. `faults` are given by their names.
 ///
 /// # Errors
-/// A fault that this simulator does not have.
+/// The simulator does not have such a fault.
 pub(super) fn simulator(protocol: WireProtocol, faults: &[String]) -> Result<Box<dyn Simulator>, String> {
     Ok(match protocol {
         WireProtocol::Emscon => Box::new(EmsconSimulator::new(parsed(faults)?)),
@@ -135,10 +137,10 @@ where
     faults.iter().map(|fault| fault.parse().map_err(|error: F::Err| error.to_string())).collect()
 }
 
-/// The same as text: what differs from the usual.
+/// [`rehearsal_ascii`] as text: the options that differ from the defaults.
 const REHEARSAL_ASCII: &str = r#"(mode: Polled(trigger: "M\\r"), layout: Columns([X, Y, Z, Sigma]), checksum: Crc16)"#;
 
-/// How lines are written in a rehearsal: asked for one by one, each with its standard deviation and a check sum.
+/// Lines of a rehearsal: polled one by one, each with its standard deviation and a check sum.
 fn rehearsal_ascii() -> AsciiOptions {
     AsciiOptions {
         mode: Mode::Polled { trigger: "M\\r".to_owned() },
@@ -148,11 +150,11 @@ fn rehearsal_ascii() -> AsciiOptions {
     }
 }
 
-/// The options with which a rehearsal speaks to its simulator, as text.
+/// Options of the client in a rehearsal, as text.
 pub(super) fn rehearsal_options(protocol: WireProtocol) -> Option<String> {
     match protocol {
         WireProtocol::Ascii => Some(REHEARSAL_ASCII.to_owned()),
-        WireProtocol::Emscon => Some(format!("(measure_ms: {})", MEASURE_MS.0)),
+        WireProtocol::Emscon => Some(format!("(measure_ms: {})", MEASURE_MS.start())),
         WireProtocol::Geocom | WireProtocol::Ndi | WireProtocol::Rtde => None,
     }
 }

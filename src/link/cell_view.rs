@@ -1,4 +1,4 @@
-//! The simulated cell as an instrument and a robot's controller see it: one place for the robot, looked at over several wires.
+//! The simulated cell as seen by an instrument and a robot's controller: one robot pose, observed over several wires.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -12,35 +12,35 @@ use super::{LinkError, SimulatedCell};
 use crate::profile::Profile;
 use crate::session::reading::MeasureRequest;
 
-/// Joints that a controller tells.
+/// Number of joints that a controller reports.
 const JOINTS: usize = 6;
 
-/// Whether a controller can tell the joints of this arm.
+/// Checks that a controller can report the joints of this arm.
 ///
 /// # Errors
-/// [`LinkError::SetUp`]: it has more or fewer.
+/// [`LinkError::SetUp`]: the numbers of joints differ.
 pub(super) fn check_joints(profile: &Profile) -> Result<(), LinkError> {
     let joints = profile.chain().dof();
     if joints == JOINTS {
         return Ok(());
     }
     Err(LinkError::SetUp(format!(
-        "'{}' has {joints} joints, but a controller with RTDE tells {JOINTS}: \
-         choose the instrument without the robot, or the profile of this robot",
+        "'{}' has {joints} joints, but an RTDE controller reports {JOINTS}: \
+         choose the instrument without the robot, or the profile of that robot",
         profile.name()
     )))
 }
 
-/// Who decides when the next shot is another one.
+/// When the view advances to the next shot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Advance {
-    /// Whoever measures says so, shot by shot: then the shots are those of the cell without wires.
-    Told,
-    /// Every shot is another one.
+    /// At each call of [`CellView::advance`], so that the shots are the same as without wires.
+    OnRequest,
+    /// At each shot.
     EveryShot,
 }
 
-/// A move of the robot under way.
+/// A move of the robot in progress.
 #[derive(Clone, Debug)]
 struct Motion {
     from: Vec<f64>,
@@ -48,16 +48,16 @@ struct Motion {
     takes: Duration,
 }
 
-/// The cell with its robot at one place.
+/// The cell with its robot at one pose.
 #[derive(Debug)]
 pub(super) struct CellView {
     pub(super) cell: SimulatedCell,
     advance: Advance,
-    /// What is measured now.
+    /// The current measurement.
     request: Option<MeasureRequest>,
-    /// The shots of it; none: the beam is broken.
+    /// Shots of the current measurement; empty if the beam is broken.
     shots: Vec<Shot>,
-    /// How many have been asked for.
+    /// Number of shots taken so far.
     taken: usize,
     motion: Option<Motion>,
     clock: Stopwatch,
@@ -68,12 +68,12 @@ impl CellView {
         Self { cell, advance, request: None, shots: Vec::new(), taken: 0, motion: None, clock: Stopwatch::start() }
     }
 
-    /// The robot is at another place at once; what is measured from now on belongs to this. Returns the time from which on the
-    /// controller tells of it (s).
+    /// Moves the robot to another pose at once and starts its measurement. Returns the time from which the controller reports
+    /// the new pose (s).
     ///
     /// # Errors
-    /// The request is none for this cell.
-    pub(super) fn go(&mut self, request: &MeasureRequest) -> Result<f64, LinkError> {
+    /// The request does not fit this cell.
+    pub(super) fn move_to(&mut self, request: &MeasureRequest) -> Result<f64, LinkError> {
         self.shots = match self.cell.shots(request) {
             Ok(shots) => shots,
             Err(LinkError::BeamBroken) => Vec::new(),
@@ -85,59 +85,59 @@ impl CellView {
         Ok(self.clock.now().as_secs_f64())
     }
 
-    /// The robot begins to move to another place and takes a while.
+    /// Starts a move to another pose that takes this long.
     ///
     /// # Errors
-    /// As [`Self::go`].
-    pub(super) fn travel(&mut self, request: &MeasureRequest, takes: Duration) -> Result<(), LinkError> {
+    /// As [`Self::move_to`].
+    pub(super) fn start_move(&mut self, request: &MeasureRequest, takes: Duration) -> Result<(), LinkError> {
         let from = self.request.as_ref().map(|before| before.configuration.clone());
-        self.go(request)?;
+        self.move_to(request)?;
         self.motion = from.map(|from| Motion { from, since: self.clock.now(), takes });
         Ok(())
     }
 
-    /// Another shot is asked for.
+    /// Advances to the next shot.
     pub(super) fn advance(&mut self) {
         self.taken += 1;
     }
 
-    /// Shots taken since the robot stands here.
+    /// Shots taken since the last move.
     pub(super) const fn taken(&self) -> usize {
         self.taken
     }
 
-    /// Part of the move that is done, while the robot moves.
+    /// Completed fraction of the move in progress.
     fn progress(&self) -> Option<f64> {
         let motion = self.motion.as_ref()?;
         let passed = self.clock.now().saturating_sub(motion.since).as_secs_f64() / motion.takes.as_secs_f64().max(1e-3);
         (passed < 1.0).then_some(passed)
     }
 
-    /// What is measured where the robot is now.
-    fn here(&self) -> Option<MeasureRequest> {
-        let mut here = self.request.clone()?;
+    /// Request for a measurement at the robot's current pose.
+    fn current_request(&self) -> Option<MeasureRequest> {
+        let mut current = self.request.clone()?;
         if let (Some(part), Some(motion)) = (self.progress(), &self.motion) {
-            for (to, from) in here.configuration.iter_mut().zip(&motion.from) {
+            for (to, from) in current.configuration.iter_mut().zip(&motion.from) {
                 *to = from + (*to - from) * part;
             }
-            here.shots = 1;
+            current.shots = 1;
         }
-        Some(here)
+        Some(current)
     }
 
-    /// The shot that is due: the same until somebody asks for another one, while the robot rests.
-    fn shown(&mut self) -> Option<Shot> {
+    /// The current shot. While the robot is at rest it stays the same until the view advances.
+    fn current_shot(&mut self) -> Option<Shot> {
         if self.progress().is_some() {
-            let here = self.here()?;
-            return self.cell.shots(&here).ok()?.into_iter().next();
+            let request = self.current_request()?;
+            return self.cell.shots(&request).ok()?.into_iter().next();
         }
         let index = self.taken.saturating_sub(1).checked_rem(self.shots.len())?;
         self.shots.get(index).cloned()
     }
 
     fn joints(&self) -> JointState {
-        let mut positions = self.here().map_or_else(Vec::new, |here| self.cell.standing(&here));
-        // A controller of six joints tells six, whatever the arm.
+        let mut positions = self.current_request().map_or_else(Vec::new, |request| self.cell.actual_joints(&request));
+        // The controller reports six joints, whatever the arm.
         positions.resize(JOINTS, 0.0);
         let mut speeds = vec![0.0; JOINTS];
         if let (Some(_), Some(motion), Some(request)) = (self.progress(), &self.motion, &self.request) {
@@ -150,7 +150,7 @@ impl CellView {
     }
 }
 
-/// A view that several threads look through.
+/// A view that is shared by several threads.
 #[derive(Clone, Debug)]
 pub(super) struct SharedView(Arc<Mutex<CellView>>);
 
@@ -170,11 +170,11 @@ impl PointSource for SharedView {
         if view.advance == Advance::EveryShot {
             view.advance();
         }
-        view.shown()
+        view.current_shot()
     }
 
-    fn look(&mut self) -> Option<Shot> {
-        self.lock().shown()
+    fn position(&mut self) -> Option<Shot> {
+        self.lock().current_shot()
     }
 
     fn joints(&mut self) -> JointState {
@@ -183,7 +183,7 @@ impl PointSource for SharedView {
 }
 
 impl SimulatedCell {
-    /// The shots of a measurement, one by one, as an instrument gives them.
+    /// The single shots of a measurement, as an instrument returns them.
     ///
     /// # Errors
     /// As [`super::Link::measure`] of this cell.

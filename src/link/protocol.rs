@@ -1,117 +1,117 @@
-//! What instruments and robots speak, without sockets: bytes in, events and bytes out.
+//! Protocols of instruments and robots, without sockets: bytes in, events and bytes out.
 //!
-//! A [`Protocol`] has no clock and no wire. Its owner connects, calls [`Protocol::start`], hands it every byte that arrives and
-//! every passing deadline, and carries away what it wants to send. So one and the same code talks over a serial port, TCP or a
-//! list of bytes in a test, and splitting a stream at any byte changes nothing.
+//! A [`Protocol`] has no clock and no wire. Its owner connects, calls [`Protocol::start`], passes in every byte that arrives
+//! and every deadline that expires, and sends the bytes that the protocol queues. The same code therefore runs over a serial
+//! port, over TCP or on a list of bytes in a test, and it does not matter where a stream is split.
 //!
 //! Conversation: `start` runs the whole set-up (identity, units, frame, mode) and ends with [`ProtocolEvent::Ready`];
-//! `trigger` asks for one shot and is answered by exactly one [`ProtocolEvent::Shot`] or [`ProtocolEvent::Failed`], or by the end
-//! of the connection. After [`ProtocolEvent::Lost`] nothing is valid until the owner has connected again and called `start`. A point is given only on
-//! an explicit success of the instrument.
+//! `trigger` requests one shot and is answered by exactly one [`ProtocolEvent::Shot`] or [`ProtocolEvent::Failed`], or by the
+//! end of the connection. After [`ProtocolEvent::Lost`] nothing is valid until the owner has reconnected and called `start`.
+//! A point is reported only when the instrument explicitly reports success.
 
 #![warn(missing_docs)]
 
 pub mod ascii;
+pub mod backoff;
 pub mod crc;
 pub mod emscon;
+pub mod error_streak;
+mod excerpt;
 pub mod geocom;
 pub mod lines;
 pub mod ndi;
 pub mod outbox;
-pub mod patience;
+pub mod receive_buffer;
 pub mod rtde;
-pub mod text;
-pub mod unread;
-pub mod unreadable;
 
 use std::fmt::Debug;
 use std::time::Duration;
 
 use nalgebra::Point3;
 
-/// Time since some start that the owner of the protocol chose; only differences matter.
+/// Time since an arbitrary start chosen by the owner of the protocol; only differences matter.
 pub type Moment = Duration;
 
 /// One conversation with an instrument or a robot.
 pub trait Protocol: Send + Debug {
-    /// A new connection: forgets all that was received, what still waits to be fetched included, and begins the set-up.
+    /// Begins the set-up on a new connection. Discards everything received before, including events that were not fetched.
     fn start(&mut self, now: Moment);
 
-    /// Bytes as they arrived; any split of the stream gives the same events. A datagram is fed whole.
+    /// Takes bytes as they arrive. Any split of the stream gives the same events; a datagram is passed in one piece.
     fn feed(&mut self, bytes: &[u8], now: Moment);
 
-    /// Time has passed: deadlines, retries, keep-alive.
+    /// Handles deadlines, retries and keep-alives that are due.
     fn tick(&mut self, now: Moment);
 
-    /// Asks for one shot. Not ready, or one is under way: answered by [`ProtocolEvent::Failed`].
+    /// Requests one shot. Answered by [`ProtocolEvent::Failed`] if the link is not ready or another shot is in progress.
     fn trigger(&mut self, now: Moment);
 
-    /// Gives up the shot under way; what still comes of it is swallowed. Not answered.
+    /// Cancels the shot in progress without an answer; a late result of it is discarded.
     fn cancel(&mut self, now: Moment);
 
     /// The next bytes to send.
     fn next_output(&mut self) -> Option<Vec<u8>>;
 
-    /// The next thing that happened.
+    /// The next event.
     fn next_event(&mut self) -> Option<ProtocolEvent>;
 
-    /// When [`Self::tick`] wants to be called at the latest.
+    /// The latest time for the next call of [`Self::tick`].
     fn next_deadline(&self) -> Option<Moment>;
 
-    /// Whether points are shown between shots: then something is heard from the other end all the time.
+    /// Whether points arrive between shots, so that silence means a lost connection.
     fn shows_live(&self) -> bool {
         false
     }
 }
 
-/// Something that happened on the wire.
+/// An event of a protocol.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ProtocolEvent {
-    /// The set-up is complete and was read back; shots may be asked for.
+    /// The set-up is complete and was read back; shots may be requested.
     Ready(Identity),
-    /// The shot that was asked for.
+    /// The requested shot.
     Shot(Shot),
-    /// The shot that was asked for did not come; the link goes on.
+    /// The requested shot failed; the link stays usable.
     Failed(Failure),
-    /// A point that nobody asked for: a stream, or the position of the reflector. Never a measurement.
+    /// An unrequested point of a stream, or the current position of the reflector. Never a measurement.
     Live(Shot),
-    /// A complete measurement that somebody started at the instrument itself.
+    /// A complete measurement that was started at the instrument itself.
     Offered(Shot),
-    /// Joint values that the robot reported.
+    /// Joint values reported by the robot.
     Joints(JointState),
-    /// Something that the operator should know.
+    /// A message for the operator.
     Status(Status),
-    /// The connection is of no use any more.
+    /// The connection is lost.
     Lost(Failure),
 }
 
-/// Who answers.
+/// Identity and settings of the instrument at the other end.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identity {
-    /// Maker, model, serial number, version: in one line.
+    /// Maker, model, serial number and version, in one line.
     pub name: String,
-    /// Reflector in use with its surface offset, if the instrument says it.
+    /// Reflector in use with its surface offset, if the instrument reports it.
     pub reflector: Option<Reflector>,
-    /// What was checked in the set-up, one item each, such as `units: mm, rad (read back)`.
+    /// Settings that were checked in the set-up, such as `units: mm, rad (read back)`.
     pub checked: Vec<String>,
-    /// What the operator should know before measuring, such as a frame that is not the instrument's own.
+    /// Problems to resolve before measuring, such as a frame that is not the instrument's own.
     pub warnings: Vec<String>,
-    /// What holds for every instrument of this kind, such as how accurate it can be at all.
+    /// Remarks that hold for every instrument of this kind, such as its achievable accuracy.
     pub notes: Vec<String>,
 }
 
-/// A reflector that the instrument knows.
+/// A reflector in the instrument's list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reflector {
-    /// Number at the instrument.
+    /// Number of the reflector in that list.
     pub id: i32,
-    /// Name.
+    /// Name of the reflector in that list.
     pub name: String,
-    /// Distance of its centre from the surface that it touches (m).
+    /// Distance of its centre from the surface it touches (m).
     pub offset: f64,
 }
 
-/// One point.
+/// One measured point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
     /// Centre of the reflector in the frame of the instrument (m).
@@ -128,20 +128,20 @@ pub struct Shot {
     pub pressure: Option<f64>,
     /// Relative humidity (%).
     pub humidity: Option<f64>,
-    /// Said with the point, such as a name or `accuracy not guaranteed`.
+    /// Remark of the instrument on this point, such as a name or `accuracy not guaranteed`.
     pub remark: Option<String>,
-    /// The bytes that it was read from.
+    /// The bytes from which the point was read.
     pub raw: Vec<u8>,
 }
 
-/// Standard deviations (m) as an instrument states them; `None` where they are none: zero, negative or not finite stand for
-/// "unknown".
+/// The stated standard deviations (m), or `None` if one of them is zero, negative or not finite: instruments use such values
+/// for "unknown".
 pub fn known_sigma(stated: [f64; 3]) -> Option<[f64; 3]> {
     stated.iter().all(|value| value.is_finite() && *value > 0.0).then_some(stated)
 }
 
 impl Shot {
-    /// A point with nothing said beside it.
+    /// A point without any further information.
     pub const fn bare(point: Point3<f64>) -> Self {
         Self {
             point,
@@ -157,165 +157,169 @@ impl Shot {
     }
 }
 
-/// Joints of a robot at one time.
+/// Joint state of a robot at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointState {
-    /// Values (rad).
+    /// Joint values (rad).
     pub positions: Vec<f64>,
-    /// Speeds (rad/s), if the controller gives them.
+    /// Joint speeds (rad/s), if the controller reports them.
     pub speeds: Option<Vec<f64>>,
     /// Time by the controller's clock (s).
     pub controller_time: f64,
-    /// Why it is no time to measure, such as a protective stop.
+    /// Why the robot is stopped, such as a protective stop; `None` if it is not.
     pub stopped: Option<String>,
 }
 
-/// How much a status matters.
+/// Severity of a status message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// Good to know.
+    /// For information.
     Info,
-    /// Wants attention.
+    /// Needs attention.
     Warning,
 }
 
-/// Something to know.
+/// A message for the operator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// How much it matters.
+    /// Severity of the message.
     pub severity: Severity,
-    /// In words.
+    /// Text of the message.
     pub text: String,
 }
 
-/// Why there is no point, or no link. Every variant's message says what happened; [`Failure::hint`] says what to do.
+/// Why a shot or a link failed. Every variant's message says what happened; [`Failure::hint`] says what to do.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Failure {
-    /// No reflector is seen.
+    /// The instrument sees no reflector.
     NoTarget(String),
-    /// The reflector or the air is not steady.
+    /// The reading was not stable.
     Unstable(String),
-    /// Not now: warm-up, motion, another command.
+    /// The instrument is busy: warm-up, motion or another command.
     NotReady(String),
-    /// It said nothing in time.
+    /// No answer arrived in time.
     Silent {
-        /// What was waited for.
+        /// What the program was doing.
         what: String,
-        /// How long.
+        /// How long it waited (s).
         seconds: f64,
     },
-    /// It refused.
+    /// The instrument refused a command.
     Refused(String),
-    /// It is set in another way than asked for: units, frame, mode, reflector.
+    /// Units, frame, mode or reflector differ from the requested ones.
     Settings(String),
-    /// It multiplies its points by a scale, so that all distances are wrong.
+    /// The instrument multiplies its points by this scale, so all distances are wrong.
     Scaled(f64),
-    /// What answers, or does not, is something else than the instrument that was chosen.
+    /// The other end is not the selected kind of instrument.
     Foreign(String),
-    /// A point came that cannot be one.
+    /// The reading cannot be a measured point.
     Unusable(String),
-    /// What came cannot be understood.
+    /// The received data cannot be read.
     Garbled(String),
-    /// Somebody else uses it.
+    /// Another program uses the instrument.
     InUse(String),
-    /// There is no connection.
+    /// No connection could be made.
     Unreachable(String),
-    /// The connection ended.
+    /// The connection was lost.
     Disconnected(String),
-    /// The shot was asked for while another was under way, or before the set-up was complete.
+    /// The shot was requested during another one, or before the set-up was complete.
     TooEarly(String),
 }
 
-/// Who is at the other end of a robot's wire, in messages.
+/// Name of the other end of a robot's wire in messages.
 pub const CONTROLLER: &str = "the controller";
 
 impl std::error::Error for Failure {}
 
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.words("the instrument"))
+        f.write_str(&self.message("the instrument"))
     }
 }
 
 impl Failure {
-    /// What happened, where `who` is at the other end, such as `the controller`.
-    pub fn words(&self, who: &str) -> String {
+    /// The message, with `subject` as the name of the other end, such as `the controller`.
+    pub fn message(&self, subject: &str) -> String {
         match self {
-            Self::NoTarget(why) => format!("{who} sees no reflector ({why})"),
+            Self::NoTarget(why) => format!("{subject} sees no reflector ({why})"),
             Self::Unstable(why) => format!("the reading was not stable ({why})"),
-            Self::NotReady(why) => format!("{who} is not ready ({why})"),
-            Self::Silent { what, seconds } => format!("{who} said nothing for {seconds:.0} s while {what}"),
-            Self::Refused(why) => format!("{who} refused: {why}"),
-            Self::Settings(why) => format!("{who} is set differently: {why}"),
+            Self::NotReady(why) => format!("{subject} is not ready ({why})"),
+            Self::Silent { what, seconds } => format!("no answer from {subject} for {seconds:.0} s while {what}"),
+            Self::Refused(why) => format!("{subject} refused: {why}"),
+            Self::Settings(why) => format!("{subject} has a wrong setting: {why}"),
             Self::Scaled(scale) => {
                 format!(
-                    "{who} multiplies its points by the scale {scale} of its transformation: all distances would be wrong"
+                    "{subject} multiplies its points by the scale {scale} of its transformation, so all distances would be wrong"
                 )
             }
-            Self::Foreign(why) => format!("this does not look like what was chosen: {why}"),
-            Self::Unusable(why) => format!("the reading is no measurement: {why}"),
-            Self::Garbled(why) => format!("cannot read what {who} sends: {why}"),
-            Self::InUse(why) => format!("{who} is in use by another program ({why})"),
-            Self::Unreachable(why) => format!("there is no connection: {why}"),
-            Self::Disconnected(why) => format!("the connection is lost: {why}"),
-            Self::TooEarly(why) => format!("a shot was asked for too early: {why}"),
+            Self::Foreign(why) => format!("this does not look like the selected instrument: {why}"),
+            Self::Unusable(why) => format!("the reading is not a measurement: {why}"),
+            Self::Garbled(why) => format!("cannot read the data from {subject}: {why}"),
+            Self::InUse(why) => format!("{subject} is in use by another program ({why})"),
+            Self::Unreachable(why) => format!("no connection: {why}"),
+            Self::Disconnected(why) => format!("the connection was lost: {why}"),
+            Self::TooEarly(why) => format!("the shot was requested too early: {why}"),
         }
     }
 
-    /// A point came that is the one before again: no real instrument measures the same twice, a stuck one does.
+    /// The point equals the previous one exactly. A real instrument never repeats every digit; one that is stuck does.
     pub fn repeated() -> Self {
-        Self::Unusable("it is equal to the point before to the last digit, so it was not measured anew".to_owned())
+        Self::Unusable("identical to the previous point to the last digit, so it is not a new measurement".to_owned())
     }
 
-    /// What the operator can do.
+    /// Advice for the operator.
     pub const fn hint(&self) -> &'static str {
         match self {
-            Self::NoTarget(_) => "return the SMR to the nest until the instrument has it again, then measure again",
-            Self::Unstable(_) => "wait until the robot and the SMR are at rest, then measure again",
-            Self::NotReady(_) => "wait until the instrument shows that it is ready, then measure again",
-            Self::Silent { .. } => "look whether the instrument is on and the cable or network is in place",
-            Self::Refused(_) => "look at the instrument's own display for what it wants",
-            Self::Settings(_) => "set the instrument as said, or connect again to let the set-up do it",
-            Self::Scaled(_) => "set the scale of the instrument's transformation to 1, then connect again",
-            Self::Foreign(_) => "is it this kind of instrument, and the right port, and is it on? then connect again",
-            Self::Unusable(_) => "measure again; if it stays, check the beam and the settings of the instrument",
-            Self::Garbled(_) => "check baud rate, line ending and the kind of instrument that was chosen",
-            Self::InUse(_) => "close the other program; then connect again",
-            Self::Unreachable(_) => {
-                "check address, cable and network, and whether the instrument is on; then connect again"
+            Self::NoTarget(_) => {
+                "return the SMR to the nest until the instrument has locked on to it, then measure again"
             }
-            Self::Disconnected(_) => "check the cable or network; the link connects again by itself",
-            Self::TooEarly(_) => "wait for the reading under way",
+            Self::Unstable(_) => "wait until the robot and the SMR are at rest, then measure again",
+            Self::NotReady(_) => "wait until the instrument is ready, then measure again",
+            Self::Silent { .. } => {
+                "check that the instrument is switched on and that the cable or network is connected"
+            }
+            Self::Refused(_) => "check the instrument's own display",
+            Self::Settings(_) => "correct the setting at the instrument, or reconnect and let the set-up do it",
+            Self::Scaled(_) => "set the scale of the instrument's transformation to 1, then reconnect",
+            Self::Foreign(_) => "check the kind of instrument and the port, and that it is switched on; then reconnect",
+            Self::Unusable(_) => "measure again; if this persists, check the beam and the settings of the instrument",
+            Self::Garbled(_) => "check the baud rate, the line ending and the selected kind of instrument",
+            Self::InUse(_) => "close the other program, then reconnect",
+            Self::Unreachable(_) => {
+                "check address, cable and network, and that the instrument is switched on; then reconnect"
+            }
+            Self::Disconnected(_) => "check the cable or network; the link reconnects automatically",
+            Self::TooEarly(_) => "wait for the current reading",
         }
     }
 
-    /// What the operator can do where a robot's controller is at the other end.
+    /// Advice for the operator if a robot's controller is at the other end.
     pub const fn controller_hint(&self) -> &'static str {
         match self {
             Self::Silent { .. } => {
-                "look whether the controller is on and the network is in place, and whether the port is that of RTDE, 30004"
+                "check that the controller is switched on, that the network is connected and that the port is that of RTDE, 30004"
             }
-            Self::Refused(_) => "the controller needs PolyScope 3.4 or newer; look at its version on the pendant",
+            Self::Refused(_) => "the controller needs PolyScope 3.4 or newer; check its version on the pendant",
             Self::Garbled(_) | Self::Foreign(_) => {
-                "is it the controller's address, and the port of RTDE, 30004? correct it, then connect again"
+                "check the controller's address and the port of RTDE, 30004; then reconnect"
             }
-            Self::InUse(_) => "end the other program that uses RTDE of this controller; then connect again",
+            Self::InUse(_) => "close the other program that uses RTDE of this controller, then reconnect",
             Self::Unreachable(_) => {
-                "check address and network, whether the controller is on, and whether its security settings allow RTDE"
+                "check address and network, that the controller is switched on and that its security settings allow RTDE"
             }
-            Self::Disconnected(_) => "check the network; the link connects again by itself",
+            Self::Disconnected(_) => "check the network; the link reconnects automatically",
             Self::NoTarget(_)
             | Self::Unstable(_)
             | Self::NotReady(_)
             | Self::Settings(_)
             | Self::Scaled(_)
             | Self::Unusable(_)
-            | Self::TooEarly(_) => "look at the pendant for the state of the robot, then try again",
+            | Self::TooEarly(_) => "check the state of the robot on the pendant, then try again",
         }
     }
 
-    /// True where asking again at once has a chance.
+    /// Whether an immediate retry may succeed.
     pub const fn is_transient(&self) -> bool {
         matches!(self, Self::Unstable(_) | Self::NotReady(_))
     }

@@ -1,22 +1,23 @@
-//! A rehearsal over real wires: the simulated cell behind simulated instruments, spoken to over TCP on this machine or over a
-//! pseudo-terminal, by the same code that speaks to the real ones.
+//! A rehearsal over real wires: the simulated cell behind simulated instruments, reached over TCP on this machine or over a
+//! pseudo-terminal by the same code as real ones.
 //!
-//! The simulated instruments live [`PACE`] times faster than real ones, so that nobody waits for a telescope that is not there.
+//! The clocks of the simulated instruments run [`SPEEDUP`] times faster than real ones, so that a rehearsal does not wait for
+//! the motion of a telescope that does not exist.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::cell_view::{Advance, CellView, SharedView, check_joints};
-use super::serve::{Pace, Place, serve};
-use super::{Link, LinkError, LinkNews, RawLog, SimulatedCell, Wired, build};
+use super::serve::{Endpoint, Speedup, serve};
+use super::{Link, LinkError, LinkEvent, RawLog, SimulatedCell, Wired, build};
 use crate::profile::Profile;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::simulation::Simulation;
 use crate::session::wire::{LinkChoice, WireProtocol};
 
-/// Seconds of a simulated instrument in one of ours.
-const PACE: Pace = Pace(20);
+/// Speed of the simulated instruments' clocks.
+const SPEEDUP: Speedup = Speedup(20);
 
 /// A simulated cell over wires.
 #[derive(Debug)]
@@ -24,34 +25,34 @@ pub struct Rehearsal {
     view: SharedView,
     wired: Wired,
     has_robot: bool,
-    /// Ends the servers.
+    /// Stops the servers.
     stop: Arc<AtomicBool>,
 }
 
 impl Rehearsal {
-    /// The cell of a profile behind the wires of a simulation. `log` takes every byte that goes over them.
+    /// Serves the cell of a profile over the wires of a simulation and connects to it. `log` records every byte.
     ///
     /// # Errors
-    /// As [`SimulatedCell::new`]; the arm cannot be shown by such a controller; the system refuses a port or a thread.
+    /// As [`SimulatedCell::new`]; an arm that such a controller cannot report; a port or a thread that is not available.
     pub fn new(profile: &Profile, simulation: &Simulation, log: Option<&RawLog>) -> Result<Self, LinkError> {
         let cell = SimulatedCell::new(profile, simulation)?;
-        let view = SharedView::new(CellView::new(cell, Advance::Told));
+        let view = SharedView::new(CellView::new(cell, Advance::OnRequest));
         let stop = Arc::new(AtomicBool::new(false));
         let mut choice = LinkChoice::default();
         let mut has_robot = false;
         let start = |protocol: WireProtocol, is_serial: bool| {
-            let place = if is_serial { Place::PseudoTerminal } else { Place::Loopback };
-            // The controller's own clock says when the robot stood where: it is not hurried.
-            let pace = if protocol.is_robot() { Pace(1) } else { PACE };
-            serve(protocol, &[], &place, view.clone(), pace, &stop)
+            let endpoint = if is_serial { Endpoint::PseudoTerminal } else { Endpoint::Loopback };
+            // The time stamps of the controller order its joint values and the moves of the robot, so its clock runs in real time.
+            let speedup = if protocol.is_robot() { Speedup(1) } else { SPEEDUP };
+            serve(protocol, &[], &endpoint, view.clone(), speedup, &stop)
         };
         for wire in &simulation.wires {
             let protocol = wire.protocol();
             if protocol.is_robot() {
                 check_joints(profile)?;
             }
-            if wire.is_serial() && matches!(protocol, WireProtocol::Emscon | WireProtocol::Rtde) {
-                return Err(LinkError::SetUp(format!("{protocol} is not spoken on serial lines; use tcp")));
+            if wire.is_serial() && !protocol.has_serial_lines() {
+                return Err(LinkError::SetUp(format!("{protocol} does not use serial lines; use tcp")));
             }
             let address = start(protocol, wire.is_serial())?;
             let known = if protocol.is_robot() { choice.robot.is_some() } else { !choice.address.is_empty() };
@@ -67,7 +68,7 @@ impl Rehearsal {
             }
         }
         if choice.address.is_empty() {
-            // Only the robot is on a wire: the tracker speaks the language of the method paper's.
+            // Only the robot's wire was given. The instrument is the kind of tracker used in the method paper.
             choice.address = start(WireProtocol::Emscon, false)?;
             choice.options = build::rehearsal_options(WireProtocol::Emscon);
         }
@@ -78,7 +79,7 @@ impl Rehearsal {
 }
 
 impl Rehearsal {
-    /// What the simulated instrument warned of in its set-up.
+    /// Warnings of the simulated instrument's set-up.
     pub fn warnings(&self) -> Vec<String> {
         self.wired.warnings()
     }
@@ -97,10 +98,10 @@ impl Link for Rehearsal {
     }
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
-        let since = self.view.lock().go(request)?;
+        let since = self.view.lock().move_to(request)?;
         self.wired.robot_moved(since);
         let mut reading = self.wired.measure(request, keep_going)?;
-        // Time is virtual, as without a wire.
+        // Time is virtual, as without wires.
         reading.seconds = self.view.lock().cell.time(request, reading.shots);
         if !self.has_robot {
             reading.configuration = None;
@@ -108,11 +109,11 @@ impl Link for Rehearsal {
         Ok(reading)
     }
 
-    fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
+    fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkEvent>)> {
         self.wired.watch(wait)
     }
 
-    fn eye(&self) -> Option<super::Look> {
-        self.wired.eye()
+    fn live_poll(&self) -> Option<super::LivePoll> {
+        self.wired.live_poll()
     }
 }

@@ -1,10 +1,9 @@
-//! Measurements of a table, played as if they were captured now.
+//! Replays the measurements of a table as if they were captured now.
 //!
-//! A reading is found by the name of its pose, or, where the table does not know the name, by configuration. Where a pose has
-//! several rows, the one that is played depends on the number of the measurement, not on what was played before, so that an
-//! interrupted session goes on with the same values: it is the last of them that stands in the table at this number or earlier
-//! (row 1 is measurement 1), or else the first. Rows that are asked for in the order of the table are so played in its order,
-//! drift poses included, and a repeated measurement moves on to the next row of its pose.
+//! A reading is found by the name of its pose or, if the table does not contain the name, by configuration. If a pose has
+//! several rows, the choice depends only on the number of the measurement, so that a resumed session gets the same values: it
+//! is the last row of the pose up to this number (row 1 is measurement 1), or else its first row. Requests in the order of the
+//! table therefore replay it in order, drift poses included, and a repeated measurement takes the next row of its pose.
 
 use super::{Link, LinkError};
 use crate::kinematics::JointType;
@@ -14,13 +13,15 @@ use crate::session::reading::{MeasureRequest, Reading};
 use crate::text::printable;
 use crate::units::{DEGREE, MICROMETRE};
 
-/// Joint values differ by no more than this at the same pose: 0.001° (rad), 1 µm (m).
-const SAME_POSE: (f64, f64) = (1e-3 * DEGREE, MICROMETRE);
+/// Largest difference of a joint angle at the same pose (rad).
+const SAME_ANGLE: f64 = 1e-3 * DEGREE;
+/// Largest difference of a sliding joint at the same pose (m).
+const SAME_LENGTH: f64 = MICROMETRE;
 
-/// Time that a measurement is said to have taken (s).
+/// Reported duration of a measurement (s).
 const SECONDS: f64 = 5.0;
 
-/// A table that plays the instrument.
+/// A table that takes the place of the instrument.
 #[derive(Clone, Debug)]
 pub struct Replay {
     file: String,
@@ -29,12 +30,10 @@ pub struct Replay {
     readings: Vec<Row>,
 }
 
-/// What was measured in a row of the table.
+/// A measurement in the table, without its reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReplayRow {
-    /// Name of the pose.
     pub pose: String,
-    /// Index of the target.
     pub target: usize,
     /// Pendant joint values (rad, sliding joints m).
     pub configuration: Vec<f64>,
@@ -43,10 +42,10 @@ pub struct ReplayRow {
 }
 
 impl Replay {
-    /// From the bytes of a table for the robot of `profile`. Copies of rows are left out; `file` is the name in messages.
+    /// Reads the bytes of a table for the robot of `profile`. Duplicate rows are skipped; `file` is the name for messages.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`] with all defects of the table together, or see [`Self::of_table`].
+    /// [`LinkError::SetUp`] with all defects of the table, or as in [`Self::of_table`].
     pub fn new(profile: &Profile, bytes: &[u8], file: &str, layout: Layout) -> Result<Self, LinkError> {
         let joints: Vec<JointType> = profile.chain().joints().iter().map(|joint| joint.joint_type).collect();
         let table =
@@ -54,7 +53,7 @@ impl Replay {
         Self::of_table(profile, &table, file)
     }
 
-    /// From a table that was read before. A row without a target is of the first one.
+    /// Replays a table that was read before. A row without a target belongs to the first one.
     ///
     /// # Errors
     /// [`LinkError::SetUp`]: a target that the profile does not have.
@@ -82,7 +81,7 @@ impl Replay {
         Ok(Self { file, joints, rows, readings })
     }
 
-    /// What can be played, in the order of the table: the poses that do not repeat others are a plan.
+    /// All rows in the order of the table; those that do not repeat others form a plan.
     pub fn rows(&self) -> &[ReplayRow] {
         &self.rows
     }
@@ -90,15 +89,14 @@ impl Replay {
     /// Whether two configurations are the same pose.
     fn is_same(&self, a: &[f64], b: &[f64]) -> bool {
         let tolerance = |joint: &JointType| match joint {
-            JointType::Revolute => SAME_POSE.0,
-            JointType::Prismatic => SAME_POSE.1,
+            JointType::Revolute => SAME_ANGLE,
+            JointType::Prismatic => SAME_LENGTH,
         };
         a.len() == b.len() && a.iter().zip(b).zip(&self.joints).all(|((a, b), joint)| (a - b).abs() <= tolerance(joint))
     }
 
     /// The reading for a request.
     fn find(&self, request: &MeasureRequest) -> Option<&Row> {
-        let all = || self.rows.iter().zip(&self.readings).enumerate();
         let is_known = self.rows.iter().any(|row| row.pose == request.pose);
         let matches = |row: &ReplayRow| {
             row.target == request.target
@@ -108,7 +106,8 @@ impl Replay {
                     self.is_same(&row.configuration, &request.configuration)
                 }
         };
-        let mut candidates = all().filter(|(_, (row, _))| matches(row)).map(|(index, (_, reading))| (index, reading));
+        let rows = self.rows.iter().zip(&self.readings).enumerate();
+        let mut candidates = rows.filter(|(_, (row, _))| matches(row)).map(|(index, (_, reading))| (index, reading));
         let first = candidates.next()?;
         let reached = candidates.take_while(|(index, _)| (*index as u64) < request.number).last();
         Some(reached.unwrap_or(first).1)
@@ -120,7 +119,7 @@ impl Link for Replay {
         Ok(format!("measurements of '{}', {} rows", self.file, self.rows.len()))
     }
 
-    /// The joint values of the row are passed on as those that the robot reported.
+    /// Returns the joint values of the row as those reported by the robot.
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
         if !keep_going() {
             return Err(LinkError::Cancelled);

@@ -1,22 +1,23 @@
-//! A robot's controller on a wire without an instrument beside it: to look whether it tells its joint angles.
+//! A robot's controller on a wire without an instrument, to test whether it reports joint angles.
 
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
 use super::protocol::{CONTROLLER, Failure, Identity};
 use super::wire::{RawLog, Wire, WireEvent};
-use super::{LinkError, LinkNews, build};
+use super::wired::{joints_timeout, link_ended, no_robot};
+use super::{LinkError, LinkEvent, build};
 use crate::session::reading::LiveReading;
 use crate::session::wire::WireAddress;
 
-/// Longest time until it tells its joints.
-const SET_UP: Duration = Duration::from_secs(15);
-/// A wait looks so often whether it is still wanted.
-const LOOK: Duration = Duration::from_millis(50);
-/// What is older than this is not now.
-const FRESH: Duration = Duration::from_secs(1);
-/// Events taken at once.
-const AT_ONCE: usize = 1024;
+/// Longest wait for the first joint values.
+const SET_UP_TIMEOUT: Duration = Duration::from_secs(15);
+/// Interval at which a wait checks whether it was cancelled.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Age up to which joint values count as current.
+const MAX_AGE: Duration = Duration::from_secs(1);
+/// Most events handled per poll.
+const MAX_EVENTS_PER_POLL: usize = 1024;
 
 /// A robot's controller on a wire.
 #[derive(Debug)]
@@ -24,38 +25,38 @@ pub struct WiredRobot {
     wire: Wire,
     identity: Option<Identity>,
     down: Option<Failure>,
-    /// Why it does not move on, as told last.
+    /// Reason of the stop that was reported last.
     stopped: Option<String>,
 }
 
 impl WiredRobot {
-    /// The controller at an address. `log` takes every byte.
+    /// The controller at an address. `log` records every byte.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: no address of a robot, an option that cannot be, no thread.
+    /// [`LinkError::SetUp`]: not an address of a robot, an invalid option, or a thread that cannot be started.
     pub fn new(address: &WireAddress, options: Option<&str>, log: Option<&RawLog>) -> Result<Self, LinkError> {
         if !address.protocol.is_robot() {
-            return Err(LinkError::SetUp(format!("'{address}' is no robot; 'rtde:HOST' is one")));
+            return Err(LinkError::SetUp(no_robot(address)));
         }
         let protocol = build::protocol(address, options).map_err(LinkError::SetUp)?;
         let wire = Wire::start(address.clone(), protocol, log.cloned())
-            .map_err(|error| LinkError::SetUp(format!("the link cannot be started: {error}")))?;
+            .map_err(|error| LinkError::SetUp(format!("cannot start the link: {error}")))?;
         Ok(Self { wire, identity: None, down: None, stopped: None })
     }
 
-    /// Waits until it tells its joints, while it is wanted.
+    /// Waits until the controller reports joint values. Messages of the set-up go to `on_event`.
     ///
     /// # Errors
-    /// [`LinkError::Controller`]: it does not, and why; [`LinkError::Cancelled`].
+    /// [`LinkError::Controller`] if it does not, and [`LinkError::Cancelled`].
     pub fn connect_while(
         &mut self,
         keep_going: &dyn Fn() -> bool,
-        told: &mut dyn FnMut(LinkNews),
+        on_event: &mut dyn FnMut(LinkEvent),
     ) -> Result<Identity, LinkError> {
-        let until = self.wire.now() + SET_UP;
+        let until = self.wire.now() + SET_UP_TIMEOUT;
         loop {
-            let (live, news) = self.watch(LOOK);
-            news.into_iter().filter(|one| matches!(one, LinkNews::Status(_))).for_each(&mut *told);
+            let (live, events) = self.watch(POLL_INTERVAL);
+            events.into_iter().filter(|event| matches!(event, LinkEvent::Notice(_))).for_each(&mut *on_event);
             if let Some(failure) = &self.down {
                 return Err(LinkError::Controller(failure.clone()));
             }
@@ -66,41 +67,40 @@ impl WiredRobot {
                 return Err(LinkError::Cancelled);
             }
             if self.wire.now() > until {
-                let what = "joint angles were awaited".to_owned();
-                return Err(LinkError::Controller(Failure::Silent { what, seconds: SET_UP.as_secs_f64() }));
+                return Err(LinkError::Controller(joints_timeout(SET_UP_TIMEOUT)));
             }
         }
     }
 
-    /// Its joints now, and what has happened; takes up to `wait`.
-    pub fn watch(&mut self, wait: Duration) -> (LiveReading, Vec<LinkNews>) {
-        let mut news = Vec::new();
+    /// The current joint values and the events since the last call; waits up to `wait`.
+    pub fn watch(&mut self, wait: Duration) -> (LiveReading, Vec<LinkEvent>) {
+        let mut events = Vec::new();
         let until = self.wire.now() + wait;
-        for _ in 0..AT_ONCE {
+        for _ in 0..MAX_EVENTS_PER_POLL {
             match self.wire.events.recv_timeout(until.saturating_sub(self.wire.now())) {
                 Ok(WireEvent::Up(identity)) => {
                     self.down = None;
-                    news.push(LinkNews::Up(identity.name.clone()));
+                    events.push(LinkEvent::Up(identity.name.clone()));
                     self.identity = Some(identity);
                 }
                 Ok(WireEvent::Down(failure)) => {
-                    news.push(LinkNews::Down(failure.words(CONTROLLER)));
+                    events.push(LinkEvent::Down(failure.message(CONTROLLER)));
                     self.down = Some(failure);
                 }
-                Ok(WireEvent::Status(status)) => news.push(LinkNews::Status(status.text)),
+                Ok(WireEvent::Status(status)) => events.push(LinkEvent::Notice(status.text)),
                 Ok(WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_)) => {}
                 Err(RecvTimeoutError::Timeout) => break,
                 Err(RecvTimeoutError::Disconnected) => {
-                    self.down = Some(Failure::Disconnected("the link has ended".to_owned()));
+                    self.down = Some(link_ended());
                     break;
                 }
             }
         }
         let (latest, now) = (self.wire.latest(), self.wire.now());
-        let fresh = latest.joints.filter(|(at, _)| now.saturating_sub(*at) <= FRESH).map(|(_, state)| state);
-        let stopped = fresh.as_ref().and_then(|state| state.stopped.clone());
+        let current = latest.joints.filter(|(at, _)| now.saturating_sub(*at) <= MAX_AGE).map(|(_, state)| state);
+        let stopped = current.as_ref().and_then(|state| state.stopped.clone());
         if stopped != self.stopped {
-            news.extend(stopped.clone().map(|why| LinkNews::Status(format!("it does not move on: {why}"))));
+            events.extend(stopped.clone().map(|why| LinkEvent::Notice(format!("it is stopped: {why}"))));
             self.stopped = stopped;
         }
         let live = LiveReading {
@@ -108,10 +108,10 @@ impl WiredRobot {
             point: None,
             is_blind: true,
             silent: None,
-            is_still: Some(latest.is_still && fresh.is_some()),
-            joints: fresh.map(|state| state.positions),
-            down: self.down.as_ref().map(|failure| failure.words(CONTROLLER)),
+            is_still: Some(latest.is_still && current.is_some()),
+            joints: current.map(|state| state.positions),
+            down: self.down.as_ref().map(|failure| failure.message(CONTROLLER)),
         };
-        (live, news)
+        (live, events)
     }
 }

@@ -1,4 +1,4 @@
-//! Simulated instruments that are really listening: on a TCP port of this machine or behind a pseudo-terminal.
+//! Servers for simulated instruments, on a TCP port of this machine or behind a pseudo-terminal.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -19,131 +19,133 @@ use crate::session::reading::MeasureRequest;
 use crate::session::simulation::Simulation;
 use crate::session::wire::WireProtocol;
 
-/// A server looks so often for what is to do.
-const LOOK: Duration = Duration::from_millis(2);
-/// A peer that does not read for so long is hung up on.
-const WRITE: Duration = Duration::from_secs(5);
-/// The simulated robot takes this long for a move.
-const MOVE: Duration = Duration::from_secs(2);
-/// Shots that differ at one place.
-const DIFFERENT: u32 = 256;
+/// Interval at which a server polls its connection.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
+/// The server closes the connection of a peer that does not read for this long.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Duration of a move of the simulated robot.
+const MOVE_DURATION: Duration = Duration::from_secs(2);
+/// Number of different shots at one pose; after them the shots repeat.
+const DISTINCT_SHOTS: u32 = 256;
 
-/// Where a simulator listens.
+/// Endpoint at which a simulator listens.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum Endpoint {
     /// A free TCP port of this machine.
     Loopback,
     /// This TCP address, such as `127.0.0.1:7000`.
     Tcp(String),
-    /// A pseudo-terminal.
     PseudoTerminal,
 }
 
-/// How fast a simulated instrument lives: so many of its seconds in one of ours.
+/// Factor by which the clock of a simulated instrument runs faster than real time.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pace(pub(super) u32);
+pub(super) struct Speedup(pub(super) u32);
 
-/// The clock of a simulator.
+/// Clock of a simulator.
 #[derive(Clone, Copy, Debug)]
-struct PacedClock(Stopwatch, Pace);
+struct ScaledClock {
+    real: Stopwatch,
+    speedup: Speedup,
+}
 
-impl PacedClock {
-    fn start(pace: Pace) -> Self {
-        Self(Stopwatch::start(), pace)
+impl ScaledClock {
+    fn start(speedup: Speedup) -> Self {
+        Self { real: Stopwatch::start(), speedup }
     }
 
     fn now(self) -> Duration {
-        self.0.now() * self.1.0
+        self.real.now() * self.speedup.0
     }
 }
 
-/// Lets the other end of a protocol listen until `stop`; returns its address, such as `emscon:tcp:127.0.0.1:40123`. `faults`: by
-/// their names.
+/// Serves the simulator of a protocol until `stop` is set and returns its address, such as `emscon:tcp:127.0.0.1:40123`.
+/// `faults` are given by their names.
 ///
 /// # Errors
-/// [`LinkError::SetUp`]: an unknown fault; the system refuses the port, the pseudo-terminal or a thread.
+/// [`LinkError::SetUp`]: an unknown fault, or a port, pseudo-terminal or thread that is not available.
 pub(super) fn serve(
     protocol: WireProtocol,
     faults: &[String],
-    place: &Place,
+    endpoint: &Endpoint,
     source: impl PointSource + 'static,
-    pace: Pace,
+    speedup: Speedup,
     stop: &Arc<AtomicBool>,
 ) -> Result<String, LinkError> {
     let simulator = build::simulator(protocol, faults).map_err(LinkError::SetUp)?;
-    listen(place, simulator, source, pace, Arc::clone(stop))
+    listen(endpoint, simulator, source, speedup, Arc::clone(stop))
         .map(|rest| format!("{protocol}:{rest}"))
         .map_err(|error| LinkError::SetUp(format!("the simulated {protocol} cannot listen: {error}")))
 }
 
-/// The same for a simulator; returns the address without its protocol.
+/// Serves a simulator and returns the address without the protocol.
 fn listen(
-    place: &Place,
+    endpoint: &Endpoint,
     simulator: Box<dyn Simulator>,
     source: impl PointSource + 'static,
-    pace: Pace,
+    speedup: Speedup,
     stop: Arc<AtomicBool>,
 ) -> io::Result<String> {
-    let (listener, shown) = match place {
-        Place::PseudoTerminal => {
+    let (listener, address) = match endpoint {
+        Endpoint::PseudoTerminal => {
             let (master, slave) = serialport::TTYPort::pair()?;
             let device = slave.name().ok_or_else(|| io::Error::other("the pseudo-terminal has no name"))?;
             spawn(move || {
-                // The other side is opened by its name; ours stays open so that the line is not torn in between.
+                // The client opens the slave side by its name. Holding it open here keeps the line up between clients.
                 let _held = slave;
-                serve_serial(master, simulator, source, pace, &stop);
+                serve_serial(master, simulator, source, speedup, &stop);
             })?;
             return Ok(format!("serial:{device}:115200"));
         }
-        Place::Loopback => {
+        Endpoint::Loopback => {
             let (listener, port) = loopback()?;
             (listener, format!("tcp:127.0.0.1:{port}"))
         }
-        Place::Tcp(address) => {
+        Endpoint::Tcp(address) => {
             let listener = TcpListener::bind(address.as_str())?;
             let bound = listener.local_addr()?;
             (listener, format!("tcp:{bound}"))
         }
     };
-    spawn(move || serve_tcp(&listener, simulator, source, pace, &stop))?;
-    Ok(shown)
+    spawn(move || serve_tcp(&listener, simulator, source, speedup, &stop))?;
+    Ok(address)
 }
 
 fn spawn(work: impl FnOnce() + Send + 'static) -> io::Result<()> {
     thread::Builder::new().name("simulated-link".to_owned()).spawn(work).map(drop)
 }
 
-/// Answers one connection after the other.
+/// Serves one connection after the other.
 fn serve_tcp(
     listener: &TcpListener,
     mut simulator: Box<dyn Simulator>,
     mut source: impl PointSource,
-    pace: Pace,
+    speedup: Speedup,
     stop: &AtomicBool,
 ) {
     if listener.set_nonblocking(true).is_err() {
         return;
     }
-    let clock = PacedClock::start(pace);
+    let clock = ScaledClock::start(speedup);
     while !stop.load(Ordering::Relaxed) {
         match listener.accept() {
             Ok((stream, _)) => {
                 if stream.set_nonblocking(true).is_ok() && stream.set_nodelay(true).is_ok() {
-                    // Whatever ends the connection, the next one is welcome.
+                    // However the connection ends, the next one is accepted.
                     let _ended = talk(stream, simulator.as_mut(), &mut source, clock, stop);
                 }
             }
-            Err(_error) => thread::sleep(LOOK),
+            Err(_error) => thread::sleep(POLL_INTERVAL),
         }
     }
 }
 
-/// Answers one connection until either side hangs up.
+/// Serves one connection until either side closes it.
 fn talk(
     mut stream: TcpStream,
     simulator: &mut dyn Simulator,
     source: &mut impl PointSource,
-    clock: PacedClock,
+    clock: ScaledClock,
     stop: &AtomicBool,
 ) -> io::Result<()> {
     let mut buffer = vec![0; 16 * 1024];
@@ -165,7 +167,7 @@ fn talk(
             match output {
                 Output::Bytes(bytes) => {
                     stream.set_nonblocking(false)?;
-                    stream.set_write_timeout(Some(WRITE))?;
+                    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
                     stream.write_all(&bytes)?;
                     stream.set_nonblocking(true)?;
                 }
@@ -173,31 +175,31 @@ fn talk(
             }
         }
         if is_idle {
-            thread::sleep(LOOK);
+            thread::sleep(POLL_INTERVAL);
         }
     }
     Ok(())
 }
 
-/// Answers on a serial line; hanging up there means silence.
+/// Serves a serial line. It cannot be closed like a connection, so a simulator that hangs up starts again at once.
 fn serve_serial(
     mut line: serialport::TTYPort,
     mut simulator: Box<dyn Simulator>,
     mut source: impl PointSource,
-    pace: Pace,
+    speedup: Speedup,
     stop: &AtomicBool,
 ) {
-    let clock = PacedClock::start(pace);
+    let clock = ScaledClock::start(speedup);
     let mut buffer = vec![0; 4096];
     simulator.accept(clock.now());
-    if line.set_timeout(LOOK).is_err() {
+    if line.set_timeout(POLL_INTERVAL).is_err() {
         return;
     }
     while !stop.load(Ordering::Relaxed) {
         match line.read(&mut buffer) {
             Ok(count) => simulator.feed(buffer.get(..count).unwrap_or_default(), &mut source, clock.now()),
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {}
-            Err(_nobody_there) => thread::sleep(LOOK),
+            Err(_no_client) => thread::sleep(POLL_INTERVAL),
         }
         simulator.tick(&mut source, clock.now());
         while let Some(output) = simulator.next_output() {
@@ -213,7 +215,7 @@ fn serve_serial(
     }
 }
 
-/// A simulated instrument or robot that listens until this is dropped, for another program or another window.
+/// A simulated instrument or robot for another program; it listens until this is dropped.
 #[derive(Debug)]
 pub struct Served {
     view: SharedView,
@@ -225,11 +227,11 @@ pub struct Served {
 }
 
 impl Served {
-    /// The cell of a profile behind this protocol. `listen`: a TCP address; none: a pseudo-terminal. `faults`: by their names,
-    /// see `docs/links.md`.
+    /// Serves the cell of a profile by a protocol, at a TCP address or, without one, behind a pseudo-terminal. `faults` are given
+    /// by their names, see `docs/links.md`.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: an unknown fault, a cell that cannot be simulated, a port that the system refuses.
+    /// [`LinkError::SetUp`]: an unknown fault, a cell that cannot be simulated, or a port that is not available.
     pub fn new(
         profile: &Profile,
         simulation: &Simulation,
@@ -240,55 +242,53 @@ impl Served {
         if protocol.is_robot() {
             check_joints(profile)?;
         }
-        if listen.is_none() && matches!(protocol, WireProtocol::Emscon | WireProtocol::Rtde) {
-            return Err(LinkError::SetUp(format!(
-                "{protocol} is not spoken on serial lines: it needs a TCP address to listen on"
-            )));
+        if listen.is_none() && !protocol.has_serial_lines() {
+            return Err(LinkError::SetUp(format!("{protocol} does not use serial lines; it needs a TCP address")));
         }
         let mut cell = SimulatedCell::new(profile, simulation)?;
         let robot_title = cell.connect()?;
         let view = SharedView::new(CellView::new(cell, Advance::EveryShot));
         let stop = Arc::new(AtomicBool::new(false));
-        let place = listen.map_or(Place::PseudoTerminal, |address| Place::Tcp(address.to_owned()));
-        let address = serve(protocol, faults, &place, view.clone(), Pace(1), &stop)?;
+        let endpoint = listen.map_or(Endpoint::PseudoTerminal, |address| Endpoint::Tcp(address.to_owned()));
+        let address = serve(protocol, faults, &endpoint, view.clone(), Speedup(1), &stop)?;
         Ok(Self { view, address, options: build::rehearsal_options(protocol), robot_title, number: 0, stop })
     }
 
-    /// The controller of the same robot listens as well, at this TCP address; returns where.
+    /// Serves the controller of the same robot at a TCP address as well, and returns its address.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: a robot that RTDE cannot tell, or a port that the system refuses.
+    /// [`LinkError::SetUp`]: a robot that RTDE cannot report, or a port that is not available.
     pub fn listen_for_robot(&self, profile: &Profile, listen: &str) -> Result<String, LinkError> {
         check_joints(profile)?;
-        let place = Place::Tcp(listen.to_owned());
-        serve(WireProtocol::Rtde, &[], &place, self.view.clone(), Pace(1), &self.stop)
+        let endpoint = Endpoint::Tcp(listen.to_owned());
+        serve(WireProtocol::Rtde, &[], &endpoint, self.view.clone(), Speedup(1), &self.stop)
     }
 
-    /// The address to give to whoever connects.
+    /// Address for the client.
     pub fn address(&self) -> &str {
         &self.address
     }
 
-    /// The options that go with it, where the usual ones would not do.
+    /// Options that the client needs, if the defaults do not fit.
     pub fn options(&self) -> Option<&str> {
         self.options.as_deref()
     }
 
-    /// What is simulated, in one line.
+    /// Description of the simulated cell, in one line.
     pub fn title(&self) -> &str {
         &self.robot_title
     }
 
-    /// The device, if this listens on a pseudo-terminal.
+    /// Device of the pseudo-terminal, if it uses one.
     pub fn device(&self) -> Option<PathBuf> {
         let rest = self.address.split_once(":serial:")?.1;
         rest.rsplit_once(':').map(|(device, _)| PathBuf::from(device))
     }
 
-    /// The robot moves to a pose, except for the first one, where it is at once.
+    /// Moves the robot to a pose. It is at the first pose at once.
     ///
     /// # Errors
-    /// The configuration (pendant values, rad) is none of this robot.
+    /// The configuration (pendant values, rad) does not fit the robot.
     pub fn go(&mut self, pose: &str, configuration: &[f64], following: Option<&[f64]>) -> Result<(), LinkError> {
         self.number += 1;
         let request = MeasureRequest {
@@ -298,12 +298,12 @@ impl Served {
             configuration: configuration.to_vec(),
             following: following.map(<[f64]>::to_vec),
             settle: 0.0,
-            shots: DIFFERENT,
+            shots: DISTINCT_SHOTS,
         };
-        self.view.lock().travel(&request, MOVE)
+        self.view.lock().start_move(&request, MOVE_DURATION)
     }
 
-    /// Shots taken since the robot has been sent here.
+    /// Shots taken since the last move.
     pub fn taken(&self) -> usize {
         self.view.lock().taken()
     }

@@ -1,17 +1,18 @@
-//! The simulated cell: a robot, a tracker and an operator that exist in the program only.
+//! The simulated cell: a robot, a tracker and an operator.
 //!
-//! Readings are fixed by the seed, the number of the measurement and what was asked; not by what this object has measured before,
-//! so that a session that was interrupted sees the same values when it goes on. One fault needs memory: for swapped rows the
-//! operator has to know the pose before. Where the program was started again between the two, he stands right at the second.
+//! Readings depend only on the seed, the number of the measurement and the request, not on earlier measurements of this
+//! object, so that a resumed session sees the same values. One fault needs memory: swapped rows need the previous pose. If the
+//! program was restarted between the two measurements, the second one is taken at the right pose.
 //!
-//! - **Arm.** Nominal plus the hidden deviations ([`HiddenArm`]); free targets sit within a few millimetres of their nominal
-//!   place, whatever uncertainty the profile leaves them.
-//! - **Tracker.** Within about 0.1 m of the place in the profile, turned anyhow: nobody may rely on its frame.
-//! - **Noise.** Normal and independent per coordinate and shot; the σ that is stated is that of the mean of the shots.
-//! - **Time.** Virtual. A measurement takes its settling, 1 s per shot, and the move to the pose that is shown next, at a
-//!   tenth of the joint speeds: the way onward, because the way here is not part of the request.
-//! - **Drift.** Grows by 15 s per measurement, the time that one usually takes, for the same reason. It stays after its last
-//!   measurement but grows no more.
+//! - **Arm.** Nominal plus the hidden deviations ([`HiddenArm`]); free targets are within a few millimetres of their nominal
+//!   position, whatever uncertainty the profile states for them.
+//! - **Tracker.** Within about 0.1 m of its position in the profile, with a random orientation, so that nothing can rely on
+//!   its frame.
+//! - **Noise.** Normal and independent per coordinate and shot; the stated σ is that of the mean of the shots.
+//! - **Time.** Virtual. A measurement takes its settling time, 1 s per shot, and the move to the next pose at a tenth of the
+//!   joint speeds. The move to the current pose is not part of the request, so the move to the next one is counted instead.
+//! - **Drift.** Grows with a fixed time of 15 s per measurement, for the same reason. After the last affected measurement it
+//!   stays constant.
 
 mod random;
 mod truth;
@@ -28,24 +29,20 @@ use crate::session::simulation::{Fault, FaultKind, Simulation};
 use crate::units::{DEGREE, INCH, MILLIMETRE, from_mm, to_mm};
 use random::{Random, Use};
 
-/// Standard deviation of a coordinate where neither simulation nor profile has one (m).
+/// Standard deviation of a coordinate if neither simulation nor profile states one (m).
 const DEFAULT_NOISE: f64 = 0.01 * MILLIMETRE;
-/// Standard deviation of the place of the tracker, per coordinate (m).
+/// Standard deviation of the tracker's position, per coordinate (m).
 const TRACKER_SPREAD: f64 = 0.1;
-/// Part of the joint speeds that the operator uses.
+/// Fraction of the joint speeds used by the operator.
 const SPEED: f64 = 0.1;
-/// Time that a move takes longer than at constant speed (s).
+/// Extra time of a move for acceleration and braking (s).
 const RAMP: f64 = 1.0;
-/// Time of one shot (s).
+/// Duration of one shot (s).
 const SHOT: f64 = 1.0;
-/// Time of a whole measurement as drift counts it (s).
+/// Duration of a whole measurement for the drift (s).
 const USUAL_TIME: f64 = 15.0;
-/// Speeds of joints of which none is known (rad/s) and (m/s).
-const DEFAULT_SPEEDS: (f64, f64) = (60.0 * DEGREE, 0.25);
-/// Where a joint without limits may stand by mistake, to both sides of zero (rad) and (m).
-const DEFAULT_REACH: (f64, f64) = (90.0 * DEGREE, 0.1);
 
-/// A cell that is simulated in this process. It reports no joint values of its own.
+/// A cell simulated in this process. It does not report joint values.
 #[derive(Clone, Debug)]
 pub struct SimulatedCell {
     title: String,
@@ -55,16 +52,16 @@ pub struct SimulatedCell {
     joints: Vec<JointRange>,
     noise: Noise,
     faults: Vec<Fault>,
-    /// Number and configuration of the measurement before.
-    before: Option<(u64, Vec<f64>)>,
+    /// Number and configuration of the previous measurement.
+    previous: Option<(u64, Vec<f64>)>,
 }
 
-/// How the instrument scatters.
+/// Scatter of the instrument.
 #[derive(Clone, Debug)]
 enum Noise {
-    /// The same everywhere (m).
+    /// Standard deviation of each coordinate (m).
     Constant(f64),
-    /// By distance.
+    /// Dependent on the distance.
     Instrument(Instrument),
 }
 
@@ -72,12 +69,12 @@ impl SimulatedCell {
     /// The cell of a profile.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: a noise that is not a number, a fault of a joint that the arm does not have or that has another
-    /// unit, or the paper's deviations for another arm than the paper's.
+    /// [`LinkError::SetUp`]: invalid noise, a fault of a joint that the arm does not have or with the wrong unit, or the
+    /// deviations of the method paper for another arm.
     pub fn new(profile: &Profile, simulation: &Simulation) -> Result<Self, LinkError> {
         let noise = match (simulation.noise_mm, profile.instrument()) {
             (Some(noise), _) if !(noise.is_finite() && noise >= 0.0) => {
-                return Err(LinkError::SetUp(format!("the noise is {noise} mm; it must be a number from 0 on")));
+                return Err(LinkError::SetUp(format!("the noise is {noise} mm; it must be a number of at least 0")));
             }
             (Some(noise), _) => Noise::Constant(from_mm(noise)),
             (None, Some(instrument)) => Noise::Instrument(instrument.clone()),
@@ -97,31 +94,31 @@ impl SimulatedCell {
             joints: profile.joints().to_vec(),
             noise,
             faults: simulation.faults.clone(),
-            before: None,
+            previous: None,
         })
     }
 
-    /// What the identification should find.
+    /// The true cell, which the identification should find.
     pub const fn truth(&self) -> &HiddenArm {
         &self.truth
     }
 
-    /// Kinds of the faults that measurement `number` has, each with the number that its random values belong to.
+    /// Kinds of the faults of measurement `number`, each with the measurement whose random values it uses.
     fn faults(&self, number: u64) -> impl Iterator<Item = (FaultKind, u64)> {
         self.faults.iter().filter(move |fault| fault.affects(number)).map(move |fault| {
-            // What stays is drawn once, what happens again is drawn again.
+            // A lasting fault is drawn once, a recurring one for each measurement.
             (fault.kind, if fault.kind.lasts() { fault.first } else { number })
         })
     }
 
-    /// Where the robot really stands, in its own joint values.
-    pub(super) fn standing(&self, request: &MeasureRequest) -> Vec<f64> {
+    /// Actual joint values of the robot, which differ from the requested ones in some faults.
+    pub(super) fn actual_joints(&self, request: &MeasureRequest) -> Vec<f64> {
         let mut here = request.configuration.clone();
         for fault in &self.faults {
             let is_second = fault.first.checked_add(1) == Some(request.number);
             if fault.kind == FaultKind::SwappedRows
                 && is_second
-                && let Some((before, configuration)) = &self.before
+                && let Some((before, configuration)) = &self.previous
                 && *before == fault.first
             {
                 here.clone_from(configuration);
@@ -131,12 +128,15 @@ impl SimulatedCell {
             match kind {
                 FaultKind::SwappedRows => here = request.following.clone().unwrap_or(here),
                 FaultKind::WrongPose => {
-                    here = request.following.clone().unwrap_or_else(|| self.elsewhere(Use::Fault(kind, number)));
+                    here = request
+                        .following
+                        .clone()
+                        .unwrap_or_else(|| self.random_configuration(Use::Fault(kind, number)));
                 }
                 _ => {}
             }
         }
-        // What is wrong with a joint is wrong wherever he stands.
+        // Joint faults apply at any pose, so they come after the faults that choose the pose.
         for (kind, _) in self.faults(request.number) {
             match kind {
                 FaultKind::MistypedJoint { joint, by, quantity } => {
@@ -155,20 +155,20 @@ impl SimulatedCell {
         here
     }
 
-    /// A configuration by seed, inside the limits.
-    fn elsewhere(&self, of: Use) -> Vec<f64> {
+    /// A random configuration within the joint limits.
+    fn random_configuration(&self, of: Use) -> Vec<f64> {
         let mut random = Random::new(self.seed, of);
         let joints = self.truth.arm.chain.joints().iter().zip(&self.joints);
         joints
             .map(|(joint, range)| {
-                let reach = of_type(joint.joint_type, DEFAULT_REACH);
+                let reach = default_reach(joint.joint_type);
                 let (low, high) = range.planning_limits.or(range.limits).unwrap_or((-reach, reach));
                 random.between(low, high)
             })
             .collect()
     }
 
-    /// The SMR in the tracker frame (m), without noise.
+    /// Position of the SMR in the tracker frame (m), without noise.
     fn true_point(&self, request: &MeasureRequest) -> Option<Point3<f64>> {
         let mut target = *self.truth.arm.targets.get(request.target)?;
         for (kind, number) in self.faults(request.number) {
@@ -177,15 +177,15 @@ impl SimulatedCell {
             }
         }
         let arm = ForwardKinematics::new(&self.truth.arm.chain);
-        Some(self.tracker_from_base * arm.point_in_base(&self.standing(request), &target))
+        Some(self.tracker_from_base * arm.point_in_base(&self.actual_joints(request), &target))
     }
 
-    /// The direction of a fault.
+    /// Random direction of a fault.
     fn direction(&self, kind: FaultKind, number: u64) -> Vector3<f64> {
         Random::new(self.seed, Use::Fault(kind, number)).direction()
     }
 
-    /// What all shots are off by (m), and what their places along one line differ by, root mean square (m).
+    /// Common offset of all shots (m), and the RMS vector of the motion between them (m).
     fn errors(&self, number: u64) -> (Vector3<f64>, Vector3<f64>) {
         let (mut offset, mut motion) = (Vector3::zeros(), Vector3::zeros());
         for (kind, drawn_for) in self.faults(number) {
@@ -199,7 +199,7 @@ impl SimulatedCell {
                 _ => {}
             }
         }
-        // Drift stays where it is after its last measurement.
+        // After its last measurement the drift stays constant.
         for fault in self.faults.iter().filter(|fault| fault.first < number) {
             if let FaultKind::Drift { mm_per_hour } = fault.kind {
                 let measurements = number.min(fault.last.unwrap_or(number)).saturating_sub(fault.first);
@@ -210,7 +210,7 @@ impl SimulatedCell {
         (offset, motion)
     }
 
-    /// What the instrument's numbers are multiplied by when they are taken for millimetres.
+    /// Factor that results from reading the instrument's numbers in the wrong unit.
     fn unit_factor(&self, number: u64) -> f64 {
         self.faults(number).fold(1.0, |factor, (kind, _)| match kind {
             FaultKind::Inch => factor * MILLIMETRE / INCH,
@@ -219,14 +219,14 @@ impl SimulatedCell {
         })
     }
 
-    /// Time of a measurement and of the move onward (s).
+    /// Duration of a measurement and of the move to the next pose (s).
     pub(super) fn time(&self, request: &MeasureRequest, shots: u32) -> f64 {
         let onward = request.following.as_deref().unwrap_or(&request.configuration);
         let joints = self.truth.arm.chain.joints().iter().zip(&self.joints);
         let slowest = joints.zip(request.configuration.iter().zip(onward)).fold(
             0.0_f64,
             |slowest, ((joint, range), (from, to))| {
-                let speed = range.max_speed.unwrap_or_else(|| of_type(joint.joint_type, DEFAULT_SPEEDS));
+                let speed = range.max_speed.unwrap_or_else(|| default_speed(joint.joint_type));
                 slowest.max((to - from).abs() / (speed * SPEED))
             },
         );
@@ -249,15 +249,23 @@ impl SimulatedCell {
     }
 }
 
-/// The value for this type of joint: turning or sliding.
-const fn of_type(joint_type: JointType, (turning, sliding): (f64, f64)) -> f64 {
+/// Speed of a joint if the profile states none (rad/s or m/s).
+const fn default_speed(joint_type: JointType) -> f64 {
     match joint_type {
-        JointType::Revolute => turning,
-        JointType::Prismatic => sliding,
+        JointType::Revolute => 60.0 * DEGREE,
+        JointType::Prismatic => 0.25,
     }
 }
 
-/// Whether the arm has the joint of a fault.
+/// Range of a joint without limits, to both sides of zero (rad or m).
+const fn default_reach(joint_type: JointType) -> f64 {
+    match joint_type {
+        JointType::Revolute => 90.0 * DEGREE,
+        JointType::Prismatic => 0.1,
+    }
+}
+
+/// Checks that the arm has the joint of a fault.
 fn check_fault(fault: &Fault, profile: &Profile) -> Result<(), LinkError> {
     let (joint, quantity) = match fault.kind {
         FaultKind::JointSign { joint } => (joint, None),
@@ -270,7 +278,7 @@ fn check_fault(fault: &Fault, profile: &Profile) -> Result<(), LinkError> {
     };
     let needed = found.joint_type.quantity();
     if quantity.is_some_and(|quantity| quantity != needed) {
-        return Err(LinkError::SetUp(format!("fault '{fault}': joint {} is counted in {}", found.name, needed.unit())));
+        return Err(LinkError::SetUp(format!("fault '{fault}': joint {} is in {}", found.name, needed.unit())));
     }
     Ok(())
 }
@@ -305,14 +313,14 @@ impl Link for SimulatedCell {
 }
 
 impl SimulatedCell {
-    /// The shots of a measurement in the tracker frame (m) and their σ per coordinate (m), as the instrument gives them.
+    /// The shots of a measurement in the tracker frame (m) and their σ per coordinate (m).
     ///
     /// # Errors
-    /// The request is none for this cell, or the beam is broken.
+    /// The request does not fit this cell, or the beam is broken.
     pub(super) fn single_shots(&mut self, request: &MeasureRequest) -> Result<(Vec<Vector3<f64>>, f64), LinkError> {
         self.check(request)?;
         let true_point = self.true_point(request);
-        self.before = Some((request.number, request.configuration.clone()));
+        self.previous = Some((request.number, request.configuration.clone()));
         let Some(true_point) = true_point else {
             return Err(LinkError::SetUp(format!("the simulated arm has no target {}", request.target + 1)));
         };
@@ -328,13 +336,13 @@ impl SimulatedCell {
         let mut random = Random::new(self.seed, Use::Noise(request.number));
         let factor = self.unit_factor(request.number);
         let shots = along_line(count)
-            .map(|place| (true_point.coords + offset + motion * place + random.normals() * sigma) * factor)
+            .map(|position| (true_point.coords + offset + motion * position + random.normals() * sigma) * factor)
             .collect();
         Ok((shots, sigma * factor))
     }
 }
 
-/// Evenly spaced places with mean 0 and mean square 1 (a single one is 0).
+/// Evenly spaced positions with mean 0 and mean square 1 (a single one is 0).
 fn along_line(count: u32) -> impl Iterator<Item = f64> {
     let n = f64::from(count);
     let step = if count > 1 { (12.0 / (n * n - 1.0)).sqrt() } else { 0.0 };

@@ -1,7 +1,8 @@
-//! Instruments and robots that answer like the real ones: the other end of every [`super::protocol`], for rehearsals and tests.
+//! Simulated instruments and robots: the other end of every [`super::protocol`], for rehearsals and tests.
 //!
-//! As sans-IO as the protocols: a [`Simulator`] gets bytes and gives bytes. What it measures comes from a [`PointSource`], so
-//! the same simulated cell is behind each of them. Faults are named and counted, never random, so a test can rely on them.
+//! Like the protocols they do no I/O: a [`Simulator`] takes bytes and returns bytes. Its measurements come from a
+//! [`PointSource`], so that one simulated cell serves all of them. Faults are named and counted, never random, so that tests can
+//! rely on them.
 
 pub mod ascii;
 #[cfg(test)]
@@ -18,41 +19,41 @@ use std::fmt::Debug;
 
 use super::protocol::{JointState, Moment, Shot};
 
-/// What the simulated instrument looks at.
+/// The source of a simulated instrument's measurements.
 pub trait PointSource: Send + Debug {
-    /// One shot at the reflector, noise included; `None`: the beam is broken.
+    /// One shot at the reflector with noise; `None` if the beam is broken.
     fn shot(&mut self) -> Option<Shot>;
 
-    /// Where the reflector is now, for live display; takes no noise from the sequence of the shots.
-    fn look(&mut self) -> Option<Shot>;
+    /// Current position of the reflector for the live view. Does not affect the noise of the shots.
+    fn position(&mut self) -> Option<Shot>;
 
-    /// The joints of the robot as its controller reports them.
+    /// Joint state of the robot as its controller reports it.
     fn joints(&mut self) -> JointState;
 }
 
 /// The other end of a wire.
 pub trait Simulator: Send + Debug {
-    /// Somebody connected.
+    /// Starts a new connection.
     fn accept(&mut self, now: Moment);
 
-    /// Bytes from the other side.
+    /// Takes bytes from the other side.
     fn feed(&mut self, bytes: &[u8], source: &mut dyn PointSource, now: Moment);
 
-    /// Time has passed.
+    /// Handles everything that is due.
     fn tick(&mut self, source: &mut dyn PointSource, now: Moment);
 
-    /// What it does next.
+    /// The next output.
     fn next_output(&mut self) -> Option<Output>;
 
-    /// When [`Self::tick`] wants to be called at the latest.
+    /// The latest time for the next call of [`Self::tick`].
     fn next_deadline(&self) -> Option<Moment>;
 }
 
-/// What a simulator does.
+/// An output of a simulator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Output {
-    /// Sends these bytes in one write.
+    /// Bytes to send in one write.
     Bytes(Vec<u8>),
-    /// Hangs up.
+    /// Closes the connection.
     Close,
 }

@@ -19,7 +19,7 @@ use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::Rtde;
 use super::protocol::{JointState, Protocol, Shot};
-use super::serve::{Pace, Place, serve};
+use super::serve::{Endpoint, Speedup, serve};
 use super::simulator::PointSource;
 use super::simulator::ascii::AsciiFault;
 use super::simulator::emscon::EmsconFault;
@@ -28,7 +28,7 @@ use super::simulator::ndi::NdiFault;
 use super::simulator::rtde::RtdeFault;
 use super::transport::Stopwatch;
 use super::wire::Wire;
-use super::{Link as _, LinkError, LinkNews, RawLog, Wired, build};
+use super::{Link as _, LinkError, LinkEvent, RawLog, Wired, build};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::wire::{WireAddress, WireProtocol};
 
@@ -65,7 +65,7 @@ impl Stage {
         self.lock().shots
     }
 
-    /// Place of the shot with this number (m); no two are alike.
+    /// Endpoint of the shot with this number (m); no two are alike.
     fn point(shot: u32) -> Point3<f64> {
         Point3::new(1.2345 + 0.001 * f64::from(shot), -0.67825, 0.090_125)
     }
@@ -82,7 +82,7 @@ impl PointSource for Stage {
         Some(Shot { sigma: Some([scene.sigma; 3]), ..Shot::bare(Self::point(scene.shots)) })
     }
 
-    fn look(&mut self) -> Option<Shot> {
+    fn position(&mut self) -> Option<Shot> {
         Some(Shot::bare(Self::point(self.lock().shots)))
     }
 
@@ -148,26 +148,26 @@ impl Bench {
     /// With faults of the instrument, and of the robot if there is one.
     fn with(
         protocol: WireProtocol,
-        place: &Place,
+        endpoint: &Endpoint,
         of_instrument: &[&str],
         of_robot: Option<&[&str]>,
         log: Option<&RawLog>,
     ) -> Self {
         let stage = Stage::new();
         let stop = Arc::new(AtomicBool::new(false));
-        let wire = |protocol: WireProtocol, place: &Place, names: &[&str], pace| {
-            let address = serve(protocol, &faults(names), place, stage.clone(), Pace(pace), &stop).unwrap();
+        let wire = |protocol: WireProtocol, endpoint: &Endpoint, names: &[&str], speedup| {
+            let address = serve(protocol, &faults(names), endpoint, stage.clone(), Speedup(speedup), &stop).unwrap();
             let address: WireAddress = address.parse().unwrap();
             Wire::start(address, quick(protocol), log.cloned()).unwrap()
         };
-        let instrument = wire(protocol, place, of_instrument, 20);
-        let robot = of_robot.map(|names| wire(WireProtocol::Rtde, &Place::Loopback, names, 1));
+        let instrument = wire(protocol, endpoint, of_instrument, 20);
+        let robot = of_robot.map(|names| wire(WireProtocol::Rtde, &Endpoint::Loopback, names, 1));
         let wired = Wired::over(protocol.to_string(), instrument, robot).simulated(Box::new(|| ()));
         Self { stage, wired, stop }
     }
 
     fn tcp(protocol: WireProtocol, of_instrument: &[&str]) -> Self {
-        Self::with(protocol, &Place::Loopback, of_instrument, None, None)
+        Self::with(protocol, &Endpoint::Loopback, of_instrument, None, None)
     }
 
     /// One shot. A point is one that was taken for it, or the test fails.
@@ -181,7 +181,7 @@ impl Bench {
     }
 
     /// Waits until something has happened.
-    fn until(&mut self, what: impl Fn(&LinkNews) -> bool) {
+    fn until(&mut self, what: impl Fn(&LinkEvent) -> bool) {
         let end = Instant::now() + DEADLINE;
         let mut seen = String::new();
         while Instant::now() < end {

@@ -1,4 +1,4 @@
-//! Wires: serial ports, TCP both ways, UDP. Reads wait a moment and no longer; what is closed says so.
+//! Transports: serial ports, TCP in both directions, UDP. Reads have a timeout; a closed connection is an error.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _, UdpSocket};
@@ -8,32 +8,32 @@ use serialport::SerialPort;
 
 use crate::session::wire::Route;
 
-/// Longest time to connect.
-const CONNECT: Duration = Duration::from_secs(5);
-/// Longest time that a write may take: a peer that does not read is lost.
-const WRITE: Duration = Duration::from_secs(5);
-/// Longest datagram.
-const DATAGRAM: usize = 65_536;
+/// Timeout of a connection attempt.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+/// Timeout of a write; a peer that does not read counts as lost.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Largest datagram (bytes).
+const MAX_DATAGRAM: usize = 65_536;
 
-/// A connected wire.
+/// A connected transport.
 pub(super) trait Transport: Send {
-    /// Reads what is there, waits up to `wait` for it; nothing came: 0.
+    /// Reads available bytes and waits up to `wait` for them; 0 if none arrived.
     ///
     /// # Errors
-    /// The wire is closed or broken.
+    /// The connection is closed or broken.
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
 
-    /// Writes everything.
+    /// Writes all bytes.
     ///
     /// # Errors
-    /// The wire is closed or broken, or the peer does not read.
+    /// The connection is closed or broken, or the peer does not read.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 }
 
-/// Connects; asks `keep_going` while it waits for somebody.
+/// Connects. `keep_going` can cancel the wait for a client.
 ///
 /// # Errors
-/// Nobody is there, with what to do about it in the message; [`io::ErrorKind::Interrupted`] once `keep_going` says no.
+/// The other end cannot be reached; the message contains advice. [`io::ErrorKind::Interrupted`] if it was cancelled.
 pub(super) fn connect(route: &Route, keep_going: &dyn Fn() -> bool) -> io::Result<Box<dyn Transport>> {
     match route {
         Route::Serial { device, speed } => serial(device, *speed),
@@ -44,12 +44,12 @@ pub(super) fn connect(route: &Route, keep_going: &dyn Fn() -> bool) -> io::Resul
 }
 
 fn serial(device: &str, speed: u32) -> io::Result<Box<dyn Transport>> {
-    let port = serialport::new(device, speed).timeout(WRITE).open().map_err(|error| {
+    let port = serialport::new(device, speed).timeout(WRITE_TIMEOUT).open().map_err(|error| {
         let advice = match error.kind() {
             serialport::ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
-                "; the user must belong to the group of the device, often 'dialout'"
+                "; add the user to the group of the device, often 'dialout'"
             }
-            serialport::ErrorKind::NoDevice => "; another program may use it",
+            serialport::ErrorKind::NoDevice => "; another program may be using it",
             serialport::ErrorKind::Io(io::ErrorKind::NotFound) => "; is the adapter plugged in?",
             _ => "",
         };
@@ -63,11 +63,11 @@ struct Serial(Box<dyn SerialPort>);
 impl Transport for Serial {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.0.set_timeout(wait.max(Duration::from_millis(1)))?;
-        patient(self.0.read(buffer), "the serial port is gone; is the adapter still plugged in?")
+        bytes_read(self.0.read(buffer), "the serial port is gone; is the adapter still plugged in?")
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.0.set_timeout(WRITE)?;
+        self.0.set_timeout(WRITE_TIMEOUT)?;
         self.0.write_all(bytes)?;
         self.0.flush()
     }
@@ -76,7 +76,7 @@ impl Transport for Serial {
 fn addresses(host: &str, port: u16) -> io::Result<Vec<SocketAddr>> {
     let found: Vec<SocketAddr> = (host, port)
         .to_socket_addrs()
-        .map_err(|error| io::Error::other(format!("'{host}' is no known host: {error}")))?
+        .map_err(|error| io::Error::other(format!("unknown host '{host}': {error}")))?
         .collect();
     if found.is_empty() { Err(io::Error::other(format!("'{host}' has no address"))) } else { Ok(found) }
 }
@@ -87,14 +87,16 @@ fn tcp(host: &str, port: u16, keep_going: &dyn Fn() -> bool) -> io::Result<Box<d
         if !keep_going() {
             return Err(io::ErrorKind::Interrupted.into());
         }
-        match TcpStream::connect_timeout(&address, CONNECT) {
+        match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT) {
             Ok(stream) => return stream_of(stream),
             Err(error) => last = error,
         }
     }
     let advice = match last.kind() {
-        io::ErrorKind::ConnectionRefused => "; nothing listens there: is it the right port, and is the controller up?",
-        io::ErrorKind::TimedOut => "; nobody answers: is it the right address, and is the cable in?",
+        io::ErrorKind::ConnectionRefused => {
+            "; nothing listens there: check the port, and that the controller is running"
+        }
+        io::ErrorKind::TimedOut => "; no answer: check the address and the cable",
         _ => "",
     };
     Err(io::Error::new(last.kind(), format!("cannot connect to {host} port {port}: {last}{advice}")))
@@ -102,7 +104,7 @@ fn tcp(host: &str, port: u16, keep_going: &dyn Fn() -> bool) -> io::Result<Box<d
 
 fn stream_of(stream: TcpStream) -> io::Result<Box<dyn Transport>> {
     stream.set_nodelay(true)?;
-    stream.set_write_timeout(Some(WRITE))?;
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     Ok(Box::new(Stream(stream)))
 }
 
@@ -111,7 +113,7 @@ struct Stream(TcpStream);
 impl Transport for Stream {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.0.set_read_timeout(Some(wait.max(Duration::from_millis(1))))?;
-        patient(self.0.read(buffer), "the other end has closed the connection")
+        bytes_read(self.0.read(buffer), "the other end closed the connection")
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -125,7 +127,7 @@ impl Transport for Stream {
 }
 
 fn listen(host: &str, port: u16, keep_going: &dyn Fn() -> bool) -> io::Result<Box<dyn Transport>> {
-    const LOOK: Duration = Duration::from_millis(20);
+    const POLL_INTERVAL: Duration = Duration::from_millis(20);
     let listener = TcpListener::bind((host, port))
         .map_err(|error| io::Error::new(error.kind(), format!("cannot listen on {host} port {port}: {error}")))?;
     listener.set_nonblocking(true)?;
@@ -141,14 +143,14 @@ fn listen(host: &str, port: u16, keep_going: &dyn Fn() -> bool) -> io::Result<Bo
         if !keep_going() {
             return Err(io::ErrorKind::Interrupted.into());
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
 fn udp(host: &str, port: u16) -> io::Result<Box<dyn Transport>> {
     let socket = UdpSocket::bind((host, port))
         .map_err(|error| io::Error::new(error.kind(), format!("cannot listen on {host} port {port}: {error}")))?;
-    Ok(Box::new(Datagrams { socket, peer: None, packet: vec![0; DATAGRAM] }))
+    Ok(Box::new(Datagrams { socket, peer: None, packet: vec![0; MAX_DATAGRAM] }))
 }
 
 struct Datagrams {
@@ -165,7 +167,7 @@ impl Transport for Datagrams {
                 self.peer = Some(peer);
                 count
             }
-            Err(error) if is_patience(&error) => return Ok(0),
+            Err(error) if is_timeout(&error) => return Ok(0),
             Err(error) => return Err(error),
         };
         let count = received.min(buffer.len());
@@ -176,38 +178,36 @@ impl Transport for Datagrams {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // Nobody has spoken yet: there is nobody to answer.
+        // Without a received datagram there is no address to answer to.
         let Some(peer) = self.peer else { return Ok(()) };
         self.socket.send_to(bytes, peer).map(drop)
     }
 }
 
-fn is_patience(error: &io::Error) -> bool {
+fn is_timeout(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }
 
-/// Nothing within the time is no error; an end is.
-fn patient(read: io::Result<usize>, closed: &str) -> io::Result<usize> {
+/// Turns a timeout into 0 bytes, and the end of the stream into an error.
+fn bytes_read(read: io::Result<usize>, closed: &str) -> io::Result<usize> {
     match read {
         Ok(0) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, closed)),
         Ok(count) => Ok(count),
-        Err(error) if is_patience(&error) => Ok(0),
+        Err(error) if is_timeout(&error) => Ok(0),
         Err(error) => Err(error),
     }
 }
 
-/// Time since the first of its moments, for protocols.
+/// Clock for protocols: time since its start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stopwatch(Instant);
 
 impl Stopwatch {
-    /// Starts now.
     #[expect(clippy::disallowed_methods, reason = "a wire is an edge of the program: deadlines need a clock")]
     pub(super) fn start() -> Self {
         Self(Instant::now())
     }
 
-    /// Time since the start.
     pub(super) fn now(self) -> Duration {
         self.0.elapsed()
     }
@@ -216,7 +216,7 @@ impl Stopwatch {
 /// A listener on this machine for a simulated instrument.
 ///
 /// # Errors
-/// The system refuses.
+/// No port is available.
 pub(super) fn loopback() -> io::Result<(TcpListener, u16)> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
     let port = listener.local_addr()?.port();

@@ -1,4 +1,4 @@
-//! Instruments on a wire: what the wizard asks for, in the words of a protocol, with the gates that every point passes.
+//! Instruments on a wire: measurements by way of a protocol, with the checks that every point must pass.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::RecvTimeoutError;
@@ -8,62 +8,71 @@ use nalgebra::{Point3, Vector3};
 
 use super::cell_view::check_joints;
 use super::protocol::{CONTROLLER, Failure, Identity, JointState, Severity, Shot, known_sigma};
-use super::wire::{Eye, Latest, RawLog, Wire, WireEvent};
-use super::{Link, LinkError, LinkNews, build};
+use super::wire::{Latest, RawLog, Wire, WireEvent, WireMonitor};
+use super::{Link, LinkError, LinkEvent, build};
 use crate::profile::Profile;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
-use crate::session::wire::{LinkChoice, WireAddress};
+use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
 use crate::units::to_mm;
 
-/// Longest time of a set-up: trackers initialise for more than a minute.
-const SET_UP: Duration = Duration::from_mins(2);
-/// Longest time for a shot; protocols answer earlier by their own limits.
-const SHOT: Duration = Duration::from_mins(2);
-/// A reading that was not steady is tried so often in all, with this pause between.
-const TRIES: (u32, Duration) = (3, Duration::from_secs(2));
-/// The same pause where the instrument is a simulated one.
-const SIMULATED_PAUSE: Duration = Duration::from_millis(100);
-/// The robot comes to rest within this.
-const REST: Duration = Duration::from_secs(20);
-/// A simulated one within this.
-const SIMULATED_REST: Duration = Duration::from_secs(2);
-/// What is older than this is not now.
-const FRESH: Duration = Duration::from_secs(1);
-/// A wait looks so often whether it is still wanted.
-const LOOK: Duration = Duration::from_millis(50);
-/// So often for the joints of the robot.
-const LOOK_AT_JOINTS: Duration = Duration::from_millis(5);
-/// Events taken at once: the rest waits for the next look.
-const AT_ONCE: usize = 1024;
-/// A shot is not steady if it states so many times the usual standard deviation, and more than this (m), once there are so many
-/// shots to tell what is usual.
-const UNSTEADY: (f64, f64, usize) = (3.0, 0.05e-3, 5);
-/// So many shots tell what is usual.
-const USUAL: usize = 256;
-/// No instrument measures nearer or farther (m).
-const RANGE: (f64, f64) = (0.05, 100.0);
+/// Longest duration of a set-up: trackers take more than a minute to initialise.
+const SET_UP_TIMEOUT: Duration = Duration::from_mins(2);
+/// Longest duration of a shot; protocols fail earlier by their own limits.
+const SHOT_TIMEOUT: Duration = Duration::from_mins(2);
+/// Attempts per shot; only a transient failure is retried.
+const SHOT_ATTEMPTS: u32 = 3;
+/// Pause before a retry.
+const RETRY_PAUSE: Duration = Duration::from_secs(2);
+/// Pause before a retry with a simulated instrument.
+const SIMULATED_RETRY_PAUSE: Duration = Duration::from_millis(100);
+/// Longest wait until the robot is at rest.
+const REST_TIMEOUT: Duration = Duration::from_secs(20);
+/// Longest wait until a simulated robot is at rest.
+const SIMULATED_REST_TIMEOUT: Duration = Duration::from_secs(2);
+/// Joint changes up to this during a measurement do not count as motion (rad).
+const REST_TOLERANCE: f64 = 1e-4;
+/// Age up to which a value counts as current.
+const MAX_AGE: Duration = Duration::from_secs(1);
+/// Interval at which a wait checks whether it was cancelled.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Interval at which the joint values are polled.
+const JOINT_POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// Most events handled per poll; the rest waits for the next one.
+const MAX_EVENTS_PER_POLL: usize = 1024;
+/// A shot is unstable if its stated standard deviation exceeds the usual one by this factor and also [`UNSTABLE_SIGMA`].
+const UNSTABLE_FACTOR: f64 = 3.0;
+/// A stated standard deviation below this is never unstable (m).
+const UNSTABLE_SIGMA: f64 = 0.05e-3;
+/// Fewest shots from which the usual standard deviation is known.
+const FEWEST_SIGMAS: usize = 5;
+/// Number of latest shots from which the usual standard deviation is taken.
+const SIGMA_HISTORY: usize = 256;
+/// Shortest distance that any instrument measures (m).
+const NEAREST: f64 = 0.05;
+/// Longest distance that any instrument measures (m).
+const FARTHEST: f64 = 100.0;
 
-/// An instrument on a wire, and the robot's controller on another if it tells its joint angles.
+/// An instrument on a wire, and the robot's controller on another wire if it reports joint angles.
 pub struct Wired {
     instrument: Wire,
     address: String,
     robot: Option<Wire>,
     identity: Option<Identity>,
-    /// Why the instrument cannot be asked.
+    /// Why the link to the instrument is down.
     down: Option<Failure>,
     robot_down: Option<Failure>,
-    news: Vec<LinkNews>,
-    /// Standard deviations that the instrument has stated for the shots so far (m), the newest last.
+    events: Vec<LinkEvent>,
+    /// Standard deviations stated for the latest shots (m), newest last.
     sigmas: VecDeque<f64>,
-    /// The shot before this one: an instrument that is stuck gives the same again.
-    before: Option<Point3<f64>>,
-    /// For a simulated instrument: told before every shot.
+    /// The previous point: an instrument that is stuck repeats it.
+    previous_point: Option<Point3<f64>>,
+    /// Set for a simulated instrument.
     before_shot: Option<BeforeShot>,
-    /// For a simulated robot: what it told before this is of the place before (s, its own clock).
+    /// For a simulated robot: joint values before this time belong to its previous position (s, controller's clock).
     robot_since: f64,
 }
 
-/// Told before a shot is asked for.
+/// Called before each triggered shot.
 type BeforeShot = Box<dyn FnMut() + Send>;
 
 impl std::fmt::Debug for Wired {
@@ -76,39 +85,39 @@ impl std::fmt::Debug for Wired {
 }
 
 impl Wired {
-    /// The instrument of a choice. `log` takes every byte.
+    /// The instrument of a choice. `log` records every byte.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: an address or an option that cannot be; the system refuses a thread.
+    /// [`LinkError::SetUp`]: an invalid address or option, or a thread that cannot be started.
     pub fn new(choice: &LinkChoice, log: Option<&RawLog>) -> Result<Self, LinkError> {
         let address: WireAddress = choice.address.parse().map_err(LinkError::SetUp)?;
         if address.protocol.is_robot() {
-            let message = format!("'{address}' is a robot: it tells where it stands, but not where the SMR is");
+            let message = format!("'{address}' is a robot controller: it reports joint angles, not SMR positions");
             return Err(LinkError::SetUp(message));
         }
         let robot = choice.robot.as_deref().map(str::parse::<WireAddress>).transpose().map_err(LinkError::SetUp)?;
         if let Some(robot) = robot.as_ref().filter(|robot| !robot.protocol.is_robot()) {
-            return Err(LinkError::SetUp(format!("'{robot}' is no robot; 'rtde:HOST' is one")));
+            return Err(LinkError::SetUp(no_robot(robot)));
         }
         let start = |address: WireAddress, options: Option<&str>| {
             let protocol = build::protocol(&address, options).map_err(LinkError::SetUp)?;
             Wire::start(address, protocol, log.cloned())
-                .map_err(|error| LinkError::SetUp(format!("the link cannot be started: {error}")))
+                .map_err(|error| LinkError::SetUp(format!("cannot start the link: {error}")))
         };
-        let shown = address.to_string();
+        let name = address.to_string();
         let instrument = start(address, choice.options.as_deref())?;
-        Ok(Self::over(shown, instrument, robot.map(|robot| start(robot, None)).transpose()?))
+        Ok(Self::over(name, instrument, robot.map(|robot| start(robot, None)).transpose()?))
     }
 
-    /// Whether the robot's controller of a choice, if there is one, can tell the joints of this arm.
+    /// Checks that the robot's controller of a choice, if any, can report the joints of this arm.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: it tells more or fewer.
+    /// [`LinkError::SetUp`]: the numbers of joints differ.
     pub fn check_arm(profile: &Profile, choice: &LinkChoice) -> Result<(), LinkError> {
         if choice.robot.is_some() { check_joints(profile) } else { Ok(()) }
     }
 
-    /// An instrument on a wire that is there already.
+    /// An instrument on a wire that was started already.
     pub(super) const fn over(address: String, instrument: Wire, robot: Option<Wire>) -> Self {
         Self {
             instrument,
@@ -117,89 +126,89 @@ impl Wired {
             identity: None,
             down: None,
             robot_down: None,
-            news: Vec::new(),
+            events: Vec::new(),
             sigmas: VecDeque::new(),
-            before: None,
+            previous_point: None,
             before_shot: None,
             robot_since: f64::NEG_INFINITY,
         }
     }
 
-    /// The same for a simulated instrument, where nothing has to settle and which is told of every shot.
+    /// Marks the instrument as simulated: nothing has to settle, and `before_shot` is called before each triggered shot.
     #[must_use]
     pub(super) fn simulated(mut self, before_shot: BeforeShot) -> Self {
         self.before_shot = Some(before_shot);
         self
     }
 
-    /// A simulated robot stands elsewhere since then (s, its own clock).
+    /// Tells the link that the simulated robot moved at this time (s, controller's clock).
     pub(super) const fn robot_moved(&mut self, since: f64) {
         self.robot_since = since;
     }
 
-    /// Who answers, once it does.
+    /// Identity of the instrument, once it is connected.
     pub const fn identity(&self) -> Option<&Identity> {
         self.identity.as_ref()
     }
 
-    /// What it warned of in its set-up.
+    /// Warnings of the instrument's set-up.
     pub fn warnings(&self) -> Vec<String> {
         self.identity.as_ref().map(|identity| identity.warnings.clone()).unwrap_or_default()
     }
 
-    /// Takes what has happened; an answer to a trigger is given back.
+    /// Handles the events of both wires for up to `wait`; returns early with the answer to a trigger.
     fn drain(&mut self, wait: Duration) -> Option<Result<Shot, Failure>> {
         if let Some(robot) = &self.robot {
             while let Ok(event) = robot.events.try_recv() {
                 match event {
                     WireEvent::Up(identity) => {
                         self.robot_down = None;
-                        self.news.push(LinkNews::Up(format!("robot: {}", identity.name)));
+                        self.events.push(LinkEvent::Up(format!("robot: {}", identity.name)));
                     }
                     WireEvent::Down(failure) => {
-                        self.news.push(LinkNews::Down(format!("robot: {}", failure.words(CONTROLLER))));
+                        self.events.push(LinkEvent::Down(format!("robot: {}", failure.message(CONTROLLER))));
                         self.robot_down = Some(failure);
                     }
-                    WireEvent::Status(status) => self.news.push(LinkNews::Status(format!("robot: {}", status.text))),
+                    WireEvent::Status(status) => self.events.push(LinkEvent::Notice(format!("robot: {}", status.text))),
                     WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_) => {}
                 }
             }
         }
         let until = self.instrument.now() + wait;
-        // However much comes, this ends.
-        for _ in 0..AT_ONCE {
+        // The limit ends the loop even if events arrive faster than they are handled.
+        for _ in 0..MAX_EVENTS_PER_POLL {
             let left = until.saturating_sub(self.instrument.now());
             let event = match self.instrument.events.recv_timeout(left) {
                 Ok(event) => event,
                 Err(RecvTimeoutError::Timeout) => return None,
                 Err(RecvTimeoutError::Disconnected) => {
-                    self.down = Some(Failure::Disconnected("the link has ended".to_owned()));
-                    return Some(Err(Failure::Disconnected("the link has ended".to_owned())));
+                    self.down = Some(link_ended());
+                    return Some(Err(link_ended()));
                 }
             };
             match event {
                 WireEvent::Up(identity) => {
                     self.down = None;
-                    self.news.push(LinkNews::Up(identity.name.clone()));
+                    self.events.push(LinkEvent::Up(identity.name.clone()));
                     if !identity.warnings.is_empty() {
-                        // One message: of several only the last would be seen.
-                        self.news.push(LinkNews::Status(identity.warnings.join("; ")));
+                        // Of several messages the screen would show only the last.
+                        self.events.push(LinkEvent::Notice(identity.warnings.join("; ")));
                     }
                     self.identity = Some(identity);
                 }
                 WireEvent::Down(failure) => {
-                    self.news.push(LinkNews::Down(failure.to_string()));
+                    self.events.push(LinkEvent::Down(failure.to_string()));
                     self.down = Some(failure.clone());
                     return Some(Err(failure));
                 }
                 WireEvent::Shot(shot) => return Some(Ok(shot)),
                 WireEvent::Failed(failure) => return Some(Err(failure)),
                 WireEvent::Offered(_) => {
-                    let text = "somebody has measured at the instrument itself; the point was not taken".to_owned();
-                    self.news.push(LinkNews::Status(text));
+                    let text = "a measurement triggered at the instrument itself was ignored".to_owned();
+                    self.events.push(LinkEvent::Notice(text));
                 }
                 WireEvent::Status(status) if status.severity == Severity::Warning => {
-                    self.news.push(LinkNews::Status(status.text));
+                    self.events.push(LinkEvent::Notice(status.text));
                 }
                 WireEvent::Status(_) => {}
             }
@@ -207,38 +216,39 @@ impl Wired {
         None
     }
 
-    /// Waits for `time`, or until it is not wanted any more.
+    /// Waits for `time`; fails if it is cancelled or the link is lost.
     fn pause(&mut self, time: Duration, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
         let until = self.instrument.now() + time;
         while self.instrument.now() < until {
             if !keep_going() {
                 return Err(LinkError::Cancelled);
             }
-            if let Some(Err(failure)) = self.drain(LOOK.min(until.saturating_sub(self.instrument.now()))) {
+            if let Some(Err(failure)) = self.drain(POLL_INTERVAL.min(until.saturating_sub(self.instrument.now()))) {
                 return Err(LinkError::Instrument(failure));
             }
         }
         Ok(())
     }
 
-    /// The joints of the robot once it stands, if it tells them; as they arrived from now on.
-    fn standing(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, LinkError> {
+    /// Waits until the robot is at rest and returns its joint values; `None` without a robot. Values received before this call do
+    /// not count.
+    fn joints_at_rest(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, LinkError> {
         if self.robot.is_none() {
             return Ok(None);
         }
-        let rest = if self.before_shot.is_some() { SIMULATED_REST } else { REST };
+        let rest = if self.before_shot.is_some() { SIMULATED_REST_TIMEOUT } else { REST_TIMEOUT };
         let until = self.instrument.now() + rest;
         let since = self.robot.as_ref().map_or(Duration::ZERO, Wire::now);
         loop {
             let Some(robot) = &self.robot else { return Ok(None) };
             let (latest, now) = (robot.latest(), robot.now());
-            let is_fresh = |(at, state): &(Duration, JointState)| {
-                *at >= since && now.saturating_sub(*at) <= FRESH && state.controller_time > self.robot_since
+            let is_current = |(at, state): &(Duration, JointState)| {
+                *at >= since && now.saturating_sub(*at) <= MAX_AGE && state.controller_time > self.robot_since
             };
-            let fresh = latest.joints.filter(is_fresh);
-            if let Some((_, state)) = &fresh {
+            let current = latest.joints.filter(is_current);
+            if let Some((_, state)) = &current {
                 if let Some(why) = &state.stopped {
-                    return Err(LinkError::Robot(format!("it does not move on: {why}")));
+                    return Err(LinkError::Robot(format!("it is stopped: {why}")));
                 }
                 if latest.is_still {
                     return Ok(Some(state.positions.clone()));
@@ -248,41 +258,40 @@ impl Wired {
                 return Err(LinkError::Cancelled);
             }
             if self.instrument.now() > until {
-                return Err(if fresh.is_some() {
-                    LinkError::Robot(format!("it still moves after {} s", rest.as_secs()))
+                return Err(if current.is_some() {
+                    LinkError::Robot(format!("it is still moving after {} s", rest.as_secs()))
                 } else {
-                    LinkError::Controller(no_joints(rest))
+                    LinkError::Controller(joints_timeout(rest))
                 });
             }
-            drop(self.drain(LOOK_AT_JOINTS));
-            self.is_up()?;
+            drop(self.drain(JOINT_POLL_INTERVAL));
+            self.check_up()?;
         }
     }
 
-    /// Whether both ends can be asked. Who waited for a link that is down would measure once it is back, when nobody expects
-    /// it any more.
-    fn is_up(&self) -> Result<(), LinkError> {
+    /// Fails if either link is down. A measurement must not be queued meanwhile: it would fire unexpectedly after the reconnect.
+    fn check_up(&self) -> Result<(), LinkError> {
         if let Some(failure) = &self.down {
             return Err(LinkError::Instrument(failure.clone()));
         }
         self.robot_down.clone().map_or(Ok(()), |failure| Err(LinkError::Controller(failure)))
     }
 
-    /// One shot that passes the gates; what is not steady is tried again.
+    /// One shot that passes all checks; transient failures are retried.
     fn shot(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Shot, LinkError> {
-        let pause = if self.before_shot.is_some() { SIMULATED_PAUSE } else { TRIES.1 };
-        for left in (0..TRIES.0).rev() {
+        let pause = if self.before_shot.is_some() { SIMULATED_RETRY_PAUSE } else { RETRY_PAUSE };
+        for attempts_left in (0..SHOT_ATTEMPTS).rev() {
             match self.one_shot(keep_going)? {
                 Ok(shot) => return Ok(shot),
-                Err(failure) if failure.is_transient() && left > 0 => self.pause(pause, keep_going)?,
+                Err(failure) if failure.is_transient() && attempts_left > 0 => self.pause(pause, keep_going)?,
                 Err(failure) => return Err(LinkError::Instrument(failure)),
             }
         }
-        Err(LinkError::Instrument(Failure::Unstable("tried several times".to_owned())))
+        Err(LinkError::Instrument(Failure::Unstable(format!("{SHOT_ATTEMPTS} attempts failed"))))
     }
 
     fn one_shot(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Result<Shot, Failure>, LinkError> {
-        // Nothing that came before this is an answer to it.
+        // Discard late answers to earlier triggers.
         drop(self.drain(Duration::ZERO));
         if let Some(failure) = &self.down {
             return Ok(Err(failure.clone()));
@@ -291,12 +300,12 @@ impl Wired {
             before_shot();
         }
         if !self.instrument.trigger() {
-            return Ok(Err(Failure::Disconnected("the link does not take orders".to_owned())));
+            return Ok(Err(Failure::Disconnected("the link does not accept commands".to_owned())));
         }
-        let until = self.instrument.now() + SHOT;
+        let until = self.instrument.now() + SHOT_TIMEOUT;
         loop {
-            match self.drain(LOOK) {
-                Some(Ok(shot)) => return Ok(self.gate(shot)),
+            match self.drain(POLL_INTERVAL) {
+                Some(Ok(shot)) => return Ok(self.checked(shot)),
                 Some(Err(failure)) => return Ok(Err(failure)),
                 None => {}
             }
@@ -306,82 +315,77 @@ impl Wired {
             }
             if self.instrument.now() > until {
                 self.instrument.cancel();
-                return Ok(Err(Failure::Silent { what: "measuring".to_owned(), seconds: SHOT.as_secs_f64() }));
+                return Ok(Err(Failure::Silent { what: "measuring".to_owned(), seconds: SHOT_TIMEOUT.as_secs_f64() }));
             }
         }
     }
 
-    /// What every point must be, whoever gave it.
-    fn gate(&mut self, shot: Shot) -> Result<Shot, Failure> {
-        // Whoever states 0 does not know.
+    /// Rejects points that no instrument can have measured, and unstable ones.
+    fn checked(&mut self, shot: Shot) -> Result<Shot, Failure> {
+        // Instruments state 0 for an unknown standard deviation.
         let shot = Shot { sigma: shot.sigma.and_then(known_sigma), ..shot };
         let point = shot.point;
-        let distance = point.coords.norm();
         let sigma = shot.sigma.map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
         if let (Some(sigma), Some(usual)) = (sigma, self.usual_sigma())
-            && sigma > (UNSTEADY.0 * usual).max(UNSTEADY.1)
+            && sigma > (UNSTABLE_FACTOR * usual).max(UNSTABLE_SIGMA)
         {
-            let [sigma, usual] = [sigma, usual].map(to_mm);
-            return Err(Failure::Unstable(format!("it states a sigma of {sigma:.3} mm; usual are {usual:.3} mm")));
+            let (sigma, usual) = (to_mm(sigma), to_mm(usual));
+            return Err(Failure::Unstable(format!("its stated sigma is {sigma:.3} mm, usually {usual:.3} mm")));
         }
-        let reason = match () {
-            () if !point.coords.iter().all(|value| value.is_finite()) => "it is not a number".to_owned(),
-            () if point.coords.amax() <= f64::EPSILON => "it is 0, 0, 0".to_owned(),
-            () if !(RANGE.0..=RANGE.1).contains(&distance) => {
-                format!("it is {distance:.3} m away; {} to {} m can be", RANGE.0, RANGE.1)
-            }
-            () if self.before == Some(point) => return Err(Failure::repeated()),
-            () => {
-                self.before = Some(point);
-                self.sigmas.extend(sigma);
-                while self.sigmas.len() > USUAL {
-                    self.sigmas.pop_front();
-                }
-                return Ok(shot);
-            }
-        };
-        Err(Failure::Unusable(reason))
+        check_possible(&point)?;
+        if self.previous_point == Some(point) {
+            return Err(Failure::repeated());
+        }
+        self.previous_point = Some(point);
+        self.sigmas.extend(sigma);
+        while self.sigmas.len() > SIGMA_HISTORY {
+            self.sigmas.pop_front();
+        }
+        Ok(shot)
     }
 
-    /// The middle one of the standard deviations so far (m), once there are enough.
+    /// Median of the standard deviations stated so far (m), once there are enough.
     fn usual_sigma(&self) -> Option<f64> {
         let mut sorted: Vec<f64> = self.sigmas.iter().copied().collect();
         sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= UNSTEADY.2)
+        sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= FEWEST_SIGMAS)
     }
 
-    /// What there is to see now.
+    /// The current live view.
     fn live(&self) -> LiveReading {
-        LiveReading { down: self.down.as_ref().map(ToString::to_string), ..self.look().reading() }
+        LiveReading { down: self.down.as_ref().map(ToString::to_string), ..self.monitors().live() }
     }
 
-    fn look(&self) -> Look {
-        Look { instrument: self.instrument.eye(), robot: self.robot.as_ref().map(Wire::eye) }
+    fn monitors(&self) -> Monitors {
+        Monitors {
+            instrument: self.instrument.monitor.clone(),
+            robot: self.robot.as_ref().map(|robot| robot.monitor.clone()),
+        }
     }
 }
 
-/// A look at both wires, also while something is measured.
-struct Look {
-    instrument: Eye,
-    robot: Option<Eye>,
+/// Monitors of both wires.
+struct Monitors {
+    instrument: WireMonitor,
+    robot: Option<WireMonitor>,
 }
 
-impl Look {
-    fn reading(&self) -> LiveReading {
+impl Monitors {
+    fn live(&self) -> LiveReading {
         let now = self.instrument.now();
         let Latest { live, heard, .. } = self.instrument.latest();
-        let is_fresh = |now: Duration, at: Duration| now.saturating_sub(at) <= FRESH;
+        let is_current = |now: Duration, at: Duration| now.saturating_sub(at) <= MAX_AGE;
         let robot = self.robot.as_ref().map(|robot| (robot.latest(), robot.now()));
         let joints = robot.as_ref().and_then(|(latest, now)| {
             let (at, state) = latest.joints.as_ref()?;
-            is_fresh(*now, *at).then(|| state.positions.clone())
+            is_current(*now, *at).then(|| state.positions.clone())
         });
         LiveReading {
             seconds: now.as_secs_f64(),
-            point: live.filter(|(at, _)| is_fresh(now, *at)).map(|(_, shot)| shot.point),
+            point: live.filter(|(at, _)| is_current(now, *at)).map(|(_, shot)| shot.point),
             is_blind: !self.instrument.shows_live,
             silent: heard
-                .filter(|at| self.instrument.shows_live && !is_fresh(now, *at))
+                .filter(|at| self.instrument.shows_live && !is_current(now, *at))
                 .map(|at| now.saturating_sub(at).as_secs_f64()),
             is_still: robot.as_ref().map(|(latest, _)| latest.is_still && joints.is_some()),
             joints,
@@ -397,58 +401,59 @@ impl Link for Wired {
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
         let began = self.instrument.now();
-        // Nothing that came before this is an answer to it.
+        // Discard late answers to earlier triggers.
         drop(self.drain(Duration::ZERO));
-        self.is_up()?;
-        let joints = self.standing(keep_going)?;
+        self.check_up()?;
+        let joints = self.joints_at_rest(keep_going)?;
         if self.before_shot.is_none() {
             self.pause(Duration::try_from_secs_f64(request.settle).unwrap_or_default(), keep_going)?;
         }
         let count = request.shots.max(1);
         let shots = (0..count).map(|_| self.shot(keep_going)).collect::<Result<Vec<Shot>, _>>()?;
-        if let (Some(before), Some(after)) = (&joints, self.standing(keep_going)?) {
-            let moved = before.iter().zip(&after).any(|(before, after)| (before - after).abs() > STANDING);
+        if let (Some(before), Some(after)) = (&joints, self.joints_at_rest(keep_going)?) {
+            let moved = before.iter().zip(&after).any(|(before, after)| (before - after).abs() > REST_TOLERANCE);
             if moved {
-                return Err(LinkError::Robot("it has moved while the point was measured".to_owned()));
+                return Err(LinkError::Robot("it moved during the measurement".to_owned()));
             }
         }
         let reading = mean(&shots, joints, self.instrument.now().saturating_sub(began).as_secs_f64());
         Ok(reading)
     }
 
-    fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkNews>)> {
-        // An answer without a question is one that came too late.
+    fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkEvent>)> {
+        // An answer here is a late one: no shot was requested.
         drop(self.drain(wait));
-        Some((self.live(), std::mem::take(&mut self.news)))
+        Some((self.live(), std::mem::take(&mut self.events)))
     }
 
-    fn eye(&self) -> Option<super::Look> {
-        let look = self.look();
-        Some(Box::new(move || look.reading()))
+    fn live_poll(&self) -> Option<super::LivePoll> {
+        let monitors = self.monitors();
+        Some(Box::new(move || monitors.live()))
     }
 }
 
 impl Wired {
-    /// As [`Link::connect`], while it is wanted. What happens on the way, such as a laser that warms up, is `told`.
+    /// As [`Link::connect`], but can be cancelled and passes messages of the set-up, such as a laser that is warming up, to
+    /// `on_event`.
     ///
     /// # Errors
-    /// As there; [`LinkError::Cancelled`].
+    /// As [`Link::connect`], and [`LinkError::Cancelled`].
     pub fn connect_while(
         &mut self,
         keep_going: &dyn Fn() -> bool,
-        told: &mut dyn FnMut(LinkNews),
+        on_event: &mut dyn FnMut(LinkEvent),
     ) -> Result<String, LinkError> {
-        let until = self.instrument.now() + SET_UP;
-        let mut last_told = None;
+        let until = self.instrument.now() + SET_UP_TIMEOUT;
+        let mut last_message = None;
         while self.identity.is_none() {
-            let answer = self.drain(LOOK);
+            let answer = self.drain(POLL_INTERVAL);
             if self.identity.is_some() {
                 break;
             }
-            for news in self.news.drain(..) {
-                if let LinkNews::Status(text) = &news {
-                    last_told = Some(text.clone());
-                    told(news);
+            for event in self.events.drain(..) {
+                if let LinkEvent::Notice(text) = &event {
+                    last_message = Some(text.clone());
+                    on_event(event);
                 }
             }
             if let Some(Err(failure)) = answer {
@@ -458,47 +463,60 @@ impl Wired {
                 return Err(LinkError::Cancelled);
             }
             if self.instrument.now() > until {
-                let seconds = SET_UP.as_secs_f64();
-                return Err(LinkError::Instrument(match last_told {
-                    Some(text) => Failure::NotReady(format!("{text}; the set-up was given up after {seconds:.0} s")),
-                    None => Failure::Silent { what: format!("'{}' was being set up", self.address), seconds },
+                let seconds = SET_UP_TIMEOUT.as_secs_f64();
+                return Err(LinkError::Instrument(match last_message {
+                    Some(text) => Failure::NotReady(format!("{text}; gave up after {seconds:.0} s")),
+                    None => Failure::Silent { what: format!("setting up '{}'", self.address), seconds },
                 }));
             }
         }
         if self.robot.is_some() {
-            self.standing_robot(until)?;
+            self.await_joints(until)?;
         }
-        // What was said on the way is in the line below.
-        self.news.clear();
+        // The line below repeats the messages of the set-up.
+        self.events.clear();
         let identity = self.identity.clone().unwrap_or_default();
         let reflector = identity.reflector.map_or_else(String::new, |reflector| {
             format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
         });
-        let told = identity.warnings.iter().chain(&identity.notes);
-        let warnings = told.fold(String::new(), |all, one| all + "; " + one);
-        let robot = if self.robot.is_some() { "; the robot tells its joint angles" } else { "" };
-        Ok(format!("{}{reflector}{robot}{warnings}", identity.name))
+        let remarks = identity.warnings.iter().chain(&identity.notes);
+        let remarks: String = remarks.map(|remark| format!("; {remark}")).collect();
+        let robot = if self.robot.is_some() { "; the robot reports its joint angles" } else { "" };
+        Ok(format!("{}{reflector}{robot}{remarks}", identity.name))
     }
 }
 
-/// Who hangs up in the middle of the set-up has perhaps not understood it.
+/// A peer that hangs up during the set-up is perhaps another device.
 fn in_set_up(failure: Failure) -> Failure {
     match failure {
-        Failure::Disconnected(why) => Failure::Disconnected(format!(
-            "{why}, in the middle of the set-up: is it this kind of instrument, and the right port?"
-        )),
+        Failure::Disconnected(why) => {
+            Failure::Disconnected(format!("{why}, during the set-up: check the kind of instrument and the port"))
+        }
         other => other,
     }
 }
 
-/// A robot at rest does not move by more during a measurement (rad).
-const STANDING: f64 = 1e-4;
+/// Rejects coordinates that no instrument can have measured.
+fn check_possible(point: &Point3<f64>) -> Result<(), Failure> {
+    let unusable = |reason: String| Err(Failure::Unusable(reason));
+    if !point.coords.iter().all(|value| value.is_finite()) {
+        return unusable("a coordinate is not a number".to_owned());
+    }
+    if point.coords.amax() <= f64::EPSILON {
+        return unusable("it is 0, 0, 0".to_owned());
+    }
+    let distance = point.coords.norm();
+    if !(NEAREST..=FARTHEST).contains(&distance) {
+        return unusable(format!("it is {distance:.3} m away; instruments measure from {NEAREST} to {FARTHEST} m"));
+    }
+    Ok(())
+}
 
 impl Wired {
-    /// Waits until the robot tells its joints.
-    fn standing_robot(&mut self, until: Duration) -> Result<(), LinkError> {
+    /// Waits until the robot reports joint values.
+    fn await_joints(&mut self, until: Duration) -> Result<(), LinkError> {
         loop {
-            drop(self.drain(LOOK));
+            drop(self.drain(POLL_INTERVAL));
             if let Some(failure) = &self.robot_down {
                 return Err(LinkError::Controller(failure.clone()));
             }
@@ -506,15 +524,25 @@ impl Wired {
                 return Ok(());
             }
             if self.instrument.now() > until {
-                return Err(LinkError::Controller(no_joints(SET_UP)));
+                return Err(LinkError::Controller(joints_timeout(SET_UP_TIMEOUT)));
             }
         }
     }
 }
 
-/// The controller answers, but its joint angles do not come.
-fn no_joints(waited: Duration) -> Failure {
-    Failure::Silent { what: "joint angles were awaited".to_owned(), seconds: waited.as_secs_f64() }
+/// The controller answers but does not report joint angles.
+pub(super) fn joints_timeout(waited: Duration) -> Failure {
+    Failure::Silent { what: "waiting for joint angles".to_owned(), seconds: waited.as_secs_f64() }
+}
+
+/// The thread of the link has ended.
+pub(super) fn link_ended() -> Failure {
+    Failure::Disconnected("the link has ended".to_owned())
+}
+
+/// An address that is not one of a robot's controller.
+pub(super) fn no_robot(address: &WireAddress) -> String {
+    format!("'{address}' is not a robot controller; use '{}'", WireProtocol::ROBOT_ADDRESS)
 }
 
 /// The mean of shots with its scatter, and its σ where every shot states one.

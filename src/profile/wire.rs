@@ -12,12 +12,13 @@
 use std::fmt;
 use std::str::FromStr;
 
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use crate::text::printable;
 
-/// What is spoken on a wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+/// Protocol on a wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ValueEnum)]
 pub enum WireProtocol {
     /// Leica emScon, binary.
     Emscon,
@@ -56,6 +57,11 @@ impl WireProtocol {
         }
     }
 
+    /// Whether this protocol is used on serial lines.
+    pub const fn has_serial_lines(self) -> bool {
+        self.usual_speed().is_some()
+    }
+
     /// Usual speed of a serial line (baud).
     const fn usual_speed(self) -> Option<u32> {
         match self {
@@ -64,7 +70,10 @@ impl WireProtocol {
         }
     }
 
-    /// Whether it tells where a robot stands, not where a reflector is.
+    /// Form of the address of a robot's controller, for hints.
+    pub const ROBOT_ADDRESS: &str = "rtde:HOST";
+
+    /// Whether this is the protocol of a robot's controller, which reports joint angles and not SMR positions.
     pub const fn is_robot(self) -> bool {
         matches!(self, Self::Rtde)
     }
@@ -170,9 +179,9 @@ impl FromStr for WireAddress {
         };
         match (&route, protocol) {
             (Route::Udp { .. }, WireProtocol::Ascii) => {}
-            (Route::Udp { .. }, _) => return Err(format!("{protocol} is not spoken over UDP; use tcp")),
-            (Route::Serial { .. }, WireProtocol::Emscon | WireProtocol::Rtde) => {
-                return Err(format!("{protocol} is not spoken on serial lines; use tcp"));
+            (Route::Udp { .. }, _) => return Err(format!("{protocol} does not use UDP; use tcp")),
+            (Route::Serial { .. }, _) if !protocol.has_serial_lines() => {
+                return Err(format!("{protocol} does not use serial lines; use tcp"));
             }
             _ => {}
         }
@@ -263,8 +272,8 @@ mod tests {
             ("", "is no address"),
             ("192.168.0.2", "is no address"),
             ("leica:192.168.0.2", "is no protocol"),
-            ("emscon:serial:/dev/ttyUSB0", "not spoken on serial lines"),
-            ("emscon:udp:0.0.0.0:1", "not spoken over UDP"),
+            ("emscon:serial:/dev/ttyUSB0", "does not use serial lines"),
+            ("emscon:udp:0.0.0.0:1", "does not use UDP"),
             ("geocom:host", "the port is missing"),
             ("emscon:host:70000", "ports are 1 to 65535"),
             ("emscon:tcp::700", "names no host"),

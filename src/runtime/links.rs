@@ -11,7 +11,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::engine::Events;
-use crate::link::{Link, LinkError, LinkNews, RawLog, Rehearsal, Replay, SimulatedCell, Wired};
+use crate::link::{Link, LinkError, LinkEvent, RawLog, Rehearsal, Replay, SimulatedCell, Wired};
 use crate::profile::Profile;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, read_bytes_as};
@@ -68,8 +68,8 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
             Command::Connect { id, instrument, profile, cancelled } => {
                 link = None;
                 let keep_going = || !cancelled.load(Ordering::Relaxed);
-                let told = &mut |news| events.offer(Event::Remark(remark(news)));
-                match connect(&instrument, &profile, log, &keep_going, told) {
+                let on_event = &mut |event| events.offer(Event::Remark(remark(event)));
+                match connect(&instrument, &profile, log, &keep_going, on_event) {
                     Ok((connected, answer)) => {
                         link = connected;
                         (id, answer)
@@ -79,11 +79,11 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
                 }
             }
             Command::Measure { id, request, cancelled } => {
-                let eye = link.as_ref().and_then(|link| link.eye());
+                let live_poll = link.as_ref().and_then(|link| link.live_poll());
                 let shown = Cell::new(f64::NEG_INFINITY);
                 let keep_going = || {
-                    // What is seen meanwhile; a look of before the measurement is not now.
-                    if let Some(live) = eye.as_ref().map(|eye| eye())
+                    // Show the live view during the measurement, at most once per interval.
+                    if let Some(live) = live_poll.as_ref().map(|poll| poll())
                         && live.seconds >= shown.get() + WATCH.as_secs_f64()
                     {
                         shown.set(live.seconds);
@@ -107,17 +107,16 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
     }
 }
 
-/// The next command. While nobody asks, the wizard sees what the link sees.
+/// Waits for the next command, and sends the live view and the events of the link meanwhile.
 fn next(commands: &Receiver<Command>, link: Option<&mut (dyn Link + 'static)>, events: &Events) -> Option<Command> {
     let Some(link) = link else { return commands.recv().ok() };
     loop {
-        let Some((live, news)) = link.watch(Duration::ZERO) else { return commands.recv().ok() };
-        // The next look says more than one that nobody has room for.
+        let Some((live, link_events)) = link.watch(Duration::ZERO) else { return commands.recv().ok() };
         events.offer(Event::Live(live));
-        for one in news {
-            events.offer(Event::Remark(remark(one)));
+        for event in link_events {
+            events.offer(Event::Remark(remark(event)));
         }
-        // A command does not wait for the next look.
+        // A command interrupts the wait for the next poll.
         match commands.recv_timeout(WATCH) {
             Ok(command) => return Some(command),
             Err(RecvTimeoutError::Disconnected) => return None,
@@ -126,21 +125,21 @@ fn next(commands: &Receiver<Command>, link: Option<&mut (dyn Link + 'static)>, e
     }
 }
 
-/// What the operator is told about a link.
-fn remark(news: LinkNews) -> Notice {
-    match news {
-        LinkNews::Up(identity) => Notice::info(format!("connected: {identity}")),
-        LinkNews::Down(cause) => Notice::attention(format!("the link is down: {cause}"))
-            .hint("it is connected again by itself; what was measured is safe"),
-        LinkNews::Status(text) => Notice::attention(text),
+/// A link event as a message for the operator.
+fn remark(event: LinkEvent) -> Notice {
+    match event {
+        LinkEvent::Up(identity) => Notice::info(format!("connected: {identity}")),
+        LinkEvent::Down(cause) => Notice::attention(format!("the link is down: {cause}"))
+            .hint("it reconnects automatically; nothing measured so far is lost"),
+        LinkEvent::Notice(text) => Notice::attention(text),
     }
 }
 
-/// What an error of a link means to the operator.
+/// A link error as an answer with advice.
 fn failed(error: &LinkError) -> Answer {
     let hints = match error {
         LinkError::BeamBroken => {
-            vec!["return the SMR to the nest until the tracker has it again, then measure again".to_owned()]
+            vec!["return the SMR to the nest until the tracker has locked on to it, then measure again".to_owned()]
         }
         LinkError::Instrument(failure) => vec![failure.hint().to_owned()],
         LinkError::Controller(failure) => vec![failure.controller_hint().to_owned()],
@@ -151,7 +150,7 @@ fn failed(error: &LinkError) -> Answer {
     Answer::Failed(Problem { message: error.to_string(), hints })
 }
 
-/// A link with the answer that tells of it.
+/// A link with the answer to its connection.
 type Connected = (Option<Box<dyn Link>>, Answer);
 
 fn connect(
@@ -159,7 +158,7 @@ fn connect(
     profile: &Profile,
     log: Option<&RawLog>,
     keep_going: &dyn Fn() -> bool,
-    told: &mut dyn FnMut(LinkNews),
+    on_event: &mut dyn FnMut(LinkEvent),
 ) -> Result<Connected, LinkError> {
     let plain = |identity| Answer::Connected { identity, warnings: Vec::new(), recorded: Vec::new() };
     match instrument {
@@ -173,7 +172,7 @@ fn connect(
         InstrumentChoice::Linked(choice) => {
             Wired::check_arm(profile, choice)?;
             let mut wired = Wired::new(choice, log)?;
-            let identity = wired.connect_while(keep_going, told)?;
+            let identity = wired.connect_while(keep_going, on_event)?;
             let answer = Answer::Connected { identity, warnings: wired.warnings(), recorded: Vec::new() };
             Ok((Some(Box::new(wired)), answer))
         }

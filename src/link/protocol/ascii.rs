@@ -1,10 +1,10 @@
-//! One line of text per point: the way in for whatever prints coordinates, by itself or through a bridge program.
+//! One line of text per point: for any source that prints coordinates, directly or through a bridge program.
 //!
-//! *Polled*: trigger bytes go out, one line comes back. *Streamed*: lines come by themselves; a shot is the mean of the lines that
-//! arrive after it was asked for. What a line means is said by [`AsciiOptions`], never guessed: a line that can be read in two
-//! ways is refused.
+//! *Polled*: trigger bytes are sent and one line is returned. *Streamed*: lines arrive without a request; a shot is the mean of
+//! the lines that arrive after the trigger. [`AsciiOptions`] define the meaning of a line, and nothing is guessed: a line that
+//! can be read in two ways is refused.
 //!
-//! Recommended to whoever writes a bridge, in millimetres, status 0 for a valid point ([`Preset::Bridge`]):
+//! Recommended line for a bridge program, in millimetres, status 0 for a valid point ([`Preset::Bridge`]):
 //!
 //! ```text
 //! P,<id>,<x>,<y>,<z>,<sx>,<sy>,<sz>,<status>,<ISO 8601>
@@ -28,7 +28,7 @@ pub use options::LengthUnit;
 pub use options::Mode;
 pub use options::Separator;
 pub use parser::LineParser;
-pub use parser::Reading;
+pub use parser::ParsedLine;
 pub use parser::Rejection;
 pub use preset::Preset;
 pub use preset::UnknownPreset;

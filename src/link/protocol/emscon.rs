@@ -2,17 +2,17 @@
 //! The tracker listens, usually at port 700.
 //!
 //! The set-up asserts units, coordinate type, frame, reflector, mode and system settings and reads all of them back.
-//! One shot is: ask whether the tracker is ready, start, wait for the acceptance, wait for the result. Only a result that comes
-//! after the acceptance, says success and passes the gates (finite, in range, stationary, no rehearsal) is a point. An error, or *not ready*, in between ends it:
-//! which number a broken beam has is not known publicly, so none is relied on. A change of the settings in the middle rejects
-//! the shot, then everything is read again.
+//! One shot is: ask whether the tracker is ready, start, wait for the acceptance, wait for the result. Only a result that
+//! arrives after the acceptance, reports success and passes the checks (finite, in range, stationary, not in try mode) is a
+//! point. An error, or *not ready*, in between ends the shot; the error number of a broken beam is not known publicly, so the
+//! program does not rely on one. A change of the settings during a shot rejects it, and then everything is read again.
 //!
-//! What is sent and understood comes from public descriptions and was tried against simulated trackers only.
+//! The commands and packets come from public descriptions and were tested only against simulated trackers.
 
 pub mod command;
+mod conversation;
 mod exchange;
 pub mod packet;
-mod session;
 mod setup;
 mod shot;
 pub mod status;
@@ -29,30 +29,32 @@ pub use status::{
     SystemEvent, TrackerStatus,
 };
 
-use self::session::Session;
+use self::conversation::Conversation;
 use super::{Moment, Protocol, ProtocolEvent};
 
-/// TCP port at which trackers listen unless they were set otherwise.
+/// TCP port at which trackers listen by default.
 pub const PORT: u16 = 700;
 
-/// How the tracker is to be used.
+/// Options of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmsconOptions {
-    /// Duration of a stationary measurement (ms); trackers take 500 to 2000 and more.
+    /// Duration of a stationary measurement (ms); trackers accept 500 to 2000 and more.
     pub measure_ms: i32,
-    /// The absolute distance meter takes part, so that a broken beam needs no return to the nest.
+    /// Use the absolute distance meter, so that the SMR need not return to the nest after a broken beam.
     pub use_adm: bool,
-    /// Number of the reflector that is to be chosen; `None` keeps the tracker's choice.
+    /// Number of the reflector to select; `None` keeps the tracker's selection.
     pub reflector: Option<i32>,
-    /// Initialises the tracker in every set-up: its head turns for up to a minute and more.
+    /// Initialise the tracker in every set-up; its head turns for a minute or more.
     pub initialize: bool,
-    /// Asks for the position of the reflector all the time, for live display.
+    /// Let the tracker send the position of the reflector continuously, for the live view.
     pub reflector_positions: bool,
-    /// A point nearer or farther than this cannot be one (m).
-    pub distances: (f64, f64),
-    /// An idle link asks for the status after this.
+    /// Shortest possible distance of a point (m).
+    pub nearest: f64,
+    /// Longest possible distance of a point (m).
+    pub farthest: f64,
+    /// Interval at which an idle link asks for the tracker's status.
     pub keep_alive: Duration,
-    /// A result comes within the duration of the measurement and this.
+    /// Longest wait for a result, in addition to the duration of the measurement.
     pub result_margin: Duration,
 }
 
@@ -64,23 +66,24 @@ impl Default for EmsconOptions {
             reflector: None,
             initialize: false,
             reflector_positions: false,
-            distances: (0.1, 80.0),
+            nearest: 0.1,
+            farthest: 80.0,
             keep_alive: Duration::from_secs(5),
             result_margin: Duration::from_secs(10),
         }
     }
 }
 
-/// The conversation with an emScon tracker.
+/// Protocol driver of an emScon tracker.
 #[derive(Clone, Debug)]
 pub struct Emscon {
-    session: Session,
+    conversation: Conversation,
 }
 
 impl Emscon {
-    /// A conversation that has not begun.
+    /// A driver that is not connected yet.
     pub fn new(options: EmsconOptions) -> Self {
-        Self { session: Session::new(options) }
+        Self { conversation: Conversation::new(options) }
     }
 }
 
@@ -92,46 +95,46 @@ impl Default for Emscon {
 
 impl Protocol for Emscon {
     fn start(&mut self, now: Moment) {
-        self.session.start(now);
+        self.conversation.start(now);
     }
 
     fn feed(&mut self, bytes: &[u8], now: Moment) {
-        self.session.feed(bytes, now);
+        self.conversation.feed(bytes, now);
     }
 
     fn tick(&mut self, now: Moment) {
-        self.session.tick(now);
+        self.conversation.tick(now);
     }
 
     fn trigger(&mut self, now: Moment) {
-        self.session.trigger(now);
+        self.conversation.trigger(now);
     }
 
     fn cancel(&mut self, now: Moment) {
-        self.session.cancel(now);
+        self.conversation.cancel(now);
     }
 
     fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.session.outbox.next_output()
+        self.conversation.outbox.next_output()
     }
 
     fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.session.outbox.next_event()
+        self.conversation.outbox.next_event()
     }
 
     fn next_deadline(&self) -> Option<Moment> {
-        self.session.next_deadline()
+        self.conversation.next_deadline()
     }
 
     fn shows_live(&self) -> bool {
-        self.session.shows_live()
+        self.conversation.shows_live()
     }
 }
 
 #[cfg(test)]
 impl Emscon {
-    /// Bytes that wait for the rest of a packet.
+    /// Bytes of an incomplete packet.
     pub(in crate::link) fn pending(&self) -> usize {
-        self.session.pending()
+        self.conversation.pending()
     }
 }

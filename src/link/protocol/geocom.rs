@@ -1,8 +1,8 @@
 //! Leica total stations by GeoCOM in ASCII, over a serial port or TCP.
 //!
-//! One request is out at a time, each with a transaction number of its own; an answer with another number is thrown away. The
-//! driver asks for angles and slope distance and makes the point itself, so the station and orientation that are set at the
-//! instrument cannot leak in: `E = d sin V sin Hz`, `N = d sin V cos Hz`, `H = d cos V`, with V the zenith angle and Hz clockwise.
+//! One request is in progress at a time, each with its own transaction number; an answer with another number is discarded. The
+//! driver reads angles and slope distance and computes the point itself, so that the station and orientation set at the
+//! instrument have no effect: `E = d sin V sin Hz`, `N = d sin V cos Hz`, `H = d cos V`, with V the zenith angle and Hz clockwise.
 
 mod codes;
 mod driver;

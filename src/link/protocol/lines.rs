@@ -1,23 +1,23 @@
-//! Lines out of a stream of bytes.
+//! Splits a stream of bytes into lines.
 
-/// Longest line that is kept (bytes); no instrument writes longer ones.
+/// Longest accepted line (bytes); no instrument writes longer ones.
 pub const MAX_LINE: usize = 4096;
 
-/// Byte order mark of UTF-8, which some programs put before their first line.
+/// Byte order mark of UTF-8, which some programs write before their first line.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
-/// What a splitter found.
+/// A piece of the stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Piece {
-    /// A line without its end, never empty.
+    /// A line without its terminator, never empty.
     Line(Vec<u8>),
-    /// More than [`MAX_LINE`] bytes without an end; all up to the next end are thrown away.
+    /// More than [`MAX_LINE`] bytes without a terminator; everything up to the next terminator is discarded.
     Overlong,
 }
 
-/// Cuts a stream at CR, LF or CR LF, drops NUL bytes and a byte order mark, and keeps a part of a line until the rest comes.
+/// Splits a stream at CR, LF or CR LF, drops NUL bytes and a byte order mark, and buffers a partial line until it is complete.
 ///
-/// Empty lines are not reported, so CR LF is simply two ends, wherever the stream is split.
+/// Empty lines are not reported, so CR LF simply counts as two terminators, wherever the stream is split.
 #[derive(Clone, Debug, Default)]
 pub struct LineSplitter {
     partial: Vec<u8>,
@@ -45,7 +45,7 @@ impl LineSplitter {
         }
     }
 
-    /// The line ends here, though no end was sent: for datagrams.
+    /// Ends the line without a terminator: a datagram is a whole line.
     pub fn end(&mut self) -> Option<Piece> {
         let line = std::mem::take(&mut self.partial);
         if std::mem::take(&mut self.skipping) {
@@ -55,7 +55,7 @@ impl LineSplitter {
         (!line.is_empty()).then_some(Piece::Line(line))
     }
 
-    /// Throws away the line that has begun, up to its end, wherever that comes: its rest must not pass for a line.
+    /// Discards the partial line up to its terminator, even if that arrives later: the rest must not be taken for a line.
     pub fn discard_partial(&mut self) {
         if !self.partial.is_empty() {
             self.partial.clear();
@@ -63,17 +63,17 @@ impl LineSplitter {
         }
     }
 
-    /// Forgets everything: a new connection.
+    /// Resets the splitter for a new connection.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// Bytes of the line that has begun.
+    /// Bytes of the partial line.
     pub const fn pending(&self) -> usize {
         self.partial.len()
     }
 
-    /// Number of lines thrown away for their length.
+    /// Number of lines discarded for their length.
     pub const fn overlong(&self) -> u64 {
         self.overlong
     }

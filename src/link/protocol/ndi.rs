@@ -1,7 +1,7 @@
 //! NDI Polaris and Aurora by the combined API, over a serial port or TCP.
 //!
 //! Commands and text replies end with four hexadecimal digits of CRC-16/ARC and CR; `BX` answers in binary. A shot is the first
-//! frame after the one that was current when the shot was asked for.
+//! frame after the one that was current at the trigger.
 
 mod codes;
 mod driver;

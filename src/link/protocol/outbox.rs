@@ -1,27 +1,34 @@
-//! What a protocol has to say and to send, in bounded queues: neither a peer that floods the wire or reads nothing nor an owner
-//! that is slow can fill the memory.
+//! Bounded queues for the events and outputs of a protocol: neither a peer that floods the wire or never reads, nor a slow
+//! owner, can fill the memory.
 //!
-//! - A live point or joint state takes the place of the one that still waits: only now is of interest.
-//! - Of offered points the newest wait.
-//! - Of the statuses of each severity the first and the newest wait, and those between them go: the first ones name the cause,
-//!   the newest say how things are. Information cannot crowd out warnings. Of a status that comes again and again the first and
-//!   the newest wait.
-//! - Nothing that answers a trigger, no end of a set-up and no end of a connection is ever dropped: their number is the owner's.
+//! - A new live point or joint state replaces the queued one, because only the current value matters.
+//! - Only the newest offered points are kept.
+//! - For each severity, the first and the newest status messages are kept and those in between are dropped: the first ones
+//!   name the cause, the newest describe the current state. Information never displaces warnings. Of a repeated message, the
+//!   first and the newest copy are kept.
+//! - Answers to a trigger, the end of a set-up and the end of a connection are never dropped; their number is bounded because
+//!   each follows a call of the owner.
 
 use std::collections::VecDeque;
 
 use super::{Failure, ProtocolEvent, Severity, Status};
 
-/// Most offered points that wait.
+/// Most offered points in the queue.
 pub const MAX_OFFERED: usize = 32;
 
-/// Most statuses of a severity that wait: so many of the first ones, and so many of the newest.
-pub const MAX_STATUSES: (usize, usize) = (16, 16);
+/// Oldest status messages of each severity that are kept in the queue.
+pub const MAX_FIRST_STATUSES: usize = 16;
 
-/// Most messages that wait to be sent; a peer that takes none is lost anyway.
+/// Newest status messages of each severity that are kept in the queue.
+pub const MAX_NEWEST_STATUSES: usize = 16;
+
+/// Most status messages of each severity in the queue.
+pub const MAX_STATUSES: usize = MAX_FIRST_STATUSES + MAX_NEWEST_STATUSES;
+
+/// Most messages waiting to be sent; a peer that accepts none of them is lost anyway.
 pub const MAX_OUTPUTS: usize = 64;
 
-/// Events and bytes on their way to the owner of a protocol.
+/// Events and outputs that the owner of a protocol has not fetched yet.
 #[derive(Clone, Debug, Default)]
 pub struct Outbox {
     events: VecDeque<ProtocolEvent>,
@@ -29,7 +36,7 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Forgets everything: a new connection.
+    /// Empties both queues for a new connection.
     pub fn clear(&mut self) {
         self.events.clear();
         self.outputs.clear();
@@ -41,18 +48,17 @@ impl Outbox {
             ProtocolEvent::Live(_) => self.events.retain(|other| !matches!(other, ProtocolEvent::Live(_))),
             ProtocolEvent::Joints(_) => self.events.retain(|other| !matches!(other, ProtocolEvent::Joints(_))),
             ProtocolEvent::Offered(_) => {
-                self.make_room(0, MAX_OFFERED, |other| matches!(other, ProtocolEvent::Offered(_)));
+                self.drop_excess(0, MAX_OFFERED, |other| matches!(other, ProtocolEvent::Offered(_)));
             }
             ProtocolEvent::Status(status) => {
                 if self.newest_status() == Some(status) {
                     return;
                 }
                 self.drop_repetition(status);
-                let (first, newest) = MAX_STATUSES;
                 let severity = status.severity;
-                self.make_room(
-                    first,
-                    first + newest,
+                self.drop_excess(
+                    MAX_FIRST_STATUSES,
+                    MAX_STATUSES,
                     |other| matches!(other, ProtocolEvent::Status(status) if status.severity == severity),
                 );
             }
@@ -61,17 +67,17 @@ impl Outbox {
         self.events.push_back(event);
     }
 
-    /// Queues a status.
-    pub fn say(&mut self, severity: Severity, text: impl Into<String>) {
+    /// Queues a status message.
+    pub fn report(&mut self, severity: Severity, text: impl Into<String>) {
         self.push(ProtocolEvent::Status(Status { severity, text: text.into() }));
     }
 
-    /// The shot that was asked for did not come.
+    /// Queues the failure of the requested shot.
     pub fn fail(&mut self, failure: Failure) {
         self.push(ProtocolEvent::Failed(failure));
     }
 
-    /// The connection is of no use any more: what was not sent yet goes nowhere.
+    /// Queues the loss of the connection and discards outputs that were not sent.
     pub fn lose(&mut self, failure: Failure) {
         self.outputs.clear();
         self.push(ProtocolEvent::Lost(failure));
@@ -101,7 +107,7 @@ impl Outbox {
         })
     }
 
-    /// Of a status that waits twice the later one goes.
+    /// Removes the later copy of a status message that is queued twice.
     fn drop_repetition(&mut self, status: &Status) {
         let is_same = |event: &ProtocolEvent| matches!(event, ProtocolEvent::Status(other) if other == status);
         if self.events.iter().filter(|event| is_same(event)).count() > 1
@@ -111,11 +117,11 @@ impl Outbox {
         }
     }
 
-    /// Makes room for one more of a kind of which at most `limit` wait: the oldest behind the first `kept` goes.
-    fn make_room(&mut self, kept: usize, limit: usize, is_kind: impl Fn(&ProtocolEvent) -> bool) {
-        let places = || self.events.iter().enumerate().filter(|(_, event)| is_kind(event)).map(|(place, _)| place);
-        if places().count() >= limit
-            && let Some(oldest) = places().nth(kept)
+    /// Drops one event of a kind if `limit` of them are queued: the oldest one after the first `kept`.
+    fn drop_excess(&mut self, kept: usize, limit: usize, is_kind: impl Fn(&ProtocolEvent) -> bool) {
+        let indices = || self.events.iter().enumerate().filter(|(_, event)| is_kind(event)).map(|(index, _)| index);
+        if indices().count() >= limit
+            && let Some(oldest) = indices().nth(kept)
         {
             self.events.remove(oldest);
         }

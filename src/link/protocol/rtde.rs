@@ -1,51 +1,55 @@
-//! Universal Robots real-time data exchange over TCP, port 30004: the joint values that the controller measures.
+//! Universal Robots real-time data exchange over TCP, port 30004: the measured joint values of the controller.
 //!
-//! The set-up asks for version 2 of the protocol, the version of the controller and five values, then starts the stream. From
-//! then on every packet is a [`ProtocolEvent::Joints`]; a stream that is silent is lost. Nothing is ever written to the robot.
+//! The set-up requests version 2 of the protocol, the version of the controller and five values, then starts the stream. From
+//! then on every packet is a [`ProtocolEvent::Joints`]; a silent stream counts as lost. Nothing is ever written to the robot.
 //! There are no shots: a trigger is refused.
 
 pub mod mode;
 pub mod packet;
-mod stillness;
+mod rest;
 #[cfg(test)]
 mod tests;
 
 use std::time::Duration;
 
-pub use stillness::Stillness;
+pub use rest::RestDetector;
 
 use self::packet::{Framer, Packet, Record, TextMessage, encode, packet_type, request_version, set_up_outputs};
+use super::excerpt::excerpt;
 use super::outbox::Outbox;
-use super::text::shown;
 use super::{Failure, Identity, JointState, Moment, Protocol, ProtocolEvent, Severity};
 
 /// TCP port of the interface.
 pub const PORT: u16 = 30_004;
 
-/// Controllers drop clients that read too slowly; more than this is of no use here (Hz).
+/// Highest frequency (Hz). Controllers drop clients that read too slowly, and more is not needed here.
 pub const MAX_FREQUENCY: f64 = 25.0;
 
-/// The least that is asked for (Hz).
+/// Lowest frequency (Hz).
 pub const MIN_FREQUENCY: f64 = 1.0;
 
-/// How the robot is to be read.
+/// Options of the robot's stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RtdeOptions {
-    /// Packets per second (Hz), taken into [`MIN_FREQUENCY`] to [`MAX_FREQUENCY`].
+    /// Packets per second (Hz), clamped to [`MIN_FREQUENCY`] .. [`MAX_FREQUENCY`].
     pub frequency: f64,
-    /// An answer in the set-up comes within this.
-    pub patience: Duration,
-    /// A stream without data for this is lost; at a low frequency, without three packets.
-    pub silence: Duration,
+    /// Longest wait for an answer in the set-up.
+    pub answer_timeout: Duration,
+    /// A stream without data for this long counts as lost; at a low frequency, a stream that misses three packets.
+    pub stream_timeout: Duration,
 }
 
 impl Default for RtdeOptions {
     fn default() -> Self {
-        Self { frequency: MAX_FREQUENCY, patience: Duration::from_secs(5), silence: Duration::from_secs(1) }
+        Self {
+            frequency: MAX_FREQUENCY,
+            answer_timeout: Duration::from_secs(5),
+            stream_timeout: Duration::from_secs(1),
+        }
     }
 }
 
-/// What is awaited.
+/// The packet that is awaited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Off,
@@ -56,7 +60,7 @@ enum Phase {
     Data,
 }
 
-/// The conversation with a controller.
+/// Protocol driver of a controller.
 #[derive(Clone, Debug)]
 pub struct Rtde {
     options: RtdeOptions,
@@ -65,17 +69,17 @@ pub struct Rtde {
     phase: Phase,
     name: String,
     recipe: u8,
-    /// Robot mode and safety status of the packet before.
+    /// Robot mode and safety status of the previous packet.
     modes: Option<(i32, i32)>,
-    /// When what is awaited began to be awaited.
+    /// Start of the current wait.
     since: Moment,
 }
 
 impl Rtde {
-    /// A conversation that has not begun.
+    /// A driver that is not connected yet.
     pub fn new(options: RtdeOptions) -> Self {
         let is_number = options.frequency.is_finite();
-        let frequency = if is_number { options.frequency } else { MIN_FREQUENCY }.clamp(MIN_FREQUENCY, MAX_FREQUENCY);
+        let frequency = if is_number { options.frequency.clamp(MIN_FREQUENCY, MAX_FREQUENCY) } else { MIN_FREQUENCY };
         Self {
             options: RtdeOptions { frequency, ..options },
             outbox: Outbox::default(),
@@ -88,13 +92,17 @@ impl Rtde {
         }
     }
 
-    /// How long what is awaited may take.
-    fn patience(&self) -> Duration {
+    /// Longest duration of the current wait.
+    fn timeout(&self) -> Duration {
         let three_packets = Duration::from_secs_f64(3.0 / self.options.frequency);
-        if self.phase == Phase::Data { self.options.silence.max(three_packets) } else { self.options.patience }
+        if self.phase == Phase::Data {
+            self.options.stream_timeout.max(three_packets)
+        } else {
+            self.options.answer_timeout
+        }
     }
 
-    /// Sends a request and awaits its answer.
+    /// Sends a request and waits for its answer.
     fn ask(&mut self, phase: Phase, request: Vec<u8>, now: Moment) {
         self.phase = phase;
         self.since = now;
@@ -109,7 +117,7 @@ impl Rtde {
                 self.ask(Phase::ControllerVersion, request, now);
             }
             (Phase::ProtocolVersion, Packet::ProtocolVersion(false)) => {
-                let text = "version 2 of the interface; the controller needs newer software";
+                let text = "version 2 of the interface; update the software of the controller";
                 self.lose(Failure::Refused(text.to_owned()));
             }
             (Phase::ControllerVersion, Packet::ControllerVersion([major, minor, fix, build])) => {
@@ -130,8 +138,8 @@ impl Rtde {
             }
             (Phase::Data, Packet::Data { recipe, values }) if recipe == self.recipe => self.take_data(&values, now),
             (Phase::Data, Packet::Data { recipe, .. }) => {
-                let text = format!("skipped data of recipe {recipe}; recipe {} was asked for", self.recipe);
-                self.outbox.say(Severity::Warning, text);
+                let text = format!("skipped data of recipe {recipe} instead of {}", self.recipe);
+                self.outbox.report(Severity::Warning, text);
             }
             _ => {}
         }
@@ -139,20 +147,20 @@ impl Rtde {
 
     fn take_text(&mut self, message: &TextMessage) {
         let severity = if message.level >= 3 { Severity::Info } else { Severity::Warning };
-        self.outbox.say(severity, format!("{}: {}", message.source, message.text));
+        self.outbox.report(severity, format!("{}: {}", message.source, message.text));
     }
 
-    /// Every value has to be there, with the type that it is read as.
+    /// Checks that every requested value is available with the expected type.
     fn take_types(&mut self, recipe: u8, types: &[String], now: Moment) {
         let in_use: Vec<&str> = refused(types, "IN_USE");
         let not_found = refused(types, "NOT_FOUND");
         if !in_use.is_empty() {
-            self.lose(Failure::InUse(format!("another program has {}", in_use.join(", "))));
+            self.lose(Failure::InUse(format!("another program uses {}", in_use.join(", "))));
         } else if !not_found.is_empty() {
             self.lose(Failure::Refused(format!("the controller does not know {}", not_found.join(", "))));
         } else if types.iter().ne(Record::FIELDS.iter().map(|(_, kind)| kind)) {
-            let types = shown(&types.join(","));
-            self.lose(Failure::Garbled(format!("the controller announced values of other types: {types}")));
+            let types = excerpt(&types.join(","));
+            self.lose(Failure::Garbled(format!("unexpected types of the values: {types}")));
         } else {
             self.recipe = recipe;
             self.ask(Phase::Start, encode(packet_type::CONTROL_PACKAGE_START, &[]), now);
@@ -168,7 +176,7 @@ impl Rtde {
         self.since = now;
         self.watch_modes(&record);
         if !record.is_finite() {
-            self.outbox.say(Severity::Warning, "the controller reported a joint value that is no finite number");
+            self.outbox.report(Severity::Warning, "the controller reported a joint value that is not a finite number");
             return;
         }
         let is_normal = record.safety_status == mode::SAFETY_NORMAL;
@@ -180,18 +188,18 @@ impl Rtde {
         }));
     }
 
-    /// Says changes of the modes, and at the beginning what is not as usual.
+    /// Reports changes of the modes, and at the start any unusual ones.
     fn watch_modes(&mut self, record: &Record) {
         let usual = (mode::MODE_RUNNING, mode::SAFETY_NORMAL);
         let (robot_mode, safety_status) =
             self.modes.replace((record.robot_mode, record.safety_status)).unwrap_or(usual);
         if robot_mode != record.robot_mode {
-            self.outbox.say(Severity::Info, format!("robot mode: {}", mode::robot_mode(record.robot_mode)));
+            self.outbox.report(Severity::Info, format!("robot mode: {}", mode::robot_mode(record.robot_mode)));
         }
         if safety_status != record.safety_status {
             let is_normal = record.safety_status == mode::SAFETY_NORMAL;
             let severity = if is_normal { Severity::Info } else { Severity::Warning };
-            self.outbox.say(severity, format!("safety status: {}", mode::safety_status(record.safety_status)));
+            self.outbox.report(severity, format!("safety status: {}", mode::safety_status(record.safety_status)));
         }
     }
 
@@ -202,7 +210,7 @@ impl Rtde {
     }
 }
 
-/// The names whose type says that they are refused.
+/// Names of the values that were refused with this word in place of a type.
 fn refused(types: &[String], word: &str) -> Vec<&'static str> {
     let pairs = Record::FIELDS.iter().zip(types);
     pairs.filter(|(_, kind)| *kind == word).map(|((name, _), _)| *name).collect()
@@ -228,8 +236,8 @@ impl Protocol for Rtde {
         if self.phase == Phase::ProtocolVersion
             && let Err(error) = self.framer.check_header()
         {
-            // Nothing was understood so far: this never was a controller.
-            self.lose(Failure::Foreign(format!("no RTDE comes: {error}")));
+            // No packet was understood so far, so the other end is not a controller.
+            self.lose(Failure::Foreign(format!("it does not use RTDE: {error}")));
             return;
         }
         while self.phase != Phase::Off {
@@ -246,19 +254,19 @@ impl Protocol for Rtde {
     }
 
     fn tick(&mut self, now: Moment) {
-        if self.phase == Phase::Off || now < self.since.saturating_add(self.patience()) {
+        if self.phase == Phase::Off || now < self.since.saturating_add(self.timeout()) {
             return;
         }
         let what = match self.phase {
-            Phase::Data => "joint values were awaited",
-            _ => "the stream of joint values was set up",
+            Phase::Data => "waiting for joint values",
+            _ => "setting up the stream of joint values",
         };
         let seconds = now.saturating_sub(self.since).as_secs_f64();
         self.lose(Failure::Silent { what: what.to_owned(), seconds });
     }
 
     fn trigger(&mut self, _now: Moment) {
-        let text = "a robot controller has joint values and no shots".to_owned();
+        let text = "a robot controller reports joint values and takes no shots".to_owned();
         self.outbox.fail(Failure::Refused(text));
     }
 
@@ -273,13 +281,13 @@ impl Protocol for Rtde {
     }
 
     fn next_deadline(&self) -> Option<Moment> {
-        (self.phase != Phase::Off).then(|| self.since.saturating_add(self.patience()))
+        (self.phase != Phase::Off).then(|| self.since.saturating_add(self.timeout()))
     }
 }
 
 #[cfg(test)]
 impl Rtde {
-    /// Bytes that wait for the rest of a packet.
+    /// Bytes of an incomplete packet.
     pub(in crate::link) fn pending(&self) -> usize {
         self.framer.pending()
     }

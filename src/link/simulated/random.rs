@@ -1,4 +1,4 @@
-//! Random numbers of a simulated cell: each use has its own sequence, fixed by the seed.
+//! Random numbers of a simulated cell: each purpose has its own sequence, determined by the seed.
 
 use std::f64::consts::TAU;
 
@@ -8,12 +8,12 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::session::simulation::FaultKind;
 
-/// What random numbers are drawn for. Uses do not disturb each other: a fault more does not change the noise.
+/// Purpose of random numbers. Purposes are independent: an additional fault does not change the noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Use {
-    /// The deviations of the arm.
+    /// Deviations of the arm.
     Arm,
-    /// Where the tracker stands.
+    /// Pose of the tracker.
     Tracker,
     /// Noise of the measurement with this number.
     Noise(u64),
@@ -22,7 +22,7 @@ pub(super) enum Use {
 }
 
 impl Use {
-    /// Uses in the highest byte, numbers of measurements below.
+    /// Number of the random stream: the purpose in the highest byte, the measurement below.
     const fn stream(self) -> u64 {
         let (purpose, number) = match self {
             Self::Arm => (0, 0),
@@ -73,7 +73,7 @@ impl Random {
         Unit::try_new(self.normals(), f64::MIN_POSITIVE).map_or_else(Vector3::x, Unit::into_inner)
     }
 
-    /// A frame within about `spread` (m) of `place`, turned anyhow.
+    /// A frame with a random orientation, within about `spread` (m) of `place`.
     pub(super) fn frame_near(&mut self, place: &Point3<f64>, spread: f64) -> Isometry3<f64> {
         let origin = place.coords + self.normals() * spread;
         let vector = self.normals();

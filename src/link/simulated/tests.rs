@@ -237,12 +237,12 @@ fn what_cannot_be_simulated_is_said() {
         refused("epson_ls3_b401s", Truth::Drawn, None, "mistyped-joint@1:j3:5deg"),
     ];
     insta::assert_snapshot!(messages.join("\n"), @r"
-    the true deviations of the method paper belong to its arm (profile 'soochow'), not to 'ur5e': there alpha1 is -90 deg, here 90; take drawn or nominal ones
-    the true deviations of the method paper belong to its arm (profile 'soochow'), not to 'franka_panda': that one has six joints in the standard convention; take drawn or nominal ones
-    the noise is -1 mm; it must be a number from 0 on
+    the true deviations of the method paper belong to its arm (profile 'soochow'), not to 'ur5e': alpha1 is -90 deg in the paper and 90 in the profile; use drawn or nominal ones
+    the true deviations of the method paper belong to its arm (profile 'soochow'), not to 'franka_panda': the paper's arm has six joints in the standard convention; use drawn or nominal ones
+    the noise is -1 mm; it must be a number of at least 0
     fault 'joint-sign@1:j7': 'soochow' has 6 joints
-    fault 'mistyped-joint@1:j2:5mm': joint J2 is counted in deg
-    fault 'mistyped-joint@1:j3:5deg': joint J3 is counted in mm
+    fault 'mistyped-joint@1:j2:5mm': joint J2 is in deg
+    fault 'mistyped-joint@1:j3:5deg': joint J3 is in mm
     ");
     let short = MeasureRequest { configuration: vec![0.0; 3], ..request(1) };
     assert!(matches!(cell(&[]).measure(&short, &|| true), Err(LinkError::SetUp(_))));

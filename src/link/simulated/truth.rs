@@ -1,4 +1,4 @@
-//! The arm that hides in a simulated cell.
+//! The true arm of a simulated cell.
 
 use nalgebra::Isometry3;
 
@@ -9,11 +9,11 @@ use crate::profile::{Level, Profile};
 use crate::session::simulation::Truth;
 use crate::units::{MILLIMETRE, from_deg, from_mm, to_mm};
 
-/// A drawn target is not farther than this from its nominal place, one standard deviation per coordinate (m). The uncertainty
-/// of a profile may cover a whole flange; a technician's ruler is better than that.
+/// Largest standard deviation per coordinate of a drawn target (m). The uncertainty in a profile may cover a whole flange; a
+/// technician with a ruler measures better than that.
 const TARGET_SPREAD: f64 = 2.0 * MILLIMETRE;
 
-/// A geometry is the paper's if no constant differs by more (m) or (rad).
+/// Largest difference of a constant from that of the method paper's arm (m or rad).
 const SAME_GEOMETRY: f64 = 1e-6;
 
 /// Table I of the method paper: α (deg), a (mm), d (mm), θ (deg) per joint.
@@ -39,19 +39,19 @@ const TABLE_II: [[f64; 4]; 6] = [
 /// Table II: Δβ of joint 2 (deg).
 const TABLE_II_BETA_2: f64 = 0.155;
 
-/// The constants of a row of the tables, in its order.
+/// Constants of a table row, in order.
 const COLUMNS: [LinkParameter; 4] = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
 
-/// What a simulated cell is really like, and what an identification should find.
+/// The true geometry of a simulated cell, which an identification should find.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HiddenArm {
     /// The arm, with its targets before any bump.
     pub arm: Arm,
-    /// Where the tracker stands.
+    /// Pose of the tracker.
     pub base_from_tracker: Isometry3<f64>,
 }
 
-/// Deviations from nominal ((m) or (rad)), target coordinates among them.
+/// Deviations from nominal (m or rad), including target coordinates.
 pub(super) fn deviations(profile: &Profile, truth: Truth, seed: u64) -> Result<Vec<(ParameterId, f64)>, LinkError> {
     match truth {
         Truth::Nominal => Ok(Vec::new()),
@@ -68,7 +68,7 @@ pub(super) fn deviations(profile: &Profile, truth: Truth, seed: u64) -> Result<V
             is_paper_arm(profile.chain())
                 .map_err(|difference| {
                     LinkError::SetUp(format!(
-                        "the true deviations of the method paper belong to its arm (profile 'soochow'), not to '{}': {difference}; take drawn or nominal ones",
+                        "the true deviations of the method paper belong to its arm (profile 'soochow'), not to '{}': {difference}; use drawn or nominal ones",
                         profile.name()
                     ))
                 })
@@ -89,17 +89,17 @@ fn paper_deviations() -> Vec<(ParameterId, f64)> {
     rows.chain([(beta, from_deg(TABLE_II_BETA_2))]).collect()
 }
 
-/// Whether a chain is that of table I; the first difference if not.
+/// Checks that a chain is that of table I; returns the first difference otherwise.
 fn is_paper_arm(chain: &KinematicChain) -> Result<(), String> {
     if chain.convention() != Convention::Standard || chain.dof() != TABLE_I.len() {
-        return Err("that one has six joints in the standard convention".to_owned());
+        return Err("the paper's arm has six joints in the standard convention".to_owned());
     }
     for (index, (joint, row)) in chain.joints().iter().zip(TABLE_I).enumerate() {
         let is_plain = joint.joint_type == JointType::Revolute
             && joint.direction > 0.0
             && joint.coupling.iter().all(|coupling| coupling.abs() <= 0.0);
         if !is_plain {
-            return Err(format!("there joint {} turns by its pendant value, without a coupling", joint.name));
+            return Err(format!("in the paper, joint {} turns by its pendant value, without a coupling", joint.name));
         }
         for (parameter, value) in COLUMNS.into_iter().zip(row) {
             let id = ParameterId::Link { joint: index, parameter };
@@ -107,17 +107,24 @@ fn is_paper_arm(chain: &KinematicChain) -> Result<(), String> {
             let quantity = parameter.quantity();
             let excess = (here - quantity.from_edge(value)).abs();
             if excess.is_nan() || excess > SAME_GEOMETRY {
-                return Err(format!("there {id} is {value} {}, here {}", quantity.unit(), quantity.to_edge(here)));
+                return Err(format!(
+                    "{id} is {value} {} in the paper and {} in the profile",
+                    quantity.unit(),
+                    quantity.to_edge(here)
+                ));
             }
         }
         if joint.link.beta.abs() > SAME_GEOMETRY {
-            return Err(format!("there beta{} is zero", index + 1));
+            return Err(format!("beta{} is zero in the paper", index + 1));
         }
     }
-    // Fixed frames around the arm change no distance, but a target would sit elsewhere.
+    // A fixed frame at the flange changes no distance between flange poses, but it would move the targets.
     let offset = chain.flange().translation.vector.norm();
     if offset > from_mm(SAME_GEOMETRY) || chain.flange().rotation.angle() > SAME_GEOMETRY {
-        return Err(format!("there the flange is the last link frame, here it is {} mm from it", to_mm(offset)));
+        return Err(format!(
+            "the paper's flange is the last link frame, the profile's is {} mm from it",
+            to_mm(offset)
+        ));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! A program or gauge that prints one line per point, by the same settings as the driver.
+//! A simulated program or gauge that prints one line per point, with the same options as the driver.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -21,50 +21,50 @@ use crate::link::protocol::ascii::unescape;
 use crate::link::protocol::crc::crc16_arc;
 use crate::link::protocol::crc::nmea_xor;
 
-/// What it says when there is no point, in the words of T2SA.
+/// Line for a missing point, in the form of T2SA.
 const ERROR_TEXT: &str = "ERR-305 point measurement failed";
 
-/// Time between two lines of a stream.
+/// Interval of the lines of a stream.
 const PERIOD: Duration = Duration::from_millis(100);
 
 /// Time from a trigger to its line.
 const MEASURING: Duration = Duration::from_millis(300);
 
-/// How late a late answer is: later than any driver waits.
+/// Delay of a late answer, longer than the driver waits.
 const LATE: Duration = Duration::from_secs(40);
 
-/// Bytes kept of a trigger that is not complete.
+/// Most bytes of an incomplete trigger.
 const MAX_RECEIVED: usize = 4096;
 
-/// Most triggers that wait for their line.
+/// Most triggers in progress.
 const MAX_MEASURING: usize = 256;
 
 faults! {
-    /// What can go wrong with a line.
+    /// A fault of the simulated line source. Its occasion is a line.
     pub AsciiFault {
-        Halves "halves" "Half the line, a pause, the other half.",
-        Cut "cut" "Half the line, then its end: the rest is lost.",
+        Halves "halves" "The line in two halves with a pause between them.",
+        Cut "cut" "Half the line, then its terminator; the rest is lost.",
         TwoInOne "two-in-one" "Two lines in one write.",
-        Joined "joined" "Two lines with no end between them.",
-        CarriageReturnOnly "carriage-return-only" "CR alone ends the line.",
-        DecimalComma "decimal-comma" "The other decimal sign than the one that was set.",
-        NotANumber "not-a-number" "`NaN` for a coordinate.",
+        Joined "joined" "Two lines without a terminator between them.",
+        CarriageReturnOnly "carriage-return-only" "The line ends with CR alone.",
+        DecimalComma "decimal-comma" "The wrong decimal sign.",
+        NotANumber "not-a-number" "A coordinate is `NaN`.",
         Thousands "thousands" "Digits grouped in thousands: `1,234.5`.",
         EmptyLines "empty-lines" "Some empty lines before the line.",
-        LongLine "long-line" "10,000 bytes without an end before the line.",
-        ErrorText "error-text" "An error text in place of the line.",
-        StaleRepeat "stale-repeat" "The line before again.",
-        DisconnectMidLine "disconnect-mid-line" "Hangs up in the middle of the line.",
-        Origin "origin" "0, 0, 0: what some programs print when a measurement failed.",
-        WrongUnit "wrong-unit" "A point a thousand times too far: metres taken for millimetres.",
-        BitError "bit-error" "A digit that changed on the way; a check value shows it.",
-        Noise "noise" "Bytes as they look at a wrong baud rate.",
+        LongLine "long-line" "10,000 bytes without a terminator before the line.",
+        ErrorText "error-text" "An error message instead of the line.",
+        StaleRepeat "stale-repeat" "The previous line again.",
+        DisconnectMidLine "disconnect-mid-line" "The connection is closed in the middle of the line.",
+        Origin "origin" "0, 0, 0, as some programs print after a failed measurement.",
+        WrongUnit "wrong-unit" "A point a million times too far: the wrong unit.",
+        BitError "bit-error" "A digit changed in transit; a check sum detects it.",
+        Noise "noise" "Bytes as received at a wrong baud rate.",
         Silent "silent" "Nothing is sent.",
-        Late "late" "The line comes long after the driver gave up.",
+        Late "late" "The line arrives long after the driver gave up.",
     }
 }
 
-/// Prints lines: one for each trigger, or ten per second.
+/// A simulated line source: one line per trigger, or ten per second.
 #[derive(Debug)]
 pub struct AsciiSimulator {
     options: AsciiOptions,
@@ -79,7 +79,7 @@ pub struct AsciiSimulator {
 }
 
 impl AsciiSimulator {
-    /// Fails where [`AsciiOptions::validate`] does. A layout by regular expression is answered in the words of T2SA.
+    /// Fails if [`AsciiOptions::validate`] does. With a layout by regular expression it answers in the form of T2SA.
     pub fn new(options: AsciiOptions, faults: impl IntoIterator<Item = Planned<AsciiFault>>) -> Result<Self, String> {
         options.validate()?;
         let trigger = match &options.mode {
@@ -99,12 +99,12 @@ impl AsciiSimulator {
         })
     }
 
-    /// Bytes of a trigger that is not complete, for the bound of the memory.
+    /// Bytes of an incomplete trigger.
     pub const fn pending(&self) -> usize {
         self.received.len()
     }
 
-    /// Prints one line, with the fault that is due.
+    /// Prints one line, with any fault that is due.
     fn print(&mut self, source: &mut dyn PointSource, now: Moment) {
         let fault = self.faults.occasion(|_| true);
         self.printed = self.printed.saturating_add(1);
@@ -194,7 +194,7 @@ impl AsciiSimulator {
         })
     }
 
-    /// Ten digits after the point: less than a nanometre in every unit.
+    /// A number with ten decimals, which is finer than a nanometre in every unit.
     fn number(&self, value: f64, fault: Option<AsciiFault>) -> String {
         let text = format!("{value:.10}");
         let own = if self.options.decimal_sign == DecimalSign::Comma { "," } else { "." };
@@ -205,7 +205,7 @@ impl AsciiSimulator {
         }
     }
 
-    /// The line with its check value and end.
+    /// The line with its check sum and terminator.
     fn line(&self, body: &str) -> String {
         match self.options.checksum {
             Checksum::None => format!("{body}\r\n"),
@@ -215,7 +215,7 @@ impl AsciiSimulator {
     }
 }
 
-/// The last digit plus one: still a number, but another.
+/// Increments a digit, so that the result is still a number.
 fn with_digit_changed(mut bytes: Vec<u8>) -> Vec<u8> {
     if let Some(digit) = bytes.iter_mut().find(|byte| byte.is_ascii_digit()) {
         *digit = if *digit == b'9' { b'0' } else { *digit + 1 };

@@ -1,7 +1,8 @@
-//! A protocol and a simulator face to face, with virtual time: what one sends the other gets, and when nothing moves any more
-//! the time goes on to the next deadline.
+//! Connects a protocol to a simulator in virtual time: each receives what the other sends, and when nothing is left to send, the
+//! time advances to the next deadline.
 //!
-//! What the protocol was given is on a [`Tape`], to be given again in other pieces or damaged: see [`streams`] and [`fuzz`].
+//! The inputs of the protocol are recorded on a [`Tape`], for replays that are split differently or damaged: see [`streams`] and
+//! [`fuzz`].
 
 mod cell;
 pub mod fuzz;
@@ -10,20 +11,20 @@ mod tests;
 
 use std::time::Duration;
 
-pub use cell::Cell;
+pub use cell::MockCell;
 pub use streams::{Input, Tape};
 
 use super::{Output, Simulator};
 use crate::link::protocol::{Failure, Moment, Protocol, ProtocolEvent};
 
-/// Virtual time at the beginning: not zero, for only differences matter.
+/// Virtual start time. It is not zero, because only differences may matter.
 pub const START: Moment = Duration::from_secs(100);
 
-/// Exchanges and deadlines at one moment, above which the two go on for ever.
+/// Most exchanges and deadlines at one time; more mean an endless loop.
 const MAX_EXCHANGES: u32 = 100_000;
 
-/// An event is waited for so long.
-const PATIENCE: Duration = Duration::from_mins(10);
+/// Longest wait for an event.
+const EVENT_TIMEOUT: Duration = Duration::from_mins(10);
 
 /// Both ends of a wire.
 #[derive(Debug)]
@@ -32,26 +33,25 @@ pub struct Bench<P, S> {
     pub protocol: P,
     /// The far end.
     pub simulator: S,
-    /// What the far end looks at.
-    pub cell: Cell,
+    /// Source of the far end's measurements.
+    pub cell: MockCell,
     /// Virtual time.
     pub now: Moment,
-    /// Everything that the protocol sent.
+    /// Everything the protocol sent.
     pub sent: Vec<Vec<u8>>,
-    /// Everything that the protocol was given.
+    /// Everything the protocol received.
     pub tape: Tape,
     is_connected: bool,
-    /// Exchanges and deadlines since the time went on.
+    /// Exchanges and deadlines since the time advanced.
     exchanges: u32,
 }
 
 impl<P: Protocol, S: Simulator> Bench<P, S> {
-    /// Not connected yet.
     pub fn new(protocol: P, simulator: S) -> Self {
         Self {
             protocol,
             simulator,
-            cell: Cell::default(),
+            cell: MockCell::default(),
             now: START,
             sent: Vec::new(),
             tape: Tape::default(),
@@ -60,43 +60,43 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
         }
     }
 
-    /// Virtual time that has passed.
+    /// Virtual time since the start.
     pub fn elapsed(&self) -> Duration {
         self.now.saturating_sub(START)
     }
 
-    /// Connects, or connects again.
+    /// Connects or reconnects.
     pub fn connect(&mut self) {
         self.is_connected = true;
         self.simulator.accept(self.now);
-        self.give(Input::Start(self.now));
+        self.pass(Input::Start(self.now));
     }
 
-    /// Connects and waits until the link is ready or lost; what was said on the way.
+    /// Connects, waits until the link is ready or lost, and returns all events.
     pub fn settle(&mut self) -> Vec<ProtocolEvent> {
         self.connect();
         self.run_until(|event| matches!(event, ProtocolEvent::Ready(_) | ProtocolEvent::Lost(_)))
     }
 
-    /// Asks for a shot, and does not wait.
+    /// Requests a shot without waiting for it.
     pub fn trigger(&mut self) {
-        self.give(Input::Trigger(self.now));
+        self.pass(Input::Trigger(self.now));
     }
 
-    /// Gives up the shot under way.
+    /// Cancels the shot in progress.
     pub fn cancel(&mut self) {
-        self.give(Input::Cancel(self.now));
+        self.pass(Input::Cancel(self.now));
     }
 
-    /// Asks for a shot and waits until it is there, has failed or the link is lost: what was said on the way, the answer last.
+    /// Requests a shot, waits until it is answered or the link is lost, and returns all events, the answer last.
     pub fn shoot(&mut self) -> Vec<ProtocolEvent> {
         self.trigger();
         self.run_until(|event| is_answer(event) || matches!(event, ProtocolEvent::Lost(_)))
     }
 
-    /// Goes on until an event is as asked for, for ten minutes at most.
+    /// Runs until `is_last` accepts an event, at most ten minutes, and returns all events.
     pub fn run_until(&mut self, is_last: impl Fn(&ProtocolEvent) -> bool) -> Vec<ProtocolEvent> {
-        let end = self.now + PATIENCE;
+        let end = self.now + EVENT_TIMEOUT;
         let mut events = Vec::new();
         loop {
             if self.drain(&mut events, &is_last) || !self.advance(end) {
@@ -105,7 +105,7 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
         }
     }
 
-    /// Goes on for a time.
+    /// Runs for a time and returns all events.
     pub fn run_for(&mut self, duration: Duration) -> Vec<ProtocolEvent> {
         let end = self.now + duration;
         let mut events = Vec::new();
@@ -117,32 +117,32 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
         }
     }
 
-    /// Bytes that a test held back arrive at the simulator.
+    /// Passes bytes to the simulator.
     pub fn simulator_gets(&mut self, bytes: &[u8]) {
         self.simulator.feed(bytes, &mut self.cell, self.now);
     }
 
-    /// The cable is pulled: nothing arrives any more, on either side, and nobody is told.
+    /// Pulls the cable: nothing arrives on either side, and neither is notified.
     pub fn unplug(&mut self) {
         self.is_connected = false;
     }
 
-    /// One write goes to the simulator, and what it answers comes back.
+    /// Passes one write to the simulator and its answers to the protocol.
     pub fn step(&mut self) {
         if let Some(bytes) = self.protocol.next_output() {
             self.simulator_gets(&bytes);
         }
         while let Some(Output::Bytes(bytes)) = self.simulator.next_output() {
-            self.give(Input::Feed(bytes, self.now));
+            self.pass(Input::Feed(bytes, self.now));
         }
     }
 
-    fn give(&mut self, input: Input) {
-        input.give_to(&mut self.protocol);
+    fn pass(&mut self, input: Input) {
+        input.pass_to(&mut self.protocol);
         self.tape.0.push(input);
     }
 
-    /// Moves bytes until there are none; true once an event is as asked for.
+    /// Moves bytes until there are none left; `true` once `is_last` accepts an event.
     fn drain(&mut self, events: &mut Vec<ProtocolEvent>, is_last: &impl Fn(&ProtocolEvent) -> bool) -> bool {
         let mut has_moved = true;
         while has_moved {
@@ -174,14 +174,14 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
         false
     }
 
-    /// What the simulator does reaches the protocol; what the owner of a socket says when the other side hangs up.
+    /// Passes an output of the simulator to the protocol. Returns the event for the end of a connection.
     fn deliver(&mut self, output: Output) -> Option<ProtocolEvent> {
         if !self.is_connected {
             return None;
         }
         match output {
             Output::Bytes(bytes) => {
-                self.give(Input::Feed(bytes, self.now));
+                self.pass(Input::Feed(bytes, self.now));
                 None
             }
             Output::Close => {
@@ -191,7 +191,7 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
         }
     }
 
-    /// Goes to the next deadline; false where there is none before the end.
+    /// Advances to the next deadline; `false` if there is none before the end.
     fn advance(&mut self, end: Moment) -> bool {
         let deadlines = [self.protocol.next_deadline(), self.simulator.next_deadline()];
         let next = deadlines.into_iter().flatten().min().filter(|next| *next <= end);
@@ -201,18 +201,18 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
         }
         self.count_exchange();
         self.now = then;
-        self.give(Input::Tick(then));
+        self.pass(Input::Tick(then));
         self.simulator.tick(&mut self.cell, then);
         next.is_some()
     }
 
     fn count_exchange(&mut self) {
         self.exchanges += 1;
-        assert!(self.exchanges < MAX_EXCHANGES, "the two ends go on for ever at {:?}", self.now);
+        assert!(self.exchanges < MAX_EXCHANGES, "endless exchange at {:?}", self.now);
     }
 }
 
-/// A trigger was answered.
+/// Whether an event answers a trigger.
 pub const fn is_answer(event: &ProtocolEvent) -> bool {
     matches!(event, ProtocolEvent::Shot(_) | ProtocolEvent::Failed(_))
 }
@@ -220,7 +220,7 @@ pub const fn is_answer(event: &ProtocolEvent) -> bool {
 /// Bytes of a text of hexadecimal digits.
 ///
 /// # Panics
-/// It is none.
+/// The text contains anything else.
 pub fn hex(text: &str) -> Vec<u8> {
     let digits: String = text.split_whitespace().collect();
     let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();

@@ -1,8 +1,8 @@
-//! A Leica emScon tracker that is not there: the other end of [`crate::link::protocol::emscon`].
+//! A simulated Leica emScon tracker: the other end of [`crate::link::protocol::emscon`].
 //!
-//! It keeps its settings from one connection to the next and starts with none of those that a set-up asks for. It measures in
-//! right-handed and spherical coordinates, in every unit of length and angle; other coordinate types are refused as not
-//! implemented. It behaves as public descriptions say that a tracker does; no real one was at hand.
+//! It keeps its settings between connections, and its initial settings all differ from those that a set-up asks for. It
+//! measures in right-handed and spherical coordinates, in every unit of length and angle; other coordinate types are refused
+//! as not implemented. It follows public descriptions of the interface and was never compared with a real tracker.
 
 mod fault;
 mod result;
@@ -25,13 +25,13 @@ use crate::link::protocol::emscon::{
     CommandId, CoordinateType, Framer, LaserStatus, ProcessorStatus, ResultStatus, SystemEvent, TrackerStatus, i32_at,
 };
 
-/// Positions of the reflector are sent this often.
+/// Interval of the reflector positions.
 const POSITION_INTERVAL: Duration = Duration::from_millis(300);
 
-/// The initialisation takes this long.
+/// Duration of the initialisation.
 const INITIALIZATION: Duration = Duration::from_secs(20);
 
-/// Something that takes time.
+/// A task that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Work {
     Initialize,
@@ -72,9 +72,9 @@ impl EmsconSimulator {
         self.writes.send(packet);
     }
 
-    /// Says that something happened, if it was told to talk.
-    fn tell(&mut self, event: SystemEvent) {
-        if self.tracker.is_talkative() {
+    /// Sends an event, if unsolicited messages are on.
+    fn announce(&mut self, event: SystemEvent) {
+        if self.tracker.sends_events() {
             self.send(PacketWriter::event(event).finish());
         }
     }
@@ -86,14 +86,14 @@ impl EmsconSimulator {
         self.writes.close();
     }
 
-    fn obey(&mut self, request: &[u8], source: &mut dyn PointSource, now: Moment) {
+    fn execute(&mut self, request: &[u8], source: &mut dyn PointSource, now: Moment) {
         let (Some(0), Some(number)) = (i32_at(request, 4), i32_at(request, 8)) else { return };
         let command = CommandId::from_number(number);
         if self.is_mute || self.is_refused(command) {
             return;
         }
         if let Some(answers) = self.tracker.answer(command, request) {
-            self.resist(command);
+            self.misapply(command);
             for answer in answers {
                 self.send(answer);
             }
@@ -115,7 +115,7 @@ impl EmsconSimulator {
         }
     }
 
-    /// A command that a planned fault does not let through.
+    /// Refuses a command if a fault is planned for it.
     fn is_refused(&mut self, command: CommandId) -> bool {
         if command == CommandId::SetStationaryModeParams && self.faults.strikes(EmsconFault::NoStationary) {
             self.send(PacketWriter::reply(command, ResultStatus::NotImplemented).finish());
@@ -124,8 +124,8 @@ impl EmsconSimulator {
         false
     }
 
-    /// Accepts a setting and keeps another, where that is planned.
-    fn resist(&mut self, command: CommandId) {
+    /// Changes an accepted setting if a fault is planned for it.
+    fn misapply(&mut self, command: CommandId) {
         if command == CommandId::SetUnits && self.faults.strikes(EmsconFault::Metres) {
             self.tracker.units[0] = 0;
         }
@@ -149,7 +149,7 @@ impl EmsconSimulator {
     fn tracker_status(&self, source: &mut dyn PointSource) -> TrackerStatus {
         if self.work.is_some() {
             TrackerStatus::Busy
-        } else if self.tracker.is_initialized && source.look().is_some() {
+        } else if self.tracker.is_initialized && source.position().is_some() {
             TrackerStatus::Ready
         } else {
             TrackerStatus::NotReady
@@ -165,19 +165,16 @@ impl EmsconSimulator {
         if self.faults.strikes(EmsconFault::Early) {
             self.send_result(source);
         }
-        let status = match () {
-            () if self.faults.strikes(EmsconFault::Busy) || self.work.is_some() => ResultStatus::ServerBusy,
-            () if self.faults.strikes(EmsconFault::NotReady) || source.look().is_none() => {
-                self.send(PacketWriter::error(command, ResultStatus::MeasurementStatusNotReady).finish());
-                return;
-            }
-            () => ResultStatus::AllOk,
-        };
-        self.send(PacketWriter::reply(command, status).finish());
-        if status != ResultStatus::AllOk {
+        if self.faults.strikes(EmsconFault::Busy) || self.work.is_some() {
+            self.send(PacketWriter::reply(command, ResultStatus::ServerBusy).finish());
             return;
         }
-        self.tell(SystemEvent::MeasStatusBusy);
+        if self.faults.strikes(EmsconFault::NotReady) || source.position().is_none() {
+            self.send(PacketWriter::error(command, ResultStatus::MeasurementStatusNotReady).finish());
+            return;
+        }
+        self.send(PacketWriter::reply(command, ResultStatus::AllOk).finish());
+        self.announce(SystemEvent::MeasStatusBusy);
         let duration = Duration::from_millis(u64::try_from(self.tracker.stationary[0]).unwrap_or(0));
         self.work = Some((Work::Measure, now + duration));
         if self.is_instant {
@@ -197,29 +194,29 @@ impl EmsconSimulator {
                     SystemEvent::MeasStatusReady,
                     SystemEvent::StatisticModeChanged,
                 ] {
-                    self.tell(event);
+                    self.announce(event);
                 }
             }
         }
     }
 
-    /// Another program changes a setting, where that is planned. A real tracker announces it to everybody.
-    fn disturb(&mut self) {
+    /// Lets another program change a setting, if planned. A real tracker announces changes to all clients.
+    fn interfere(&mut self) {
         if self.faults.strikes(EmsconFault::UnitsChanged) {
             self.tracker.units = [0, 1, 0, 0, 0];
-            self.tell(SystemEvent::UnitsChanged);
+            self.announce(SystemEvent::UnitsChanged);
         }
         if self.faults.strikes(EmsconFault::TypeChanged) {
             self.tracker.coordinate_type = CoordinateType::SphericalCounterClockwise;
-            self.tell(SystemEvent::CoordinateSystemTypeChanged);
+            self.announce(SystemEvent::CoordinateSystemTypeChanged);
         }
         if self.faults.strikes(EmsconFault::FrameChanged) {
             self.tracker.orientation[0] = 100.0;
-            self.tell(SystemEvent::StationOrientationParamsChanged);
+            self.announce(SystemEvent::StationOrientationParamsChanged);
         }
         if self.faults.strikes(EmsconFault::ReflectorChanged) {
             self.tracker.reflector = 1;
-            self.tell(SystemEvent::ReflectorChanged);
+            self.announce(SystemEvent::ReflectorChanged);
         }
     }
 }
@@ -258,7 +255,7 @@ impl Simulator for EmsconSimulator {
         }
         while self.is_connected {
             match self.framer.next_packet() {
-                Ok(Some(request)) => self.obey(&request, source, now),
+                Ok(Some(request)) => self.execute(&request, source, now),
                 Ok(None) => break,
                 Err(_) => self.hang_up(),
             }
@@ -298,14 +295,14 @@ impl Simulator for EmsconSimulator {
 
 #[cfg(test)]
 impl EmsconSimulator {
-    /// Another program has the transformation applied; a real tracker announces it to everybody.
+    /// Lets another program switch on the transformation. A real tracker announces changes to all clients.
     pub(in crate::link) fn apply_transformation(&mut self) {
         self.tracker.settings[1] = 1;
-        self.tell(SystemEvent::SystemSettingsChanged);
+        self.announce(SystemEvent::SystemSettingsChanged);
         self.writes.flush();
     }
 
-    /// Bytes that wait for the rest of a request.
+    /// Bytes of an incomplete request.
     pub(in crate::link) fn pending(&self) -> usize {
         self.framer.pending()
     }

@@ -1,14 +1,14 @@
-//! When a fault of a simulator strikes: on which of its occasions, counted from 1, and how often.
+//! Schedule of a simulator's faults: on which of its occasions, counted from 1, a fault occurs.
 //!
-//! What an occasion is, such as a connection, a measurement or a packet of data, stands with each fault. As text a planned
-//! fault is `name`, `name@3` from the third occasion, `name@3x2` twice from there, `name@1x*` for ever.
+//! The description of each fault states its occasion, such as a connection, a measurement or a data packet. As text a planned
+//! fault is `name` (the first occasion), `name@3` (the third), `name@3x2` (the third and fourth) or `name@1x*` (always).
 
 use std::fmt::{self, Debug, Display};
 use std::str::FromStr;
 
 use thiserror::Error;
 
-/// A list of faults: names for scripts and command lines, and what they do.
+/// Defines an enumeration of faults with names and descriptions.
 macro_rules! faults {
     ($(#[$doc:meta])* $vis:vis $name:ident { $($variant:ident $text:literal $words:literal,)* }) => {
         $(#[$doc])*
@@ -18,18 +18,17 @@ macro_rules! faults {
         }
 
         impl $name {
-            /// All of them.
+            /// All faults.
             $vis const ALL: &[Self] = &[$(Self::$variant),*];
 
-            /// Its name as text.
             $vis const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)*
                 }
             }
 
-            /// What it does.
-            $vis const fn words(self) -> &'static str {
+            /// Effect of the fault.
+            $vis const fn description(self) -> &'static str {
                 match self {
                     $(Self::$variant => $words,)*
                 }
@@ -57,55 +56,49 @@ macro_rules! faults {
 }
 pub(crate) use faults;
 
-/// Why a text is no planned fault.
+/// Why a text is not a planned fault.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum FaultError {
-    /// There is no such fault.
-    #[error("there is no fault '{name}'; there are {known}")]
-    Unknown {
-        /// The name.
-        name: String,
-        /// All names.
-        known: String,
-    },
-    /// What stands behind the `@` cannot be read.
+    /// Unknown fault.
+    #[error("there is no fault '{name}'; faults: {known}")]
+    Unknown { name: String, known: String },
+    /// The text after the `@` cannot be read.
     #[error("cannot read the occasions '{0}'; write name@first or name@firstxtimes, such as drip@2x3 or drip@1x*")]
     Occasions(String),
 }
 
-/// A fault with its occasions.
+/// A fault with the occasions on which it occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Planned<F> {
-    /// Which.
     pub fault: F,
-    /// From which occasion, counted from 1.
+    /// First occasion, counted from 1.
     pub first: u32,
-    /// On how many occasions; `u32::MAX` for ever.
+    /// Number of occasions; `u32::MAX` for all.
     pub times: u32,
 }
 
 impl<F> Planned<F> {
-    /// On the first occasion only.
+    /// Occurs on the first occasion only.
     pub const fn once(fault: F) -> Self {
         Self { fault, first: 1, times: 1 }
     }
 
-    /// Once, on this occasion.
+    /// Occurs once, on this occasion.
     pub const fn at(fault: F, first: u32) -> Self {
         Self { fault, first, times: 1 }
     }
 
-    /// On every occasion.
+    /// Occurs on every occasion.
     pub const fn always(fault: F) -> Self {
         Self { fault, first: 1, times: u32::MAX }
     }
 
-    /// On some occasions in a row.
+    /// Occurs on consecutive occasions.
     pub const fn from(fault: F, first: u32, times: u32) -> Self {
         Self { fault, first, times }
     }
 
-    /// True on the occasion with this number, counted from 1.
+    /// Whether it occurs on this occasion, counted from 1.
     const fn is_due(&self, occasion: u32) -> bool {
         occasion >= self.first && occasion - self.first < self.times
     }
@@ -138,19 +131,19 @@ impl<F: FromStr<Err = FaultError>> FromStr for Planned<F> {
     }
 }
 
-/// Planned faults with the occasions that have passed.
+/// Planned faults, each with the number of its past occasions.
 #[derive(Clone, Debug, Default)]
 pub struct FaultPlan<F> {
     faults: Vec<(Planned<F>, u32)>,
 }
 
 impl<F: Copy + PartialEq> FaultPlan<F> {
-    /// No occasion has passed.
+    /// A plan without past occasions.
     pub fn new(faults: impl IntoIterator<Item = Planned<F>>) -> Self {
         Self { faults: faults.into_iter().map(|planned| (planned, 0)).collect() }
     }
 
-    /// An occasion for a fault: whether it strikes.
+    /// Counts an occasion of a fault and returns whether the fault occurs.
     pub fn strikes(&mut self, fault: F) -> bool {
         let mut strikes = false;
         for (planned, passed) in self.faults.iter_mut().filter(|(planned, _)| planned.fault == fault) {
@@ -160,7 +153,7 @@ impl<F: Copy + PartialEq> FaultPlan<F> {
         strikes
     }
 
-    /// An occasion for several faults: the first one that strikes.
+    /// Counts an occasion of several faults and returns the first one that occurs.
     pub fn occasion(&mut self, could: impl Fn(F) -> bool) -> Option<F> {
         let mut due = None;
         for (planned, passed) in self.faults.iter_mut().filter(|(planned, _)| could(planned.fault)) {
@@ -205,38 +198,38 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_planned_fault_is_refused_with_the_names_that_exist() {
+    fn an_unknown_fault_is_refused_with_the_known_names() {
         let refused = |text: &str| text.parse::<Planned<Example>>().unwrap_err().to_string();
-        assert_eq!(refused("drop"), "there is no fault 'drop'; there are drip, cut-20");
+        assert_eq!(refused("drop"), "there is no fault 'drop'; faults: drip, cut-20");
         for text in ["drip@", "drip@0", "drip@1x", "drip@1x0", "drip@x2", "drip@-1", "drip@1x2x3"] {
             assert!(refused(text).starts_with("cannot read the occasions"), "{text}");
         }
     }
 
     #[test]
-    fn every_fault_has_a_name_of_its_own_and_words() {
+    fn every_fault_has_its_own_name_and_a_description() {
         fn check<F: Copy + Debug + PartialEq + FromStr>(
             faults: &[F],
             name: fn(F) -> &'static str,
-            words: fn(F) -> &'static str,
+            description: fn(F) -> &'static str,
         ) {
             for fault in faults {
                 let is_name = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
                 assert!(name(*fault).chars().all(is_name), "{fault:?}");
-                assert!(words(*fault).ends_with('.'), "{fault:?}");
+                assert!(description(*fault).ends_with('.'), "{fault:?}");
                 assert_eq!(name(*fault).parse().ok(), Some(*fault));
             }
         }
-        check(EmsconFault::ALL, EmsconFault::name, EmsconFault::words);
-        check(AsciiFault::ALL, AsciiFault::name, AsciiFault::words);
-        check(GeocomFault::ALL, GeocomFault::name, GeocomFault::words);
-        check(NdiFault::ALL, NdiFault::name, NdiFault::words);
-        check(RtdeFault::ALL, RtdeFault::name, RtdeFault::words);
-        check(Example::ALL, Example::name, Example::words);
+        check(EmsconFault::ALL, EmsconFault::name, EmsconFault::description);
+        check(AsciiFault::ALL, AsciiFault::name, AsciiFault::description);
+        check(GeocomFault::ALL, GeocomFault::name, GeocomFault::description);
+        check(NdiFault::ALL, NdiFault::name, NdiFault::description);
+        check(RtdeFault::ALL, RtdeFault::name, RtdeFault::description);
+        check(Example::ALL, Example::name, Example::description);
     }
 
     #[test]
-    fn a_fault_strikes_on_its_occasions_only() {
+    fn a_fault_occurs_on_its_occasions_only() {
         let mut plan = FaultPlan::new(vec![Planned::from(Example::Drip, 2, 2), Planned::from(Example::Drip, 6, 1)]);
         let strikes: Vec<bool> = (0..7).map(|_| plan.strikes(Example::Drip)).collect();
         assert_eq!(strikes, [false, true, true, false, false, true, false]);
@@ -244,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn an_occasion_for_several_faults_counts_for_each_and_the_first_one_strikes() {
+    fn an_occasion_of_several_faults_counts_for_each_and_the_first_one_occurs() {
         let mut plan = FaultPlan::new([Planned::at(Example::Drip, 2), Planned::at(Example::CutOff, 2)]);
         assert_eq!(plan.occasion(|_| true), None);
         assert_eq!(plan.occasion(|fault| fault == Example::CutOff), Some(Example::CutOff));

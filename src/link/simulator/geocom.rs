@@ -1,4 +1,4 @@
-//! A total station that speaks GeoCOM.
+//! A simulated total station with GeoCOM.
 
 use std::f64::consts::TAU;
 use std::time::Duration;
@@ -14,42 +14,42 @@ use crate::link::protocol::geocom::Request;
 use crate::link::protocol::geocom::decode_request;
 use crate::link::protocol::geocom::encode_reply;
 
-/// Time of a measurement.
+/// Duration of a measurement.
 const MEASURING: Duration = Duration::from_millis(1500);
 
-/// Time of everything else.
+/// Time from any other request to its answer.
 const ANSWERING: Duration = Duration::from_millis(30);
 
-/// Longest request that is kept (bytes).
+/// Longest accepted request (bytes).
 const MAX_RECEIVED: usize = 4096;
 
 faults! {
-    /// What can go wrong.
+    /// A fault of the simulated total station. Its occasion is a measurement unless the description says otherwise.
     pub GeocomFault {
-        WrongTransaction "wrong-transaction" "The answer has the number of another request.",
-        LateReply "late-reply" "The answer comes only just before the next one.",
-        CrcError "crc-error" "The answer carries a wrong CRC.",
-        HalfLine "half-line" "Half the answer, a pause, the other half.",
-        CarriageReturnOnly "carriage-return-only" "CR alone ends the answer.",
-        AngleOnly "angle-only" "Code 1285 with the plausible numbers of the measurement before.",
-        NoTarget "no-target" "Code 8710, and zeros for numbers.",
+        WrongTransaction "wrong-transaction" "The answer has the transaction number of another request.",
+        LateReply "late-reply" "The answer arrives just before the next one.",
+        CrcError "crc-error" "The answer has a wrong CRC.",
+        HalfLine "half-line" "The answer in two halves with a pause between them.",
+        CarriageReturnOnly "carriage-return-only" "The answer ends with CR alone.",
+        AngleOnly "angle-only" "Code 1285 with the plausible numbers of the previous measurement.",
+        NoTarget "no-target" "Code 8710 with zeros.",
         Busy "busy" "Code 1293.",
         AccuracyNotGuaranteed "accuracy-not-guaranteed" "Code 1284 with a good point.",
         NoFullCorrection "no-full-correction" "Code 1283 with a good point.",
         LicenceMissing "licence-missing" "Code 27: the licence is missing.",
-        TransportTimeout "transport-timeout" "The transport times out: 3077.",
-        StaleRepeat "stale-repeat" "Everything is well, but the numbers are those of the measurement before.",
-        NotANumber "not-a-number" "Everything is well, but the numbers are not.",
+        TransportTimeout "transport-timeout" "Transport error 3077: timeout.",
+        StaleRepeat "stale-repeat" "Success, but with the numbers of the previous measurement.",
+        NotANumber "not-a-number" "Success, but with values that are not numbers.",
         Silent "silent" "No answer.",
-        DisconnectMidLine "disconnect-mid-line" "Hangs up in the middle of the answer.",
-        Noise "noise" "Noise of a wrong baud rate in place of the answer.",
-        Asleep "asleep" "Sleeps when connected: what wakes it is lost.",
-        Echo "echo" "Every request comes back before its answer, as some Bluetooth adapters do.",
-        Dead "dead" "No answer to anything, as from an instrument that is off.",
+        DisconnectMidLine "disconnect-mid-line" "The connection is closed in the middle of the answer.",
+        Noise "noise" "Noise, as at a wrong baud rate, instead of the answer.",
+        Asleep "asleep" "Asleep when connected; the request that wakes it is lost. Occasion: a connection.",
+        Echo "echo" "Echoes the request before its answer, as some Bluetooth adapters do. Occasion: a request.",
+        Dead "dead" "No answer, as from an instrument that is switched off. Occasion: a request.",
     }
 }
 
-/// When a fault can happen.
+/// Occasion of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Occasion {
     Connection,
@@ -67,7 +67,7 @@ impl GeocomFault {
     }
 }
 
-/// A total station.
+/// A simulated total station.
 #[derive(Debug)]
 pub struct GeocomSimulator {
     faults: FaultPlan<GeocomFault>,
@@ -81,7 +81,6 @@ pub struct GeocomSimulator {
 }
 
 impl GeocomSimulator {
-    /// An instrument with some faults.
     pub fn new(faults: impl IntoIterator<Item = Planned<GeocomFault>>) -> Self {
         Self {
             faults: FaultPlan::new(faults),
@@ -95,7 +94,7 @@ impl GeocomSimulator {
         }
     }
 
-    /// Bytes of a request that is not complete, for the bound of the memory.
+    /// Bytes of an incomplete request.
     pub const fn pending(&self) -> usize {
         self.received.len()
     }
@@ -125,19 +124,19 @@ impl GeocomSimulator {
         self.send(now + ANSWERING, ended(&answer));
     }
 
-    /// Transport result, code and parameters of a request that is no measurement.
+    /// Transport result, return code and parameters of a request that is not a measurement.
     fn ordinary(&mut self, request: &Request) -> (u32, u32, String) {
         let parameters = match request.rpc {
             0 | 2008 | 9037 | 18005 => String::new(),
             110 => "1,50,3".to_owned(),
             2020 => {
-                self.edm_mode.clone_from(&short(&request.parameters));
+                self.edm_mode.clone_from(&stored(&request.parameters));
                 String::new()
             }
             2021 => self.edm_mode.clone(),
             2023 => self.prism_constant.clone(),
             2024 => {
-                self.prism_constant.clone_from(&short(&request.parameters));
+                self.prism_constant.clone_from(&stored(&request.parameters));
                 String::new()
             }
             2026 => "0".to_owned(),
@@ -205,7 +204,7 @@ impl GeocomSimulator {
         self.schedule.send(at, bytes);
     }
 
-    /// An answer that was held back comes just before the next one.
+    /// Sends a delayed answer just before the next one.
     fn send_late(&mut self, at: Moment) {
         if let Some(late) = self.late.take() {
             self.schedule.send(at, late);
@@ -213,8 +212,8 @@ impl GeocomSimulator {
     }
 }
 
-/// A parameter that is kept; no instrument keeps long ones.
-fn short(text: &str) -> String {
+/// A parameter as the instrument stores it, with a limited length.
+fn stored(text: &str) -> String {
     text.chars().take(32).collect()
 }
 
@@ -222,7 +221,7 @@ fn ended(text: &str) -> Vec<u8> {
     format!("{text}\r\n").into_bytes()
 }
 
-/// Horizontal angle, zenith angle (rad) and slope distance (m), with digits for less than a nanometre.
+/// Horizontal angle, zenith angle (rad) and slope distance (m), written to better than a nanometre.
 fn polar(shot: &Shot) -> String {
     let point = shot.point.coords;
     let horizontal = point.x.atan2(point.y).rem_euclid(TAU);

@@ -1,4 +1,4 @@
-//! A tracker that speaks the combined API of NDI, with one tool.
+//! A simulated tracker with the combined API of NDI and one tool.
 
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ const FRAMES_PER_SECOND: f64 = 60.0;
 /// Time from a command to its reply.
 const ANSWERING: Duration = Duration::from_millis(4);
 
-/// How late a late reply is: later than the driver waits.
+/// Delay of a late reply, longer than the driver waits.
 const LATE: Duration = Duration::from_millis(2500);
 
 /// Fit error of the markers (mm).
@@ -32,31 +32,31 @@ const FIT_MM: f64 = 0.025;
 const HANDLE: u8 = 0x0A;
 
 faults! {
-    /// What can go wrong with a position.
+    /// A fault of the simulated tracker. Its occasion is a position unless the description says otherwise.
     pub NdiFault {
-        BadCrc "bad-crc" "The reply carries a wrong CRC.",
+        BadCrc "bad-crc" "The reply has a wrong CRC.",
         Missing "missing" "The tool is not seen.",
         Disabled "disabled" "The port of the tool is disabled.",
         WrongMode "wrong-mode" "`ERROR0C`: wrong mode.",
         CommandDamaged "command-damaged" "`ERROR04`: the command arrived damaged.",
-        CommandTimeout "command-timeout" "`ERROR05`: it took too long.",
-        LateReply "late-reply" "The reply comes after the driver gave up.",
-        Halves "halves" "Half the packet, a pause, the other half.",
+        CommandTimeout "command-timeout" "`ERROR05`: the command took too long.",
+        LateReply "late-reply" "The reply arrives after the driver gave up.",
+        Halves "halves" "The packet in two halves with a pause between them.",
         Cut "cut" "Half the packet; the rest is lost.",
-        WrongLength "wrong-length" "The header announces another length; its CRC is right.",
-        WrongBody "wrong-body" "The body has another length than its tools need; its CRCs are right.",
-        FrozenFrame "frozen-frame" "The number of the frame stands still.",
-        NotANumber "not-a-number" "A position that is no number.",
-        NoRotation "no-rotation" "A rotation that is none.",
+        WrongLength "wrong-length" "The header states another length; its CRC is right.",
+        WrongBody "wrong-body" "The body has the wrong length for its tools; its CRCs are right.",
+        FrozenFrame "frozen-frame" "The frame number stops advancing.",
+        NotANumber "not-a-number" "A position that is not a number.",
+        NoRotation "no-rotation" "An invalid rotation.",
         Origin "origin" "0, 0, 0.",
         Silent "silent" "No reply.",
-        Reset "reset" "`RESET`: it was switched off and on.",
-        DisconnectMidPacket "disconnect-mid-packet" "Hangs up in the middle of the reply.",
-        InitialisationFails "initialisation-fails" "`INIT` fails, when connected.",
+        Reset "reset" "`RESET`, as after switching off and on.",
+        DisconnectMidPacket "disconnect-mid-packet" "The connection is closed in the middle of the reply.",
+        InitialisationFails "initialisation-fails" "`INIT` fails. Occasion: `INIT`.",
     }
 }
 
-/// Position of the tool in one frame.
+/// Pose of the tool in one frame.
 #[derive(Clone, Copy, Debug)]
 struct Pose {
     quaternion: [f64; 4],
@@ -64,7 +64,7 @@ struct Pose {
     origin_mm: [f64; 3],
 }
 
-/// A tracker that measures the tip of a tool.
+/// A simulated tracker that measures the tip of a tool.
 #[derive(Debug)]
 pub struct NdiSimulator {
     faults: FaultPlan<NdiFault>,
@@ -74,13 +74,13 @@ pub struct NdiSimulator {
     is_initialised: bool,
     is_enabled: bool,
     is_tracking: bool,
-    /// The frame that was last asked for, and what was seen in it.
+    /// The last requested frame, with the pose of the tool in it.
     last: Option<(u32, Option<Pose>)>,
     schedule: Schedule,
 }
 
 impl NdiSimulator {
-    /// The points of the source are at `tip_mm` in the frame of the tool (mm).
+    /// A tracker whose source gives the points of the tool's tip, at `tip_mm` in the frame of the tool (mm).
     pub fn new(tip_mm: [f64; 3], faults: impl IntoIterator<Item = Planned<NdiFault>>) -> Self {
         Self {
             faults: FaultPlan::new(faults),
@@ -95,7 +95,7 @@ impl NdiSimulator {
         }
     }
 
-    /// Bytes of a command that is not complete, for the bound of the memory.
+    /// Bytes of an incomplete command.
     pub const fn pending(&self) -> usize {
         self.decoder.pending()
     }
@@ -103,7 +103,7 @@ impl NdiSimulator {
     fn command(&mut self, command: &str, source: &mut dyn PointSource, now: Moment) {
         let reply = match command {
             "INIT:" => self.initialise(),
-            // The only text that nobody reads by its format: it says what this is.
+            // The only reply that clients do not parse, so it marks the tracker as simulated.
             "APIREV:" => "G.003.001 SIMULATED".to_owned(),
             "PHSR:02" if !self.is_initialised => format!("01{HANDLE:02X}001"),
             "PHSR:03" if self.is_initialised && !self.is_enabled => format!("01{HANDLE:02X}011"),
@@ -142,7 +142,7 @@ impl NdiSimulator {
         }
     }
 
-    /// Replies with the tool in the frame of this time.
+    /// Replies with the pose of the tool in the frame at this time.
     fn position(&mut self, is_binary: bool, source: &mut dyn PointSource, now: Moment) {
         let fault = self.faults.occasion(|fault| fault != NdiFault::InitialisationFails);
         let frame = match (fault, self.last) {
@@ -151,16 +151,16 @@ impl NdiSimulator {
         };
         let pose = match self.last {
             Some((last, pose)) if last == frame => pose,
-            _ => self.look(source),
+            _ => self.observe(source),
         };
         self.last = Some((frame, pose));
-        let pose = pose.filter(|_| fault != Some(NdiFault::Missing)).map(|pose| spoilt(pose, fault));
+        let pose = pose.filter(|_| fault != Some(NdiFault::Missing)).map(|pose| with_fault(pose, fault));
         let bytes =
             if is_binary { binary_reply(pose, frame, fault) } else { encode_text(&text_reply(pose, frame, fault)) };
         self.reply(bytes, fault, now + ANSWERING);
     }
 
-    fn look(&self, source: &mut dyn PointSource) -> Option<Pose> {
+    fn observe(&self, source: &mut dyn PointSource) -> Option<Pose> {
         let point = source.shot()?.point;
         let origin = (point - self.rotation * self.tip) * 1e3;
         let q = self.rotation;
@@ -184,7 +184,7 @@ impl NdiSimulator {
     }
 }
 
-/// Number of the frame of a time.
+/// Number of the frame at a time.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -194,7 +194,7 @@ fn frame_at(now: Moment) -> u32 {
     (now.as_secs_f64() * FRAMES_PER_SECOND) as u32
 }
 
-fn spoilt(mut pose: Pose, fault: Option<NdiFault>) -> Pose {
+fn with_fault(mut pose: Pose, fault: Option<NdiFault>) -> Pose {
     match fault {
         Some(NdiFault::NotANumber) => pose.origin_mm = [f64::NAN; 3],
         Some(NdiFault::NoRotation) => pose.quaternion = [0.1; 4],
@@ -247,7 +247,7 @@ fn binary_reply(pose: Option<Pose>, frame: u32, fault: Option<NdiFault>) -> Vec<
         body.extend([0; 5]);
     }
     if fault == Some(NdiFault::WrongLength) {
-        // The header of a longer packet before a shorter body: the rest never comes.
+        // The header of a longer packet before a shorter body: the rest never arrives.
         let longer = encode_binary(&[body.as_slice(), &[0; 30]].concat());
         return longer.into_iter().take(body.len() + 8).collect();
     }

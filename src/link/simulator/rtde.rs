@@ -1,8 +1,8 @@
-//! A Universal Robots controller that is not there: the other end of [`crate::link::protocol::rtde`].
+//! A simulated Universal Robots controller: the other end of [`crate::link::protocol::rtde`].
 //!
-//! It knows the time, the joint values and speeds, the robot mode and the safety status; every other name is not found. A robot
-//! with fewer than six joints has zeros behind them, one with more shows the first six. As a real controller it hangs up on a
-//! client that does not read.
+//! It provides the time, the joint values and speeds, the robot mode and the safety status; every other name is not found. A
+//! robot with fewer than six joints is padded with zeros, and of one with more the first six are reported. Like a real
+//! controller it closes the connection of a client that does not read.
 
 #[cfg(test)]
 mod tests;
@@ -17,46 +17,45 @@ use crate::link::protocol::rtde::mode::{MODE_RUNNING, SAFETY_NORMAL};
 use crate::link::protocol::rtde::packet::{Framer, encode, packet_type};
 
 faults! {
-    /// A fault of the simulated controller. The occasion is a packet of data unless its text says otherwise.
+    /// A fault of the simulated controller. Its occasion is a data packet unless the description says otherwise.
     pub RtdeFault {
-        Drip "drip" "Sends every byte in a write of its own. Occasion: a connection.",
+        Drip "drip" "Sends every byte in its own write. Occasion: a connection.",
         OldProtocol "old-protocol" "Refuses version 2 of the protocol. Occasion: a connection.",
-        NotFound "not-found" "Does not know the joint speeds. Occasion: a set-up of the outputs.",
-        InUse "in-use" "Says that the joint speeds are in use. Occasion: a set-up of the outputs.",
-        WrongType "wrong-type" "Announces integers as the joint speeds. Occasion: a set-up of the outputs.",
-        StartRefused "start-refused" "Does not start the stream. Occasion: a start.",
+        NotFound "not-found" "Does not know the joint speeds. Occasion: setting up the outputs.",
+        InUse "in-use" "Reports that the joint speeds are in use. Occasion: setting up the outputs.",
+        WrongType "wrong-type" "Announces integers as the joint speeds. Occasion: setting up the outputs.",
+        StartRefused "start-refused" "Does not start the stream. Occasion: starting it.",
         TextFlood "text-flood" "Sends 1000 different messages before the data.",
         ProtectiveStop "protective-stop" "Reports a protective stop.",
         PowerOff "power-off" "Reports that the power is off.",
         Moving "moving" "Reports that the first joint turns at 0.2 rad/s.",
-        NotFinite "not-finite" "Reports a joint value that is no number.",
+        NotFinite "not-finite" "Reports a joint value that is not a number.",
         WrongRecipe "wrong-recipe" "Sends the data under another recipe.",
-        ShortData "short-data" "Sends data that lack their last value.",
-        Silence "silence" "Sends no data any more until somebody connects again.",
-        Cut "cut" "Hangs up in the middle of the data.",
+        ShortData "short-data" "Sends data without their last value.",
+        Silence "silence" "Stops sending data until the next connection.",
+        Cut "cut" "Closes the connection in the middle of the data.",
         SizeZero "size-zero" "Sends data whose size field is 0.",
     }
 }
 
-/// The recipe of the outputs; there is one.
+/// Number of the only recipe.
 const RECIPE: u8 = 1;
 
-/// The most that a controller sends (Hz).
+/// Highest frequency of a controller (Hz).
 const MAX_FREQUENCY: f64 = 500.0;
 
-/// Messages in a flood.
 const FLOOD: usize = 1000;
 
-/// Speed of the joint that moves (rad/s).
+/// Speed of the moving joint (rad/s).
 const SPEED: f64 = 0.2;
 
-/// A protective stop.
+/// Safety status of a protective stop.
 const SAFETY_PROTECTIVE_STOP: i32 = 3;
 
-/// The robot is without power.
+/// Robot mode without power.
 const MODE_POWER_OFF: i32 = 3;
 
-/// Values that the controller knows.
+/// Values that the controller provides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Field {
     Timestamp,
@@ -67,7 +66,7 @@ enum Field {
 }
 
 impl Field {
-    /// Name, type and value that belong together.
+    /// Name, type and field of each value.
     const ALL: [(&'static str, &'static str, Self); 5] = [
         ("timestamp", "DOUBLE", Self::Timestamp),
         ("actual_q", "VECTOR6D", Self::ActualQ),
@@ -77,7 +76,7 @@ impl Field {
     ];
 }
 
-/// What is reported.
+/// Values of one data packet.
 #[derive(Clone, Copy, Debug)]
 struct Report {
     time: f64,
@@ -88,7 +87,7 @@ struct Report {
 }
 
 impl Report {
-    /// A value as it stands on the wire.
+    /// A value as bytes.
     fn bytes(&self, field: Field) -> Vec<u8> {
         let numbers = |values: &[f64]| values.iter().flat_map(|value| value.to_be_bytes()).collect();
         match field {
@@ -111,7 +110,7 @@ pub struct RtdeSimulator {
     interval: Duration,
     next_data: Option<Moment>,
     is_connected: bool,
-    /// How far the first joint was turned by a fault (rad).
+    /// Angle by which a fault has turned the first joint (rad).
     travel: f64,
 }
 
@@ -141,7 +140,7 @@ impl RtdeSimulator {
         self.writes.close();
     }
 
-    fn obey(&mut self, kind: u8, content: &[u8], now: Moment) {
+    fn execute(&mut self, kind: u8, content: &[u8], now: Moment) {
         match kind {
             packet_type::REQUEST_PROTOCOL_VERSION => {
                 let is_accepted = content == [0, 2] && !self.faults.strikes(RtdeFault::OldProtocol);
@@ -166,7 +165,7 @@ impl RtdeSimulator {
         }
     }
 
-    /// A recipe: a frequency and names. It counts only if every name is known.
+    /// Sets up a recipe from a frequency and names. It is accepted only if every name is known.
     fn set_up(&mut self, content: &[u8]) {
         let Some((frequency, names)) = content.split_first_chunk::<8>() else { return };
         let names = String::from_utf8_lossy(names);
@@ -250,11 +249,11 @@ impl RtdeSimulator {
         }
     }
 
-    /// A warning in words.
+    /// Sends a warning as text.
     fn send_text(&mut self, text: &str) {
         let source = "simulator";
-        let counted = |text: &str| [&[u8::try_from(text.len()).unwrap_or(0)][..], text.as_bytes()].concat();
-        let content = [counted(text), counted(source), vec![2]].concat();
+        let with_length = |text: &str| [&[u8::try_from(text.len()).unwrap_or(0)][..], text.as_bytes()].concat();
+        let content = [with_length(text), with_length(source), vec![2]].concat();
         self.answer(packet_type::TEXT_MESSAGE, &content);
     }
 }
@@ -275,7 +274,7 @@ impl Simulator for RtdeSimulator {
         }
         while self.is_connected {
             match self.framer.next_packet() {
-                Ok(Some((kind, content))) => self.obey(kind, &content, now),
+                Ok(Some((kind, content))) => self.execute(kind, &content, now),
                 Ok(None) => return,
                 Err(_) => self.hang_up(),
             }
@@ -306,7 +305,7 @@ impl Simulator for RtdeSimulator {
 
 #[cfg(test)]
 impl RtdeSimulator {
-    /// Bytes that wait for the rest of a request.
+    /// Bytes of an incomplete request.
     pub(in crate::link) fn pending(&self) -> usize {
         self.framer.pending()
     }

@@ -1,4 +1,4 @@
-//! What a simulated instrument that takes its time is going to write, and when.
+//! Scheduled writes of a simulated instrument.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -6,13 +6,13 @@ use std::time::Duration;
 use super::Output;
 use crate::link::protocol::Moment;
 
-/// Pause in the middle of a write in halves.
+/// Pause between the halves of a split write.
 const PAUSE: Duration = Duration::from_millis(700);
 
-/// Most writes that wait for their time, and most that wait to be fetched; more are lost.
+/// Most scheduled writes, and most due writes that were not fetched; further ones are dropped.
 const MAX_WAITING: usize = 256;
 
-/// Writes that wait for their time, and those whose time has come.
+/// Scheduled writes, and due ones that were not fetched yet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Schedule {
     later: VecDeque<(Moment, Output)>,
@@ -20,31 +20,31 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    /// Forgets everything: a new connection.
+    /// Discards all writes for a new connection.
     pub(super) fn clear(&mut self) {
         self.later.clear();
         self.now.clear();
     }
 
-    /// Writes bytes at a time.
+    /// Schedules a write.
     pub(super) fn send(&mut self, at: Moment, bytes: Vec<u8>) {
         self.insert(at, Output::Bytes(bytes));
     }
 
-    /// Half of the bytes, a pause, the other half.
+    /// Schedules the bytes in two halves with a pause between them.
     pub(super) fn send_halves(&mut self, at: Moment, bytes: &[u8]) {
         let (first, rest) = halves(bytes);
         self.send(at, first.to_vec());
         self.send(at + PAUSE, rest.to_vec());
     }
 
-    /// Hangs up in the middle of the bytes.
+    /// Schedules the first half of the bytes and the end of the connection.
     pub(super) fn break_off(&mut self, at: Moment, bytes: &[u8]) {
         self.send(at, halves(bytes).0.to_vec());
         self.insert(at, Output::Close);
     }
 
-    /// What is due by now may be fetched.
+    /// Makes the writes available that are due.
     pub(super) fn tick(&mut self, now: Moment) {
         while let Some((_, output)) = self.later.pop_front_if(|(at, _)| *at <= now) {
             if self.now.len() < MAX_WAITING {
@@ -58,15 +58,15 @@ impl Schedule {
         self.now.pop_front()
     }
 
-    /// When [`Self::tick`] has something to do.
+    /// The next time at which [`Self::tick`] has something to do.
     pub(super) fn next_deadline(&self) -> Option<Moment> {
         self.later.front().map(|(at, _)| *at)
     }
 
     fn insert(&mut self, at: Moment, output: Output) {
         if self.later.len() < MAX_WAITING {
-            let place = self.later.partition_point(|(other, _)| *other <= at);
-            self.later.insert(place, (at, output));
+            let index = self.later.partition_point(|(other, _)| *other <= at);
+            self.later.insert(index, (at, output));
         }
     }
 }
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_fetches_is_bounded() {
+    fn writes_that_are_never_fetched_are_bounded() {
         let mut schedule = Schedule::default();
         for second in 0..1000 {
             schedule.send(at(second), vec![1]);

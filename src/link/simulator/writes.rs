@@ -1,22 +1,22 @@
-//! How the packets of a simulated instrument are cut into writes.
+//! Splits the packets of a simulated instrument into writes.
 
 use std::collections::VecDeque;
 
 use super::Output;
 
-/// A peer that lets this many bytes pile up is hung up on.
+/// The connection of a peer with more unread bytes than this is closed.
 const MAX_BYTES: usize = 1 << 20;
 
-/// Writes that wait.
+/// Writes that were not fetched yet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Writes {
-    /// Packets that are to go out in one write.
+    /// Packets that will go out in one write.
     joined: Vec<u8>,
     outputs: VecDeque<Output>,
     bytes: usize,
-    /// Every byte goes in a write of its own.
+    /// Whether every byte is written on its own.
     pub(super) is_dripping: bool,
-    /// All packets of a moment go in one write.
+    /// Whether all packets of one step are written together.
     pub(super) is_joining: bool,
 }
 
@@ -40,13 +40,13 @@ impl Writes {
         }
     }
 
-    /// Hangs up behind what was sent.
+    /// Closes the connection after the queued bytes.
     pub(super) fn close(&mut self) {
         self.flush();
         self.outputs.push_back(Output::Close);
     }
 
-    /// True where the other side does not read.
+    /// Whether the other side does not read.
     pub(super) const fn is_overfull(&self) -> bool {
         self.bytes > MAX_BYTES
     }

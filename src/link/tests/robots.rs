@@ -6,7 +6,7 @@ use super::*;
 use crate::link::protocol::Failure;
 
 fn bench(faults: &[&str]) -> Bench {
-    let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(faults), None);
+    let mut bench = Bench::with(WireProtocol::Emscon, &Endpoint::Loopback, &[], Some(faults), None);
     bench.wired.connect().unwrap();
     bench
 }
@@ -65,7 +65,8 @@ fn a_protective_stop_is_said_at_once_and_nothing_is_measured() {
 #[test]
 fn every_fault_of_the_controller_is_survived_or_said() {
     for name in fault_names(WireProtocol::Rtde) {
-        let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(&[&format!("{name}@2x1")]), None);
+        let mut bench =
+            Bench::with(WireProtocol::Emscon, &Endpoint::Loopback, &[], Some(&[&format!("{name}@2x1")]), None);
         // Where the fault comes early, it is the set-up that fails; it is tried again.
         let end = Instant::now() + DEADLINE;
         let mut said = Vec::new();
@@ -82,8 +83,8 @@ fn every_fault_of_the_controller_is_survived_or_said() {
 #[test]
 fn a_controller_that_goes_away_is_told_and_comes_back() {
     let mut bench = bench(&["cut@20"]);
-    bench.until(|news| matches!(news, LinkNews::Down(cause) if cause.starts_with("robot: ")));
-    bench.until(|news| matches!(news, LinkNews::Up(name) if name.starts_with("robot: ")));
+    bench.until(|news| matches!(news, LinkEvent::Down(cause) if cause.starts_with("robot: ")));
+    bench.until(|news| matches!(news, LinkEvent::Up(name) if name.starts_with("robot: ")));
     bench.measure().unwrap();
 }
 
@@ -91,12 +92,12 @@ fn a_controller_that_goes_away_is_told_and_comes_back() {
 #[test]
 fn a_shot_that_is_asked_for_while_the_controller_is_away_is_refused_at_once() {
     let mut bench = bench(&["cut@20"]);
-    bench.until(|news| matches!(news, LinkNews::Down(cause) if cause.starts_with("robot: ")));
+    bench.until(|news| matches!(news, LinkEvent::Down(cause) if cause.starts_with("robot: ")));
     let (before, start) = (bench.stage.shots(), Instant::now());
     let error = bench.measure().unwrap_err();
     assert!(matches!(&error, LinkError::Controller(Failure::Disconnected(_))), "{error:?}");
     assert!(start.elapsed() < Duration::from_millis(300), "{:?}", start.elapsed());
-    bench.until(|news| matches!(news, LinkNews::Up(name) if name.starts_with("robot: ")));
+    bench.until(|news| matches!(news, LinkEvent::Up(name) if name.starts_with("robot: ")));
     assert_eq!(bench.stage.shots(), before, "nothing is measured by itself");
 }
 
@@ -107,7 +108,7 @@ fn what_is_wrong_with_the_controller_is_told_with_what_helps() {
         ("in-use@1x*", "another program", "end the other program"),
         ("not-found@1x*", "does not know", "PolyScope 3.4"),
     ] {
-        let mut bench = Bench::with(WireProtocol::Emscon, &Place::Loopback, &[], Some(&[fault]), None);
+        let mut bench = Bench::with(WireProtocol::Emscon, &Endpoint::Loopback, &[], Some(&[fault]), None);
         let error = bench.wired.connect().unwrap_err();
         let LinkError::Controller(failure) = &error else { panic!("{fault}: {error:?}") };
         assert!(error.to_string().starts_with("the robot: ") && error.to_string().contains(part), "{fault}: {error}");

@@ -67,7 +67,7 @@ fn what_comes_byte_by_byte_or_joined_or_in_halves_is_the_same() {
 #[test]
 fn a_serial_line_carries_the_same_points() {
     for protocol in [WireProtocol::Ascii, WireProtocol::Geocom, WireProtocol::Ndi] {
-        let mut bench = Bench::with(protocol, &Place::PseudoTerminal, &[], None, None);
+        let mut bench = Bench::with(protocol, &Endpoint::PseudoTerminal, &[], None, None);
         bench.wired.connect().unwrap();
         let reading = bench.measure().unwrap();
         assert_eq!(reading.shots, 1);
@@ -89,7 +89,7 @@ fn a_link_that_dies_in_mid_packet_fails_the_shot_comes_back_and_measures_nothing
         assert!(failure.to_string().starts_with("the connection is lost"), "{failure}");
         assert!(failure.hint().contains("connects again by itself"), "{}", failure.hint());
         let taken = bench.stage.shots();
-        bench.until(|news| matches!(news, LinkNews::Up(_)));
+        bench.until(|news| matches!(news, LinkEvent::Up(_)));
         assert_eq!(bench.stage.shots(), taken, "{protocol}: nobody has asked for a shot");
         bench.measure().unwrap();
     }
@@ -112,7 +112,7 @@ fn settings_that_lie_are_found_in_the_set_up_and_said() {
         } else {
             bench.wired.connect().unwrap_err()
         };
-        let waits = |news: &LinkNews| matches!(news, LinkNews::Status(text) if text.contains("warming up"));
+        let waits = |news: &LinkEvent| matches!(news, LinkEvent::Notice(text) if text.contains("warming up"));
         let is_said = error.to_string().contains(part) || (error == LinkError::Cancelled && told.iter().any(waits));
         assert!(is_said, "{fault}: {error}");
     }
@@ -155,7 +155,7 @@ fn a_shot_that_states_a_much_larger_sigma_than_usual_is_no_point() {
     bench.stage.lock().sigma = 0.2e-3;
     let error = bench.measure().unwrap_err();
     let LinkError::Instrument(Failure::Unstable(why)) = &error else { panic!("{error:?}") };
-    assert_eq!(why, "it states a sigma of 0.346 mm; usual are 0.009 mm");
+    assert_eq!(why, "its stated sigma is 0.346 mm, usually 0.009 mm");
     // What is more than usual, but still small, is a point: it stands farther away.
     bench.stage.lock().sigma = 20e-6;
     bench.measure().unwrap();
@@ -224,7 +224,7 @@ fn a_serial_port_that_is_in_use_or_missing_is_said() {
 #[test]
 fn addresses_of_the_wrong_kind_are_refused_before_anything_is_opened() {
     let refused = |choice: &LinkChoice| Wired::new(choice, None).unwrap_err().to_string();
-    assert!(refused(&choice("rtde:127.0.0.1")).contains("not where the SMR is"));
+    assert!(refused(&choice("rtde:127.0.0.1")).contains("not SMR positions"));
     let with_robot = LinkChoice { robot: Some("emscon:127.0.0.1".to_owned()), ..choice("emscon:127.0.0.1") };
     assert!(refused(&with_robot).contains("is no robot"));
     let with_options = LinkChoice { options: Some("(speed: 3)".to_owned()), ..choice("emscon:127.0.0.1") };
@@ -322,7 +322,7 @@ fn somebody_may_connect_to_this_program() {
 fn the_raw_log_holds_what_came_and_went() {
     let mut file = tempfile::tempfile().unwrap();
     let log = RawLog::new(file.try_clone().unwrap());
-    let mut bench = Bench::with(WireProtocol::Ascii, &Place::Loopback, &[], None, Some(&log));
+    let mut bench = Bench::with(WireProtocol::Ascii, &Endpoint::Loopback, &[], None, Some(&log));
     bench.wired.connect().unwrap();
     let reading = bench.measure().unwrap();
     let mut text = String::new();
@@ -410,9 +410,9 @@ fn an_instrument_that_falls_silent_is_said_to_be_and_nothing_old_is_shown_as_now
         live.silent.is_some_and(|seconds| seconds >= 2.0)
     });
     // The same is seen while a measurement waits for it.
-    let look = wired.eye().unwrap();
+    let poll = wired.live_poll().unwrap();
     let end = Instant::now() + DEADLINE;
-    let silent = || look().silent.is_some_and(|seconds| seconds >= 2.5) && look().point.is_none();
+    let silent = || poll().silent.is_some_and(|seconds| seconds >= 2.5) && poll().point.is_none();
     let result = wired.measure(&request(1), &|| !silent() && Instant::now() < end);
     assert_eq!(result, Err(LinkError::Cancelled));
     assert!(silent());
@@ -437,7 +437,7 @@ fn who_takes_the_connection_and_says_nothing_is_perhaps_another_device() {
     let mut wired = Wired::new(&choice(&format!("ndi:127.0.0.1:{port}")), None).unwrap();
     let error = wired.connect().unwrap_err();
     let LinkError::Instrument(failure @ Failure::Foreign(why)) = &error else { panic!("{error:?}") };
-    assert!(why.contains("said nothing for 2 s"), "{why}");
-    assert!(failure.hint().contains("the right port"), "{}", failure.hint());
+    assert!(why.contains("sent nothing for 2 s"), "{why}");
+    assert!(failure.hint().contains("the port"), "{}", failure.hint());
     drop(listener);
 }

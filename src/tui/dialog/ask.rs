@@ -6,7 +6,7 @@ use crate::session::filter::Filter;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
-use crate::session::wire::{LinkChoice, WireAddress};
+use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
 use crate::tui::form::{Check, TextField};
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Intent, reading};
@@ -88,7 +88,7 @@ pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
                 &proposed.options.unwrap_or_default(),
                 "Empty: the usual ones. For ascii a preset such as xyz or bridge; else as (measure_ms: 2000).",
             )
-            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, if the robot's controller tells its joint angles. Empty: it does not.")
+            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, if the robot's controller reports its joint angles. Empty: it does not.")
             .pick(
                 "measure by itself",
                 &["no", "yes"],
@@ -109,7 +109,7 @@ fn link(values: &[String]) -> Result<Intent, String> {
     if let Some(robot) = &robot
         && !robot.parse::<WireAddress>()?.protocol.is_robot()
     {
-        return Err(format!("'{robot}' is no robot; rtde:HOST is one"));
+        return Err(format!("'{robot}' is not a robot controller; use {}", WireProtocol::ROBOT_ADDRESS));
     }
     let is_automatic = automatic == "yes";
     let choice = LinkChoice { address: parsed.to_string(), options: some(options), robot, is_automatic };

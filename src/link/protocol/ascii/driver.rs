@@ -1,4 +1,4 @@
-//! The conversation: triggers, streams, and what must not pass for the answer.
+//! The conversation: triggers, streams, and lines that must not be taken for the answer.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -13,34 +13,35 @@ use super::super::Protocol;
 use super::super::ProtocolEvent;
 use super::super::Severity;
 use super::super::Shot;
+use super::super::error_streak::ErrorStreak;
 use super::super::lines::LineSplitter;
+use super::super::lines::MAX_LINE;
 use super::super::lines::Piece;
 use super::super::outbox::Outbox;
-use super::super::unreadable::Unreadable;
 use super::escape::unescape;
 use super::options::AsciiOptions;
 use super::options::Checksum;
 use super::options::Mode;
 use super::parser::LineParser;
-use super::parser::Reading;
+use super::parser::ParsedLine;
 use super::parser::Rejection;
 
-/// Quiet time that ends the rest of an answer nobody waits for any more.
+/// Idle time after which no more of a late answer is expected.
 const DRAIN: Duration = Duration::from_millis(200);
 
-/// After it an answer that never came is not expected any more.
+/// Time after which a missing answer is no longer expected.
 const FORGET: Duration = Duration::from_mins(1);
 
-/// Most triggers without an answer that are remembered.
+/// Most unanswered triggers that are kept.
 const MAX_OWED: usize = 16;
 
-/// So many lines in a row with an old time are a clock that was set back, not late lines.
+/// Consecutive lines with an old time that mean a clock that was set back instead of late lines.
 const OLD_IN_A_ROW: u32 = 3;
 
-/// So often an average is begun again after an unreadable line.
+/// Most restarts of an average after unreadable lines.
 const MAX_RESTARTS: u32 = 3;
 
-/// Most bytes that a shot keeps of the lines that it was averaged from.
+/// Most raw bytes that an averaged shot keeps.
 const MAX_RAW: usize = 65_536;
 
 /// The generic line driver.
@@ -53,32 +54,32 @@ pub struct AsciiProtocol {
     outbox: Outbox,
     started: bool,
     capture: Option<Capture>,
-    /// Triggers sent that no line has answered, each with the time at which it is forgotten: as many lines may still come that
-    /// are older than the next trigger.
+    /// Unanswered triggers, each with the time at which its answer is no longer expected. For each of them a line may still
+    /// arrive that is older than the next trigger.
     owed: VecDeque<Moment>,
     last_byte: Option<Moment>,
     last_line: Option<Moment>,
-    silence_said: bool,
+    silence_reported: bool,
     last_time: Option<f64>,
     previous: Option<Point3<f64>>,
-    unreadable: Unreadable,
+    errors: ErrorStreak,
     old_in_a_row: u32,
 }
 
-/// A shot under way.
+/// A shot in progress.
 #[derive(Debug)]
 enum Capture {
-    /// Waits for the line to be quiet, then sends the trigger.
+    /// Waiting for the line to be idle before the trigger is sent.
     Draining { until: Moment, deadline: Moment },
-    /// Waits for the line that answers. `unsure` lines may still come that are older than the trigger; `old` ones came that were
+    /// Waiting for the answer. `unsure` lines may still arrive that are older than the trigger; `old` lines arrived that are
     /// older by their own time.
     Waiting { deadline: Moment, unsure: usize, old: u32 },
-    /// Collects lines of a stream.
+    /// Collecting lines of a stream.
     Averaging { deadline: Moment, shots: Vec<Shot>, restarts: u32, last_fault: Option<String> },
 }
 
 impl AsciiProtocol {
-    /// Fails where [`AsciiOptions::validate`] does.
+    /// Fails if [`AsciiOptions::validate`] does.
     pub fn new(options: AsciiOptions) -> Result<Self, String> {
         let trigger = match &options.mode {
             Mode::Polled { trigger } => unescape(trigger)?,
@@ -97,15 +98,15 @@ impl AsciiProtocol {
             owed: VecDeque::new(),
             last_byte: None,
             last_line: None,
-            silence_said: false,
+            silence_reported: false,
             last_time: None,
             previous: None,
-            unreadable: Unreadable::default(),
+            errors: ErrorStreak::default(),
             old_in_a_row: 0,
         })
     }
 
-    /// Bytes of a line that has begun, for the bound of the memory.
+    /// Bytes of an incomplete line.
     pub const fn pending(&self) -> usize {
         self.splitter.pending()
     }
@@ -119,13 +120,15 @@ impl AsciiProtocol {
 
     fn identity(&self) -> Identity {
         let options = self.parser.options();
-        let mut notes = vec!["unit, frame and reflector are as set here: a line of text cannot say them".to_owned()];
+        let mut notes = vec!["unit, frame and reflector are as set here; the lines do not contain them".to_owned()];
         if options.checksum == Checksum::None {
-            notes.push("lines carry no check value: a damaged digit cannot be seen".to_owned());
+            notes.push("lines have no check sum, so a damaged digit is not detected".to_owned());
         }
         let mut warnings = Vec::new();
         if options.allow_identical {
-            warnings.push("equal readings are allowed: a source that repeats its last line is not noticed".to_owned());
+            warnings.push(
+                "identical readings are allowed, so a source that repeats its last line is not detected".to_owned(),
+            );
         }
         Identity {
             name: "source of text lines".to_owned(),
@@ -139,21 +142,21 @@ impl AsciiProtocol {
     fn take(&mut self, piece: Piece, now: Moment) {
         match piece {
             Piece::Overlong => {
-                self.refuse(Rejection::Garbled("more than 4096 bytes without a line end".to_owned()), now);
+                self.refuse(Rejection::Garbled(format!("more than {MAX_LINE} bytes without a line end")), now);
             }
             Piece::Line(line) => match self.parser.read(&line) {
-                Ok(Reading::Skipped) => {}
-                Ok(Reading::Point(shot)) => self.accept(shot, now),
+                Ok(ParsedLine::Skipped) => {}
+                Ok(ParsedLine::Point(shot)) => self.accept(shot, now),
                 Err(rejection) => self.refuse(rejection, now),
             },
         }
     }
 
-    /// A line that can be read.
+    /// Handles a readable line.
     fn accept(&mut self, shot: Shot, now: Moment) {
-        self.unreadable.clear();
+        self.errors.reset();
         self.last_line = Some(now);
-        self.silence_said = false;
+        self.silence_reported = false;
         let is_old = matches!((shot.instrument_time, self.last_time), (Some(time), Some(last)) if time <= last);
         if is_old {
             self.pass_over_old();
@@ -167,30 +170,30 @@ impl AsciiProtocol {
         }
     }
 
-    /// A line whose time is not after that of an earlier line: a repeat or a late one.
+    /// Handles a line whose time is not later than that of an earlier line: a repetition or a late answer.
     fn pass_over_old(&mut self) {
         self.old_in_a_row = self.old_in_a_row.saturating_add(1);
         if self.old_in_a_row == OLD_IN_A_ROW {
-            let text = "the times in the lines do not advance: if the instrument's clock was set back, connect again";
-            self.outbox.say(Severity::Warning, text);
+            let text = "the times in the lines do not advance; if the instrument's clock was set back, reconnect";
+            self.outbox.report(Severity::Warning, text);
         }
         self.owed.pop_front();
         if let Some(Capture::Waiting { unsure, old, .. }) = &mut self.capture {
             *unsure = unsure.saturating_sub(1);
             *old = old.saturating_add(1);
         } else if let Some(Capture::Averaging { last_fault, .. }) = &mut self.capture {
-            *last_fault = Some("its time is not later than that of the line before".to_owned());
+            *last_fault = Some("its time is not later than that of the previous line".to_owned());
         }
     }
 
     fn accept_polled(&mut self, shot: Shot, now: Moment) {
         let was_owed = self.owed.pop_front().is_some();
         match self.capture {
-            // It may be the answer to a trigger before this one. One more trigger makes sure.
+            // It may be the answer to an earlier trigger. One more trigger resolves that.
             Some(Capture::Waiting { unsure: unsure @ 1.., .. }) => self.send_trigger(unsure - 1, now),
             Some(Capture::Waiting { .. }) => {
                 let soon = now + self.timeout * 2;
-                self.owed.iter_mut().for_each(|forgotten| *forgotten = soon.min(*forgotten));
+                self.owed.iter_mut().for_each(|expires| *expires = soon.min(*expires));
                 self.finish(shot);
             }
             _ if was_owed || self.is_repeat(&shot) => {}
@@ -219,7 +222,7 @@ impl AsciiProtocol {
         !self.parser.options().allow_identical && self.previous == Some(shot.point)
     }
 
-    /// Gives the shot, unless it is the last one again.
+    /// Reports the shot, unless it repeats the previous one.
     fn finish(&mut self, shot: Shot) {
         self.capture = None;
         if self.is_repeat(&shot) {
@@ -229,7 +232,7 @@ impl AsciiProtocol {
         self.outbox.push(ProtocolEvent::Shot(shot));
     }
 
-    /// A line that gives no point.
+    /// Handles a line without a point.
     fn refuse(&mut self, rejection: Rejection, now: Moment) {
         if !self.started {
             return;
@@ -237,9 +240,9 @@ impl AsciiProtocol {
         if let Rejection::Garbled(text) = &rejection {
             self.count_bad(text);
         } else {
-            self.unreadable.clear();
+            self.errors.reset();
             self.last_line = Some(now);
-            self.silence_said = false;
+            self.silence_reported = false;
         }
         match &mut self.capture {
             Some(Capture::Waiting { .. }) => self.refuse_polled(rejection, now),
@@ -250,7 +253,7 @@ impl AsciiProtocol {
             None => {
                 let was_owed = self.owed.pop_front().is_some();
                 if !was_owed && let Rejection::Instrument(text) = rejection {
-                    self.outbox.say(Severity::Warning, format!("the instrument says: {text}"));
+                    self.outbox.report(Severity::Warning, format!("message of the instrument: {text}"));
                 }
             }
         }
@@ -259,13 +262,13 @@ impl AsciiProtocol {
     fn refuse_polled(&mut self, rejection: Rejection, now: Moment) {
         self.owed.pop_front();
         match self.capture {
-            // What it says may be about an earlier trigger.
+            // It may belong to an earlier trigger.
             Some(Capture::Waiting { unsure: unsure @ 1.., .. }) => self.send_trigger(unsure - 1, now),
             _ => self.fail(failure(rejection)),
         }
     }
 
-    /// An average never spans a failure; noise on the line lets it begin again.
+    /// Restarts the average after noise, and fails it after any other rejection.
     fn refuse_averaged(&mut self, rejection: Rejection) {
         let Some(Capture::Averaging { shots, restarts, last_fault, .. }) = &mut self.capture else {
             return;
@@ -280,8 +283,8 @@ impl AsciiProtocol {
 
     fn count_bad(&mut self, text: &str) {
         let check = "baud rate, line ending, separator and decimal sign";
-        if let Some(said) = self.unreadable.one_more("lines", text, check) {
-            self.outbox.say(Severity::Warning, said);
+        if let Some(warning) = self.errors.record("lines", text, check) {
+            self.outbox.report(Severity::Warning, warning);
         }
     }
 
@@ -301,7 +304,7 @@ impl AsciiProtocol {
     }
 
     fn begin_polled(&mut self, now: Moment) {
-        self.owed.retain(|forgotten| *forgotten > now);
+        self.owed.retain(|expires| *expires > now);
         let until = self.last_byte.unwrap_or(Moment::ZERO) + DRAIN;
         if !self.owed.is_empty() && until > now {
             self.capture = Some(Capture::Draining { until, deadline: now + self.timeout });
@@ -314,14 +317,14 @@ impl AsciiProtocol {
         let seconds = self.timeout.as_secs_f64();
         let failure = match self.capture.take() {
             Some(Capture::Waiting { old, .. }) if old > 0 => {
-                Failure::Unusable("only lines came whose time is not later than that of an earlier line".to_owned())
+                Failure::Unusable("all lines have a time that is not later than that of an earlier line".to_owned())
             }
             Some(Capture::Averaging { last_fault: Some(text), .. }) => Failure::Garbled(text),
             Some(Capture::Averaging { shots, .. }) if !shots.is_empty() => {
-                Failure::Silent { what: format!("collecting lines ({} had come)", shots.len()), seconds }
+                Failure::Silent { what: format!("collecting lines ({} received)", shots.len()), seconds }
             }
             _ if self.lines().is_some() => {
-                let what = "waiting for its lines (if it has to be asked for each, set the option 'mode')".to_owned();
+                let what = "waiting for its lines (if each must be requested, set the option 'mode')".to_owned();
                 Failure::Silent { what, seconds }
             }
             _ => Failure::Silent { what: "waiting for a line".to_owned(), seconds },
@@ -329,10 +332,10 @@ impl AsciiProtocol {
         self.outbox.fail(failure);
     }
 
-    /// When a stream that stopped is to be noticed.
+    /// When to report that a stream stopped.
     fn silence_deadline(&self) -> Option<Moment> {
-        let watched = self.started && self.lines().is_some() && self.capture.is_none() && !self.silence_said;
-        self.last_line.filter(|_| watched).map(|last| last + self.timeout)
+        let is_watched = self.started && self.lines().is_some() && self.capture.is_none() && !self.silence_reported;
+        self.last_line.filter(|_| is_watched).map(|last| last + self.timeout)
     }
 }
 
@@ -342,12 +345,12 @@ impl Protocol for AsciiProtocol {
         self.outbox.clear();
         self.capture = None;
         self.owed.clear();
-        self.unreadable.clear();
+        self.errors.reset();
         self.old_in_a_row = 0;
         self.last_byte = None;
         self.last_time = None;
         self.last_line = Some(now);
-        self.silence_said = false;
+        self.silence_reported = false;
         self.started = true;
         let identity = self.identity();
         self.outbox.push(ProtocolEvent::Ready(identity));
@@ -375,7 +378,7 @@ impl Protocol for AsciiProtocol {
     fn tick(&mut self, now: Moment) {
         match self.capture {
             Some(Capture::Draining { deadline, .. }) if deadline <= now => {
-                let text = "it goes on sending though nothing was asked for: is it a stream?";
+                let text = "it keeps sending lines without a request; check whether it is a stream";
                 self.fail(Failure::NotReady(text.to_owned()));
             }
             Some(Capture::Draining { until, .. }) if until <= now => self.send_trigger(self.owed.len(), now),
@@ -385,16 +388,16 @@ impl Protocol for AsciiProtocol {
             _ => {}
         }
         if self.silence_deadline().is_some_and(|deadline| deadline <= now) {
-            self.silence_said = true;
+            self.silence_reported = true;
             let text = format!("no readable line for {:.1} s", self.timeout.as_secs_f64());
-            self.outbox.say(Severity::Warning, text);
+            self.outbox.report(Severity::Warning, text);
         }
     }
 
     fn trigger(&mut self, now: Moment) {
         let refused = match (self.started, &self.capture) {
-            (false, _) => Some("the link has not begun"),
-            (true, Some(_)) => Some("another shot is under way"),
+            (false, _) => Some("the link is not connected"),
+            (true, Some(_)) => Some("another shot is in progress"),
             (true, None) => None,
         };
         if let Some(text) = refused {
@@ -403,7 +406,7 @@ impl Protocol for AsciiProtocol {
         if self.lines().is_none() {
             return self.begin_polled(now);
         }
-        // The line that has begun is older than the trigger.
+        // A partial line is older than the trigger.
         self.splitter.discard_partial();
         let deadline = now + self.timeout;
         self.capture = Some(Capture::Averaging { deadline, shots: Vec::new(), restarts: 0, last_fault: None });
@@ -442,7 +445,7 @@ fn failure(rejection: Rejection) -> Failure {
     }
 }
 
-/// The mean of lines; what they state as standard deviation is kept, for most of it is common to all of them.
+/// The mean of lines. The stated standard deviation is not reduced, because most of the error is common to all of them.
 fn average(shots: &[Shot]) -> Shot {
     let Some(last) = shots.last() else {
         return Shot::bare(Point3::origin());
@@ -464,7 +467,7 @@ fn average(shots: &[Shot]) -> Shot {
     mean
 }
 
-/// Root of the mean square of the stated standard deviations (m), if every line states it.
+/// RMS of the stated standard deviations (m), if every line states one.
 fn mean_square_root(shots: &[Shot]) -> Option<[f64; 3]> {
     let mut squares = [0.0; 3];
     for shot in shots {

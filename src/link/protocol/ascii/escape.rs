@@ -1,4 +1,4 @@
-//! Trigger bytes written as text.
+//! Escapes in trigger texts.
 
 /// Bytes of a text with the escapes `\r`, `\n`, `\t`, `\0`, `\\` and `\x06`.
 pub fn unescape(text: &str) -> Result<Vec<u8>, String> {
@@ -28,6 +28,6 @@ fn hexadecimal(high: Option<char>, low: Option<char>) -> Result<u8, String> {
     let digit = |character: Option<char>| character.and_then(|c| c.to_digit(16)).and_then(|d| u8::try_from(d).ok());
     match (digit(high), digit(low)) {
         (Some(high), Some(low)) => Ok(high << 4 | low),
-        _ => Err("`\\x` wants two hexadecimal digits, such as \\x06".to_owned()),
+        _ => Err("`\\x` needs two hexadecimal digits, such as \\x06".to_owned()),
     }
 }

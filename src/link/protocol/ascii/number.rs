@@ -1,18 +1,18 @@
-//! Numbers and times as instruments write them; strict, so that nothing is read in two ways.
+//! Numbers and times as instruments write them. Parsing is strict, so that no text has two readings.
 
-use super::super::text::shown;
+use super::super::excerpt::excerpt;
 use super::options::DecimalSign;
 
 /// A finite decimal number with the given decimal sign, an optional sign and exponent; no digit grouping, no `NaN`.
 pub(super) fn number(text: &str, sign: DecimalSign) -> Result<f64, String> {
-    let refused = |why: &str| Err(format!("`{}` {why}", shown(text)));
+    let refused = |why: &str| Err(format!("`{}` {why}", excerpt(text)));
     let plain = text.strip_prefix(['+', '-']).unwrap_or(text);
     let (own, other) = match sign {
         DecimalSign::Point => ('.', ','),
         DecimalSign::Comma => (',', '.'),
     };
     if plain.contains(other) {
-        return refused(&format!("has a `{other}`, but the decimal sign is set to `{own}`"));
+        return refused(&format!("contains `{other}`, but the decimal sign is set to `{own}`"));
     }
     if !plain.starts_with(|c: char| c.is_ascii_digit() || c == own) {
         return refused("is not a number");
@@ -27,9 +27,9 @@ pub(super) fn number(text: &str, sign: DecimalSign) -> Result<f64, String> {
 }
 
 /// A time (s): a plain number of seconds, `2026-05-04T12:30:05.25Z` (zone optional) or `05/04/2026 12:30:05`. Only differences
-/// of one instrument's times have a meaning.
+/// between times of one instrument are meaningful.
 pub(super) fn time(text: &str, sign: DecimalSign) -> Result<f64, String> {
-    let calendar = || calendar_time(text).ok_or_else(|| format!("`{}` is not a time", shown(text)));
+    let calendar = || calendar_time(text).ok_or_else(|| format!("`{}` is not a time", excerpt(text)));
     number(text, sign).or_else(|_| calendar())
 }
 

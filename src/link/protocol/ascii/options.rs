@@ -1,4 +1,4 @@
-//! What a line means and how it is asked for.
+//! Options of the line driver: the meaning of a line and how it is requested.
 
 use regex::bytes::Regex;
 use regex::bytes::RegexBuilder;
@@ -7,37 +7,38 @@ use serde::Serialize;
 
 use super::escape::unescape;
 
-/// Settings of the generic line driver, as a profile carries them.
+/// Options of the generic line driver, as a profile states them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AsciiOptions {
-    /// How a point is asked for.
+    /// How a point is requested.
     pub mode: Mode,
-    /// Where in the line the values are.
+    /// Positions of the values in the line.
     pub layout: Layout,
     /// Unit of the coordinates and of their standard deviations.
     pub unit: LengthUnit,
-    /// What stands between the columns.
+    /// Separator of the columns.
     pub separator: Separator,
-    /// What stands between whole and fraction.
+    /// Decimal sign.
     pub decimal_sign: DecimalSign,
-    /// Lines that begin with it are skipped.
+    /// Lines that start with this text are skipped.
     pub comment_prefix: Option<String>,
-    /// Check value at the end of each line.
+    /// Check sum at the end of each line.
     pub checksum: Checksum,
-    /// Lines that match this regular expression are an error text of the instrument.
+    /// Lines that match this regular expression are error messages of the instrument.
     pub error_pattern: Option<String>,
-    /// Lines that match this regular expression and give no point are skipped, such as acknowledgements.
+    /// Lines that match this regular expression and contain no point are skipped, such as acknowledgements.
     pub ignore_pattern: Option<String>,
     /// Texts of the status column that mean a valid point.
     pub valid_statuses: Vec<String>,
-    /// Farthest possible distance from the instrument (mm).
+    /// Longest possible distance from the instrument (mm).
     pub range_mm: f64,
-    /// Whether two shots running may be equal to the last digit. A real instrument never does that; a stuck one does.
+    /// Whether consecutive shots may be identical to the last digit. A real instrument never repeats itself; one that is stuck
+    /// does.
     pub allow_identical: bool,
-    /// How long a polled line, or the next line of a stream, may take (s).
+    /// Time limit of a polled line, or of the next line of a stream (s).
     pub timeout_s: f64,
-    /// Whether every packet is a whole line, as over UDP, and needs no line end.
+    /// Whether every packet is a whole line without a line end, as over UDP.
     pub datagrams: bool,
 }
 
@@ -62,25 +63,25 @@ impl Default for AsciiOptions {
     }
 }
 
-/// How a point is asked for.
+/// How a point is requested.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mode {
-    /// Bytes are sent and one line answers.
+    /// Bytes are sent, and one line is the answer.
     Polled {
-        /// What to send, with the escapes `\r`, `\n`, `\t`, `\0`, `\\` and `\x06`.
+        /// Bytes to send, with the escapes `\r`, `\n`, `\t`, `\0`, `\\` and `\x06`.
         trigger: String,
     },
-    /// Lines come by themselves.
+    /// Lines arrive without a request.
     Streamed {
-        /// How many lines after the trigger are averaged into one shot.
+        /// Number of lines after the trigger that are averaged into one shot.
         lines: u32,
     },
 }
 
-/// Where in the line the values are.
+/// Positions of the values in a line.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Layout {
-    /// Separated columns; a line has exactly these.
+    /// Separated columns; a line must have exactly these.
     Columns(Vec<Column>),
     /// A regular expression with the named groups `x`, `y`, `z` and, if wanted, `name`, `sigma`, `sx`, `sy`, `sz`, `time` and
     /// `status`.
@@ -90,7 +91,7 @@ pub enum Layout {
 /// Meaning of a column.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Column {
-    /// Nothing of interest.
+    /// An ignored column.
     Skip,
     /// Exactly this text, such as `P` in front of every point.
     Literal(String),
@@ -112,7 +113,7 @@ pub enum Column {
     SigmaZ,
     /// Time by the instrument's clock: seconds, or date and time.
     Time,
-    /// Whether the point is valid.
+    /// Status of the point.
     Status,
 }
 
@@ -135,7 +136,7 @@ impl Column {
     }
 }
 
-/// Makes a regular expression. Classes such as `\d` are those of ASCII, so no tables of Unicode are needed.
+/// Compiles a regular expression. Classes such as `\d` are ASCII only, so no Unicode tables are needed.
 pub(super) fn compile(pattern: &str) -> Result<Regex, String> {
     let regex = RegexBuilder::new(pattern).unicode(false).size_limit(MAX_PATTERN).build();
     regex.map_err(|error| error.to_string())
@@ -161,7 +162,7 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// One of it (m).
+    /// Length of one unit (m).
     pub const fn metres(self) -> f64 {
         match self {
             Self::Metre => 1.0,
@@ -171,7 +172,7 @@ impl LengthUnit {
         }
     }
 
-    /// Its sign.
+    /// Symbol of the unit.
     pub const fn symbol(self) -> &'static str {
         match self {
             Self::Metre => "m",
@@ -182,7 +183,7 @@ impl LengthUnit {
     }
 }
 
-/// What stands between columns. Around commas, semicolons and tabs, spaces do not count.
+/// Separator of columns. Spaces around commas, semicolons and tabs are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Separator {
     /// `,`
@@ -195,7 +196,7 @@ pub enum Separator {
     Spaces,
 }
 
-/// What stands between whole and fraction.
+/// Decimal sign of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum DecimalSign {
     /// `1.5`
@@ -204,19 +205,19 @@ pub enum DecimalSign {
     Comma,
 }
 
-/// Check value at the end of a line.
+/// Check sum at the end of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Checksum {
-    /// None.
+    /// No check sum.
     None,
-    /// `*` and two hexadecimal digits: XOR of all before the `*`, a `$` in front not counted.
+    /// `*` and two hexadecimal digits: XOR of all bytes before the `*`, without a leading `$`.
     Nmea,
-    /// Four hexadecimal digits: CRC-16/ARC of all before them.
+    /// Four hexadecimal digits: CRC-16/ARC of all bytes before them.
     Crc16,
 }
 
 impl AsciiOptions {
-    /// Whether a driver can work with these settings; if not, why, all reasons in one text.
+    /// Fails with all reasons in one text if the driver cannot use these options.
     pub fn validate(&self) -> Result<(), String> {
         let mut problems = Vec::new();
         self.check_mode(&mut problems);
@@ -259,14 +260,14 @@ impl AsciiOptions {
             problems.push(format!("layout: unknown group `{group}`; known are {}", GROUPS.join(", ")));
         }
         for group in GROUPS.iter().filter(|group| groups.iter().filter(|known| known == *group).count() > 1) {
-            problems.push(format!("layout: `{group}` stands twice"));
+            problems.push(format!("layout: `{group}` occurs twice"));
         }
         match ["x", "y", "z"].iter().filter(|axis| has(axis)).count() {
             3 => {}
             1 => {
                 problems.push("layout has one coordinate: a gauge of one dimension gives no point in space".to_owned());
             }
-            _ => problems.push("layout wants x, y and z".to_owned()),
+            _ => problems.push("layout needs x, y and z".to_owned()),
         }
         let sigmas = ["sx", "sy", "sz"].iter().filter(|axis| has(axis)).count();
         if !matches!(sigmas, 0 | 3) || (sigmas == 3 && has("sigma")) {

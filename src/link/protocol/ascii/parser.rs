@@ -1,4 +1,4 @@
-//! One line to one reading, or the reason why not.
+//! Parses one line into a point, or returns why it contains none.
 
 use nalgebra::Point3;
 use regex::bytes::Regex;
@@ -7,8 +7,8 @@ use thiserror::Error;
 use super::super::Shot;
 use super::super::crc::crc16_arc;
 use super::super::crc::nmea_xor;
+use super::super::excerpt::excerpt;
 use super::super::known_sigma;
-use super::super::text::shown;
 use super::number::number;
 use super::number::time;
 use super::options::AsciiOptions;
@@ -18,30 +18,30 @@ use super::options::Layout;
 use super::options::Separator;
 use super::options::compile;
 
-/// What a line said.
+/// Content of a line.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Reading {
-    /// A comment, or another line that was to be skipped.
+pub enum ParsedLine {
+    /// A comment or another line to skip.
     Skipped,
     /// A point.
     Point(Shot),
 }
 
-/// Why a line gives no point.
+/// Why a line contains no point.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Rejection {
-    /// It has another form: cut, joined, other separator, noise.
+    /// The line has the wrong form: truncated, joined, with another separator, or noise.
     #[error("{0}")]
     Garbled(String),
-    /// It says that there is no point.
+    /// The line states that there is no point.
     #[error("{0}")]
     NoPoint(String),
-    /// An error text of the instrument.
+    /// The line is an error message of the instrument.
     #[error("{0}")]
     Instrument(String),
 }
 
-/// Reads lines by the settings.
+/// Parses lines according to the options.
 #[derive(Debug)]
 pub struct LineParser {
     options: AsciiOptions,
@@ -51,7 +51,7 @@ pub struct LineParser {
 }
 
 impl LineParser {
-    /// Fails like [`AsciiOptions::validate`].
+    /// Fails if [`AsciiOptions::validate`] does.
     pub fn new(options: AsciiOptions) -> Result<Self, String> {
         options.validate()?;
         let layout = match &options.layout {
@@ -63,22 +63,21 @@ impl LineParser {
         Ok(Self { options, layout, error, ignore })
     }
 
-    /// The settings.
+    /// Options of the parser.
     pub const fn options(&self) -> &AsciiOptions {
         &self.options
     }
 
-    /// Reads a line without its end.
-    pub fn read(&self, line: &[u8]) -> Result<Reading, Rejection> {
+    /// Parses a line without its terminator.
+    pub fn read(&self, line: &[u8]) -> Result<ParsedLine, Rejection> {
         let decoded = decode(line);
         let text = decoded.trim();
         if text.is_empty() || self.options.comment_prefix.as_ref().is_some_and(|prefix| text.starts_with(prefix)) {
-            return Ok(Reading::Skipped);
+            return Ok(ParsedLine::Skipped);
         }
-        // An error text may well come without the check value that points have.
-        let is_error = |text: &str| self.error.as_ref().is_some_and(|error| error.is_match(text.as_bytes()));
-        if is_error(text) {
-            return Err(Rejection::Instrument(shown(text)));
+        // Error messages may come without a check sum even if points have one.
+        if self.error.as_ref().is_some_and(|error| error.is_match(text.as_bytes())) {
+            return Err(Rejection::Instrument(excerpt(text)));
         }
         let is_latin = std::str::from_utf8(line).is_err();
         let body = self.checked(text, is_latin)?;
@@ -87,26 +86,26 @@ impl LineParser {
             Err(Rejection::Garbled(_))
                 if self.ignore.as_ref().is_some_and(|ignore| ignore.is_match(text.as_bytes())) =>
             {
-                Ok(Reading::Skipped)
+                Ok(ParsedLine::Skipped)
             }
-            other => other.map(Reading::Point),
+            other => other.map(ParsedLine::Point),
         }
     }
 
-    /// The line without its check value.
+    /// Checks the check sum and returns the line without it.
     fn checked<'line>(&self, text: &'line str, is_latin: bool) -> Result<&'line str, Rejection> {
         let (body, stated, right) = match self.options.checksum {
             Checksum::None => return Ok(text),
             Checksum::Nmea => {
                 let Some((body, stated)) = text.rsplit_once('*') else {
-                    return Err(Rejection::Garbled("the check value after `*` is missing".to_owned()));
+                    return Err(Rejection::Garbled("the check sum after `*` is missing".to_owned()));
                 };
                 let body = body.strip_prefix('$').unwrap_or(body);
                 (body, stated, format!("{:02X}", nmea_xor(&encoded(body, is_latin))))
             }
             Checksum::Crc16 => {
                 let Some((body, stated)) = text.len().checked_sub(4).and_then(|at| text.split_at_checked(at)) else {
-                    return Err(Rejection::Garbled("the line is too short for its check value".to_owned()));
+                    return Err(Rejection::Garbled("the line is too short for its check sum".to_owned()));
                 };
                 (body, stated, format!("{:04X}", crc16_arc(&encoded(body, is_latin))))
             }
@@ -114,7 +113,7 @@ impl LineParser {
         if stated.eq_ignore_ascii_case(&right) {
             return Ok(body.trim_end_matches([',', ';', ' ', '\t']));
         }
-        Err(Rejection::Garbled(format!("the check value is `{}`, but the line gives {right}", shown(stated))))
+        Err(Rejection::Garbled(format!("the check sum is `{}`, but that of the line is {right}", excerpt(stated))))
     }
 
     fn fields<'line>(&self, text: &'line str) -> Result<Fields<'line>, Rejection> {
@@ -126,12 +125,12 @@ impl LineParser {
     }
 }
 
-/// UTF-8, or else Latin-1, where every byte is a character.
+/// Decodes UTF-8, or else Latin-1, in which every byte is a character.
 fn decode(line: &[u8]) -> String {
     std::str::from_utf8(line).map_or_else(|_| line.iter().copied().map(char::from).collect(), str::to_owned)
 }
 
-/// The bytes that [`decode`] made the text of.
+/// The bytes from which [`decode`] made the text.
 fn encoded(text: &str, is_latin: bool) -> Vec<u8> {
     if is_latin { text.chars().filter_map(|c| u8::try_from(c).ok()).collect() } else { text.as_bytes().to_vec() }
 }
@@ -156,13 +155,13 @@ fn separated<'line>(text: &'line str, columns: &[Column], separator: Separator) 
     };
     if values.len() != columns.len() {
         let (found, wanted) = (values.len(), columns.len());
-        return Err(Rejection::Garbled(format!("{found} columns instead of {wanted} in `{}`", shown(text))));
+        return Err(Rejection::Garbled(format!("{found} columns instead of {wanted} in `{}`", excerpt(text))));
     }
     let mut fields = Fields::default();
     for (column, &value) in columns.iter().zip(&values) {
         match column {
             Column::Literal(literal) if literal != value => {
-                return Err(Rejection::Garbled(format!("`{}` stands where `{literal}` should", shown(value))));
+                return Err(Rejection::Garbled(format!("`{}` instead of `{literal}`", excerpt(value))));
             }
             _ => {
                 if let Some(group) = column.group() {
@@ -177,16 +176,16 @@ fn separated<'line>(text: &'line str, columns: &[Column], separator: Separator) 
 fn matched<'line>(text: &'line str, pattern: &Regex) -> Result<Fields<'line>, Rejection> {
     let mut all = pattern.captures_iter(text.as_bytes());
     let Some(captures) = all.next() else {
-        return Err(Rejection::Garbled(format!("`{}` does not match the pattern", shown(text))));
+        return Err(Rejection::Garbled(format!("`{}` does not match the pattern", excerpt(text))));
     };
     if all.next().is_some() {
-        return Err(Rejection::Garbled(format!("`{}` matches the pattern twice", shown(text))));
+        return Err(Rejection::Garbled(format!("`{}` matches the pattern twice", excerpt(text))));
     }
     let mut fields = Fields::default();
     for group in pattern.capture_names().flatten() {
         if let Some(value) = captures.name(group) {
-            // A pattern of bytes may cut a character in two.
-            let cut = || Rejection::Garbled(format!("`{group}` in `{}` is no text", shown(text)));
+            // A pattern on bytes may split a character.
+            let cut = || Rejection::Garbled(format!("`{group}` in `{}` is not text", excerpt(text)));
             let value = text.get(value.range()).ok_or_else(cut)?;
             fields.set(group, value.trim());
         }
@@ -215,11 +214,11 @@ impl<'line> Fields<'line> {
     }
 
     fn into_shot(self, options: &AsciiOptions, line: &[u8]) -> Result<Shot, Rejection> {
-        // The status first: beside an invalid one the numbers may be anything.
+        // Check the status first: with an invalid one the numbers may be anything.
         if let Some(status) = self.status
             && !options.valid_statuses.iter().any(|valid| valid == status)
         {
-            return Err(Rejection::NoPoint(format!("the status of the point is `{}`", shown(status))));
+            return Err(Rejection::NoPoint(format!("the status of the point is `{}`", excerpt(status))));
         }
         let metres = options.unit.metres();
         let [x, y, z] = self.point.map(|text| coordinate(text, options));
@@ -229,12 +228,12 @@ impl<'line> Fields<'line> {
         shot.sigma = self.stated_sigma(options)?;
         shot.instrument_time =
             self.time.map(|text| time(text, options.decimal_sign)).transpose().map_err(Rejection::Garbled)?;
-        shot.remark = self.name.filter(|name| !name.is_empty()).map(shown);
+        shot.remark = self.name.filter(|name| !name.is_empty()).map(excerpt);
         shot.raw = line.to_vec();
         Ok(shot)
     }
 
-    /// Standard deviations (m). Zero or nothing means that the instrument does not know it.
+    /// Standard deviations (m); `None` for zero or an empty field, which mean unknown.
     fn stated_sigma(&self, options: &AsciiOptions) -> Result<Option<[f64; 3]>, Rejection> {
         let texts = if self.sigma.is_some() { [self.sigma; 3] } else { self.sigmas };
         let mut sigmas = [0.0; 3];
@@ -258,21 +257,19 @@ fn coordinate(text: Option<&str>, options: &AsciiOptions) -> Result<f64, Rejecti
     let text = text.ok_or_else(|| Rejection::Garbled("a coordinate is missing".to_owned()))?;
     let word = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
     if word.starts_with("nan") || word.starts_with("inf") || word.starts_with("1.#") {
-        return Err(Rejection::NoPoint(format!("a coordinate is `{}`", shown(text))));
+        return Err(Rejection::NoPoint(format!("a coordinate is `{}`", excerpt(text))));
     }
     number(text, options.decimal_sign).map_err(Rejection::Garbled)
 }
 
-/// Refuses what no instrument measures: exactly its own origin, or farther than it can see.
+/// Rejects points that no instrument measures: exactly at its origin, or out of range.
 fn check_point(point: &Point3<f64>, range: f64) -> Result<(), Rejection> {
     if point.coords.iter().all(|value| *value == 0.0) {
-        return Err(Rejection::NoPoint("it is exactly 0, 0, 0, which means a failed measurement".to_owned()));
+        return Err(Rejection::NoPoint("it is exactly 0, 0, 0, as after a failed measurement".to_owned()));
     }
     let distance = point.coords.norm();
     if distance <= range {
         return Ok(());
     }
-    Err(Rejection::NoPoint(format!(
-        "it is {distance:.1} m away, farther than the {range:.1} m set as the range; check the unit"
-    )))
+    Err(Rejection::NoPoint(format!("it is {distance:.1} m away, beyond the range of {range:.1} m; check the unit")))
 }

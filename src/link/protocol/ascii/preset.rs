@@ -1,4 +1,4 @@
-//! Settings for what is commonly met.
+//! Options for common sources.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,14 +10,14 @@ use super::options::Column;
 use super::options::Layout;
 use super::options::Mode;
 
-/// Both forms of the answer. After the third value no comma may stand: with decimal commas there would be six values.
+/// Both forms of the answer. No comma may follow the third value: with decimal commas there would be six values.
 const ANSWER_OF_T2SA: &str =
     r"(?:\bresult\s+|;X:\s*)(?<x>[^\s,;]+)(?:,|;Y:\s*)(?<y>[^\s,;]+)(?:,|;Z:\s*)(?<z>[^\s,;]+)(?:[\s;]|$)";
 
-/// A gauge's line: number of the gauge, a letter, the value.
+/// Line of a gauge: its number, a letter, the value.
 const GAUGE_LINE: &str = r"^\d\dA(?<x>[+-]\d+\.\d+)$";
 
-/// Named settings to start from.
+/// A named set of options.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
     /// A stream of `x,y,z`.
@@ -26,19 +26,19 @@ pub enum Preset {
     NameXyz,
     /// `SpatialAnalyzer` behind the T2SA server: polled, answers in sentences with `ACK` and `ERR`.
     T2sa,
-    /// A Mitutoyo gauge: one dimension. Refused by [`AsciiOptions::validate`], and said why.
+    /// A Mitutoyo gauge with one dimension. [`AsciiOptions::validate`] refuses it with the reason.
     Mitutoyo,
     /// UDP datagrams of `x,y,z,time`.
     UdpXyzTime,
-    /// The line that is recommended to whoever writes a bridge.
+    /// The line recommended for bridge programs.
     Bridge,
 }
 
 impl Preset {
-    /// All of them.
+    /// All presets.
     pub const ALL: [Self; 6] = [Self::Xyz, Self::NameXyz, Self::T2sa, Self::Mitutoyo, Self::UdpXyzTime, Self::Bridge];
 
-    /// Its name in profiles and on screens.
+    /// Name in profiles and on screens.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Xyz => "xyz",
@@ -50,7 +50,7 @@ impl Preset {
         }
     }
 
-    /// Its settings.
+    /// Options of the preset.
     pub fn options(self) -> AsciiOptions {
         let columns =
             |columns: &[Column]| AsciiOptions { layout: Layout::Columns(columns.to_vec()), ..AsciiOptions::default() };
@@ -82,7 +82,7 @@ fn bridge_columns() -> [Column; 10] {
     ]
 }
 
-/// The answer carries a time too, but in whole seconds: it cannot tell two shots apart, so it is not used.
+/// The answer contains a time too, but in whole seconds. It cannot distinguish two shots, so it is not used.
 fn t2sa() -> AsciiOptions {
     AsciiOptions {
         mode: Mode::Polled { trigger: "!MEAS_SINGLE_POINT:calibration;points;p\\r\\n".to_owned() },
@@ -102,7 +102,7 @@ impl fmt::Display for Preset {
 
 /// No preset has this name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("no preset is called `{0}`; there are: xyz | name,x,y,z | T2SA | Mitutoyo 1-D | UDP xyz+time | bridge")]
+#[error("there is no preset `{}`; presets: {}", .0, Preset::ALL.map(Preset::name).join(" | "))]
 pub struct UnknownPreset(String);
 
 impl FromStr for Preset {

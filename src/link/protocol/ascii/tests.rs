@@ -21,22 +21,22 @@ use super::Layout;
 use super::LengthUnit;
 use super::LineParser;
 use super::Mode;
+use super::ParsedLine;
 use super::Preset;
-use super::Reading;
 use super::Rejection;
 use super::Separator;
 use super::number::number;
 use super::number::time;
 use super::unescape;
 
-fn read(options: &AsciiOptions, line: &str) -> Result<Reading, Rejection> {
+fn read(options: &AsciiOptions, line: &str) -> Result<ParsedLine, Rejection> {
     LineParser::new(options.clone()).unwrap().read(line.as_bytes())
 }
 
 #[track_caller]
 fn assert_point(options: &AsciiOptions, line: &str, metres: [f64; 3]) {
     match read(options, line) {
-        Ok(Reading::Point(shot)) => {
+        Ok(ParsedLine::Point(shot)) => {
             assert!((shot.point - Point3::from(metres)).norm() < 1e-12, "{}", shot.point);
             assert_eq!(shot.raw, line.as_bytes());
         }
@@ -105,7 +105,7 @@ fn check_values_are_checked() {
 #[test]
 fn the_recommended_line_is_read_whole() {
     let line = "P,A7,1,2,3,0.01,0.02,0.03,0,2026-05-04T12:30:05.250+02:00";
-    let Ok(Reading::Point(shot)) = read(&Preset::Bridge.options(), line) else {
+    let Ok(ParsedLine::Point(shot)) = read(&Preset::Bridge.options(), line) else {
         panic!("{:?}", read(&Preset::Bridge.options(), line));
     };
     assert_eq!(shot.remark.as_deref(), Some("A7"));
@@ -122,7 +122,7 @@ fn t2sa_is_understood_in_both_forms() {
     let metres = [-1.25, 0.002, 3e-3];
     assert_point(&options, "ACK-300 Measured p result -1250.0,2.0,3 05/04/2026 12:30:05", metres);
     assert_point(&options, "ACK-300 POS p;X:-1250.0;Y:2;Z:3.0;Rx:0.1;Ry:0;Rz:0;", metres);
-    assert_eq!(read(&options, "ACK-300 command accepted"), Ok(Reading::Skipped));
+    assert_eq!(read(&options, "ACK-300 command accepted"), Ok(ParsedLine::Skipped));
     assert_eq!(read(&options, "ERR-342 no lock"), Err(Rejection::Instrument("ERR-342 no lock".to_owned())));
     assert_garbled(&options, "result 1,2,3 result 4,5,6");
 }
@@ -297,7 +297,7 @@ fn a_flood_of_lines_keeps_the_queues_short() {
         let mut protocol = started(options);
         protocol.feed(flood.as_bytes(), Duration::ZERO);
         let events: Vec<ProtocolEvent> = std::iter::from_fn(|| protocol.next_event()).collect();
-        assert!(events.len() <= MAX_OFFERED + MAX_STATUSES.0 + MAX_STATUSES.1 + 1, "{}", events.len());
+        assert!(events.len() <= MAX_OFFERED + MAX_STATUSES + 1, "{}", events.len());
         let last = events.iter().rev().find_map(|event| match event {
             ProtocolEvent::Live(shot) | ProtocolEvent::Offered(shot) => Some(shot.raw.clone()),
             _ => None,
@@ -310,7 +310,7 @@ fn a_flood_of_lines_keeps_the_queues_short() {
 fn latin_1_names_do_not_spoil_a_line() {
     let parser = LineParser::new(Preset::NameXyz.options()).unwrap();
     match parser.read(b"Pr\xFCfpunkt,1,2,3") {
-        Ok(Reading::Point(shot)) => assert_eq!(shot.remark.as_deref(), Some("Pr\u{fc}fpunkt")),
+        Ok(ParsedLine::Point(shot)) => assert_eq!(shot.remark.as_deref(), Some("Pr\u{fc}fpunkt")),
         other => panic!("{other:?}"),
     }
 }

@@ -1,28 +1,28 @@
-//! Commands that the program sends.
+//! Commands to the tracker.
 
 use super::status::{CommandId, CoordinateType, LengthUnit, MeasurementMode, PacketType};
 
-/// Units as the tracker keeps them.
+/// Units that are set at the tracker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Units {
-    /// Length.
+    /// Unit of length.
     pub length: LengthUnit,
-    /// Angle: 0 rad, 1 deg, 2 gon.
+    /// Unit of angles: 0 rad, 1 deg, 2 gon.
     pub angle: i32,
-    /// Temperature: 0 °C, 1 °F.
+    /// Unit of temperature: 0 °C, 1 °F.
     pub temperature: i32,
-    /// Pressure: 0 mbar, 1 hPa, 2 kPa, 3 mmHg, 4 psi, 5 inH2O, 6 inHg.
+    /// Unit of pressure: 0 mbar, 1 hPa, 2 kPa, 3 mmHg, 4 psi, 5 inH2O, 6 inHg.
     pub pressure: i32,
-    /// Humidity: 0 relative (%).
+    /// Unit of humidity: 0 relative (%).
     pub humidity: i32,
 }
 
 impl Units {
-    /// What this program asks for: mm, rad, °C, mbar (the same as hPa), %.
+    /// The units that this program sets: mm, rad, °C, mbar (the same as hPa), %.
     pub const WANTED: Self =
         Self { length: LengthUnit::Millimetre, angle: 0, temperature: 0, pressure: 0, humidity: 0 };
 
-    /// From the five numbers of the wire.
+    /// Units from the five numbers of the wire.
     pub const fn from_numbers([length, angle, temperature, pressure, humidity]: [i32; 5]) -> Self {
         Self { length: LengthUnit::from_number(length), angle, temperature, pressure, humidity }
     }
@@ -50,31 +50,31 @@ impl std::fmt::Display for Units {
     }
 }
 
-/// System settings in the order of the wire.
+/// System settings, in the order of the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SystemSettings {
-    /// Weather monitor: 0 not connected, 1 read only, 2 read and calculate the refraction.
+    /// Weather monitor status: 0 not connected, 1 read only, 2 read and calculate the refraction.
     pub weather_monitor_status: i32,
-    /// The transformation is applied to results.
+    /// Whether the transformation is applied to results.
     pub apply_transformation_params: i32,
-    /// The station orientation is applied to results.
+    /// Whether the station orientation is applied to results.
     pub apply_station_orientation_params: i32,
-    /// The last position is kept when the beam breaks.
+    /// Whether the last position is kept when the beam breaks.
     pub keep_last_position: i32,
-    /// Status changes are sent unasked.
+    /// Whether status changes are sent without a request.
     pub send_unsolicited_messages: i32,
-    /// The position of the reflector is sent all the time.
+    /// Whether the position of the reflector is sent continuously.
     pub send_reflector_position_data: i32,
-    /// Results are rehearsals.
+    /// Whether results are taken in try mode, which does not count as a measurement.
     pub try_measurement_mode: i32,
-    /// An inclination sensor is there.
+    /// Whether an inclination sensor is connected.
     pub has_nivel: i32,
-    /// A camera is there.
+    /// Whether a camera is connected.
     pub has_video_camera: i32,
 }
 
 impl SystemSettings {
-    /// From the nine numbers of the wire.
+    /// Settings from the nine numbers of the wire.
     pub const fn from_numbers(numbers: [i32; 9]) -> Self {
         let [
             weather_monitor_status,
@@ -117,7 +117,7 @@ impl SystemSettings {
 }
 
 impl std::fmt::Display for SystemSettings {
-    /// The fields that matter here.
+    /// Only the fields that matter here.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { weather_monitor_status, send_unsolicited_messages, .. } = self;
         let Self { send_reflector_position_data, try_measurement_mode, .. } = self;
@@ -129,7 +129,7 @@ impl std::fmt::Display for SystemSettings {
 /// A command with its parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Command {
-    /// Which.
+    /// Identifier of the command.
     pub id: CommandId,
     body: Vec<u8>,
 }
@@ -165,7 +165,7 @@ impl Command {
         Self::with(CommandId::SetStationaryModeParams, &[milliseconds, i32::from(use_adm)])
     }
 
-    /// Chooses a reflector.
+    /// Selects a reflector.
     pub fn set_reflector(id: i32) -> Self {
         Self::with(CommandId::SetReflector, &[id])
     }
@@ -175,7 +175,7 @@ impl Command {
         Self::with(CommandId::SetSystemSettings, &settings.numbers())
     }
 
-    /// The bytes of the wire.
+    /// The command as bytes.
     pub fn encode(&self) -> Vec<u8> {
         let size = i32::try_from(12 + self.body.len()).unwrap_or(i32::MAX);
         let head = [size, PacketType::Command.number(), self.id.number()];

@@ -1,30 +1,28 @@
-//! One command under way: how long its answer may take, and when it is sent again.
+//! One command in progress: the time limit of its answer, and its retries.
 
 use std::time::Duration;
 
 use super::super::Moment;
-use super::super::patience::Patience;
+use super::super::backoff::Backoff;
 use super::command::Command;
 use super::status::CommandId;
 
-/// An ordinary command is answered within this.
+/// Time limit of an ordinary command.
 pub(super) const ORDINARY: Duration = Duration::from_secs(30);
 
-/// The initialisation is answered within this: the head of the tracker turns.
+/// Time limit of the initialisation, in which the head of the tracker turns.
 pub(super) const INITIALIZE: Duration = Duration::from_secs(90);
 
-/// The first question of a connection is answered within this: it only reads. What takes the connection and says nothing is often
-/// no tracker.
+/// Time limit of the first command of a connection, which only reads. A peer that accepts the connection and stays silent is
+/// usually not a tracker.
 pub(super) const FIRST: Duration = Duration::from_secs(8);
 
-/// A command whose answer is not complete.
+/// A command that was not answered completely.
 #[derive(Clone, Debug)]
 pub(super) struct Exchange {
-    /// The command.
     pub command: Command,
-    /// When it was sent, or is to be sent again.
     state: State,
-    patience: Patience,
+    backoff: Backoff,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -33,70 +31,67 @@ enum State {
     Paused { until: Moment },
 }
 
-/// What time has done to an exchange.
+/// What an exchange needs at some time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Due {
-    /// Nothing.
     Nothing,
-    /// These bytes are to be sent again.
-    Again(Vec<u8>),
-    /// No answer came in time.
+    /// Send these bytes again.
+    Resend(Vec<u8>),
+    /// The answer is overdue.
     TimedOut,
 }
 
 impl Exchange {
-    /// A command that is being sent now.
+    /// A command sent now.
     pub(super) fn new(command: Command, now: Moment) -> Self {
-        let state = State::Sent { until: now + patience(command.id) };
-        Self { command, state, patience: Patience::default() }
+        let state = State::Sent { until: now + time_limit(command.id) };
+        Self { command, state, backoff: Backoff::default() }
     }
 
-    /// The first one of a connection.
+    /// The first command of a connection, sent now.
     pub(super) fn first(command: Command, now: Moment) -> Self {
         Self { state: State::Sent { until: now + FIRST }, ..Self::new(command, now) }
     }
 
-    /// True where an answer to this command is the answer to this exchange.
+    /// Whether an answer to this command answers this exchange.
     pub(super) fn is_answered_by(&self, command: CommandId) -> bool {
         matches!(self.state, State::Sent { .. }) && self.command.id == command
     }
 
-    /// The next moment at which [`Self::due`] has something to say.
+    /// The next time at which [`Self::due`] returns an action.
     pub(super) const fn deadline(&self) -> Moment {
         match self.state {
             State::Sent { until } | State::Paused { until } => until,
         }
     }
 
-    /// Asks again after a pause.
+    /// Schedules the command again after a pause.
     pub(super) fn repeat_after(&mut self, pause: Duration, now: Moment) {
         self.state = State::Paused { until: now + pause };
     }
 
-    /// The tracker is busy: asks again after a growing pause. False once that has gone on for too long.
+    /// Schedules a retry for a busy tracker after a growing pause; `false` once it has been busy for too long.
     pub(super) fn retry(&mut self, now: Moment) -> bool {
-        let again = self.patience.again_at(now);
-        if let Some(until) = again {
-            self.state = State::Paused { until };
-        }
-        again.is_some()
+        let Some(until) = self.backoff.next_attempt(now) else { return false };
+        self.state = State::Paused { until };
+        true
     }
 
-    /// What is to be done now.
+    /// The action that is due now.
     pub(super) fn due(&mut self, now: Moment) -> Due {
         match self.state {
             State::Sent { until } if now >= until => Due::TimedOut,
             State::Paused { until } if now >= until => {
-                self.state = State::Sent { until: now + patience(self.command.id) };
-                Due::Again(self.command.encode())
+                self.state = State::Sent { until: now + time_limit(self.command.id) };
+                Due::Resend(self.command.encode())
             }
             _ => Due::Nothing,
         }
     }
 }
 
-/// How long the answer to a command may take.
-pub(super) const fn patience(command: CommandId) -> Duration {
+/// Time limit of a command.
+pub(super) const fn time_limit(command: CommandId) -> Duration {
     match command {
         CommandId::Initialize => INITIALIZE,
         _ => ORDINARY,

@@ -1,65 +1,67 @@
-//! Packets: where one ends and the next begins, and what stands in it.
+//! Packets: framing and contents.
 //!
 //! Little-endian, packed to 4 bytes: a header of total size and type (i32 each), then i32, f64 and UTF-16 fields at fixed
-//! offsets. `long` is 32 bits wide whatever the compiler of the day thinks. A packet may be longer than known (newer firmware),
-//! never shorter.
+//! offsets. `long` in the public descriptions is 32 bits wide. A packet may be longer than known (newer firmware), but not
+//! shorter.
 
 use thiserror::Error;
 
-use super::super::unread::Unread;
+use super::super::receive_buffer::ReceiveBuffer;
 use super::status::{CommandId, MeasurementMode, PacketType, ResultStatus, SystemEvent};
 use crate::text::printable;
 
-/// The smallest packet that exists (bytes).
+/// Size of the smallest packet (bytes).
 pub const MIN_PACKET: usize = 12;
 
-/// A size above this is no size but lost synchronisation (bytes).
+/// Size of the largest packet (bytes); a larger one means that the stream is out of sync.
 pub const MAX_PACKET: usize = 65_536;
 
-/// Numbers of types are small; a dozen is known.
+/// Limit for type numbers; the known ones are below 20.
 const MAX_TYPE: i32 = 1000;
 
-/// Why bytes are no packet.
+/// Why bytes cannot be read as a packet.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum PacketError {
-    /// The header says what no header says.
-    #[error("a packet of {0} bytes was announced; sizes from 12 to 65536 exist, so the stream is out of step")]
+    /// The header states an impossible size.
+    #[error(
+        "a packet of {0} bytes was announced; sizes are {MIN_PACKET} to {MAX_PACKET}, so the stream is out of sync"
+    )]
     Size(i32),
     /// A packet ends before its last field.
     #[error("packet '{what}' has {size} bytes, at least {least} are needed")]
     Short {
-        /// Which packet.
+        /// Name of the packet.
         what: &'static str,
-        /// Its size (bytes).
+        /// Size of the packet (bytes).
         size: usize,
-        /// The size with all known fields (bytes).
+        /// Size of all known fields (bytes).
         least: usize,
     },
 }
 
-/// Cuts a stream into packets. Never waits for more than the rest of one packet.
+/// Splits a stream into packets. Buffers at most one packet.
 #[derive(Clone, Debug, Default)]
 pub struct Framer {
-    unread: Unread,
+    received: ReceiveBuffer,
 }
 
 impl Framer {
-    /// Forgets what is there.
+    /// Discards all received bytes.
     pub fn clear(&mut self) {
-        self.unread.clear();
+        self.received.clear();
     }
 
-    /// Adds bytes.
+    /// Appends received bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
-        self.unread.feed(bytes);
+        self.received.feed(bytes);
     }
 
-    /// The next whole packet.
+    /// The next complete packet.
     ///
     /// # Errors
-    /// [`PacketError::Size`]: nothing behind it can be trusted.
+    /// [`PacketError::Size`]: the stream is out of sync.
     pub fn next_packet(&mut self) -> Result<Option<Vec<u8>>, PacketError> {
-        let rest = self.unread.bytes();
+        let rest = self.received.unread();
         let Some(size) = i32_at(rest, 0) else { return Ok(None) };
         let length = usize::try_from(size).unwrap_or(0);
         if !(MIN_PACKET..=MAX_PACKET).contains(&length) {
@@ -67,60 +69,60 @@ impl Framer {
         }
         let packet = rest.get(..length).map(<[u8]>::to_vec);
         if packet.is_some() {
-            self.unread.skip(length);
+            self.received.consume(length);
         }
         Ok(packet)
     }
 
-    /// Whether the next packet has a size or a type that no tracker sends, of whatever firmware.
+    /// Whether the next packet has a size or a type that no tracker sends, whatever its firmware.
     pub fn announces_unknown(&self) -> bool {
-        let rest = self.unread.bytes();
+        let rest = self.received.unread();
         let size = i32_at(rest, 0).map(|size| usize::try_from(size).unwrap_or(0));
         size.is_some_and(|size| !(MIN_PACKET..=MAX_PACKET).contains(&size))
             || i32_at(rest, 4).is_some_and(|kind| !(0..MAX_TYPE).contains(&kind))
     }
 
-    /// The first bytes that wait, at most so many.
+    /// The first unread bytes, at most this many.
     pub fn start(&self, most: usize) -> &[u8] {
-        let rest = self.unread.bytes();
+        let rest = self.received.unread();
         rest.get(..most).unwrap_or(rest)
     }
 
-    /// Bytes that wait for the rest of their packet.
+    /// Bytes of an incomplete packet.
     pub fn pending(&self) -> usize {
-        self.unread.bytes().len()
+        self.received.unread().len()
     }
 }
 
-/// What the tracker sends.
+/// A packet from the tracker.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Packet {
     /// Answer to a command.
     Reply(Reply),
-    /// Error of a command, or of none.
+    /// Error of a command, or an unrelated one.
     Error {
-        /// Which command.
+        /// The command that failed.
         command: CommandId,
-        /// What.
+        /// The error.
         status: ResultStatus,
     },
     /// One measured point.
     Single(SingleResult),
-    /// Where the reflector is now, in the units that are set.
+    /// Current position of the reflector in the tracker's units.
     ReflectorPosition {
-        /// Values in the coordinate type that is set.
+        /// Coordinates in the tracker's coordinate type.
         values: [f64; 3],
-        /// The packet.
+        /// Bytes of the packet.
         raw: Vec<u8>,
     },
-    /// Something changed.
+    /// A status change.
     Event(SystemEvent),
-    /// A kind that this program has no use for, or does not know.
+    /// A type that this program does not use or does not know.
     Skipped(PacketType),
 }
 
 impl Packet {
-    /// Reads one packet.
+    /// Decodes one packet.
     ///
     /// # Errors
     /// [`PacketError::Short`].
@@ -154,24 +156,24 @@ impl Packet {
     }
 }
 
-/// Answer to a command; what stands behind the status depends on the command.
+/// Answer to a command; the fields after the status depend on the command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reply {
     bytes: Vec<u8>,
 }
 
 impl Reply {
-    /// Which command is answered.
+    /// The answered command.
     pub fn command(&self) -> CommandId {
         command_of(&self.bytes)
     }
 
-    /// How it went.
+    /// Result of the command.
     pub fn status(&self) -> ResultStatus {
         status_of(&self.bytes)
     }
 
-    /// Fields of an answer that has at least `least` bytes.
+    /// Fields of the answer, which must have at least `least` bytes.
     ///
     /// # Errors
     /// [`PacketError::Short`].
@@ -181,34 +183,34 @@ impl Reply {
     }
 }
 
-/// Fields of a packet that was found long enough for them.
+/// Fields of a packet whose length was checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Fields<'a> {
     bytes: &'a [u8],
 }
 
 impl Fields<'_> {
-    /// An integer.
+    /// The integer at an offset.
     pub fn i32(&self, offset: usize) -> i32 {
         i32_at(self.bytes, offset).unwrap_or_default()
     }
 
-    /// Integers in a row.
+    /// Consecutive integers from an offset.
     pub fn integers<const N: usize>(&self, offset: usize) -> [i32; N] {
         std::array::from_fn(|index| self.i32(offset + 4 * index))
     }
 
-    /// A number; not a number where the packet has none.
+    /// The number at an offset; NaN beyond the end of the packet.
     pub fn f64(&self, offset: usize) -> f64 {
         f64_at(self.bytes, offset)
     }
 
-    /// Numbers in a row.
+    /// Consecutive numbers from an offset.
     pub fn numbers<const N: usize>(&self, offset: usize) -> [f64; N] {
         std::array::from_fn(|index| self.f64(offset + 8 * index))
     }
 
-    /// A name of 32 UTF-16 units that ends at the first zero.
+    /// The name at an offset: 32 UTF-16 units, ended by the first zero.
     pub fn name(&self, offset: usize) -> String {
         let field = self.bytes.get(offset..offset + 64).unwrap_or_default();
         let units = field.chunks_exact(2).map(|unit| unit.try_into().map_or(0, u16::from_le_bytes));
@@ -217,27 +219,27 @@ impl Fields<'_> {
     }
 }
 
-/// One measured point, in the units that are set.
+/// One measured point, in the tracker's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SingleResult {
-    /// How the measurement went.
+    /// Result of the measurement.
     pub status: ResultStatus,
-    /// Mode in which it was taken.
+    /// Measurement mode of the result.
     pub mode: MeasurementMode,
-    /// Taken in try mode: a rehearsal, no measurement.
+    /// Whether it was taken in try mode and is not a real measurement.
     pub is_try: bool,
-    /// Coordinates.
+    /// Coordinates of the point.
     pub values: [f64; 3],
-    /// Their standard deviations.
+    /// Standard deviations of the coordinates.
     pub sigma: [f64; 3],
-    /// Temperature, pressure, humidity.
+    /// Temperature, pressure and humidity.
     pub weather: [f64; 3],
-    /// The packet.
+    /// Bytes of the packet.
     pub raw: Vec<u8>,
 }
 
 impl SingleResult {
-    /// The two kinds differ in where the weather stands.
+    /// Reads a result. The two kinds of packet differ in the offset of the weather values.
     fn read(bytes: &[u8], weather: usize) -> Self {
         let int = |offset| i32_at(bytes, offset).unwrap_or(-1);
         Self {
@@ -258,7 +260,7 @@ pub fn i32_at(bytes: &[u8], offset: usize) -> Option<i32> {
     Some(i32::from_le_bytes(*field))
 }
 
-/// The number at an offset; not a number where the bytes end before it.
+/// The number at an offset; NaN beyond the end of the bytes.
 pub fn f64_at(bytes: &[u8], offset: usize) -> f64 {
     bytes.get(offset..).and_then(<[u8]>::first_chunk::<8>).map_or(f64::NAN, |field| f64::from_le_bytes(*field))
 }

@@ -1,9 +1,9 @@
-//! The set-up: every setting that a point depends on is set and read back, and read again whenever the tracker says that it
-//! changed.
+//! The set-up: writes and reads back every setting that points depend on, and reads it again whenever the tracker reports a
+//! change.
 //!
-//! A whole set-up writes first. A re-check reads first and writes only what differs, so that the tracker's announcement of our
-//! own change, which may come late, costs one reading and no endless loop. What cannot be set again without changing what the
-//! points mean (the frame, the reflector) ends the link instead.
+//! A whole set-up writes first. A re-check reads first and writes only what differs, so that a late announcement of our own
+//! change costs one reading instead of an endless loop. A changed frame or reflector ends the link, because writing it back
+//! would not tell which points were measured with which.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -15,39 +15,39 @@ use super::packet::{Fields, PacketError, Reply};
 use super::status::{
     CoordinateType, LaserStatus, MeasurementMode, ProcessorStatus, ResultStatus, SystemEvent, TrackerStatus,
 };
-use super::step::{Setting, Step, reading_of};
+use super::step::{SetUpStep, Setting, reading_of};
 
-/// A laser that warms up is asked again after this.
+/// Interval at which a laser that is warming up is polled.
 pub(super) const WARM_UP_PAUSE: Duration = Duration::from_secs(5);
 
-/// Reflectors that are remembered at most; trackers have a few dozen.
+/// Most reflectors that are kept; trackers have a few dozen.
 pub(super) const MAX_REFLECTORS: usize = 256;
 
-/// Transformation without effect: translation, rotation, scale.
+/// The identity transformation: translation, rotation, scale.
 const NO_TRANSFORMATION: [f64; 7] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
-/// Parameters of a frame that differ by no more than this are the same.
+/// Largest difference at which parameters of a frame count as equal.
 const SAME: f64 = 1e-12;
 
-/// What follows an answer.
+/// What follows after an answer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Outcome {
-    /// The step is done.
+    /// The step is complete.
     Done,
-    /// The same answer has more packets.
+    /// The answer has more packets.
     More,
-    /// The same question again after the warm-up pause; why, in words.
+    /// The command must be repeated after the warm-up pause, for this reason.
     Wait(String),
 }
 
-/// A set-up or re-check under way, and what was found in it.
+/// A set-up or re-check in progress, with its findings.
 #[derive(Clone, Debug)]
 pub(super) struct SetUp {
     options: EmsconOptions,
-    steps: VecDeque<Step>,
+    steps: VecDeque<SetUpStep>,
     is_whole: bool,
-    /// Steps that this tracker does not know.
-    unsupported: Vec<Step>,
+    /// Steps that this tracker does not support.
+    unsupported: Vec<SetUpStep>,
     system: Option<SystemSettings>,
     transformation: Option<[f64; 7]>,
     orientation: Option<[f64; 6]>,
@@ -57,39 +57,39 @@ pub(super) struct SetUp {
     name: String,
     checked: Vec<String>,
     warnings: Vec<String>,
-    /// Duration of a measurement that the tracker keeps (ms).
+    /// Duration of a measurement that is set at the tracker (ms).
     pub measure_ms: i32,
 }
 
 impl SetUp {
-    /// A whole set-up.
+    /// The steps of a whole set-up.
     pub(super) fn whole(options: EmsconOptions) -> Self {
         let mut steps = vec![
-            Step::SystemStatus,
-            Step::TrackerStatus,
-            Step::Write(Setting::Units),
-            Step::Check(Setting::Units),
-            Step::Write(Setting::Coordinates),
-            Step::Check(Setting::Coordinates),
-            Step::Read(Setting::System),
-            Step::Transformation,
-            Step::StationOrientation,
+            SetUpStep::SystemStatus,
+            SetUpStep::TrackerStatus,
+            SetUpStep::Write(Setting::Units),
+            SetUpStep::Check(Setting::Units),
+            SetUpStep::Write(Setting::Coordinates),
+            SetUpStep::Check(Setting::Coordinates),
+            SetUpStep::Read(Setting::System),
+            SetUpStep::Transformation,
+            SetUpStep::StationOrientation,
         ];
         if options.initialize {
-            steps.push(Step::Initialize);
+            steps.push(SetUpStep::Initialize);
         }
-        steps.push(Step::Reflectors);
+        steps.push(SetUpStep::Reflectors);
         if options.reflector.is_some() {
-            steps.extend([Step::Write(Setting::Reflector), Step::Check(Setting::Reflector)]);
+            steps.extend([SetUpStep::Write(Setting::Reflector), SetUpStep::Check(Setting::Reflector)]);
         } else {
-            steps.push(Step::Read(Setting::Reflector));
+            steps.push(SetUpStep::Read(Setting::Reflector));
         }
         steps.extend([
-            Step::Write(Setting::Mode),
-            Step::Check(Setting::Mode),
-            Step::Write(Setting::Stationary),
-            Step::Check(Setting::Stationary),
-            Step::TrackerStatus,
+            SetUpStep::Write(Setting::Mode),
+            SetUpStep::Check(Setting::Mode),
+            SetUpStep::Write(Setting::Stationary),
+            SetUpStep::Check(Setting::Stationary),
+            SetUpStep::TrackerStatus,
         ]);
         Self {
             measure_ms: options.measure_ms,
@@ -109,46 +109,46 @@ impl SetUp {
         }
     }
 
-    /// Begins a re-check of everything that a point depends on.
+    /// Starts a re-check of everything that points depend on.
     pub(super) fn recheck(&mut self) {
         self.is_whole = false;
         let steps = [
-            Step::Read(Setting::Units),
-            Step::Read(Setting::Coordinates),
-            Step::Read(Setting::System),
-            Step::Transformation,
-            Step::StationOrientation,
-            Step::Read(Setting::Reflector),
-            Step::Read(Setting::Mode),
-            Step::Read(Setting::Stationary),
-            Step::TrackerStatus,
+            SetUpStep::Read(Setting::Units),
+            SetUpStep::Read(Setting::Coordinates),
+            SetUpStep::Read(Setting::System),
+            SetUpStep::Transformation,
+            SetUpStep::StationOrientation,
+            SetUpStep::Read(Setting::Reflector),
+            SetUpStep::Read(Setting::Mode),
+            SetUpStep::Read(Setting::Stationary),
+            SetUpStep::TrackerStatus,
         ];
         self.steps = steps.into_iter().filter(|step| !self.unsupported.contains(step)).collect();
     }
 
-    /// The step under way.
-    pub(super) fn step(&self) -> Option<Step> {
+    /// The current step.
+    pub(super) fn step(&self) -> Option<SetUpStep> {
         self.steps.front().copied()
     }
 
-    /// True where the step that is to come, or is under way, reads what the event says has changed.
+    /// Whether the current or a later step reads the setting changed by this event.
     pub(super) fn will_read(&self, event: SystemEvent) -> bool {
         let Some(reading) = reading_of(event) else { return true };
         self.steps.iter().any(|step| match (step, reading) {
-            (Step::Read(setting) | Step::Check(setting), Step::Read(changed)) => *setting == changed,
+            (SetUpStep::Read(setting) | SetUpStep::Check(setting), SetUpStep::Read(changed)) => *setting == changed,
             (step, reading) => *step == reading,
         })
     }
 
-    /// The command of the step under way.
+    /// The command of the current step.
     pub(super) fn command(&self) -> Option<Command> {
         Some(match self.step()? {
-            Step::Write(setting) => self.write(setting),
+            SetUpStep::Write(setting) => self.write(setting),
             other => Command::bare(other.command()),
         })
     }
 
-    /// Who answered, what was checked and what to know. Leaves the lists empty for the next re-check.
+    /// Identity, checked settings and warnings. Empties the lists for the next re-check.
     pub(super) fn identity(&mut self) -> Identity {
         Identity {
             name: self.name.clone(),
@@ -159,10 +159,10 @@ impl SetUp {
         }
     }
 
-    /// The step under way was refused.
+    /// Handles the refusal of the current step.
     ///
     /// # Errors
-    /// Nothing can be measured without it.
+    /// The step is required for measurements.
     pub(super) fn refused(&mut self, status: ResultStatus) -> Result<Outcome, Failure> {
         let Some(step) = self.steps.pop_front() else { return Ok(Outcome::Done) };
         let what = step.command().words();
@@ -171,18 +171,18 @@ impl SetUp {
             return Err(failure);
         }
         self.unsupported.push(step);
-        if let Step::Write(setting) = step {
-            self.steps.retain(|next| *next != Step::Check(setting));
-            self.unsupported.push(Step::Read(setting));
+        if let SetUpStep::Write(setting) = step {
+            self.steps.retain(|next| *next != SetUpStep::Check(setting));
+            self.unsupported.push(SetUpStep::Read(setting));
         }
-        self.warnings.push(format!("{what}: {}; the set-up went on without it", status.described()));
+        self.warnings.push(format!("{what}: {}; continued without it", status.described()));
         Ok(Outcome::Done)
     }
 
-    /// The step under way was answered with success.
+    /// Handles a successful answer to the current step.
     ///
     /// # Errors
-    /// The tracker is set in a way in which nothing can be measured, or the answer is too short.
+    /// A setting does not allow measurements, or the answer is too short.
     pub(super) fn answered(&mut self, reply: &Reply) -> Result<Outcome, Failure> {
         let Some(step) = self.step() else { return Ok(Outcome::Done) };
         let outcome = self.judge(step, reply)?;
@@ -192,22 +192,22 @@ impl SetUp {
         Ok(outcome)
     }
 
-    fn judge(&mut self, step: Step, reply: &Reply) -> Result<Outcome, Failure> {
+    fn judge(&mut self, step: SetUpStep, reply: &Reply) -> Result<Outcome, Failure> {
         match step {
-            Step::SystemStatus => return self.judge_system(fields(reply, 56)?),
-            Step::TrackerStatus => {
+            SetUpStep::SystemStatus => return self.judge_system(fields(reply, 56)?),
+            SetUpStep::TrackerStatus => {
                 let status = TrackerStatus::from_number(fields(reply, 20)?.i32(16));
                 if self.steps.len() == 1 && status != TrackerStatus::Ready {
                     self.warnings.push(format!("tracker status: {status}"));
                 }
             }
-            Step::Reflectors => return self.list(fields(reply, 100)?),
-            Step::Transformation => self.judge_transformation(fields(reply, 72)?.numbers(16))?,
-            Step::StationOrientation => self.judge_orientation(fields(reply, 64)?.numbers(16))?,
-            Step::Read(setting) => self.judge_setting(setting, reply, false)?,
-            Step::Check(setting) => self.judge_setting(setting, reply, true)?,
-            Step::Initialize => self.checked.push("initialised".to_owned()),
-            Step::Write(_) => {}
+            SetUpStep::Reflectors => return self.list(fields(reply, 100)?),
+            SetUpStep::Transformation => self.judge_transformation(fields(reply, 72)?.numbers(16))?,
+            SetUpStep::StationOrientation => self.judge_orientation(fields(reply, 64)?.numbers(16))?,
+            SetUpStep::Read(setting) => self.judge_setting(setting, reply, false)?,
+            SetUpStep::Check(setting) => self.judge_setting(setting, reply, true)?,
+            SetUpStep::Initialize => self.checked.push("initialised".to_owned()),
+            SetUpStep::Write(_) => {}
         }
         Ok(Outcome::Done)
     }
@@ -216,10 +216,7 @@ impl SetUp {
         let laser = LaserStatus::from_number(fields.i32(24));
         match laser {
             LaserStatus::HeatingUp | LaserStatus::Off => {
-                return Ok(Outcome::Wait(format!(
-                    "the laser is {}; the set-up waits until it is ready",
-                    laser.words()
-                )));
+                return Ok(Outcome::Wait(format!("the laser is {}; waiting until it is ready", laser.words())));
             }
             LaserStatus::UnableToStabilize => return Err(Failure::NotReady(format!("laser: {laser}"))),
             LaserStatus::Ready => self.checked.push("laser: ready".to_owned()),
@@ -241,8 +238,7 @@ impl SetUp {
             return Err(Failure::Scaled(scale));
         }
         if is_applied && !is_same(&values, &NO_TRANSFORMATION) && self.is_whole {
-            let text =
-                "the tracker transforms its points (scale 1): distances stay right, points are not in its own frame";
+            let text = "the tracker transforms its points (scale 1): distances stay right, but points are not in its own frame";
             self.warnings.push(text.to_owned());
         }
         unchanged("transformation", &mut self.transformation, values)
@@ -282,7 +278,7 @@ impl SetUp {
             self.checked.push(format!("{name}: {found} (read back)"));
             Ok(())
         } else if is_check {
-            Err(Failure::Settings(format!("{name}: asked for {wanted}, read back {found}")))
+            Err(Failure::Settings(format!("{name}: requested {wanted}, read back {found}")))
         } else {
             self.write_next(setting);
             Ok(())
@@ -296,7 +292,7 @@ impl SetUp {
             [settings.apply_transformation_params, settings.apply_station_orientation_params].map(|flag| flag != 0)
         };
         if self.system.is_some_and(|before| applied(before) != applied(found)) {
-            let text = "another frame is applied than before; points before and after do not fit together";
+            let text = "another frame is applied than before; points before and after the change do not fit together";
             return Err(Failure::Settings(text.to_owned()));
         }
         self.system = Some(found);
@@ -310,9 +306,9 @@ impl SetUp {
         } else if found.try_measurement_mode != 0 {
             return Err(Failure::Settings("the try mode cannot be switched off".to_owned()));
         } else if found.send_unsolicited_messages == 0 {
-            return Err(Failure::Settings("the tracker does not announce changes of its settings".to_owned()));
+            return Err(Failure::Settings("the tracker does not report changes of its settings".to_owned()));
         } else {
-            self.warnings.push(format!("system settings: asked for {wanted}, read back {found}"));
+            self.warnings.push(format!("system settings: requested {wanted}, read back {found}"));
         }
         Ok(())
     }
@@ -333,7 +329,7 @@ impl SetUp {
         let wanted = self.options.reflector.or(if self.is_whole { None } else { self.reflector });
         if let Some(wanted) = wanted.filter(|wanted| *wanted != id) {
             return Err(Failure::Settings(format!(
-                "reflector: expected {}, the tracker has {}; points with different reflectors do not fit together",
+                "reflector: expected {}, the tracker uses {}; points with different reflectors do not fit together",
                 self.reflector_name(wanted),
                 self.reflector_name(id)
             )));
@@ -343,12 +339,12 @@ impl SetUp {
         Ok(())
     }
 
-    /// One packet of the list of reflectors. Their number decides where the list ends.
+    /// Handles one packet of the list of reflectors. The list ends after the number that each packet states.
     fn list(&mut self, fields: Fields<'_>) -> Result<Outcome, Failure> {
         let total = usize::try_from(fields.i32(16)).unwrap_or(0);
         let reflector = Reflector { id: fields.i32(20), name: fields.name(36), offset: fields.f64(28) / 1000.0 };
         if total > 0 && !reflector.offset.is_finite() {
-            return Err(Failure::Garbled(format!("the offset of reflector {} is no number", reflector.id)));
+            return Err(Failure::Garbled(format!("the offset of reflector {} is not a number", reflector.id)));
         }
         self.listed += 1;
         if total > 0 && self.reflectors.len() < MAX_REFLECTORS {
@@ -369,7 +365,7 @@ impl SetUp {
         }
     }
 
-    /// The settings that are to be, with everything kept that is not our business.
+    /// The required settings; all others are kept as found.
     fn wanted(&self, found: SystemSettings) -> SystemSettings {
         SystemSettings {
             weather_monitor_status: if found.weather_monitor_status == 0 { 0 } else { 2 },
@@ -394,23 +390,23 @@ impl SetUp {
         }
     }
 
-    /// Puts the writing and checking of a setting behind the step under way.
+    /// Inserts steps to write and check a setting after the current one.
     fn write_next(&mut self, setting: Setting) {
         let rest = self.steps.split_off(self.steps.len().min(1));
-        self.steps.extend([Step::Write(setting), Step::Check(setting)]);
+        self.steps.extend([SetUpStep::Write(setting), SetUpStep::Check(setting)]);
         self.steps.extend(rest);
     }
 
-    /// True where nothing can be measured without the step.
-    fn is_needed(&self, step: Step) -> bool {
+    /// Whether measurements require the step.
+    fn is_needed(&self, step: SetUpStep) -> bool {
         match step {
-            Step::SystemStatus | Step::TrackerStatus | Step::Initialize => true,
-            Step::Read(setting) | Step::Write(setting) | Step::Check(setting) => match setting {
+            SetUpStep::SystemStatus | SetUpStep::TrackerStatus | SetUpStep::Initialize => true,
+            SetUpStep::Read(setting) | SetUpStep::Write(setting) | SetUpStep::Check(setting) => match setting {
                 Setting::Units | Setting::Coordinates | Setting::Mode => true,
                 Setting::Reflector => self.options.reflector.is_some(),
                 Setting::System | Setting::Stationary => false,
             },
-            Step::Transformation | Step::StationOrientation | Step::Reflectors => false,
+            SetUpStep::Transformation | SetUpStep::StationOrientation | SetUpStep::Reflectors => false,
         }
     }
 }
@@ -423,12 +419,12 @@ fn is_same(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME)
 }
 
-/// Keeps what was found first. Later it has to be the same: points before and after would not share a frame.
+/// Keeps the first value and rejects a different one later, because points before and after would not share a frame.
 fn unchanged<const N: usize>(what: &str, kept: &mut Option<[f64; N]>, found: [f64; N]) -> Result<(), Failure> {
     match kept {
-        Some(kept) if !is_same(kept.as_slice(), &found) => {
-            Err(Failure::Settings(format!("the {what} was changed; points before and after do not fit together")))
-        }
+        Some(kept) if !is_same(kept.as_slice(), &found) => Err(Failure::Settings(format!(
+            "the {what} was changed; points before and after the change do not fit together"
+        ))),
         _ => {
             *kept = Some(found);
             Ok(())

@@ -1,21 +1,21 @@
-//! The numbers of the interface and what they mean. All of them are open: the manuals reserve ranges that they do not list, so
-//! what is not known here stays a number and is shown as one.
+//! Enumerations of the interface. All of them are open: the manuals reserve ranges without listing them, so an unknown number is
+//! kept and shown as a number.
 
 use super::super::Failure;
 
-/// An enumeration of the wire: known numbers by name and in words, all others kept.
+/// Defines an enumeration of the wire: known numbers with a name and a text, all others as `Other`.
 macro_rules! numbers {
     ($(#[$doc:meta])* $name:ident { $($number:literal $variant:ident $words:literal,)* }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum $name {
             $(#[doc = $words] $variant,)*
-            /// A number that is not listed.
+            /// An unlisted number.
             Other(i32),
         }
 
         impl $name {
-            /// The name of a number.
+            /// The variant of a number.
             pub const fn from_number(number: i32) -> Self {
                 match number {
                     $($number => Self::$variant,)*
@@ -31,7 +31,7 @@ macro_rules! numbers {
                 }
             }
 
-            /// What it means.
+            /// Meaning in words.
             pub const fn words(self) -> &'static str {
                 match self {
                     $(Self::$variant => $words,)*
@@ -67,7 +67,7 @@ numbers! {
 }
 
 numbers! {
-    /// Command (`ES_C_`): those that this program sends or a simulated tracker knows.
+    /// Command (`ES_C_`): those sent by this program or known to the simulated tracker.
     CommandId {
         1 GetSystemStatus "reading the system status",
         2 GetTrackerStatus "reading the tracker status",
@@ -84,7 +84,7 @@ numbers! {
         27 GetCoordinateSystemType "reading the coordinate type",
         28 SetStationaryModeParams "setting the measurement time",
         29 GetStationaryModeParams "reading the measurement time",
-        40 SetReflector "choosing the reflector",
+        40 SetReflector "selecting the reflector",
         41 GetReflector "reading the reflector",
         42 GetReflectors "reading the list of reflectors",
         47 SetSystemSettings "setting the system settings",
@@ -97,7 +97,7 @@ numbers! {
 numbers! {
     /// Answer to a command (`ES_RS_`). Only [`ResultStatus::AllOk`] is success.
     ResultStatus {
-        0 AllOk "all is well",
+        0 AllOk "success",
         1 ServerBusy "the server is busy",
         2 NotImplemented "not implemented in this instrument",
         23 WrongCurrentReflector "wrong current reflector",
@@ -114,13 +114,13 @@ numbers! {
         41 ModuleTimedOut "module timed out",
         56 NoSuchCompensation "no such compensation",
         57 MeteoDataOutOfRange "weather values out of range",
-        58 InCompensationMode "a compensation is under way",
+        58 InCompensationMode "a compensation is in progress",
         94 NoTemperatureFromWeatherMonitor "no weather value from the weather monitor",
         95 NoPressureFromWeatherMonitor "no weather value from the weather monitor",
         96 NoHumidityFromWeatherMonitor "no weather value from the weather monitor",
         98 InvalidInputData "invalid input data",
         10002 NoValidAdmCompensation "no valid compensation of the distance meter",
-        10003 PressureSensorProblem "problem of the pressure sensor",
+        10003 PressureSensorProblem "pressure sensor problem",
         10004 MeasurementStatusNotReady "the measurement status is not ready",
         10005 AdmStartUpBusy "the distance meter is starting up",
         10009 NoStationaryMeasurementResult "no result of the stationary measurement",
@@ -163,7 +163,7 @@ numbers! {
         151 InitializationStatusChanged "the initialisation changed",
         850 SensorDetected "sensor detected",
         851 SensorDisconnected "sensor disconnected",
-        853 BatteryStatus "the battery wants attention",
+        853 BatteryStatus "the battery needs attention",
         997 TpConnectionClosing "the tracker processor closes the connection",
         998 ServerClosing "the server closes",
         999 ServerStarted "the server has started",
@@ -243,14 +243,14 @@ numbers! {
 }
 
 impl MeasurementMode {
-    /// True where one result is one resting reflector.
+    /// Whether one result in this mode is one point of a reflector at rest.
     pub const fn is_point(self) -> bool {
         matches!(self, Self::Stationary | Self::Fast | Self::Standard | Self::Precise | Self::Outdoor)
     }
 }
 
 impl ResultStatus {
-    /// What a status other than success means for whoever did `what`.
+    /// The failure for a status other than success, during the action `what`.
     pub fn failure(self, what: &str) -> Failure {
         let text = format!("{what}: {}", self.described());
         match self {
@@ -276,18 +276,18 @@ impl ResultStatus {
         }
     }
 
-    /// What an accepted measurement that ended with this status means. No public source says which number a broken beam has, so
-    /// a number that is not listed is taken for one.
+    /// The failure for an accepted measurement that ended with this status. The error number of a broken beam is not published,
+    /// so an unlisted number is taken for it.
     pub fn measurement_failure(self) -> Failure {
         match self {
             Self::Other(number) if !(3..=22).contains(&number) => {
-                Failure::NoTarget(format!("the measurement ended with error {number}; a broken beam does that"))
+                Failure::NoTarget(format!("the measurement ended with error {number}, as after a broken beam"))
             }
             _ => self.failure("the measurement ended"),
         }
     }
 
-    /// In words with the number; ranges that have no single names are known as ranges.
+    /// Meaning and number, including ranges whose single numbers have no names.
     pub fn described(self) -> String {
         match self {
             Self::Other(number @ 3..=10) => format!("wrong parameter ({number})"),

@@ -1,49 +1,42 @@
-//! The single commands of which the set-up is made.
+//! Steps of the set-up: one command each.
 
 use super::status::{CommandId, SystemEvent};
 
-/// Something that can be set and read back.
+/// A setting that can be written and read back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Setting {
-    /// Units.
     Units,
-    /// Coordinate type.
     Coordinates,
-    /// System settings.
     System,
-    /// Reflector.
     Reflector,
-    /// Measurement mode.
     Mode,
-    /// Duration of a measurement.
     Stationary,
 }
 
-/// One command of the set-up.
+/// A step of the set-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Step {
-    /// Laser, processor, serial number, version.
+pub(super) enum SetUpStep {
+    /// Reads laser, processor, serial number and version.
     SystemStatus,
-    /// Readiness.
+    /// Reads whether the tracker is ready.
     TrackerStatus,
-    /// Reads a setting; where it differs, it is written and checked.
+    /// Reads a setting, and writes and checks it if it differs.
     Read(Setting),
-    /// Writes a setting.
     Write(Setting),
-    /// Reads a setting; it has to be right.
+    /// Reads a setting, which must be right.
     Check(Setting),
-    /// Transformation of the results.
+    /// Reads the transformation of the results.
     Transformation,
-    /// Orientation of the station.
+    /// Reads the orientation of the station.
     StationOrientation,
-    /// Initialises; the head turns.
+    /// Initialises the tracker; its head turns.
     Initialize,
-    /// The list of reflectors.
+    /// Reads the list of reflectors.
     Reflectors,
 }
 
 impl Setting {
-    /// What it is called in messages.
+    /// Name in messages.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Units => "units",
@@ -55,7 +48,7 @@ impl Setting {
         }
     }
 
-    /// The command that reads it.
+    /// The command that reads the setting.
     pub(super) const fn read(self) -> CommandId {
         match self {
             Self::Units => CommandId::GetUnits,
@@ -67,7 +60,7 @@ impl Setting {
         }
     }
 
-    /// The command that writes it.
+    /// The command that writes the setting.
     pub(super) const fn write(self) -> CommandId {
         match self {
             Self::Units => CommandId::SetUnits,
@@ -80,8 +73,8 @@ impl Setting {
     }
 }
 
-impl Step {
-    /// Its command.
+impl SetUpStep {
+    /// The command of the step.
     pub(super) const fn command(self) -> CommandId {
         match self {
             Self::SystemStatus => CommandId::GetSystemStatus,
@@ -96,17 +89,17 @@ impl Step {
     }
 }
 
-/// The step that reads what an event says has changed; `None`: no point depends on it.
-pub(super) const fn reading_of(event: SystemEvent) -> Option<Step> {
+/// The step that reads the setting changed by an event; `None` if points do not depend on it.
+pub(super) const fn reading_of(event: SystemEvent) -> Option<SetUpStep> {
     Some(match event {
-        SystemEvent::UnitsChanged => Step::Read(Setting::Units),
-        SystemEvent::ReflectorChanged => Step::Read(Setting::Reflector),
-        SystemEvent::SystemSettingsChanged => Step::Read(Setting::System),
-        SystemEvent::CoordinateSystemTypeChanged => Step::Read(Setting::Coordinates),
-        SystemEvent::StationOrientationParamsChanged => Step::StationOrientation,
-        SystemEvent::TransformationParamsChanged => Step::Transformation,
-        SystemEvent::MeasurementModeChanged => Step::Read(Setting::Mode),
-        SystemEvent::StationaryModeParamsChanged => Step::Read(Setting::Stationary),
+        SystemEvent::UnitsChanged => SetUpStep::Read(Setting::Units),
+        SystemEvent::ReflectorChanged => SetUpStep::Read(Setting::Reflector),
+        SystemEvent::SystemSettingsChanged => SetUpStep::Read(Setting::System),
+        SystemEvent::CoordinateSystemTypeChanged => SetUpStep::Read(Setting::Coordinates),
+        SystemEvent::StationOrientationParamsChanged => SetUpStep::StationOrientation,
+        SystemEvent::TransformationParamsChanged => SetUpStep::Transformation,
+        SystemEvent::MeasurementModeChanged => SetUpStep::Read(Setting::Mode),
+        SystemEvent::StationaryModeParamsChanged => SetUpStep::Read(Setting::Stationary),
         _ => return None,
     })
 }

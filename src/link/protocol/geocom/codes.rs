@@ -1,22 +1,22 @@
-//! Return codes in words.
+//! Meanings of return codes.
 
 use super::super::Failure;
 
 /// Success.
 pub(super) const OK: u32 = 0;
-/// Done, but without the full correction.
+/// Success, but without the full correction.
 pub(super) const NO_FULL_CORRECTION: u32 = 1283;
-/// Done, but the accuracy is not guaranteed.
+/// Success, but the accuracy is not guaranteed.
 pub(super) const ACCURACY_NOT_GUARANTEED: u32 = 1284;
-/// Sleeping, as a result of the transport.
+/// Transport result of a sleeping instrument.
 pub(super) const SLEEPING: u32 = 3108;
 
-/// Codes that ask for patience: system busy, sleep mode, EDM busy, measurement busy.
+/// Codes after which a retry makes sense: system busy, sleep mode, EDM busy, measurement busy.
 pub(super) const fn is_busy(code: u32) -> bool {
     matches!(code, 13 | 25 | 786 | 1293)
 }
 
-/// What a code means.
+/// Meaning of a code.
 pub const fn code_in_words(code: u32) -> &'static str {
     match code {
         0 => "done",
@@ -24,16 +24,16 @@ pub const fn code_in_words(code: u32) -> &'static str {
         3 => "wrong result",
         6 => "timed out",
         8 => "aborted",
-        12 => "it is switching off",
+        12 => "the instrument is switching off",
         13 => "the system is busy",
         16 => "the battery is low",
-        21 => "outside of its temperature range",
+        21 => "outside the temperature range",
         22 => "not level: the tilt is out of range",
-        25 | 3108 => "it sleeps",
+        25 | 3108 => "the instrument is asleep",
         26 => "not possible",
         27 => "not available: the licence is missing",
         512..=530 => "the automatic target recognition failed",
-        770 => "no signal comes back",
+        770 => "no signal returns",
         776 => "the air is too turbulent",
         786 => "the distance meter is busy",
         818 => "the distance is out of range",
@@ -50,16 +50,16 @@ pub const fn code_in_words(code: u32) -> &'static str {
         1293 => "a measurement is busy",
         1294 => "no signal for the distance",
         1792..=1810 => "the motors failed",
-        3074 => "it could not read the request",
-        3075 => "it could not send",
+        3074 => "the instrument could not read the request",
+        3075 => "the instrument could not send",
         3077 => "the request timed out on the way",
-        3078 => "the request had a wrong form",
-        3080 | 3081 => "it does not know the request",
+        3078 => "the request was malformed",
+        3080 | 3081 => "unknown request",
         3093 => "the transaction number does not match",
         3101 | 3102 => "the CRC was wrong",
-        3107 => "another request was still under way",
-        3109 => "it is switched off",
-        3110 => "it wants a CRC",
+        3107 => "another request was still in progress",
+        3109 => "the instrument is switched off",
+        3110 => "a CRC is required",
         8704 => "the target was not found in time",
         8708 => "the target moves: not accurate",
         8710 => "no target",
@@ -70,7 +70,7 @@ pub const fn code_in_words(code: u32) -> &'static str {
     }
 }
 
-/// The failure that a code is.
+/// The failure for a code.
 pub fn failure_of(code: u32) -> Failure {
     let text = format!("code {code}: {}", code_in_words(code));
     match code {

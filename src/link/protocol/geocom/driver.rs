@@ -1,4 +1,4 @@
-//! The conversation: waking, set-up, measurement, and getting in step again after silence.
+//! The conversation: waking, set-up, measurement and recovery after silence.
 
 use std::f64::consts::PI;
 use std::f64::consts::TAU;
@@ -14,8 +14,8 @@ use super::super::ProtocolEvent;
 use super::super::Reflector;
 use super::super::Severity;
 use super::super::Shot;
+use super::super::excerpt::excerpt;
 use super::super::outbox::Outbox;
-use super::super::text::shown;
 use super::codes::ACCURACY_NOT_GUARANTEED;
 use super::codes::NO_FULL_CORRECTION;
 use super::codes::OK;
@@ -29,23 +29,23 @@ use super::options::GeocomOptions;
 use super::options::Measurement;
 use super::wire::Reply;
 
-/// How long a sleeping or silent instrument is called before it is given up.
-const CALLING: Duration = Duration::from_secs(15);
+/// Time limit for waking a sleeping or silent instrument.
+const WAKE_LIMIT: Duration = Duration::from_secs(15);
 
-/// How long one such call waits.
-const CALL: Duration = Duration::from_secs(1);
+/// Time limit of one attempt to wake it.
+const WAKE_ATTEMPT: Duration = Duration::from_secs(1);
 
-/// How long the answer to an ordinary request may take.
+/// Time limit of an ordinary request.
 const ORDINARY: Duration = Duration::from_secs(15);
 
-/// Quiet time after which the instrument is asked whether it is still there.
+/// Idle time after which a keep-alive request is sent.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
-/// What a total station can do, said before measuring.
-const ACCURACY: &str = "total stations are of the order of 0.5 to 1 mm per point: good for a coarse placement of the base, \
+/// Note on the accuracy of total stations.
+const ACCURACY: &str = "total stations measure to about 0.5 to 1 mm per point: good for a coarse placement of the base, \
                         not for a full calibration (see the data sheet)";
 
-/// Said where an instrument does not tell.
+/// Shown for information that the instrument does not report.
 const UNKNOWN: &str = "unknown";
 
 /// A Leica total station.
@@ -55,17 +55,17 @@ pub struct GeocomProtocol {
     exchange: Exchange,
     outbox: Outbox,
     phase: Phase,
-    known: Known,
+    set_up: SetUpResult,
     previous: Option<Point3<f64>>,
 }
 
 #[derive(Debug)]
 enum Phase {
     Closed,
-    /// Called until it answers.
-    Calling {
+    /// Requests are sent until one is answered.
+    Waking {
         until: Moment,
-        then: Then,
+        then: AfterWaking,
     },
     SetUp {
         steps: Vec<Call>,
@@ -73,7 +73,7 @@ enum Phase {
     Idle {
         since: Moment,
     },
-    /// Asked whether it is there; a shot may wait for the answer.
+    /// A keep-alive request is in progress; a shot may wait for its answer.
     KeepAlive {
         is_wanted: bool,
     },
@@ -82,16 +82,16 @@ enum Phase {
     },
 }
 
-/// What follows when a called instrument answers.
+/// What follows when the instrument answers again.
 #[derive(Clone, Copy, Debug)]
-enum Then {
+enum AfterWaking {
     SetUp,
     Idle,
 }
 
-/// What the set-up learned.
+/// Results of the set-up.
 #[derive(Debug, Default)]
-struct Known {
+struct SetUpResult {
     serial: Option<String>,
     name: Option<String>,
     release: Option<String>,
@@ -101,15 +101,15 @@ struct Known {
 }
 
 impl GeocomProtocol {
-    /// Fails where [`GeocomOptions::validate`] does.
+    /// Fails if [`GeocomOptions::validate`] does.
     pub fn new(options: GeocomOptions) -> Result<Self, String> {
         options.validate()?;
         let exchange = Exchange::new(options.checksum);
         let outbox = Outbox::default();
-        Ok(Self { options, exchange, outbox, phase: Phase::Closed, known: Known::default(), previous: None })
+        Ok(Self { options, exchange, outbox, phase: Phase::Closed, set_up: SetUpResult::default(), previous: None })
     }
 
-    /// Bytes of a line that has begun, for the bound of the memory.
+    /// Bytes of an incomplete line.
     pub const fn pending(&self) -> usize {
         self.exchange.pending_bytes()
     }
@@ -118,12 +118,12 @@ impl GeocomProtocol {
         self.exchange.ask(call, now, &mut self.outbox);
     }
 
-    fn call_it(&mut self, now: Moment, patience: Duration, then: Then) {
-        self.phase = Phase::Calling { until: now + patience, then };
-        self.ask(null_call(CALL), now);
+    fn wake(&mut self, now: Moment, limit: Duration, then: AfterWaking) {
+        self.phase = Phase::Waking { until: now + limit, then };
+        self.ask(null_call(WAKE_ATTEMPT), now);
     }
 
-    /// Makes the first of the steps that are left.
+    /// Sends the request of the next step.
     fn make_step(&mut self, now: Moment) {
         let step = match &self.phase {
             Phase::SetUp { steps } | Phase::Measuring { steps } => steps.last().cloned(),
@@ -137,7 +137,7 @@ impl GeocomProtocol {
     fn handle(&mut self, outcome: Outcome, now: Moment) {
         match std::mem::replace(&mut self.phase, Phase::Closed) {
             Phase::Closed => {}
-            Phase::Calling { until, then } => self.handle_called(&outcome, until, then, now),
+            Phase::Waking { until, then } => self.handle_waking(&outcome, until, then, now),
             Phase::SetUp { steps } => self.handle_set_up(outcome, steps, now),
             Phase::Idle { since } => self.phase = Phase::Idle { since },
             Phase::KeepAlive { is_wanted } => self.handle_keep_alive(&outcome, is_wanted, now),
@@ -145,20 +145,20 @@ impl GeocomProtocol {
         }
     }
 
-    fn handle_called(&mut self, outcome: &Outcome, until: Moment, then: Then, now: Moment) {
+    fn handle_waking(&mut self, outcome: &Outcome, until: Moment, then: AfterWaking, now: Moment) {
         match (outcome, then) {
-            (Outcome::Reply(..), Then::SetUp) => {
-                self.phase = Phase::SetUp { steps: set_up(&self.options) };
+            (Outcome::Reply(..), AfterWaking::SetUp) => {
+                self.phase = Phase::SetUp { steps: set_up_calls(&self.options) };
                 self.make_step(now);
             }
-            (Outcome::Reply(..), Then::Idle) => {
-                self.outbox.say(Severity::Info, "the instrument answers again");
+            (Outcome::Reply(..), AfterWaking::Idle) => {
+                self.outbox.report(Severity::Info, "the instrument answers again");
                 self.phase = Phase::Idle { since: now };
             }
-            _ if now >= until => self.lose(failure_of_outcome(outcome, CALLING)),
+            _ if now >= until => self.lose(failure_of_outcome(outcome, WAKE_LIMIT)),
             _ => {
-                self.phase = Phase::Calling { until, then };
-                self.ask(null_call(CALL), now);
+                self.phase = Phase::Waking { until, then };
+                self.ask(null_call(WAKE_ATTEMPT), now);
             }
         }
     }
@@ -175,7 +175,7 @@ impl GeocomProtocol {
         if is_wanted {
             self.outbox.fail(failure_of_outcome(outcome, KEEP_ALIVE));
         }
-        self.call_it(now, CALLING, Then::Idle);
+        self.wake(now, WAKE_LIMIT, AfterWaking::Idle);
     }
 
     fn handle_set_up(&mut self, outcome: Outcome, mut steps: Vec<Call>, now: Moment) {
@@ -183,13 +183,13 @@ impl GeocomProtocol {
             Outcome::Reply(call, reply) => (call, reply),
             other => return self.lose(failure_of_outcome(&other, ORDINARY)),
         };
-        if let Err(failure) = self.known.learn(&call, &reply, &self.options) {
+        if let Err(failure) = self.set_up.record(&call, &reply, &self.options) {
             return self.lose(failure);
         }
         steps.pop();
         if steps.is_empty() {
             self.phase = Phase::Idle { since: now };
-            let identity = std::mem::take(&mut self.known).identity();
+            let identity = std::mem::take(&mut self.set_up).identity();
             return self.outbox.push(ProtocolEvent::Ready(identity));
         }
         self.phase = Phase::SetUp { steps };
@@ -211,7 +211,7 @@ impl GeocomProtocol {
             }
             other => {
                 self.outbox.fail(failure_of_outcome(&other, limit));
-                return self.call_it(now, CALLING, Then::Idle);
+                return self.wake(now, WAKE_LIMIT, AfterWaking::Idle);
             }
         };
         steps.pop();
@@ -228,7 +228,7 @@ impl GeocomProtocol {
         let remark = match reply.code {
             OK => None,
             NO_FULL_CORRECTION | ACCURACY_NOT_GUARANTEED => Some(code_in_words(reply.code).to_owned()),
-            // Whatever numbers follow may be of an earlier measurement.
+            // The numbers that follow an error may belong to an earlier measurement.
             code => return Err(failure_of(code)),
         };
         let (point, face) = point_from_polar(&reply.parameters)?;
@@ -251,11 +251,11 @@ impl GeocomProtocol {
 fn point_from_polar(parameters: &[String]) -> Result<(Point3<f64>, u8), Failure> {
     let value = |index: usize| parameters.get(index).and_then(|text: &String| text.trim().parse::<f64>().ok());
     let (Some(horizontal), Some(zenith), Some(distance)) = (value(0), value(1), value(2)) else {
-        return Err(Failure::Garbled(format!("`{}` is not two angles and a distance", shown(&parameters.join(",")))));
+        return Err(Failure::Garbled(format!("`{}` is not two angles and a distance", excerpt(&parameters.join(",")))));
     };
     let is_angle = |angle: f64| (-TAU..=2.0 * TAU).contains(&angle);
     if !is_angle(horizontal) || !is_angle(zenith) {
-        return Err(Failure::Unusable("an angle is out of its range".to_owned()));
+        return Err(Failure::Unusable("an angle is out of range".to_owned()));
     }
     if !(distance > 0.0 && distance < 1e5) {
         return Err(Failure::Unusable(format!("the distance is {distance} m")));
@@ -274,17 +274,17 @@ fn failure_of_outcome(outcome: &Outcome, limit: Duration) -> Failure {
     }
 }
 
-/// `COM_NullProc`: does nothing, but answers.
+/// `COM_NullProc`: a request without effect, to get an answer.
 const fn null_call(limit: Duration) -> Call {
-    Call { rpc: 0, parameters: String::new(), limit, what: "waiting for a sign of life" }
+    Call { rpc: 0, parameters: String::new(), limit, what: "waiting for any answer" }
 }
 
 fn ordinary(rpc: u32, parameters: String, what: &'static str) -> Call {
     Call { rpc, parameters, limit: ORDINARY, what }
 }
 
-/// The calls of the set-up, the first one last.
-fn set_up(options: &GeocomOptions) -> Vec<Call> {
+/// The calls of the set-up in reverse order.
+fn set_up_calls(options: &GeocomOptions) -> Vec<Call> {
     let plain = |rpc, what| ordinary(rpc, String::new(), what);
     let mut steps = vec![
         plain(5003, "asking for the serial number"),
@@ -307,7 +307,7 @@ fn set_up(options: &GeocomOptions) -> Vec<Call> {
     steps
 }
 
-/// The calls of a measurement, the first one last.
+/// The calls of a measurement in reverse order.
 fn measurement(options: &GeocomOptions) -> Vec<Call> {
     let limit = Duration::from_secs_f64(options.timeout_s);
     let what = "measuring";
@@ -324,35 +324,35 @@ fn measurement(options: &GeocomOptions) -> Vec<Call> {
     }
 }
 
-impl Known {
-    fn learn(&mut self, call: &Call, reply: &Reply, options: &GeocomOptions) -> Result<(), Failure> {
-        let is_order = matches!(call.rpc, 2020 | 2024 | 18005);
+impl SetUpResult {
+    fn record(&mut self, call: &Call, reply: &Reply, options: &GeocomOptions) -> Result<(), Failure> {
+        let is_write = matches!(call.rpc, 2020 | 2024 | 18005);
         if reply.code != OK {
             let text = format!("{} failed: {} (code {})", call.what, code_in_words(reply.code), reply.code);
-            if is_order {
+            if is_write {
                 return Err(Failure::Settings(text));
             }
             self.warnings.push(text);
-            return self.unread(call, options);
+            return self.check_read_back(call, options);
         }
-        let first = reply.parameters.first().map_or_else(|| UNKNOWN.to_owned(), |text| shown(text));
+        let first = reply.parameters.first().map_or_else(|| UNKNOWN.to_owned(), |text| excerpt(text));
         match call.rpc {
             5003 => self.serial = Some(first),
             5004 => self.name = Some(first),
-            110 => self.release = Some(shown(&reply.parameters.join("."))),
+            110 => self.release = Some(excerpt(&reply.parameters.join("."))),
             18005 => {
                 self.checked.push(format!("target recognition: {}", if call.parameters == "1" { "on" } else { "off" }));
             }
-            2021 => return self.learn_edm_mode(&first, options),
-            2023 => return self.learn_prism(&first, options),
+            2021 => return self.record_edm_mode(&first, options),
+            2023 => return self.record_prism(&first, options),
             2026 => self.checked.push(format!("face: {}", if first == "1" { 2 } else { 1 })),
             _ => {}
         }
         Ok(())
     }
 
-    /// What was set must be read back.
-    fn unread(&self, call: &Call, options: &GeocomOptions) -> Result<(), Failure> {
+    /// Fails if a setting that was written could not be read back.
+    fn check_read_back(&self, call: &Call, options: &GeocomOptions) -> Result<(), Failure> {
         let was_set = (call.rpc == 2021 && options.edm_mode.is_some())
             || (call.rpc == 2023 && options.prism_constant_mm.is_some());
         match self.warnings.last() {
@@ -361,20 +361,20 @@ impl Known {
         }
     }
 
-    fn learn_edm_mode(&mut self, text: &str, options: &GeocomOptions) -> Result<(), Failure> {
+    fn record_edm_mode(&mut self, text: &str, options: &GeocomOptions) -> Result<(), Failure> {
         if options.edm_mode.is_some_and(|mode| text.parse() != Ok(mode)) {
-            return Err(Failure::Settings(format!("the EDM mode stays at {text}")));
+            return Err(Failure::Settings(format!("the EDM mode remains {text}")));
         }
         self.checked.push(format!("EDM mode: {text} (read back)"));
         Ok(())
     }
 
-    fn learn_prism(&mut self, text: &str, options: &GeocomOptions) -> Result<(), Failure> {
+    fn record_prism(&mut self, text: &str, options: &GeocomOptions) -> Result<(), Failure> {
         let Some(constant) = text.parse::<f64>().ok().filter(|constant| constant.is_finite()) else {
             return Err(Failure::Garbled(format!("`{text}` is not a prism constant")));
         };
         if options.prism_constant_mm.is_some_and(|wanted| (wanted * 1e-3 - constant).abs() > 1e-6) {
-            return Err(Failure::Settings(format!("the prism constant stays at {:.2} mm", constant * 1e3)));
+            return Err(Failure::Settings(format!("the prism constant remains {:.2} mm", constant * 1e3)));
         }
         self.checked.push(format!("prism constant: {:.2} mm (read back)", constant * 1e3));
         self.reflector = Some(Reflector { id: 0, name: "prism by its constant".to_owned(), offset: constant });
@@ -405,8 +405,8 @@ impl Protocol for GeocomProtocol {
     fn start(&mut self, now: Moment) {
         self.exchange.restart();
         self.outbox.clear();
-        self.known = Known::default();
-        self.call_it(now, CALLING, Then::SetUp);
+        self.set_up = SetUpResult::default();
+        self.wake(now, WAKE_LIMIT, AfterWaking::SetUp);
     }
 
     fn feed(&mut self, bytes: &[u8], now: Moment) {
@@ -436,14 +436,14 @@ impl Protocol for GeocomProtocol {
                 *is_wanted = true;
                 return;
             }
-            Phase::Calling { then: Then::Idle, .. } => {
-                Failure::NotReady("the last request was not answered; it is being called".to_owned())
+            Phase::Waking { then: AfterWaking::Idle, .. } => {
+                Failure::NotReady("the last request was not answered; trying to reach the instrument".to_owned())
             }
-            Phase::Closed | Phase::Calling { .. } | Phase::SetUp { .. } => {
+            Phase::Closed | Phase::Waking { .. } | Phase::SetUp { .. } => {
                 Failure::TooEarly("the set-up is not complete".to_owned())
             }
             Phase::KeepAlive { .. } | Phase::Measuring { .. } => {
-                Failure::TooEarly("another shot is under way".to_owned())
+                Failure::TooEarly("another shot is in progress".to_owned())
             }
         };
         self.outbox.fail(failure);
@@ -453,9 +453,9 @@ impl Protocol for GeocomProtocol {
         match &mut self.phase {
             Phase::KeepAlive { is_wanted } => *is_wanted = false,
             Phase::Measuring { .. } => {
-                // It answers nothing else until it has done what it was asked for.
-                let patience = CALLING + Duration::from_secs_f64(self.options.timeout_s);
-                self.call_it(now, patience, Then::Idle);
+                // The instrument answers nothing else until it has finished the measurement.
+                let limit = WAKE_LIMIT + Duration::from_secs_f64(self.options.timeout_s);
+                self.wake(now, limit, AfterWaking::Idle);
             }
             _ => {}
         }

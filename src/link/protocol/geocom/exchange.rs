@@ -1,14 +1,15 @@
-//! One request at a time: transaction numbers, deadlines, and patience with a busy instrument.
+//! One request at a time: transaction numbers, deadlines and retries.
 
 use std::time::Duration;
 
 use super::super::Moment;
 use super::super::Severity;
+use super::super::backoff::Backoff;
+use super::super::error_streak::ErrorStreak;
 use super::super::lines::LineSplitter;
+use super::super::lines::MAX_LINE;
 use super::super::lines::Piece;
 use super::super::outbox::Outbox;
-use super::super::patience::Patience;
-use super::super::unreadable::Unreadable;
 use super::codes::SLEEPING;
 use super::codes::is_busy;
 use super::wire::Reply;
@@ -16,69 +17,69 @@ use super::wire::Request;
 use super::wire::decode_reply;
 use super::wire::encode_request;
 
-/// Pause before a request is sent again that was damaged on its way.
+/// Pause before a damaged request is sent again.
 const RESEND_DELAY: Duration = Duration::from_millis(200);
 
-/// How often a request is sent again that was damaged on its way.
+/// Most repetitions of a damaged request.
 const MAX_RESENDS: u32 = 2;
 
 /// Largest transaction number.
 const LAST_TRANSACTION: u16 = 32_767;
 
-/// A request to be made.
+/// A request with its time limit.
 #[derive(Clone, Debug)]
 pub(super) struct Call {
     pub(super) rpc: u32,
     pub(super) parameters: String,
-    /// How long the answer may take.
+    /// Time limit of the answer.
     pub(super) limit: Duration,
-    /// For messages: what is done meanwhile.
+    /// Description of the activity for messages.
     pub(super) what: &'static str,
 }
 
 /// How a call ended.
 #[derive(Debug)]
 pub(super) enum Outcome {
-    /// An answer, the transport being fine.
+    /// An answer without a transport error.
     Reply(Call, Reply),
-    /// None in time.
+    /// No answer in time.
     TimedOut(Call),
-    /// Busy for longer than is bearable.
+    /// Busy for too long, with the return code.
     Busy(u32),
-    /// The transport failed again and again; the code, or what was wrong with the line.
+    /// Repeated transport errors.
     Damaged(Damage),
 }
 
-/// What was wrong with a message.
+/// Kind of damage to a message.
 #[derive(Clone, Debug)]
 pub(super) enum Damage {
-    /// The instrument says it by a code.
+    /// Transport error reported by the instrument.
     Code(u32),
-    /// Its line cannot be read.
+    /// The answer cannot be read.
     Line(String),
 }
 
 #[derive(Debug)]
 struct Pending {
     call: Call,
-    /// The number of the request that is out; none between two attempts.
+    /// Number of the sent request; `None` between two attempts.
     transaction: Option<u16>,
     deadline: Moment,
     retry_at: Option<Moment>,
-    patience: Patience,
+    backoff: Backoff,
     resends: u32,
 }
 
-/// The line to the instrument.
+/// Requests and answers on the line to the instrument.
 #[derive(Debug)]
 pub(super) struct Exchange {
     splitter: LineSplitter,
     with_crc: bool,
     last_transaction: u16,
     pending: Option<Pending>,
-    /// The instrument may have half a request in its buffer: a line feed clears it.
+    /// Whether the instrument may have part of a request in its buffer, which a line feed clears.
     is_dirty: bool,
-    unreadable: Unreadable,
+    errors: ErrorStreak,
 }
 
 impl Exchange {
@@ -89,23 +90,23 @@ impl Exchange {
             last_transaction: 0,
             pending: None,
             is_dirty: true,
-            unreadable: Unreadable::default(),
+            errors: ErrorStreak::default(),
         }
     }
 
-    /// A new connection. The numbers go on, so that an answer to the old one cannot pass.
+    /// Resets for a new connection. Transaction numbers continue, so that answers from the old one are not accepted.
     pub(super) fn restart(&mut self) {
         self.splitter.clear();
         self.pending = None;
         self.is_dirty = true;
-        self.unreadable.clear();
+        self.errors.reset();
     }
 
     pub(super) const fn pending_bytes(&self) -> usize {
         self.splitter.pending()
     }
 
-    /// Sends a request; one that is under way is given up.
+    /// Sends a request and abandons the one in progress.
     pub(super) fn ask(&mut self, call: Call, now: Moment, outbox: &mut Outbox) {
         self.is_dirty |= self.pending.is_some();
         self.pending = Some(Pending {
@@ -113,13 +114,13 @@ impl Exchange {
             call,
             transaction: None,
             retry_at: None,
-            patience: Patience::default(),
+            backoff: Backoff::default(),
             resends: 0,
         });
         self.send(now, outbox);
     }
 
-    /// Gives up the request under way.
+    /// Abandons the request in progress.
     pub(super) fn abandon(&mut self) {
         self.pending = None;
         self.is_dirty = true;
@@ -141,23 +142,25 @@ impl Exchange {
 
     pub(super) fn push(&mut self, byte: u8, now: Moment, outbox: &mut Outbox) -> Option<Outcome> {
         match self.splitter.push(byte)? {
-            Piece::Overlong => self.damaged("more than 4096 bytes without a line end".to_owned(), false, now, outbox),
+            Piece::Overlong => {
+                self.damaged(format!("more than {MAX_LINE} bytes without a line end"), false, now, outbox)
+            }
             Piece::Line(line) => self.line(&line, now, outbox),
         }
     }
 
     fn line(&mut self, line: &[u8], now: Moment, outbox: &mut Outbox) -> Option<Outcome> {
         let is_reply = line.windows(4).any(|window| window == b"%R1P");
-        // Some Bluetooth adapters send back what they are given.
+        // Some Bluetooth adapters echo the requests.
         if !is_reply && line.windows(4).any(|window| window == b"%R1Q") {
             return None;
         }
         match decode_reply(line) {
             Ok(reply) if self.with_crc && !reply.checked && reply.transport == 0 => {
-                self.damaged("it carries no CRC".to_owned(), is_reply, now, outbox)
+                self.damaged("the CRC is missing".to_owned(), is_reply, now, outbox)
             }
             Ok(reply) => {
-                self.unreadable.clear();
+                self.errors.reset();
                 self.reply(reply, now, outbox)
             }
             Err(text) => self.damaged(text, is_reply, now, outbox),
@@ -167,32 +170,29 @@ impl Exchange {
     fn reply(&mut self, reply: Reply, now: Moment, outbox: &mut Outbox) -> Option<Outcome> {
         let pending = self.pending.as_mut()?;
         // An instrument that could not read the request cannot repeat its number.
-        let is_unread = reply.transport != 0 && reply.transaction == 0;
-        let is_mine = pending.transaction.is_some_and(|own| own == reply.transaction || is_unread);
-        if !is_mine {
-            outbox.say(
-                Severity::Info,
-                format!("a late or foreign answer was thrown away (number {})", reply.transaction),
-            );
+        let is_unnumbered_error = reply.transport != 0 && reply.transaction == 0;
+        let is_expected = |number| number == reply.transaction || is_unnumbered_error;
+        if !pending.transaction.is_some_and(is_expected) {
+            outbox.report(Severity::Info, format!("discarded a late or foreign answer (number {})", reply.transaction));
             return None;
         }
         pending.transaction = None;
         if reply.transport == SLEEPING {
-            return self.be_patient(SLEEPING, now);
+            return self.back_off(SLEEPING, now);
         }
         if reply.transport != 0 {
             self.is_dirty = true;
             return self.send_again(Damage::Code(reply.transport), now);
         }
         if is_busy(reply.code) {
-            return self.be_patient(reply.code, now);
+            return self.back_off(reply.code, now);
         }
         self.pending.take().map(|pending| Outcome::Reply(pending.call, reply))
     }
 
-    fn be_patient(&mut self, code: u32, now: Moment) -> Option<Outcome> {
+    fn back_off(&mut self, code: u32, now: Moment) -> Option<Outcome> {
         let pending = self.pending.as_mut()?;
-        pending.retry_at = pending.patience.again_at(now);
+        pending.retry_at = pending.backoff.next_attempt(now);
         if pending.retry_at.is_some() {
             return None;
         }
@@ -213,11 +213,11 @@ impl Exchange {
         None
     }
 
-    /// A line that cannot be read. A damaged reply is asked for again; noise is not.
+    /// Handles an unreadable line. A damaged answer is requested again; noise is ignored.
     fn damaged(&mut self, text: String, is_reply: bool, now: Moment, outbox: &mut Outbox) -> Option<Outcome> {
-        let check = "baud rate, line ending and that GeoCOM is switched on";
-        if let Some(said) = self.unreadable.one_more("lines", &text, check) {
-            outbox.say(Severity::Warning, said);
+        let check = "baud rate, line ending and whether GeoCOM is switched on";
+        if let Some(warning) = self.errors.record("lines", &text, check) {
+            outbox.report(Severity::Warning, warning);
         }
         if !is_reply {
             return None;

@@ -1,25 +1,25 @@
-//! Settings of the GeoCOM driver.
+//! Options of the GeoCOM driver.
 
 use serde::Deserialize;
 use serde::Serialize;
 
-/// Settings, as a profile carries them.
+/// Options of the GeoCOM driver, as a profile states them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GeocomOptions {
-    /// Which calls make a measurement.
+    /// The calls that make a measurement.
     pub measurement: Measurement,
-    /// Whether every message carries a CRC.
+    /// Whether every message has a CRC.
     pub checksum: bool,
-    /// Switches automatic target recognition on or off; without it the instrument is left as it is.
+    /// Switch automatic target recognition on or off; `None` leaves the instrument unchanged.
     pub target_recognition: Option<bool>,
-    /// EDM mode to set, by the instrument's own number; without it the instrument is left as it is.
+    /// EDM mode to set, by the instrument's number; `None` leaves the instrument unchanged.
     pub edm_mode: Option<u16>,
-    /// Prism constant to set (mm); without it the instrument is left as it is.
+    /// Prism constant to set (mm); `None` leaves the instrument unchanged.
     pub prism_constant_mm: Option<f64>,
-    /// How far the fine adjustment searches to each side (degree).
+    /// Search range of the fine adjustment to each side (degree).
     pub search_deg: f64,
-    /// How long a measurement may take (s).
+    /// Time limit of a measurement (s).
     pub timeout_s: f64,
 }
 
@@ -37,7 +37,7 @@ impl Default for GeocomOptions {
     }
 }
 
-/// Which calls make a measurement.
+/// The calls that make a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Measurement {
     /// `AUT_FineAdjust`, then `BAP_MeasDistanceAngle`: needs target recognition.
@@ -49,7 +49,7 @@ pub enum Measurement {
 }
 
 impl GeocomOptions {
-    /// Whether a driver can work with these settings; if not, why.
+    /// Fails with the reason if the driver cannot use these options.
     pub fn validate(&self) -> Result<(), String> {
         if !(self.search_deg > 0.0 && self.search_deg <= 90.0) {
             return Err(format!("search_deg is {}: use above 0 to 90", self.search_deg));

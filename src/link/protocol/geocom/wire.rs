@@ -2,38 +2,38 @@
 
 use super::super::crc::crc16_arc;
 
-/// A request.
+/// A request to the instrument.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// Number of the remote procedure.
     pub rpc: u32,
-    /// Number that the reply repeats; 0 for none.
+    /// Transaction number, which the reply repeats; 0 for none.
     pub transaction: u16,
     /// Parameters, separated by commas.
     pub parameters: String,
 }
 
-/// A reply.
+/// A reply of the instrument.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reply {
     /// Result of the transport; 0 is success.
     pub transport: u32,
-    /// Number of the request.
+    /// Transaction number of the request.
     pub transaction: u16,
-    /// Whether it carried a CRC, which was right.
+    /// Whether the reply had a CRC, which was right.
     pub checked: bool,
     /// Result of the procedure; 0 is success.
     pub code: u32,
-    /// Parameters; of worth only where both results allow it.
+    /// Parameters; valid only if both results allow it.
     pub parameters: Vec<String>,
 }
 
-/// Text of a request, without line end.
+/// Text of a request, without a line end.
 pub fn encode_request(request: &Request, with_crc: bool) -> String {
     encode(&format!("%R1Q,{},{}", request.rpc, request.transaction), &request.parameters, with_crc)
 }
 
-/// Text of a reply, without line end.
+/// Text of a reply, without a line end.
 pub fn encode_reply(transport: u32, transaction: u16, code: u32, parameters: &str, with_crc: bool) -> String {
     let comma = if parameters.is_empty() { "" } else { "," };
     encode(&format!("%R1P,{transport},{transaction}"), &format!("{code}{comma}{parameters}"), with_crc)
@@ -47,7 +47,7 @@ fn encode(head: &str, body: &str, with_crc: bool) -> String {
     format!("{head}:{body}")
 }
 
-/// Reads a reply; what stands before its `%R1P` is noise of a line that woke up.
+/// Reads a reply. Anything before its `%R1P` is noise of a line that woke up.
 pub fn decode_reply(line: &[u8]) -> Result<Reply, String> {
     let message = Message::read(line, "%R1P")?;
     let mut values = split_parameters(message.body).into_iter();
@@ -61,14 +61,14 @@ pub fn decode_reply(line: &[u8]) -> Result<Reply, String> {
     })
 }
 
-/// Reads a request, and whether it carried a CRC.
+/// Reads a request, and whether it had a CRC.
 pub fn decode_request(line: &[u8]) -> Result<(Request, bool), String> {
     let message = Message::read(line, "%R1Q")?;
     let parameters = message.body.to_owned();
     Ok((Request { rpc: message.number, transaction: message.transaction, parameters }, message.checked))
 }
 
-/// What requests and replies have in common.
+/// The common parts of requests and replies.
 struct Message<'line> {
     number: u32,
     transaction: u16,
@@ -79,9 +79,9 @@ struct Message<'line> {
 impl<'line> Message<'line> {
     fn read(line: &'line [u8], mark: &str) -> Result<Self, String> {
         let at = line.windows(mark.len()).rposition(|window| window == mark.as_bytes());
-        let message = at.and_then(|at| line.get(at..)).ok_or_else(|| format!("no `{mark}` in it"))?;
-        let text = std::str::from_utf8(message).map_err(|error| format!("not plain text: {error}"))?;
-        let (head, body) = text.split_once(':').ok_or("no `:` in it")?;
+        let message = at.and_then(|at| line.get(at..)).ok_or_else(|| format!("it contains no `{mark}`"))?;
+        let text = std::str::from_utf8(message).map_err(|error| format!("it is not plain text: {error}"))?;
+        let (head, body) = text.split_once(':').ok_or("it contains no `:`")?;
         let mut fields = head.split(',').skip(1);
         let number = fields.next().and_then(decimal).ok_or("its first number is missing")?;
         let transaction = match fields.next() {
@@ -106,13 +106,13 @@ impl<'line> Message<'line> {
     }
 }
 
-/// A number of digits only.
+/// Reads a number that consists of digits only.
 fn decimal(text: &str) -> Option<u32> {
     (!text.is_empty() && text.len() <= 9 && text.bytes().all(|byte| byte.is_ascii_digit()))
         .then(|| text.parse().ok())?
 }
 
-/// Cuts at commas outside of double quotes, and takes the quotes off.
+/// Splits at commas outside double quotes, and removes the quotes.
 fn split_parameters(text: &str) -> Vec<String> {
     let mut parameters = vec![String::new()];
     let mut is_quoted = false;

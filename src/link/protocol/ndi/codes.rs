@@ -1,11 +1,11 @@
-//! Error numbers in words.
+//! Meanings of error numbers.
 
 use super::super::Failure;
 
-/// The instrument received a damaged command.
+/// Error number for a damaged command.
 pub(super) const BAD_CRC: u8 = 0x04;
 
-/// What an error number means.
+/// Meaning of an error number.
 pub const fn error_in_words(code: u8) -> &'static str {
     match code {
         0x01 => "invalid command",
@@ -29,7 +29,7 @@ pub const fn error_in_words(code: u8) -> &'static str {
     }
 }
 
-/// The failure that an error number is.
+/// The failure for an error number.
 pub fn failure_of_error(code: u8) -> Failure {
     let text = format!("ERROR{code:02X}: {}", error_in_words(code));
     match code {

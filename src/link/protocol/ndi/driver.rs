@@ -1,4 +1,4 @@
-//! The conversation: set-up, live positions, and fresh frames for shots.
+//! The conversation: set-up, live positions and shots.
 
 use std::time::Duration;
 
@@ -10,16 +10,16 @@ use super::super::Protocol;
 use super::super::ProtocolEvent;
 use super::super::Severity;
 use super::super::Shot;
+use super::super::error_streak::ErrorStreak;
+use super::super::excerpt::excerpt;
 use super::super::outbox::Outbox;
-use super::super::text::shown;
-use super::super::unreadable::Unreadable;
 use super::codes::BAD_CRC;
 use super::codes::failure_of_error;
 use super::options::NdiOptions;
 use super::options::ReplyFormat;
-use super::set_up::Next;
+use super::set_up::NextStep;
 use super::set_up::SetUp;
-use super::set_up::Step;
+use super::set_up::SetUpStep;
 use super::tools::Tool;
 use super::tools::ToolState;
 use super::tools::decode_bx;
@@ -29,22 +29,22 @@ use super::wire::Frame;
 use super::wire::FrameDecoder;
 use super::wire::encode_text;
 
-/// Quiet time after which the next byte begins a message.
+/// Idle time after which the next byte starts a message.
 const DRAIN: Duration = Duration::from_millis(200);
 
-/// Pause before the next look for a fresh frame: instruments make 20 to 60 frames per second.
+/// Interval at which a new frame is polled; instruments produce 20 to 60 per second.
 const POLL: Duration = Duration::from_millis(10);
 
-/// Time between live positions; they show too that the instrument is still there.
+/// Interval of the live positions, which also serve as keep-alive.
 const LIVE: Duration = Duration::from_millis(300);
 
-/// How often a command is sent again that was damaged on its way.
+/// Most repetitions of a damaged command.
 const MAX_RESENDS: u32 = 2;
 
-/// So many unanswered commands in a row, with nobody asking for a shot, are the end of the link.
+/// Consecutive unanswered live commands after which the link counts as lost.
 const MAX_UNANSWERED: u32 = 5;
 
-/// Most replies that may still come of commands that were given up.
+/// Most late replies to abandoned commands that are expected.
 const MAX_OWED: u32 = 16;
 
 /// An NDI tracker.
@@ -57,21 +57,21 @@ pub struct NdiProtocol {
     phase: Phase,
     set_up: SetUp,
     handle: u8,
-    /// The command that is out or will be.
+    /// The command that was sent or is scheduled.
     pending: Option<Pending>,
-    /// Replies that commands which were given up may still get.
+    /// Number of late replies to abandoned commands that may still arrive.
     owed: u32,
     unanswered: u32,
-    unreadable: Unreadable,
+    errors: ErrorStreak,
 }
 
 #[derive(Debug)]
 enum Phase {
     Closed,
-    SetUp(Step),
-    /// Live positions.
+    SetUp(SetUpStep),
+    /// Reading live positions.
     Idle,
-    /// Waits for a frame after the one that was current at the trigger.
+    /// Waiting for a frame after the one that was current at the trigger.
     Shot {
         deadline: Moment,
         to_skip: u32,
@@ -83,14 +83,14 @@ enum Phase {
 struct Pending {
     command: String,
     is_sent: bool,
-    /// When it is to be sent, or its answer is late.
+    /// When it must be sent, or when its answer is overdue.
     at: Moment,
     resends: u32,
     is_damaged: bool,
 }
 
 impl NdiProtocol {
-    /// Fails where [`NdiOptions::validate`] does.
+    /// Fails if [`NdiOptions::validate`] does.
     pub fn new(options: NdiOptions) -> Result<Self, String> {
         options.validate()?;
         let timeout = Duration::from_secs_f64(options.timeout_s);
@@ -105,11 +105,11 @@ impl NdiProtocol {
             pending: None,
             owed: 0,
             unanswered: 0,
-            unreadable: Unreadable::default(),
+            errors: ErrorStreak::default(),
         })
     }
 
-    /// Bytes of a message that has begun, for the bound of the memory.
+    /// Bytes of an incomplete message.
     pub const fn pending(&self) -> usize {
         self.decoder.pending()
     }
@@ -145,9 +145,9 @@ impl NdiProtocol {
         if let Frame::Damaged(text) = frame {
             return self.damaged(text, now);
         }
-        self.unreadable.clear();
+        self.errors.reset();
         if frame == Frame::Text("RESET".to_owned()) && !matches!(self.phase, Phase::Closed) {
-            return self.lose(Failure::Disconnected("the instrument was switched off and on, or reset".to_owned()));
+            return self.lose(Failure::Disconnected("the instrument was reset or switched off and on".to_owned()));
         }
         if frame == Frame::Text(format!("ERROR{BAD_CRC:02X}")) && self.send_again(now) {
             return;
@@ -164,7 +164,7 @@ impl NdiProtocol {
         if let Frame::Text(text) = frame
             && text.starts_with("WARNING")
         {
-            self.outbox.say(Severity::Warning, format!("the instrument says: {}", shown(text)));
+            self.outbox.report(Severity::Warning, format!("message of the instrument: {}", excerpt(text)));
         }
         match (std::mem::replace(&mut self.phase, Phase::Closed), error) {
             (Phase::Closed, _) => {}
@@ -177,12 +177,12 @@ impl NdiProtocol {
             (Phase::Shot { .. }, Some(code)) => self.fail(failure_of_error(code), now),
             (Phase::Shot { deadline, to_skip, frame_at_trigger }, None) => {
                 self.phase = Phase::Shot { deadline, to_skip, frame_at_trigger };
-                self.look_for_fresh(frame, now);
+                self.check_for_new_frame(frame, now);
             }
         }
     }
 
-    fn next_step(&mut self, step: Step, frame: &Frame, is_error: bool, now: Moment) {
+    fn next_step(&mut self, step: SetUpStep, frame: &Frame, is_error: bool, now: Moment) {
         let text = match frame {
             _ if is_error => None,
             Frame::Text(text) => Some(text.as_str()),
@@ -190,12 +190,12 @@ impl NdiProtocol {
         };
         match self.set_up.advance(step, text, &self.options) {
             Err(failure) => self.lose(failure),
-            Ok(Next::Step(step)) => {
+            Ok(NextStep::Step(step)) => {
                 let command = step.command();
                 self.phase = Phase::SetUp(step);
                 self.ask(command, now);
             }
-            Ok(Next::Ready(handle)) => {
+            Ok(NextStep::Ready(handle)) => {
                 self.handle = handle;
                 let identity = std::mem::take(&mut self.set_up).identity(handle, &self.options);
                 self.outbox.push(ProtocolEvent::Ready(identity));
@@ -204,7 +204,7 @@ impl NdiProtocol {
         }
     }
 
-    /// Waits for a shot, with live positions meanwhile.
+    /// Becomes idle and schedules the next live position.
     fn rest(&mut self, now: Moment) {
         self.phase = Phase::Idle;
         self.ask_at(self.position_command(), now + LIVE);
@@ -218,7 +218,7 @@ impl NdiProtocol {
         }
     }
 
-    fn look_for_fresh(&mut self, frame: &Frame, now: Moment) {
+    fn check_for_new_frame(&mut self, frame: &Frame, now: Moment) {
         let tool = match self.tool(frame) {
             Ok(tool) => tool,
             Err(failure) => return self.fail(failure, now),
@@ -226,23 +226,23 @@ impl NdiProtocol {
         let Phase::Shot { deadline, to_skip, frame_at_trigger } = &mut self.phase else {
             return;
         };
-        // This may be the answer to a command that was given up.
+        // This may be the answer to an abandoned command.
         if let Some(left) = to_skip.checked_sub(1) {
             *to_skip = left;
             self.owed = self.owed.saturating_sub(1);
         } else {
             let reference = *frame_at_trigger.get_or_insert(tool.frame);
-            // The number starts anew after 2^32 frames, and when tracking is started.
-            let is_fresh = tool.frame != reference && tool.frame.wrapping_sub(reference) < u32::MAX / 2;
+            // The number wraps after 2^32 frames, and restarts with tracking.
+            let is_new = tool.frame != reference && tool.frame.wrapping_sub(reference) < u32::MAX / 2;
             let has_no_frame = matches!(tool.state, ToolState::Disabled | ToolState::Unoccupied);
-            if is_fresh || has_no_frame {
+            if is_new || has_no_frame {
                 let answer = self.shot(&tool, frame);
                 self.rest(now);
                 return self.outbox.push(answer.map_or_else(ProtocolEvent::Failed, ProtocolEvent::Shot));
             }
         }
         if *deadline <= now {
-            return self.fail(Failure::NotReady("no new frame comes".to_owned()), now);
+            return self.fail(Failure::NotReady("there is no new frame".to_owned()), now);
         }
         self.ask_at(self.position_command(), now + POLL);
     }
@@ -264,7 +264,7 @@ impl NdiProtocol {
             ToolState::Seen { quaternion, origin, error } => (*quaternion, *origin, *error),
             ToolState::Missing => return Err(Failure::NoTarget(format!("tool {handle:02X} is not seen"))),
             ToolState::Disabled => return Err(Failure::Settings(format!("tool {handle:02X} is disabled"))),
-            ToolState::Unoccupied => return Err(Failure::NoTarget(format!("there is no tool at port {handle:02X}"))),
+            ToolState::Unoccupied => return Err(Failure::NoTarget(format!("no tool at port {handle:02X}"))),
         };
         let tip = Vector3::from(self.options.tip_mm) * 1e-3;
         let point = tip_in_instrument(quaternion, origin, tip).map_err(Failure::Unusable)?;
@@ -278,8 +278,8 @@ impl NdiProtocol {
     }
 
     fn damaged(&mut self, text: String, now: Moment) {
-        if let Some(said) = self.unreadable.one_more("replies", &text, "baud rate and kind of instrument") {
-            self.outbox.say(Severity::Warning, said);
+        if let Some(warning) = self.errors.record("replies", &text, "baud rate and kind of instrument") {
+            self.outbox.report(Severity::Warning, warning);
         }
         if self.send_again(now) {
             return;
@@ -288,13 +288,13 @@ impl NdiProtocol {
         if was_sent {
             self.give_up(Failure::Garbled(text), now);
         } else if let Some(pending) = &mut self.pending {
-            // Noise between two commands: what comes next begins after a pause.
+            // After noise between two commands, a pause separates the next message from it.
             pending.is_damaged = true;
             pending.at = pending.at.max(now + DRAIN);
         }
     }
 
-    /// Sends the command again after a pause, if it was sent and not too often.
+    /// Schedules the command again after a pause, unless it was not sent or was repeated too often.
     fn send_again(&mut self, now: Moment) -> bool {
         match &mut self.pending {
             Some(pending) if pending.is_sent && pending.resends < MAX_RESENDS => {
@@ -308,7 +308,7 @@ impl NdiProtocol {
         }
     }
 
-    /// The command under way brought nothing.
+    /// Handles the failure of the command in progress.
     fn give_up(&mut self, failure: Failure, now: Moment) {
         self.unanswered = self.unanswered.saturating_add(1);
         match self.phase {
@@ -326,7 +326,7 @@ impl NdiProtocol {
         }
     }
 
-    /// The rest of a message may still come: it is thrown away before the next command.
+    /// Lets the rest of a damaged message be discarded before the next command.
     const fn mark_damaged(&mut self) {
         if let Some(pending) = &mut self.pending {
             pending.is_damaged = true;
@@ -355,7 +355,7 @@ impl NdiProtocol {
     }
 }
 
-/// Number of an `ERRORxx` reply.
+/// Error number of an `ERRORxx` reply.
 fn error_of(frame: &Frame) -> Option<u8> {
     match frame {
         Frame::Text(text) => text.strip_prefix("ERROR").map(|code| u8::from_str_radix(code, 16).unwrap_or(0)),
@@ -370,8 +370,8 @@ impl Protocol for NdiProtocol {
         self.set_up = SetUp::default();
         self.owed = 0;
         self.unanswered = 0;
-        self.unreadable.clear();
-        let first = Step::Initialise;
+        self.errors.reset();
+        let first = SetUpStep::Initialise;
         let command = first.command();
         self.phase = Phase::SetUp(first);
         self.ask(command, now);
@@ -396,10 +396,10 @@ impl Protocol for NdiProtocol {
     fn trigger(&mut self, now: Moment) {
         if !matches!(self.phase, Phase::Idle) {
             let is_set_up = matches!(self.phase, Phase::Shot { .. });
-            let text = if is_set_up { "another shot is under way" } else { "the set-up is not complete" };
+            let text = if is_set_up { "another shot is in progress" } else { "the set-up is not complete" };
             return self.outbox.fail(Failure::TooEarly(text.to_owned()));
         }
-        // A live position that is on its way belongs to a frame before the trigger: it is not looked at.
+        // A live position in transit belongs to a frame before the trigger, so it is skipped.
         let is_asked = self.pending.as_ref().is_some_and(|pending| pending.is_sent);
         self.phase = Phase::Shot {
             deadline: now + self.timeout,

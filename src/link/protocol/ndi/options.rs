@@ -1,19 +1,19 @@
-//! Settings of the NDI driver.
+//! Options of the NDI driver.
 
 use serde::Deserialize;
 use serde::Serialize;
 
-/// Settings, as a profile carries them.
+/// Options of the NDI driver, as a profile states them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NdiOptions {
-    /// How positions are asked for.
+    /// Format of the positions.
     pub reply: ReplyFormat,
-    /// Port handle of the tool; without it there must be only one tool.
+    /// Port handle of the tool; required if there are several tools.
     pub handle: Option<u8>,
-    /// Point that is measured, in the frame of the tool (mm).
+    /// Measured point in the frame of the tool (mm).
     pub tip_mm: [f64; 3],
-    /// How long an answer, or a fresh frame, may take (s).
+    /// Time limit of an answer, or of a new frame (s).
     pub timeout_s: f64,
 }
 
@@ -23,7 +23,7 @@ impl Default for NdiOptions {
     }
 }
 
-/// How positions are asked for.
+/// Format of the positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ReplyFormat {
     /// `TX`: text, to 0.01 mm.
@@ -33,7 +33,7 @@ pub enum ReplyFormat {
 }
 
 impl NdiOptions {
-    /// Whether a driver can work with these settings; if not, why.
+    /// Fails with the reason if the driver cannot use these options.
     pub fn validate(&self) -> Result<(), String> {
         if self.tip_mm.iter().any(|value| !(-10_000.0..=10_000.0).contains(value)) {
             return Err("tip_mm: every coordinate must be within -10000 to 10000".to_owned());

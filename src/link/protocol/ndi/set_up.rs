@@ -1,14 +1,14 @@
-//! The way from a fresh connection to tracking.
+//! The set-up: from a new connection to tracking.
 
 use super::super::Failure;
 use super::super::Identity;
-use super::super::text::shown;
+use super::super::excerpt::excerpt;
 use super::options::NdiOptions;
 use super::options::ReplyFormat;
 
-/// Commands of the set-up, in their order.
+/// Steps of the set-up, in order.
 #[derive(Clone, Debug)]
-pub(super) enum Step {
+pub(super) enum SetUpStep {
     Initialise,
     Version,
     FindTools,
@@ -18,21 +18,21 @@ pub(super) enum Step {
     StartTracking,
 }
 
-/// What comes after a step.
+/// What follows after a step.
 #[derive(Debug)]
-pub(super) enum Next {
-    Step(Step),
+pub(super) enum NextStep {
+    Step(SetUpStep),
     Ready(u8),
 }
 
-/// What the set-up learns.
+/// Results of the set-up so far.
 #[derive(Debug, Default)]
 pub(super) struct SetUp {
     version: Option<String>,
     enabled: Vec<u8>,
 }
 
-impl Step {
+impl SetUpStep {
     pub(super) fn command(&self) -> String {
         match self {
             Self::Initialise => "INIT:".to_owned(),
@@ -45,73 +45,77 @@ impl Step {
         }
     }
 
-    /// Whether an error of the instrument at this step does not matter.
+    /// Whether an error at this step can be ignored.
     pub(super) const fn is_optional(&self) -> bool {
         matches!(self, Self::Version)
     }
 }
 
 impl SetUp {
-    /// Takes the reply to a step; none where an error did not matter.
-    pub(super) fn advance(&mut self, step: Step, reply: Option<&str>, options: &NdiOptions) -> Result<Next, Failure> {
+    /// Handles the reply to a step; `None` after an ignored error.
+    pub(super) fn advance(
+        &mut self,
+        step: SetUpStep,
+        reply: Option<&str>,
+        options: &NdiOptions,
+    ) -> Result<NextStep, Failure> {
         let reply = reply.unwrap_or_default();
-        Ok(Next::Step(match step {
-            Step::Initialise => {
+        Ok(NextStep::Step(match step {
+            SetUpStep::Initialise => {
                 okay(reply)?;
-                Step::Version
+                SetUpStep::Version
             }
-            Step::Version => {
-                self.version = (!reply.is_empty()).then(|| shown(reply));
-                Step::FindTools
+            SetUpStep::Version => {
+                self.version = (!reply.is_empty()).then(|| excerpt(reply));
+                SetUpStep::FindTools
             }
-            Step::FindTools => initialise_next(handles(reply)?),
-            Step::InitialiseTool(_, left) => {
+            SetUpStep::FindTools => initialise_next(handles(reply)?),
+            SetUpStep::InitialiseTool(_, left) => {
                 okay(reply)?;
                 initialise_next(left)
             }
-            Step::FindInitialised => self.enable_next(handles(reply)?)?,
-            Step::EnableTool(handle, left) => {
+            SetUpStep::FindInitialised => self.enable_next(handles(reply)?)?,
+            SetUpStep::EnableTool(handle, left) => {
                 okay(reply)?;
                 self.enabled.push(handle);
                 self.enable_next(left)?
             }
-            Step::StartTracking => {
+            SetUpStep::StartTracking => {
                 okay(reply)?;
-                return self.choose(options).map(Next::Ready);
+                return self.choose(options).map(NextStep::Ready);
             }
         }))
     }
 
-    fn enable_next(&self, mut left: Vec<u8>) -> Result<Step, Failure> {
+    fn enable_next(&self, mut left: Vec<u8>) -> Result<SetUpStep, Failure> {
         if let Some(handle) = left.pop() {
-            return Ok(Step::EnableTool(handle, left));
+            return Ok(SetUpStep::EnableTool(handle, left));
         }
         if self.enabled.is_empty() {
-            let text =
-                "it knows no tool: plug one in, or load the definition file of a passive one with the maker's program";
+            let text = "there is no tool: plug one in, or load the definition file of a passive one with the manufacturer's program";
             return Err(Failure::Settings(text.to_owned()));
         }
-        Ok(Step::StartTracking)
+        Ok(SetUpStep::StartTracking)
     }
 
     fn choose(&self, options: &NdiOptions) -> Result<u8, Failure> {
         let known = self.enabled.iter().map(|handle| format!("{handle:02X}")).collect::<Vec<_>>().join(", ");
         match (options.handle, self.enabled.as_slice()) {
             (Some(handle), enabled) if enabled.contains(&handle) => Ok(handle),
-            (Some(handle), _) => Err(Failure::Settings(format!("there is no tool {handle:02X}; there are: {known}"))),
+            (Some(handle), _) => Err(Failure::Settings(format!("there is no tool {handle:02X}; tools: {known}"))),
             (None, [only]) => Ok(*only),
-            (None, _) => Err(Failure::Settings(format!("there are several tools ({known}): choose a handle"))),
+            (None, _) => Err(Failure::Settings(format!("there are several tools ({known}): set the option 'handle'"))),
         }
     }
 
     pub(super) fn identity(self, handle: u8, options: &NdiOptions) -> Identity {
         let mut notes =
-            vec!["optical and magnetic trackers are of the 0.1 to 1 mm class: see the data sheet".to_owned()];
+            vec!["optical and magnetic trackers measure to about 0.1 to 1 mm: see the data sheet".to_owned()];
         if options.reply == ReplyFormat::Text {
             notes.push("TX gives positions in steps of 0.01 mm; BX is finer".to_owned());
         }
         if options.tip_mm.iter().all(|value| *value == 0.0) {
-            notes.push("no tip is set: the point is the origin of the tool, not what it touches".to_owned());
+            notes.push("no tip is set: the point is the origin of the tool, not the point it touches".to_owned());
         }
         let [x, y, z] = options.tip_mm;
         Identity {
@@ -128,21 +132,21 @@ impl SetUp {
     }
 }
 
-fn initialise_next(mut left: Vec<u8>) -> Step {
-    left.pop().map_or(Step::FindInitialised, |handle| Step::InitialiseTool(handle, left))
+fn initialise_next(mut left: Vec<u8>) -> SetUpStep {
+    left.pop().map_or(SetUpStep::FindInitialised, |handle| SetUpStep::InitialiseTool(handle, left))
 }
 
 fn okay(reply: &str) -> Result<(), Failure> {
     match reply {
         "OKAY" => Ok(()),
         warning if warning.starts_with("WARNING") => Ok(()),
-        other => Err(Failure::Garbled(format!("`{}` instead of OKAY", shown(other)))),
+        other => Err(Failure::Garbled(format!("`{}` instead of OKAY", excerpt(other)))),
     }
 }
 
-/// Handles of a `PHSR` reply: their number, then two digits of handle and three of status each.
+/// Handles of a `PHSR` reply: their number, then two digits of handle and three of status for each, in reverse order.
 fn handles(reply: &str) -> Result<Vec<u8>, Failure> {
-    let garbled = || Failure::Garbled(format!("`{}` is not a list of port handles", shown(reply)));
+    let garbled = || Failure::Garbled(format!("`{}` is not a list of port handles", excerpt(reply)));
     let byte = |text: &str| u8::from_str_radix(text, 16).map_err(|_not_hexadecimal| garbled());
     let (count, mut rest) = reply.split_at_checked(2).ok_or_else(garbled)?;
     let mut handles = Vec::new();
@@ -155,7 +159,6 @@ fn handles(reply: &str) -> Result<Vec<u8>, Failure> {
     if !rest.is_empty() {
         return Err(garbled());
     }
-    // The last one is taken first.
     handles.reverse();
     Ok(handles)
 }

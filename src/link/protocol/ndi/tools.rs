@@ -1,47 +1,47 @@
-//! What `TX` and `BX` say about the tools.
+//! Tool positions in `TX` and `BX` replies.
 
 use nalgebra::Point3;
 use nalgebra::Quaternion;
 use nalgebra::UnitQuaternion;
 use nalgebra::Vector3;
 
-use super::super::text::shown;
+use super::super::excerpt::excerpt;
 
-/// How far the norm of a quaternion may be from one: `TX` rounds each part to 0.0001.
+/// Largest deviation of a quaternion's norm from one; `TX` rounds each component to 0.0001.
 const NORM_TOLERANCE: f64 = 0.01;
 
 /// One tool in one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
-    /// Its port handle.
+    /// Port handle of the tool.
     pub handle: u8,
-    /// Where it is, or why not.
+    /// Position, or why there is none.
     pub state: ToolState,
     /// Number of the frame.
     pub frame: u32,
 }
 
-/// Where a tool is.
+/// Position of a tool, or why there is none.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ToolState {
-    /// It is seen.
+    /// The tool is seen.
     Seen {
-        /// Rotation of its frame: q0, qx, qy, qz.
+        /// Rotation of the tool frame: q0, qx, qy, qz.
         quaternion: [f64; 4],
-        /// Origin of its frame (m).
+        /// Origin of the tool frame (m).
         origin: Point3<f64>,
-        /// Fit error of its markers (m).
+        /// Fit error of the markers (m).
         error: f64,
     },
-    /// It is not seen.
+    /// The tool is not seen.
     Missing,
-    /// Its port is not enabled.
+    /// The port is not enabled.
     Disabled,
-    /// There is none at the port.
+    /// The port has no tool.
     Unoccupied,
 }
 
-/// A point of the tool in the frame of the instrument (m); fails on a rotation that is none.
+/// A point of the tool in the frame of the instrument (m). Fails if the quaternion is not a rotation.
 pub(super) fn tip_in_instrument(
     quaternion: [f64; 4],
     origin: Point3<f64>,
@@ -51,14 +51,16 @@ pub(super) fn tip_in_instrument(
     let quaternion = Quaternion::new(w, x, y, z);
     let norm = quaternion.norm();
     if (norm - 1.0).abs() > NORM_TOLERANCE || !norm.is_finite() {
-        return Err(format!("the rotation of the tool is none (its quaternion has the norm {norm:.3})"));
+        return Err(format!("the rotation of the tool is invalid (its quaternion has the norm {norm:.3})"));
     }
     let point = origin + UnitQuaternion::from_quaternion(quaternion) * tip;
-    match point.coords.iter().all(|value| value.is_finite() && value.abs() < 100.0) {
-        _ if origin.coords.norm_squared() == 0.0 => Err("the tool is exactly at 0, 0, 0".to_owned()),
-        true => Ok(point),
-        false => Err("the position of the tool is out of every range".to_owned()),
+    if origin.coords.norm_squared() == 0.0 {
+        return Err("the tool is exactly at 0, 0, 0".to_owned());
     }
+    if !point.coords.iter().all(|value| value.is_finite() && value.abs() < 100.0) {
+        return Err("the position of the tool is out of range".to_owned());
+    }
+    Ok(point)
 }
 
 /// Reads the text of a `TX 0001` reply without its CRC.
@@ -89,7 +91,7 @@ fn tx_tool(rest: &mut Cursor<'_>) -> Result<Tool, String> {
     } else {
         tx_transform(rest)?
     };
-    // An empty port has no frame.
+    // An empty port has no frame number.
     let has_frame = !rest.rest.starts_with('\n');
     let frame = if has_frame { rest.hexadecimal(8).and_then(|_status| rest.hexadecimal(8))? } else { 0 };
     if !word(rest, "\n") {
@@ -111,7 +113,7 @@ fn tx_transform(rest: &mut Cursor<'_>) -> Result<ToolState, String> {
     Ok(ToolState::Seen { quaternion, origin, error })
 }
 
-/// Takes fields of fixed width.
+/// Reads fields of fixed width.
 struct Cursor<'text> {
     rest: &'text str,
 }
@@ -127,22 +129,22 @@ impl<'text> Cursor<'text> {
         let field = self.take(width)?;
         let is_plain = field.bytes().all(|digit| digit.is_ascii_hexdigit());
         let value = u32::from_str_radix(field, 16).ok().filter(|_| is_plain);
-        value.ok_or_else(|| format!("`{}` is not hexadecimal", shown(field)))
+        value.ok_or_else(|| format!("`{}` is not hexadecimal", excerpt(field)))
     }
 
-    /// Sign and digits.
+    /// A number with sign and digits.
     fn signed(&mut self, width: usize) -> Result<f64, String> {
         let field = self.take(width)?;
         let is_signed = field.starts_with(['+', '-']);
         let value = field.parse::<i32>().ok().filter(|_| is_signed);
-        value.map(f64::from).ok_or_else(|| format!("`{}` is not a signed number", shown(field)))
+        value.map(f64::from).ok_or_else(|| format!("`{}` is not a signed number", excerpt(field)))
     }
 }
 
 /// Reads the body of a `BX 0001` reply.
 ///
-/// Instruments differ in two things, told apart by the length: whether a disabled tool has a status and a frame, and whether the
-/// status of the system follows the tools.
+/// Instruments differ in two ways, which the length tells apart: whether a disabled tool has a status and a frame number, and
+/// whether the system status follows the tools.
 pub fn decode_bx(body: &[u8]) -> Result<Vec<Tool>, String> {
     bx_tools(body, true).or_else(|error| bx_tools(body, false).map_err(|_other| error))
 }

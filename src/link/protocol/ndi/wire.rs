@@ -1,27 +1,27 @@
-//! Messages with their check values.
+//! Framing of messages with their CRC.
 
 use super::super::crc::crc16_arc;
 
-/// Longest text reply (bytes): 255 handles of 70 characters, and some more.
+/// Longest text reply (bytes): 255 handles of 70 characters, with a margin.
 pub const MAX_TEXT: usize = 20_000;
 
-/// Longest body of a binary reply (bytes): 255 handles of 42 bytes, and some more.
+/// Longest body of a binary reply (bytes): 255 handles of 42 bytes, with a margin.
 pub const MAX_BINARY: usize = 16_384;
 
 /// First bytes of a binary reply.
 const START: [u8; 2] = [0xC4, 0xA5];
 
-/// Start, length and CRC of these four bytes.
+/// Size of the header: start, length and the CRC of these four bytes.
 const HEADER: usize = 6;
 
-/// A message that arrived.
+/// A received message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Frame {
     /// A text reply, without its CRC.
     Text(String),
     /// The body of a binary reply.
     Binary(Vec<u8>),
-    /// Something that cannot be read, and why. All that follows is thrown away until [`FrameDecoder::resync`].
+    /// An unreadable message, with the reason. Everything after it is discarded until [`FrameDecoder::resync`].
     Damaged(String),
 }
 
@@ -30,7 +30,7 @@ pub fn encode_text(text: &str) -> Vec<u8> {
     format!("{text}{:04X}\r", crc16_arc(text.as_bytes())).into_bytes()
 }
 
-/// Bytes of a binary reply. A body of more than [`MAX_BINARY`] bytes is cut.
+/// Bytes of a binary reply. A body longer than [`MAX_BINARY`] is cut off.
 pub fn encode_binary(body: &[u8]) -> Vec<u8> {
     let body = body.get(..MAX_BINARY).unwrap_or(body);
     let length = u16::try_from(body.len()).unwrap_or(u16::MAX);
@@ -42,7 +42,7 @@ pub fn encode_binary(body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Cuts the stream into messages.
+/// Splits the stream into messages.
 #[derive(Clone, Debug, Default)]
 pub struct FrameDecoder {
     buffer: Vec<u8>,
@@ -52,7 +52,7 @@ pub struct FrameDecoder {
 impl FrameDecoder {
     /// Takes one byte.
     pub fn push(&mut self, byte: u8) -> Option<Frame> {
-        // Some converters add a line feed to every CR.
+        // Some converters append a line feed to every CR.
         let is_stray = self.buffer.is_empty() && matches!(byte, b'\r' | b'\n');
         if self.skipping || is_stray {
             return None;
@@ -67,12 +67,12 @@ impl FrameDecoder {
         frame
     }
 
-    /// Forgets what came: the line was quiet, so the next byte begins a message.
+    /// Discards received bytes after an idle time, so that the next byte starts a message.
     pub fn resync(&mut self) {
         *self = Self::default();
     }
 
-    /// Bytes of a message that has begun.
+    /// Bytes of an incomplete message.
     pub const fn pending(&self) -> usize {
         self.buffer.len()
     }

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::super::{Failure, Identity, JointState, ProtocolEvent, Severity, Shot, Status};
-use super::{MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES, Outbox};
+use super::{MAX_FIRST_STATUSES, MAX_NEWEST_STATUSES, MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES, Outbox};
 
 /// A flood.
 const MANY: u32 = 1000;
@@ -55,7 +55,7 @@ fn of_offered_points_the_newest_are_kept() {
 #[test]
 fn of_statuses_the_first_which_name_the_cause_and_the_newest_are_kept() {
     let events = kept((0..MANY).map(|number| said(Severity::Warning, &number)));
-    let (first, newest) = MAX_STATUSES;
+    let (first, newest) = (MAX_FIRST_STATUSES, MAX_NEWEST_STATUSES);
     let numbers = (0..MANY).filter(|number| {
         let number = *number as usize;
         number < first || number >= MANY as usize - newest
@@ -71,7 +71,7 @@ fn a_flood_of_information_leaves_every_warning() {
     let is_warning =
         |event: &&ProtocolEvent| matches!(event, ProtocolEvent::Status(s) if s.severity == Severity::Warning);
     assert_eq!(events.iter().filter(is_warning).cloned().collect::<Vec<_>>(), warnings().collect::<Vec<_>>());
-    assert_eq!(events.len(), 20 + MAX_STATUSES.0 + MAX_STATUSES.1);
+    assert_eq!(events.len(), 20 + MAX_STATUSES);
 }
 
 #[test]
@@ -95,7 +95,7 @@ fn answers_and_ends_are_all_kept_in_any_flood() {
         outbox.fail(Failure::TooEarly(x.to_string()));
         outbox.lose(Failure::Disconnected(x.to_string()));
         outbox.push(ProtocolEvent::Ready(Identity::default()));
-        outbox.say(Severity::Info, x.to_string());
+        outbox.report(Severity::Info, x.to_string());
         outbox.push(ProtocolEvent::Offered(shot(x)));
         outbox.push(ProtocolEvent::Live(shot(x)));
     }
@@ -129,7 +129,7 @@ fn outputs_are_bounded_and_go_with_the_connection() {
     assert_eq!(outbox.next_output(), None);
     assert!(matches!(outbox.next_event(), Some(ProtocolEvent::Lost(_))));
     outbox.send(vec![1]);
-    outbox.say(Severity::Info, "old");
+    outbox.report(Severity::Info, "old");
     outbox.clear();
     assert_eq!((outbox.next_output(), outbox.next_event()), (None, None));
 }

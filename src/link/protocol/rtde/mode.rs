@@ -1,5 +1,5 @@
-//! What the numbers of the robot mode and the safety status mean, as the maker's guide to the interface lists them. Numbers
-//! beyond the lists are shown as numbers.
+//! Meanings of the robot mode and the safety status, from the manufacturer's guide to the interface. Unlisted numbers are shown
+//! as numbers.
 
 /// The safety status in which the robot may move.
 pub const SAFETY_NORMAL: i32 = 1;
@@ -7,7 +7,7 @@ pub const SAFETY_NORMAL: i32 = 1;
 /// The robot mode in which programs run.
 pub const MODE_RUNNING: i32 = 7;
 
-/// A safety status in words with its number.
+/// Name and number of a safety status.
 pub fn safety_status(number: i32) -> String {
     let words = match number {
         SAFETY_NORMAL => "normal",
@@ -19,18 +19,18 @@ pub fn safety_status(number: i32) -> String {
         7 => "robot emergency stop",
         8 => "safety violation",
         9 => "safety fault",
-        10 => "a joint id wants validation",
+        10 => "joint id needs validation",
         _ => "unlisted safety status",
     };
     format!("{words} ({number})")
 }
 
-/// A robot mode in words with its number.
+/// Name and number of a robot mode.
 pub fn robot_mode(number: i32) -> String {
     let words = match number {
         -1 => "no controller",
         0 => "disconnected",
-        1 => "safety wants confirmation",
+        1 => "safety needs confirmation",
         2 => "booting",
         3 => "power off",
         4 => "power on",

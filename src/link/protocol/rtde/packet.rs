@@ -1,37 +1,37 @@
-//! Packets of the real-time data exchange: big-endian, a size (u16, the three bytes of the header included), a type (u8) and
-//! what belongs to it.
+//! Packets of the real-time data exchange: big-endian; a size (u16, including the three bytes of the header), a type (u8) and
+//! the content.
 
 use thiserror::Error;
 
-use super::super::unread::Unread;
+use super::super::receive_buffer::ReceiveBuffer;
 use crate::text::printable;
 
-/// The smallest packet: nothing but its header (bytes).
+/// Size of the smallest packet, which is only a header (bytes).
 pub const MIN_PACKET: usize = 3;
 
-/// Version of the protocol that is asked for.
+/// Requested version of the protocol.
 pub const PROTOCOL_VERSION: u16 = 2;
 
-/// Types of packets: the letters of the manual.
+/// Types of packets, by the letters of the manual.
 pub mod packet_type {
-    /// `V`: asks for a version of the protocol.
+    /// `V`: requests a version of the protocol.
     pub const REQUEST_PROTOCOL_VERSION: u8 = b'V';
-    /// `v`: asks for the version of the controller.
+    /// `v`: requests the version of the controller.
     pub const GET_URCONTROL_VERSION: u8 = b'v';
-    /// `M`: a message in words.
+    /// `M`: a text message.
     pub const TEXT_MESSAGE: u8 = b'M';
     /// `U`: data of a recipe.
     pub const DATA_PACKAGE: u8 = b'U';
-    /// `O`: sets up what the controller sends.
+    /// `O`: sets up the values that the controller sends.
     pub const CONTROL_PACKAGE_SETUP_OUTPUTS: u8 = b'O';
-    /// `I`: sets up what the controller takes.
+    /// `I`: sets up the values that the controller accepts.
     pub const CONTROL_PACKAGE_SETUP_INPUTS: u8 = b'I';
     /// `S`: starts the stream.
     pub const CONTROL_PACKAGE_START: u8 = b'S';
     /// `P`: pauses the stream.
     pub const CONTROL_PACKAGE_PAUSE: u8 = b'P';
 
-    /// All of them.
+    /// All types.
     pub const ALL: [u8; 8] = [
         REQUEST_PROTOCOL_VERSION,
         GET_URCONTROL_VERSION,
@@ -44,50 +44,50 @@ pub mod packet_type {
     ];
 }
 
-/// Why bytes are no packet.
+/// Why bytes cannot be read as a packet.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum PacketError {
-    /// The header says what no header says.
-    #[error("a packet of {0} bytes was announced; three are the least, so the stream is out of step")]
+    /// The header states an impossible size.
+    #[error("a packet of {0} bytes was announced; the smallest has three, so the stream is out of sync")]
     Size(u16),
-    /// The header names a type that a controller never sends.
+    /// The header states a type that no controller sends.
     #[error("a packet of type {0:#04x} was announced, which no controller sends")]
     Type(u8),
-    /// A packet does not have the size that its kind has.
-    #[error("packet '{kind}' has {size} bytes behind its header, {least} are needed")]
+    /// The packet is too short for its type.
+    #[error("packet '{kind}' has {size} bytes after its header, {least} are needed")]
     Short {
         /// Letter of its type.
         kind: char,
-        /// Bytes behind the header.
+        /// Bytes after the header.
         size: usize,
-        /// Bytes that are needed.
+        /// Required bytes after the header.
         least: usize,
     },
 }
 
-/// Cuts a stream into packets. Never waits for more than the rest of one packet, so for no more than 64 KiB.
+/// Splits a stream into packets. Buffers at most one packet, that is 64 KiB.
 #[derive(Clone, Debug, Default)]
 pub struct Framer {
-    unread: Unread,
+    received: ReceiveBuffer,
 }
 
 impl Framer {
-    /// Forgets what is there.
+    /// Discards all received bytes.
     pub fn clear(&mut self) {
-        self.unread.clear();
+        self.received.clear();
     }
 
-    /// Adds bytes.
+    /// Appends received bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
-        self.unread.feed(bytes);
+        self.received.feed(bytes);
     }
 
-    /// Type and content of the next whole packet.
+    /// Type and content of the next complete packet.
     ///
     /// # Errors
-    /// [`PacketError::Size`]: nothing behind it can be trusted.
+    /// [`PacketError::Size`]: the stream is out of sync.
     pub fn next_packet(&mut self) -> Result<Option<(u8, Vec<u8>)>, PacketError> {
-        let rest = self.unread.bytes();
+        let rest = self.received.unread();
         let Some(size) = rest.first_chunk::<2>().map(|field| u16::from_be_bytes(*field)) else { return Ok(None) };
         let length = usize::from(size);
         if length < MIN_PACKET {
@@ -95,16 +95,16 @@ impl Framer {
         }
         let Some([kind, content @ ..]) = rest.get(2..length) else { return Ok(None) };
         let packet = (*kind, content.to_vec());
-        self.unread.skip(length);
+        self.received.consume(length);
         Ok(Some(packet))
     }
 
-    /// Whether what has arrived can be the beginning of a packet of a controller; one byte too few to say counts as yes.
+    /// Checks whether the received bytes can be the start of a controller's packet. Too few bytes to decide are accepted.
     ///
     /// # Errors
     /// [`PacketError::Size`], [`PacketError::Type`].
     pub fn check_header(&self) -> Result<(), PacketError> {
-        match *self.unread.bytes() {
+        match *self.received.unread() {
             [high, low, ..] if usize::from(u16::from_be_bytes([high, low])) < MIN_PACKET => {
                 Err(PacketError::Size(u16::from_be_bytes([high, low])))
             }
@@ -113,44 +113,44 @@ impl Framer {
         }
     }
 
-    /// Bytes that wait for the rest of their packet.
+    /// Bytes of an incomplete packet.
     pub fn pending(&self) -> usize {
-        self.unread.bytes().len()
+        self.received.unread().len()
     }
 }
 
-/// A packet with its header. Content that does not fit is cut off; nothing that is sent comes near the limit.
+/// A packet with its header. Content beyond 64 KiB is cut off; no packet sent here comes near that.
 pub fn encode(kind: u8, content: &[u8]) -> Vec<u8> {
     let size = u16::try_from(MIN_PACKET + content.len()).unwrap_or(u16::MAX);
     let content = content.iter().copied().take(usize::from(size) - MIN_PACKET);
     size.to_be_bytes().into_iter().chain([kind]).chain(content).collect()
 }
 
-/// Asks for the version of the protocol.
+/// Request for [`PROTOCOL_VERSION`].
 pub fn request_version() -> Vec<u8> {
     encode(packet_type::REQUEST_PROTOCOL_VERSION, &PROTOCOL_VERSION.to_be_bytes())
 }
 
-/// Asks for some values at a frequency (Hz).
+/// Request for the named values at a frequency (Hz).
 pub fn set_up_outputs(frequency: f64, names: &[&str]) -> Vec<u8> {
     let content = [&frequency.to_be_bytes()[..], names.join(",").as_bytes()].concat();
     encode(packet_type::CONTROL_PACKAGE_SETUP_OUTPUTS, &content)
 }
 
-/// What the controller sends.
+/// A packet from the controller.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Packet {
     /// Whether the version of the protocol is accepted.
     ProtocolVersion(bool),
     /// Version of the controller: major, minor, bug fix, build.
     ControllerVersion([u32; 4]),
-    /// A message in words.
+    /// A text message.
     Text(TextMessage),
     /// Answer to the set-up of the outputs.
     Outputs {
         /// Number of the recipe.
         recipe: u8,
-        /// Types of the values, or why there is none.
+        /// Types of the values, or the reason why a value is not available.
         types: Vec<String>,
     },
     /// Whether the stream was started.
@@ -159,15 +159,15 @@ pub enum Packet {
     Data {
         /// Number of the recipe.
         recipe: u8,
-        /// The values.
+        /// Encoded values, see [`Record`].
         values: Vec<u8>,
     },
-    /// Another kind.
+    /// A packet of another type.
     Other(u8),
 }
 
 impl Packet {
-    /// Reads type and content.
+    /// Decodes a packet from its type and content.
     ///
     /// # Errors
     /// [`PacketError::Short`].
@@ -196,45 +196,45 @@ impl Packet {
     }
 }
 
-/// A message of the controller.
+/// A text message of the controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextMessage {
-    /// What.
+    /// Text of the message.
     pub text: String,
-    /// Who says it.
+    /// Component that sent the message.
     pub source: String,
-    /// 0 exception, 1 error, 2 warning, 3 information.
+    /// Level: 0 exception, 1 error, 2 warning, 3 information.
     pub level: u8,
 }
 
 impl TextMessage {
-    /// A length and a text, a length and a source, a level.
+    /// Decodes a length and a text, a length and a source, and a level.
     fn decode(content: &[u8]) -> Option<Self> {
-        let (text, rest) = counted(content)?;
-        let (source, rest) = counted(rest)?;
+        let (text, rest) = split_text(content)?;
+        let (source, rest) = split_text(rest)?;
         Some(Self { text, source, level: *rest.first()? })
     }
 }
 
-/// A text behind its length, and what follows.
-fn counted(bytes: &[u8]) -> Option<(String, &[u8])> {
+/// Splits off a text that is preceded by its length.
+fn split_text(bytes: &[u8]) -> Option<(String, &[u8])> {
     let (length, rest) = bytes.split_first()?;
     let (text, rest) = rest.split_at_checked(usize::from(*length))?;
     Some((printable(String::from_utf8_lossy(text).trim()), rest))
 }
 
-/// The values that are asked for, in their order.
+/// The requested values, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
-    /// Time by the controller (s).
+    /// Time by the controller's clock (s).
     pub timestamp: f64,
     /// Joint values (rad).
     pub actual_q: [f64; 6],
     /// Joint speeds (rad/s).
     pub actual_qd: [f64; 6],
-    /// What the robot is doing; see [`super::mode`].
+    /// Robot mode, see [`super::mode`].
     pub robot_mode: i32,
-    /// What the safety system says; see [`super::mode`].
+    /// Safety status, see [`super::mode`].
     pub safety_status: i32,
 }
 
@@ -248,10 +248,10 @@ impl Record {
         ("safety_status", "INT32"),
     ];
 
-    /// Bytes of all values.
+    /// Encoded size of all values (bytes).
     pub const SIZE: usize = 13 * 8 + 2 * 4;
 
-    /// Reads the values; `None`: the size is another one.
+    /// Decodes the values; `None` if the size is wrong.
     pub fn decode(values: &[u8]) -> Option<Self> {
         if values.len() != Self::SIZE {
             return None;
@@ -269,7 +269,7 @@ impl Record {
         })
     }
 
-    /// True where every number is finite.
+    /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
         self.timestamp.is_finite() && self.actual_q.iter().chain(&self.actual_qd).all(|value| value.is_finite())
     }

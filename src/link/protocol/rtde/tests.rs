@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::packet::{
     Framer, Packet, PacketError, Record, TextMessage, encode, packet_type, request_version, set_up_outputs,
 };
-use super::{Rtde, RtdeOptions, Stillness};
+use super::{RestDetector, Rtde, RtdeOptions};
 use crate::link::protocol::{Failure, JointState, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::fuzz::{Bounds, assert_hangs_up_once, fuzz_protocol, fuzz_simulator};
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
@@ -142,13 +142,13 @@ fn refusals_end_the_set_up_with_the_reason_and_a_new_connection_is_good() {
     let cases = [
         (
             RtdeFault::OldProtocol,
-            "the instrument refused: version 2 of the interface; the controller needs newer software",
+            "the instrument refused: version 2 of the interface; update the software of the controller",
         ),
         (RtdeFault::NotFound, "the instrument refused: the controller does not know actual_qd"),
-        (RtdeFault::InUse, "the instrument is in use by another program (another program has actual_qd)"),
+        (RtdeFault::InUse, "the instrument is in use by another program (another program uses actual_qd)"),
         (
             RtdeFault::WrongType,
-            "cannot read what the instrument sends: the controller announced values of other types: \
+            "cannot read the data from the instrument: unexpected types of the values: \
              DOUBLE,VECTOR6D,VECTOR6INT32,INT32,INT32",
         ),
         (RtdeFault::StartRefused, "the instrument refused: the controller does not start the stream"),
@@ -165,16 +165,16 @@ fn refusals_end_the_set_up_with_the_reason_and_a_new_connection_is_good() {
 #[test]
 fn faults_of_the_stream_lose_the_link_and_a_new_connection_is_good() {
     let cases = [
-        (RtdeFault::Silence, "the instrument said nothing for 1 s while joint values were awaited"),
-        (RtdeFault::Cut, "the connection is lost: closed by the other side"),
+        (RtdeFault::Silence, "no answer from the instrument for 1 s while waiting for joint values"),
+        (RtdeFault::Cut, "the connection was lost: closed by the other side"),
         (
             RtdeFault::SizeZero,
-            "cannot read what the instrument sends: a packet of 0 bytes was announced; three are the least, so the stream is out \
-             of step",
+            "cannot read the data from the instrument: a packet of 0 bytes was announced; the smallest has three, so the stream is out \
+             of sync",
         ),
         (
             RtdeFault::ShortData,
-            "cannot read what the instrument sends: a data packet has 108 bytes of values instead of 112",
+            "cannot read the data from the instrument: a data packet has 108 bytes of values instead of 112",
         ),
     ];
     for (fault, words) in cases {
@@ -203,7 +203,7 @@ fn a_stop_a_mode_and_a_broken_number_are_said_and_the_stream_goes_on() {
     let cases = [
         (RtdeFault::ProtectiveStop, vec!["safety status: protective stop (3)", "safety status: normal (1)"], 50),
         (RtdeFault::PowerOff, vec!["robot mode: power off (3)", "robot mode: running (7)"], 50),
-        (RtdeFault::NotFinite, vec!["the controller reported a joint value that is no finite number"; 5], 45),
+        (RtdeFault::NotFinite, vec!["the controller reported a joint value that is not a finite number"; 5], 45),
     ];
     for (fault, expected, states) in cases {
         let mut bench = ready(&[Planned::from(fault, 10, 5)]);
@@ -231,9 +231,9 @@ fn drip_and_a_flood_of_messages_change_nothing() {
 fn a_robot_is_at_rest_half_a_second_after_it_stopped() {
     let mut bench = ready(&[Planned::from(RtdeFault::Moving, 11, 10)]);
     let events = bench.run_for(Duration::from_secs(3));
-    let mut stillness = Stillness::default();
+    let mut rest_detector = RestDetector::default();
     let states = joints(&events);
-    let rests: Vec<bool> = states.iter().map(|state| stillness.feed(state)).collect();
+    let rests: Vec<bool> = states.iter().map(|state| rest_detector.feed(state)).collect();
     // 25 Hz: ten states at rest, ten moving, the first at rest again is number 20, and 13 intervals are more than 0.5 s.
     assert_eq!(rests.iter().position(|rest| *rest), Some(33));
     assert!(rests[33..].iter().all(|rest| *rest));
@@ -249,8 +249,8 @@ fn nobody_says_rest_without_speeds_across_a_gap_or_in_a_stop() {
         stopped: None,
     };
     let feed = |states: &[JointState]| {
-        let mut stillness = Stillness::default();
-        states.iter().map(|state| stillness.feed(state)).collect::<Vec<_>>()
+        let mut rest_detector = RestDetector::default();
+        states.iter().map(|state| rest_detector.feed(state)).collect::<Vec<_>>()
     };
     assert_eq!(feed(&[state(1.0), state(1.25), state(1.5)]), [false, false, true]);
     assert_eq!(feed(&[state(1.0), state(1.75), state(2.0)]), [false; 3], "gap");

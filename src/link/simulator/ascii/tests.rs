@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::super::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
 use super::super::bench::streams::assert_splits_change_nothing;
-use super::super::bench::{Bench, Cell};
+use super::super::bench::{Bench, MockCell};
 use super::super::fault::Planned;
 use super::AsciiFault;
 use super::AsciiSimulator;
@@ -118,7 +118,7 @@ fn a_stream_is_averaged_over_lines_after_the_trigger() {
     assert!(live.iter().any(|event| matches!(event, ProtocolEvent::Live(_))));
     let before = bench.cell.shots;
     let shot = shot(&mut bench);
-    let mean = (0..4).map(|n| Cell::point(before + n).coords).sum::<nalgebra::Vector3<f64>>() / 4.0;
+    let mean = (0..4).map(|n| MockCell::point(before + n).coords).sum::<nalgebra::Vector3<f64>>() / 4.0;
     assert!((shot.point.coords - mean).norm() < 1e-9);
     assert!(shot.remark.is_some_and(|remark| remark.starts_with("mean of 4 lines")));
 }
@@ -138,7 +138,7 @@ const fn expected(fault: AsciiFault) -> Option<&'static str> {
         AsciiFault::DisconnectMidLine => "",
         AsciiFault::Origin => "0, 0, 0",
         AsciiFault::WrongUnit => "check the unit",
-        AsciiFault::Silent | AsciiFault::Late => "said nothing for 5 s while waiting for a line",
+        AsciiFault::Silent | AsciiFault::Late => "no answer from the instrument for 5 s while waiting for a line",
     })
 }
 

@@ -1,26 +1,26 @@
-//! What a simulated instrument looks at in tests.
+//! A mock of the cell for tests.
 
 use nalgebra::Point3;
 
 use super::super::PointSource;
 use crate::link::protocol::{JointState, Shot};
 
-/// A reflector that the robot carries in front of the instrument: every shot is at another place, so that a stale one cannot
-/// pass for a fresh one.
+/// A reflector on a robot in front of the instrument. Every shot is at another position, so that a stale one cannot be taken for
+/// a new one.
 #[derive(Clone, Debug)]
-pub struct Cell {
-    /// Shots so far.
+pub struct MockCell {
+    /// Number of shots so far.
     pub shots: u32,
-    /// The beam reaches the reflector.
+    /// Whether the beam reaches the reflector.
     pub has_beam: bool,
-    /// Standard deviation of each coordinate that is stated (m).
+    /// Stated standard deviation of each coordinate (m).
     pub sigma: Option<[f64; 3]>,
-    /// What the robot reports.
+    /// Joint state that the robot reports.
     pub joints: JointState,
 }
 
-impl Cell {
-    /// The point of a shot, counted from 0 (m): in every direction round the instrument, above and below it, 1.4 m to 3 m away.
+impl MockCell {
+    /// Point of a shot, counted from 0 (m): in all directions around the instrument, above and below it, 1.4 m to 3 m away.
     pub fn point(shot: u32) -> Point3<f64> {
         const FIRST: f64 = -0.5;
         let turn = 0.7 * f64::from(shot);
@@ -36,13 +36,13 @@ impl Cell {
         Self::point(self.shots.saturating_sub(1))
     }
 
-    /// How far a point is from the nearest of the shots since there were `before` of them (m).
+    /// Distance of a point from the nearest shot after the first `before` ones (m).
     pub fn error(&self, point: &Point3<f64>, before: u32) -> f64 {
         (before..self.shots).map(|shot| (point - Self::point(shot)).norm()).fold(f64::INFINITY, f64::min)
     }
 }
 
-impl Default for Cell {
+impl Default for MockCell {
     fn default() -> Self {
         let positions = vec![0.1, -1.2, 1.3, -0.4, 0.5, -0.6];
         let joints = JointState { positions, speeds: Some(vec![0.0; 6]), controller_time: 0.0, stopped: None };
@@ -50,7 +50,7 @@ impl Default for Cell {
     }
 }
 
-impl PointSource for Cell {
+impl PointSource for MockCell {
     fn shot(&mut self) -> Option<Shot> {
         let point = Self::point(self.shots);
         self.has_beam.then(|| {
@@ -59,7 +59,7 @@ impl PointSource for Cell {
         })
     }
 
-    fn look(&mut self) -> Option<Shot> {
+    fn position(&mut self) -> Option<Shot> {
         self.has_beam.then(|| Shot::bare(Self::point(self.shots)))
     }
 

@@ -1,46 +1,45 @@
-//! Bytes that nobody means: random ones, and conversations that were right before some bytes were changed, lost or doubled. No
-//! panic, bounded memory, no more than one answer to a trigger. Fixed seeds; for half a second, or as long as
-//! `TRUPOSE_FUZZ_SECONDS` says.
+//! Fuzzing with random bytes and with damaged conversations, in which bytes were changed, dropped or doubled. Checks for panics,
+//! bounded memory and at most one answer per trigger. Runs with fixed seeds for half a second, or for `TRUPOSE_FUZZ_SECONDS`.
 
 use std::time::{Duration, Instant};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Cell, Input, START, Tape, is_answer};
+use super::{Input, MockCell, START, Tape, is_answer};
 use crate::link::protocol::outbox::{MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES};
 use crate::link::protocol::{Protocol, ProtocolEvent};
 use crate::link::simulator::{Output, Simulator};
 
-/// Rounds of each kind at least.
+/// Fewest rounds of each kind.
 const ROUNDS: u64 = 50;
 
 /// Inputs of a round that does not follow a tape.
 const INPUTS: u32 = 20;
 
-/// Most events that wait beside answers and ends: statuses of both severities, offered points, a live point and joints.
-const MAX_EVENTS: usize = 2 * (MAX_STATUSES.0 + MAX_STATUSES.1) + MAX_OFFERED + 2;
+/// Most queued events besides answers and ends: statuses of both severities, offered points, a live point and joints.
+const MAX_EVENTS: usize = 2 * MAX_STATUSES + MAX_OFFERED + 2;
 
-/// Most bytes that a simulator may leave for whoever does not read.
+/// Most bytes that a simulator may queue for a peer that does not read.
 const MAX_BYTES: usize = 2 << 20;
 
-/// What may wait after one input.
+/// Limits on the queues after one input.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// Bytes of a message that is not complete.
+    /// Bytes of an incomplete message.
     pub pending: usize,
-    /// Writes.
+    /// Number of writes.
     pub outputs: usize,
 }
 
 impl Bounds {
-    /// The bound of every protocol, with this one for its messages (bytes).
+    /// Limits of a protocol with this limit for incomplete messages (bytes).
     pub const fn of_protocol(pending: usize) -> Self {
         Self { pending, outputs: MAX_OUTPUTS }
     }
 }
 
-/// Runs rounds with seeds 0, 1, ... for the time that is set.
+/// Runs rounds with seeds 0, 1, ... for the configured time.
 fn rounds(mut round: impl FnMut(&mut ChaCha8Rng)) {
     #[expect(clippy::disallowed_methods, reason = "how long to fuzz is the only thing that depends on the clock")]
     let (seconds, start) = (std::env::var("TRUPOSE_FUZZ_SECONDS").ok(), Instant::now());
@@ -52,7 +51,7 @@ fn rounds(mut round: impl FnMut(&mut ChaCha8Rng)) {
     }
 }
 
-/// Bytes of any kind, or such as stand in lines, now and then with ends.
+/// Random bytes of any value, or of characters that occur in lines.
 fn noise(random: &mut ChaCha8Rng) -> Vec<u8> {
     let alphabet = b"0123456789.,;:+-%R1QP\r\n \tNaNeE*$\xC4\xA5\x00\xFF";
     let length = random.random_range(0..6000);
@@ -62,7 +61,7 @@ fn noise(random: &mut ChaCha8Rng) -> Vec<u8> {
         .collect()
 }
 
-/// Changes, drops, doubles and inserts bytes here and there.
+/// Changes, drops, doubles and inserts single bytes at random.
 fn sprinkled(bytes: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     let mut spoilt = Vec::new();
     for &byte in bytes {
@@ -78,7 +77,7 @@ fn sprinkled(bytes: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     spoilt
 }
 
-/// Cuts off the end, doubles it, inserts or changes a byte: a few times, so that most stays right.
+/// Cuts off or doubles the end, or inserts or changes a byte, a few times, so that most of the bytes stay valid.
 fn damaged(mut bytes: Vec<u8>, random: &mut ChaCha8Rng) -> Vec<u8> {
     for _ in 0..random.random_range(1..=4) {
         let place = random.random_range(0..bytes.len().max(1)).min(bytes.len());
@@ -93,7 +92,7 @@ fn damaged(mut bytes: Vec<u8>, random: &mut ChaCha8Rng) -> Vec<u8> {
     bytes
 }
 
-/// Noise, or bytes that were right, damaged in one way or the other, or not at all, so that the states behind them are reached.
+/// Noise, or valid bytes with or without damage, so that the later states of a conversation are reached too.
 fn stream(valid: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     match random.random_range(0..5) {
         0 => noise(random),
@@ -103,7 +102,7 @@ fn stream(valid: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     }
 }
 
-/// A protocol under fuzz, with what it was asked for.
+/// A protocol under test, with counts of its inputs and events.
 struct Watched<'a, P> {
     protocol: P,
     pending: &'a dyn Fn(&P) -> usize,
@@ -111,25 +110,25 @@ struct Watched<'a, P> {
     triggers: usize,
     answers: usize,
     starts: usize,
-    /// Ends of a set-up, and of a connection.
+    /// Number of completed set-ups and of lost connections.
     ends: [usize; 2],
 }
 
 impl<P: Protocol> Watched<'_, P> {
-    fn give(&mut self, input: &Input) {
+    fn pass(&mut self, input: &Input) {
         self.triggers += usize::from(matches!(input, Input::Trigger(_)));
         self.starts += usize::from(matches!(input, Input::Start(_)));
-        input.give_to(&mut self.protocol);
+        input.pass_to(&mut self.protocol);
         let pending = (self.pending)(&self.protocol);
         assert!(pending <= self.bounds.pending, "{pending} bytes are kept");
     }
 
-    /// Takes all that waits.
+    /// Fetches everything in the queues.
     fn fetch(&mut self) {
         let (mut outputs, mut others) = (0, 0);
         while self.protocol.next_output().is_some() {
             outputs += 1;
-            assert!(outputs <= self.bounds.outputs, "more than {} writes wait", self.bounds.outputs);
+            assert!(outputs <= self.bounds.outputs, "more than {} writes are queued", self.bounds.outputs);
         }
         while let Some(event) = self.protocol.next_event() {
             match event {
@@ -140,13 +139,13 @@ impl<P: Protocol> Watched<'_, P> {
             }
             assert!(self.ends.iter().all(|ends| *ends <= self.starts), "{:?} of {} starts", self.ends, self.starts);
             assert!(self.answers <= self.triggers, "{} answers to {} triggers", self.answers, self.triggers);
-            assert!(others <= MAX_EVENTS, "more than {MAX_EVENTS} events wait");
+            assert!(others <= MAX_EVENTS, "more than {MAX_EVENTS} events are queued");
         }
     }
 }
 
-/// Plays a tape with its bytes spoilt, pauses here and there and shots given up; and apart from it feeds in pieces what was on
-/// it, with starts, triggers, cancels and deadlines in between. `pending` is what waits for the rest of its message (bytes).
+/// Replays a tape with damaged bytes, random pauses and cancelled shots; and separately feeds its bytes in pieces with starts,
+/// triggers, cancels and deadlines between them. `pending` returns the bytes of an incomplete message.
 ///
 /// # Panics
 /// The test fails.
@@ -157,18 +156,18 @@ pub fn fuzz_protocol<P: Protocol>(make: impl Fn() -> P, tape: &Tape, pending: im
     };
     let valid = tape.bytes();
     rounds(|random| {
-        play_spoilt(watched(), tape, random);
-        play_freely(watched(), &valid, random);
+        replay_damaged(watched(), tape, random);
+        feed_freely(watched(), &valid, random);
     });
 }
 
-fn play_spoilt<P: Protocol>(mut watched: Watched<'_, P>, tape: &Tape, random: &mut ChaCha8Rng) {
+fn replay_damaged<P: Protocol>(mut watched: Watched<'_, P>, tape: &Tape, random: &mut ChaCha8Rng) {
     let mut late = Duration::ZERO;
-    // Where every feed is damaged, few states are reached.
+    // With damage to every feed, only few states would be reached.
     let share = [1.0, 0.2, 0.02][random.random_range(0..3)];
     for input in &tape.0 {
         let now = input.time() + late;
-        watched.give(&match input {
+        watched.pass(&match input {
             Input::Start(_) => Input::Start(now),
             Input::Tick(_) => Input::Tick(now),
             Input::Trigger(_) => Input::Trigger(now),
@@ -181,42 +180,42 @@ fn play_spoilt<P: Protocol>(mut watched: Watched<'_, P>, tape: &Tape, random: &m
             late += Duration::from_millis(random.random_range(0..20_000));
         }
         if random.random_bool(0.02) {
-            watched.give(&Input::Cancel(input.time() + late));
+            watched.pass(&Input::Cancel(input.time() + late));
         }
         watched.fetch();
     }
 }
 
-fn play_freely<P: Protocol>(mut watched: Watched<'_, P>, valid: &[u8], random: &mut ChaCha8Rng) {
+fn feed_freely<P: Protocol>(mut watched: Watched<'_, P>, valid: &[u8], random: &mut ChaCha8Rng) {
     let mut now = START;
-    watched.give(&Input::Start(now));
+    watched.pass(&Input::Start(now));
     for _ in 0..INPUTS {
         let piece = random.random_range(1..=100);
         for piece in stream(valid, random).chunks(piece) {
-            watched.give(&Input::Feed(piece.to_vec(), now));
+            watched.pass(&Input::Feed(piece.to_vec(), now));
         }
         match random.random_range(0..8) {
-            0 => watched.give(&Input::Start(now)),
-            1 => watched.give(&Input::Cancel(now)),
-            2 => watched.give(&Input::Trigger(now)),
+            0 => watched.pass(&Input::Start(now)),
+            1 => watched.pass(&Input::Cancel(now)),
+            2 => watched.pass(&Input::Trigger(now)),
             _ => {}
         }
         now = watched.protocol.next_deadline().map_or(now, |deadline| deadline.max(now));
-        watched.give(&Input::Tick(now));
-        // Only now: an owner may be slow.
+        watched.pass(&Input::Tick(now));
+        // Fetch only after several inputs, as a slow owner would.
         watched.fetch();
     }
 }
 
-/// A simulator under fuzz.
-struct Teased<'a, S> {
+/// A simulator under test.
+struct WatchedSimulator<'a, S> {
     simulator: S,
     pending: &'a dyn Fn(&S) -> usize,
     bounds: Bounds,
-    cell: Cell,
+    cell: MockCell,
 }
 
-impl<S: Simulator> Teased<'_, S> {
+impl<S: Simulator> WatchedSimulator<'_, S> {
     fn feed(&mut self, bytes: &[u8], now: Duration) {
         self.simulator.feed(bytes, &mut self.cell, now);
         let pending = (self.pending)(&self.simulator);
@@ -236,8 +235,8 @@ impl<S: Simulator> Teased<'_, S> {
     }
 }
 
-/// Feeds a simulator what a protocol sent: spoilt request by request, and in pieces with new connections and broken beams in
-/// between. `pending` is what waits for the rest of its request (bytes).
+/// Feeds a simulator with the bytes a protocol sent: request by request with damage, and in pieces with new connections and broken
+/// beams between them. `pending` returns the bytes of an incomplete request.
 ///
 /// # Panics
 /// The test fails.
@@ -247,49 +246,50 @@ pub fn fuzz_simulator<S: Simulator>(
     pending: impl Fn(&S) -> usize,
     bounds: Bounds,
 ) {
-    let teased = || Teased { simulator: make(), pending: &pending, bounds, cell: Cell::default() };
+    let watched = || WatchedSimulator { simulator: make(), pending: &pending, bounds, cell: MockCell::default() };
     let valid = sent.concat();
     rounds(|random| {
-        tease_with_requests(teased(), sent, random);
-        tease_freely(teased(), &valid, random);
+        feed_requests(watched(), sent, random);
+        feed_simulator_freely(watched(), &valid, random);
     });
 }
 
-fn tease_with_requests<S: Simulator>(mut teased: Teased<'_, S>, sent: &[Vec<u8>], random: &mut ChaCha8Rng) {
+fn feed_requests<S: Simulator>(mut watched: WatchedSimulator<'_, S>, sent: &[Vec<u8>], random: &mut ChaCha8Rng) {
     let mut now = START;
-    teased.simulator.accept(now);
+    watched.simulator.accept(now);
     for bytes in sent {
         let bytes = if random.random_bool(0.1) { noise(random) } else { sprinkled(bytes, random) };
-        teased.feed(&bytes, now);
+        watched.feed(&bytes, now);
         now += Duration::from_millis(random.random_range(0..3000));
-        teased.tick(now);
+        watched.tick(now);
     }
 }
 
-fn tease_freely<S: Simulator>(mut teased: Teased<'_, S>, valid: &[u8], random: &mut ChaCha8Rng) {
+fn feed_simulator_freely<S: Simulator>(mut watched: WatchedSimulator<'_, S>, valid: &[u8], random: &mut ChaCha8Rng) {
     let mut now = START;
     for _ in 0..INPUTS {
         if random.random_bool(1.0 / 3.0) {
-            teased.simulator.accept(now);
+            watched.simulator.accept(now);
         }
         let piece = random.random_range(1..=100);
         for piece in stream(valid, random).chunks(piece) {
-            teased.feed(piece, now);
+            watched.feed(piece, now);
         }
-        teased.cell.has_beam = random.random();
-        now = teased.simulator.next_deadline().map_or(now, |deadline| deadline.max(now));
-        teased.tick(now);
+        watched.cell.has_beam = random.random();
+        now = watched.simulator.next_deadline().map_or(now, |deadline| deadline.max(now));
+        watched.tick(now);
     }
 }
 
-/// Floods a simulator with requests whose answers nobody reads: it keeps a bounded number of bytes, and hangs up once.
+/// Asserts that a simulator flooded with requests, whose answers are never read, keeps a bounded number of bytes and closes the
+/// connection once.
 ///
 /// # Panics
 /// The test fails.
 pub fn assert_hangs_up_once<S: Simulator>(simulator: &mut S, requests: &[u8]) {
     simulator.accept(START);
-    simulator.feed(requests, &mut Cell::default(), START);
-    (0..10).for_each(|_| simulator.tick(&mut Cell::default(), START));
+    simulator.feed(requests, &mut MockCell::default(), START);
+    (0..10).for_each(|_| simulator.tick(&mut MockCell::default(), START));
     let outputs: Vec<Output> = std::iter::from_fn(|| simulator.next_output()).collect();
     let bytes: usize =
         outputs.iter().map(|output| if let Output::Bytes(bytes) = output { bytes.len() } else { 0 }).sum();

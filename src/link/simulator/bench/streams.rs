@@ -1,4 +1,4 @@
-//! One conversation cut in every way: the same events, and the same is sent.
+//! Replays of one conversation with its stream split in every way: events and outputs must stay the same.
 
 use proptest::prelude::any;
 use proptest::sample::Index;
@@ -6,24 +6,24 @@ use proptest::{prop_assert_eq, proptest};
 
 use crate::link::protocol::{Moment, Protocol, ProtocolEvent};
 
-/// Something that a protocol is given.
+/// An input of a protocol.
 #[derive(Clone, Debug)]
 pub enum Input {
     /// A new connection.
     Start(Moment),
-    /// Bytes.
+    /// Received bytes.
     Feed(Vec<u8>, Moment),
-    /// Time has passed.
+    /// A tick.
     Tick(Moment),
-    /// A shot is asked for.
+    /// A trigger.
     Trigger(Moment),
-    /// The shot under way is given up.
+    /// A cancellation of the shot.
     Cancel(Moment),
 }
 
 impl Input {
-    /// Gives it to a protocol.
-    pub fn give_to(&self, protocol: &mut impl Protocol) {
+    /// Passes the input to a protocol.
+    pub fn pass_to(&self, protocol: &mut impl Protocol) {
         match self {
             Self::Start(now) => protocol.start(*now),
             Self::Feed(bytes, now) => protocol.feed(bytes, *now),
@@ -33,30 +33,30 @@ impl Input {
         }
     }
 
-    /// When.
+    /// Time of the input.
     pub const fn time(&self) -> Moment {
         match self {
             Self::Start(now) | Self::Feed(_, now) | Self::Tick(now) | Self::Trigger(now) | Self::Cancel(now) => *now,
         }
     }
 
-    /// Bytes that are fed.
+    /// Received bytes, if any.
     pub fn bytes(&self) -> &[u8] {
         if let Self::Feed(bytes, _) = self { bytes } else { &[] }
     }
 }
 
-/// All that a protocol was given, to be given again in another way.
+/// All inputs of a protocol, for a replay.
 #[derive(Clone, Debug, Default)]
 pub struct Tape(pub Vec<Input>);
 
 impl Tape {
-    /// All bytes that were fed.
+    /// All received bytes.
     pub fn bytes(&self) -> Vec<u8> {
         self.0.iter().flat_map(Input::bytes).copied().collect()
     }
 
-    /// The same without pauses: everything between two orders comes in one piece and at one moment.
+    /// The tape without pauses: all bytes between two commands arrive in one piece at one time.
     #[must_use]
     pub fn joined(&self) -> Self {
         let mut joined: Vec<Input> = Vec::new();
@@ -75,17 +75,17 @@ impl Tape {
     }
 }
 
-/// What a protocol said and sent.
+/// Events and outputs of a protocol.
 #[derive(Debug, Default, PartialEq)]
-struct Said {
+struct Transcript {
     events: Vec<ProtocolEvent>,
     sent: Vec<Vec<u8>>,
 }
 
-/// Plays a tape, each feed cut at the places that `cuts` gives for its length. All is fetched after each input, not after each
-/// piece: of live points only the newest waits.
-fn replay<P: Protocol>(mut protocol: P, tape: &Tape, cuts: impl Fn(usize) -> Vec<usize>) -> Said {
-    let mut said = Said::default();
+/// Replays a tape with each feed split at the offsets that `cuts` returns for its length. Events are fetched after each input
+/// instead of each piece, because the queue keeps only the newest live point.
+fn replay<P: Protocol>(mut protocol: P, tape: &Tape, cuts: impl Fn(usize) -> Vec<usize>) -> Transcript {
+    let mut said = Transcript::default();
     for input in &tape.0 {
         if let Input::Feed(bytes, now) = input {
             let mut from = 0;
@@ -94,7 +94,7 @@ fn replay<P: Protocol>(mut protocol: P, tape: &Tape, cuts: impl Fn(usize) -> Vec
                 from = cut;
             }
         } else {
-            input.give_to(&mut protocol);
+            input.pass_to(&mut protocol);
         }
         said.events.extend(std::iter::from_fn(|| protocol.next_event()));
         said.sent.extend(std::iter::from_fn(|| protocol.next_output()));
@@ -102,14 +102,11 @@ fn replay<P: Protocol>(mut protocol: P, tape: &Tape, cuts: impl Fn(usize) -> Vec
     said
 }
 
-/// A conversation cut in two at every byte, into single bytes, at random places and into random pieces gives the same. Returns
-/// its events.
-///
-/// # Panics
-/// The test fails.
+/// Asserts that a conversation gives the same results when it is split in two at every byte, into single bytes, at random offsets
+/// and into random pieces. Returns its events.
 pub fn assert_splits_change_nothing<P: Protocol>(make: impl Fn() -> P, tape: &Tape) -> Vec<ProtocolEvent> {
     let whole = replay(make(), tape, |_| Vec::new());
-    // All feeds are cut at the same offset at once: every offset of every feed is tried.
+    // All feeds are split at the same offset at once, which covers every offset of every feed.
     let longest = tape.0.iter().map(|input| input.bytes().len()).max().unwrap_or(0);
     for at in 0..=longest {
         let split = replay(make(), tape, |length| if at <= length { vec![at] } else { Vec::new() });
@@ -117,15 +114,15 @@ pub fn assert_splits_change_nothing<P: Protocol>(make: impl Fn() -> P, tape: &Ta
     }
     assert_eq!(replay(make(), tape, |length| (1..length).collect()), whole, "byte by byte");
     proptest!(|(
-        places in proptest::collection::vec(any::<Index>(), 1..12),
+        offsets in proptest::collection::vec(any::<Index>(), 1..12),
         sizes in proptest::collection::vec(1_usize..400, 1..20),
     )| {
-        let at_places = |length: usize| {
-            let mut cuts: Vec<usize> = places.iter().map(|place| place.index(length.max(1))).collect();
+        let at_offsets = |length: usize| {
+            let mut cuts: Vec<usize> = offsets.iter().map(|offset| offset.index(length.max(1))).collect();
             cuts.sort_unstable();
             cuts
         };
-        prop_assert_eq!(&replay(make(), tape, at_places), &whole);
+        prop_assert_eq!(&replay(make(), tape, at_offsets), &whole);
         let in_pieces = |length: usize| {
             let ends = sizes.iter().cycle().scan(0, |end, size| {
                 *end += size;

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 
 use super::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
 use super::streams::assert_splits_change_nothing;
-use super::{Bench, Cell, Input, START, Tape};
+use super::{Bench, Input, MockCell, START, Tape};
 use crate::link::protocol::outbox::Outbox;
 use crate::link::protocol::{Failure, Moment, Protocol, ProtocolEvent, Severity, Shot};
 use crate::link::simulator::{Output, PointSource, Simulator};
@@ -62,7 +62,7 @@ impl Protocol for Toy {
     fn feed(&mut self, bytes: &[u8], _now: Moment) {
         match self.flaw {
             Flaw::Chatters => self.outbox.send(b"?".to_vec()),
-            Flaw::SeesPieces => self.outbox.say(Severity::Info, bytes.len().to_string()),
+            Flaw::SeesPieces => self.outbox.report(Severity::Info, bytes.len().to_string()),
             Flaw::Hoards => self.kept += bytes.len(),
             Flaw::Floods => self.writes.extend(bytes.iter().map(|byte| Output::Bytes(vec![*byte]))),
             _ => {}
@@ -213,7 +213,7 @@ fn who_answers_twice_hoards_or_floods_is_found() {
 
 #[test]
 fn no_two_shots_of_the_cell_are_near_each_other_and_all_are_within_reach() {
-    let points: Vec<Point3<f64>> = (0..500).map(Cell::point).collect();
+    let points: Vec<Point3<f64>> = (0..500).map(MockCell::point).collect();
     for (index, point) in points.iter().enumerate() {
         assert!((1.4..3.0).contains(&point.coords.norm()), "{point}");
         assert!(points[..index].iter().all(|other| (other - point).norm() > 1e-3), "shot {index}");

@@ -1,4 +1,4 @@
-//! Results of the simulated tracker, right ones and wrong ones.
+//! Results of the simulated tracker, including faulty ones.
 
 use super::super::PointSource;
 use super::EmsconSimulator;
@@ -7,10 +7,9 @@ use super::wire::PacketWriter;
 use crate::link::protocol::Shot;
 use crate::link::protocol::emscon::{CommandId, MeasurementMode, PacketType, ResultStatus, SystemEvent};
 
-/// Positions in a flood.
 const FLOOD: usize = 2000;
 
-/// What a result says beside the point.
+/// Fields of a result besides the point.
 #[derive(Clone, Copy, Debug, Default)]
 struct Marks {
     status: i32,
@@ -19,18 +18,18 @@ struct Marks {
 }
 
 impl EmsconSimulator {
-    /// The measurement time is over.
+    /// Ends a measurement.
     pub(super) fn measure(&mut self, source: &mut dyn PointSource) {
         if self.faults.strikes(EmsconFault::Silence) {
             return;
         }
         if self.faults.strikes(EmsconFault::Closing) {
-            self.tell(SystemEvent::ServerClosing);
+            self.announce(SystemEvent::ServerClosing);
             self.hang_up();
             return;
         }
         if self.faults.strikes(EmsconFault::LostBeam) {
-            self.tell(SystemEvent::MeasStatusNotReady);
+            self.announce(SystemEvent::MeasStatusNotReady);
             return;
         }
         for (fault, status) in [
@@ -48,14 +47,14 @@ impl EmsconSimulator {
         if self.faults.strikes(EmsconFault::UnknownType) {
             self.send(PacketWriter::new(PacketType::Other(42)).zeros(20).finish());
         }
-        self.disturb();
+        self.interfere();
         self.send_result(source);
     }
 
-    /// One result, or *not ready* where the beam is broken.
+    /// Sends one result, or *not ready* if the beam is broken.
     pub(super) fn send_result(&mut self, source: &mut dyn PointSource) {
         let Some(shot) = source.shot() else {
-            self.tell(SystemEvent::MeasStatusNotReady);
+            self.announce(SystemEvent::MeasStatusNotReady);
             return;
         };
         let marks = self.marks();
@@ -68,10 +67,10 @@ impl EmsconSimulator {
             return;
         }
         self.send_sized(packet);
-        self.tell(SystemEvent::MeasStatusReady);
+        self.announce(SystemEvent::MeasStatusReady);
     }
 
-    /// Sends a result with the size that is planned.
+    /// Sends a result with the planned size.
     fn send_sized(&mut self, packet: PacketWriter) {
         let wrong_sizes =
             [(EmsconFault::SizeZero, 0), (EmsconFault::SizeNegative, -1), (EmsconFault::SizeHuge, i32::MAX)];
@@ -117,14 +116,14 @@ impl EmsconSimulator {
         }
     }
 
-    /// The two kinds of result: the head, coordinates, standard deviations, pointing errors, a-priori values and weather.
+    /// Writes either kind of result: header, coordinates, standard deviations, pointing errors, a-priori values and weather.
     fn result(&self, shot: &Shot, values: [f64; 3], marks: Marks, is_extended: bool) -> PacketWriter {
         let sigma = shot.sigma.unwrap_or_default().map(|value| value * self.tracker.units_per_metre());
         let total = sigma.iter().map(|value| value * value).sum::<f64>().sqrt();
         let weather =
             [shot.temperature.unwrap_or(20.0), shot.pressure.unwrap_or(1013.25), shot.humidity.unwrap_or(50.0)];
         let kind = if is_extended { PacketType::SingleMeasResult2 } else { PacketType::SingleMeasResult };
-        // Extended statistics have three covariances behind either total.
+        // Extended statistics have three covariances after each total.
         let covariances = if is_extended { 24 } else { 0 };
         PacketWriter::new(kind)
             .integers(&[marks.status, marks.mode, marks.try_mode])
@@ -138,9 +137,9 @@ impl EmsconSimulator {
             .numbers(&weather)
     }
 
-    /// Where the reflector is now, if the beam is whole.
+    /// Sends the current position of the reflector, unless the beam is broken.
     pub(super) fn send_position(&mut self, source: &mut dyn PointSource) {
-        if let Some(shot) = source.look() {
+        if let Some(shot) = source.position() {
             let values = self.tracker.coordinates(&shot.point);
             self.send(PacketWriter::new(PacketType::ReflectorPosResult).i32(0).numbers(&values).finish());
         }

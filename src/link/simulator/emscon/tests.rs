@@ -1,6 +1,6 @@
 //! Literal bytes of the simulated tracker, so that it does not only agree with the link that it was written for.
 
-use super::super::bench::{Cell, hex};
+use super::super::bench::{MockCell, hex};
 use super::*;
 
 /// A tracker to which somebody is connected.
@@ -12,7 +12,7 @@ fn connected(faults: &[Planned<EmsconFault>]) -> EmsconSimulator {
 
 /// What is answered to a request, packet by packet.
 fn ask(simulator: &mut EmsconSimulator, request: &str) -> Vec<Vec<u8>> {
-    simulator.feed(&hex(request), &mut Cell::default(), Moment::ZERO);
+    simulator.feed(&hex(request), &mut MockCell::default(), Moment::ZERO);
     written(simulator)
 }
 
@@ -46,7 +46,7 @@ fn the_published_requests_have_the_published_answers() {
     let accepted = ask(&mut simulator, "0C000000 00000000 31000000");
     assert_eq!(accepted, [hex("10000000 00000000 31000000 00000000"), hex("0C000000 08000000 1A000000")]);
     assert_eq!(simulator.next_deadline(), Some(Duration::from_millis(500)));
-    simulator.tick(&mut Cell::default(), Duration::from_millis(500));
+    simulator.tick(&mut MockCell::default(), Duration::from_millis(500));
     let done = written(&mut simulator);
     assert_eq!(done.len(), 2);
     let head = "9C000000 02000000 00000000 00000000 00000000 00000000004A9340 00000000003285C0 0000000000885640";
@@ -81,7 +81,7 @@ fn answers_have_the_published_sizes() {
 fn the_extended_result_and_the_position_have_the_published_sizes() {
     let mut simulator = connected(&[Planned::once(EmsconFault::ExtendedResult), Planned::once(EmsconFault::Flood)]);
     ask(&mut simulator, "0C000000 00000000 31000000");
-    simulator.tick(&mut Cell::default(), Duration::from_secs(3));
+    simulator.tick(&mut MockCell::default(), Duration::from_secs(3));
     let packets = written(&mut simulator);
     let (result, positions) = packets.split_last().unwrap();
     assert_eq!((result.len(), &result[..8]), (204, &hex("CC000000 09000000")[..]));
@@ -94,7 +94,7 @@ fn the_extended_result_and_the_position_have_the_published_sizes() {
 #[test]
 fn a_request_that_cannot_be_one_hangs_up() {
     let mut simulator = connected(&[]);
-    simulator.feed(&[0; 12], &mut Cell::default(), Moment::ZERO);
+    simulator.feed(&[0; 12], &mut MockCell::default(), Moment::ZERO);
     assert_eq!(simulator.next_output(), Some(Output::Close));
     assert_eq!(simulator.next_output(), None);
 }

@@ -1,11 +1,11 @@
-//! What the simulated tracker is set to: it survives a connection, as in a real one.
+//! Settings of the simulated tracker. They outlast a connection, as in a real one.
 
 use nalgebra::{Point3, Vector3};
 
 use super::wire::PacketWriter;
 use crate::link::protocol::emscon::{CommandId, CoordinateType, LengthUnit, ResultStatus, i32_at};
 
-/// A reflector of the list.
+/// A reflector in the tracker's list.
 #[derive(Clone, Copy, Debug)]
 struct ListedReflector {
     id: i32,
@@ -16,27 +16,27 @@ struct ListedReflector {
     name: &'static str,
 }
 
-/// The list of reflectors. Their names are the only text of a tracker: they say what it is.
+/// The list of reflectors. Their names are the only text of a tracker, so they mark it as simulated.
 const REFLECTORS: [ListedReflector; 3] = [
     ListedReflector { id: 0, kind: 5, offset: 0.019_05, name: "SIMULATED RRR 1.5in" },
     ListedReflector { id: 1, kind: 6, offset: 0.006_35, name: "SIMULATED RRR 0.5in" },
     ListedReflector { id: 2, kind: 9, offset: 0.006_35, name: "SIMULATED TBR 0.5in" },
 ];
 
-/// Settings of the tracker. It starts with none of those that a set-up asks for.
+/// Settings of the tracker. The initial ones all differ from those that a set-up asks for.
 #[derive(Clone, Debug)]
 pub(super) struct Tracker {
-    /// Length, angle, temperature, pressure, humidity.
+    /// Units of length, angle, temperature, pressure and humidity.
     pub(super) units: [i32; 5],
     pub(super) coordinate_type: CoordinateType,
     pub(super) mode: i32,
-    /// Duration of a measurement (ms), distance meter.
+    /// Duration of a measurement (ms), and use of the distance meter.
     pub(super) stationary: [i32; 2],
     pub(super) reflector: i32,
     /// In the order of the wire: weather monitor 0, transformation 1, unsolicited messages 4, positions 5, try mode 6.
     pub(super) settings: [i32; 9],
     pub(super) orientation: [f64; 6],
-    /// Translation (m), rotation, scale. Rotations are told, but nothing is turned.
+    /// Translation (m), rotation, scale. The rotation is reported but not applied.
     pub(super) transformation: [f64; 7],
     pub(super) is_initialized: bool,
 }
@@ -58,17 +58,17 @@ impl Default for Tracker {
 }
 
 impl Tracker {
-    /// Unsolicited messages are on.
-    pub(super) const fn is_talkative(&self) -> bool {
+    /// Whether unsolicited messages are on.
+    pub(super) const fn sends_events(&self) -> bool {
         self.settings[4] != 0
     }
 
-    /// Positions of the reflector are sent.
+    /// Whether positions of the reflector are sent.
     pub(super) const fn is_streaming(&self) -> bool {
         self.settings[5] != 0
     }
 
-    /// Answers a command that only reads or writes settings; `None`: it is another one.
+    /// Answers a command that only reads or writes settings; `None` for other commands.
     pub(super) fn answer(&mut self, command: CommandId, request: &[u8]) -> Option<Vec<Vec<u8>>> {
         let ok = || PacketWriter::reply(command, ResultStatus::AllOk);
         let answer = match command {
@@ -79,7 +79,7 @@ impl Tracker {
             CommandId::GetReflector => ok().i32(self.reflector),
             CommandId::GetSystemSettings => ok().integers(&self.settings),
             CommandId::GetStationOrientationParams => ok().numbers(&self.orientation),
-            CommandId::GetTransformationParams => ok().numbers(&self.told_transformation()),
+            CommandId::GetTransformationParams => ok().numbers(&self.reported_transformation()),
             CommandId::GetReflectors => return Some(self.list(command)),
             CommandId::SetUnits
             | CommandId::SetCoordinateSystemType
@@ -95,7 +95,7 @@ impl Tracker {
         Some(vec![answer.finish()])
     }
 
-    /// Takes new settings; `None`: the request is too short.
+    /// Changes a setting; `None` if the request is too short.
     fn set(&mut self, command: CommandId, request: &[u8]) -> Option<ResultStatus> {
         let first = i32_at(request, 12)?;
         match command {
@@ -117,7 +117,7 @@ impl Tracker {
         Some(ResultStatus::AllOk)
     }
 
-    /// One packet for each reflector.
+    /// The list of reflectors: one packet for each.
     fn list(&self, command: CommandId) -> Vec<Vec<u8>> {
         let total = i32::try_from(REFLECTORS.len()).unwrap_or(i32::MAX);
         let packet = |reflector: &ListedReflector| {
@@ -128,7 +128,7 @@ impl Tracker {
         REFLECTORS.iter().map(packet).collect()
     }
 
-    /// Coordinates of a point (m) as they are set.
+    /// Coordinates of a point (m) in the current type and units.
     pub(super) fn coordinates(&self, point: &Point3<f64>) -> [f64; 3] {
         let [scale, shift] =
             if self.settings[1] == 0 { [1.0, 0.0] } else { [self.transformation[6], self.transformation[0]] };
@@ -146,15 +146,15 @@ impl Tracker {
         [y.atan2(x) * per_radian, (z / distance).acos() * per_radian, distance]
     }
 
-    /// The transformation with its translation in the unit that is set.
-    fn told_transformation(&self) -> [f64; 7] {
+    /// The transformation, with its translation in the current unit.
+    fn reported_transformation(&self) -> [f64; 7] {
         let [x, y, z, rest @ ..] = self.transformation;
         let [x, y, z] = [x, y, z].map(|part| part * self.units_per_metre());
         let [a, b, c, scale] = rest;
         [x, y, z, a, b, c, scale]
     }
 
-    /// The unit of length in a metre.
+    /// Current units of length per metre.
     pub(super) const fn units_per_metre(&self) -> f64 {
         match LengthUnit::from_number(self.units[0]) {
             LengthUnit::Millimetre => 1e3,
@@ -167,7 +167,7 @@ impl Tracker {
     }
 }
 
-/// The parameters of a request; `None`: it is too short.
+/// The parameters of a request; `None` if it is too short.
 fn integers<const N: usize>(request: &[u8]) -> Option<[i32; N]> {
     let mut values = [0; N];
     for (index, value) in values.iter_mut().enumerate() {

@@ -104,7 +104,7 @@ const fn expected(fault: GeocomFault) -> Option<&'static str> {
         | GeocomFault::Echo
         | GeocomFault::Asleep => return None,
         GeocomFault::WrongTransaction | GeocomFault::LateReply | GeocomFault::Silent | GeocomFault::Noise => {
-            "said nothing for 60 s while measuring"
+            "no answer from the instrument for 60 s while measuring"
         }
         GeocomFault::AngleOnly => "code 1285: only angles",
         GeocomFault::NoTarget => "no reflector (code 8710",

@@ -83,7 +83,7 @@ fn a_handle_that_is_not_there_ends_the_set_up() {
     let options = NdiOptions { handle: Some(3), ..options(ReplyFormat::Binary) };
     let mut bench = Bench::new(NdiProtocol::new(options).unwrap(), NdiSimulator::new(TIP_MM, []));
     let lost = bench.settle().pop();
-    assert_eq!(lost, Some(ProtocolEvent::Lost(Failure::Settings("there is no tool 03; there are: 0A".to_owned()))));
+    assert_eq!(lost, Some(ProtocolEvent::Lost(Failure::Settings("there is no tool 03; tools: 0A".to_owned()))));
 }
 
 #[test]
@@ -111,13 +111,13 @@ const fn expected(fault: NdiFault, reply: ReplyFormat) -> &'static str {
         (NdiFault::WrongBody | NdiFault::WrongLength, ReplyFormat::Text) => "characters too many",
         (NdiFault::WrongBody, ReplyFormat::Binary) => "length is wrong",
         (NdiFault::LateReply | NdiFault::Cut | NdiFault::Silent, _) | (NdiFault::WrongLength, ReplyFormat::Binary) => {
-            "said nothing for 2 s while waiting for a position"
+            "no answer from the instrument for 2 s while waiting for a position"
         }
         (NdiFault::Halves, _) => "",
-        (NdiFault::FrozenFrame, _) => "no new frame comes",
+        (NdiFault::FrozenFrame, _) => "there is no new frame",
         (NdiFault::NotANumber, ReplyFormat::Text) => "not a signed number",
-        (NdiFault::NotANumber, ReplyFormat::Binary) => "out of every range",
-        (NdiFault::NoRotation, _) => "rotation of the tool is none",
+        (NdiFault::NotANumber, ReplyFormat::Binary) => "is out of range",
+        (NdiFault::NoRotation, _) => "rotation of the tool is invalid",
         (NdiFault::Origin, _) => "0, 0, 0",
         (NdiFault::Reset | NdiFault::DisconnectMidPacket | NdiFault::InitialisationFails, _) => "lost",
     }

@@ -1,11 +1,11 @@
 //! Literal bytes of the simulated controller, so that it does not only agree with the link that it was written for.
 
-use super::super::bench::Cell;
+use super::super::bench::MockCell;
 use super::*;
 
 /// What is answered to a request.
 fn ask(simulator: &mut RtdeSimulator, request: &[u8]) -> Option<Output> {
-    simulator.feed(request, &mut Cell::default(), Moment::ZERO);
+    simulator.feed(request, &mut MockCell::default(), Moment::ZERO);
     simulator.next_output()
 }
 
@@ -21,7 +21,7 @@ fn the_published_requests_have_the_published_answers() {
     assert_eq!(ask(&mut simulator, &[&head[..], names].concat()), bytes(&types));
     assert_eq!(ask(&mut simulator, &[0x00, 0x03, 0x53]), bytes(&[0x00, 0x04, 0x53, 0x01]));
     assert_eq!(simulator.next_deadline(), Some(Duration::from_millis(8)));
-    simulator.tick(&mut Cell::default(), Duration::from_millis(8));
+    simulator.tick(&mut MockCell::default(), Duration::from_millis(8));
     let q: Vec<u8> = [0.1, -1.2, 1.3, -0.4, 0.5, -0.6].iter().flat_map(|value| f64::to_be_bytes(*value)).collect();
     let data = [&[0x00, 0x3c, 0x55, 0x01][..], &0.008_f64.to_be_bytes(), &q].concat();
     assert_eq!(simulator.next_output(), bytes(&data));

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use super::super::{Command, CommandId, EmsconOptions, i32_at};
 use super::{bench, bench_with, commands, failure, ready};
 use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
-use crate::link::simulator::bench::Cell;
+use crate::link::simulator::bench::MockCell;
 
 #[test]
 fn the_set_up_writes_and_reads_back_everything_that_a_point_depends_on() {
@@ -45,7 +45,7 @@ fn a_shot_is_the_point_of_the_cell_in_metres() {
     for number in 0..3 {
         let events = bench.shoot();
         let Some(ProtocolEvent::Shot(shot)) = events.last() else { panic!("{events:?}") };
-        assert!((shot.point - Cell::point(number)).norm() < 1e-12);
+        assert!((shot.point - MockCell::point(number)).norm() < 1e-12);
         assert!(shot.sigma.unwrap().iter().zip([4e-6, 5e-6, 6e-6]).all(|(a, b)| (a - b).abs() < 1e-15));
         assert_eq!((shot.temperature, shot.pressure, shot.humidity), (Some(20.0), Some(1013.25), Some(50.0)));
         assert_eq!(shot.raw.len(), 156);
@@ -63,7 +63,7 @@ fn a_reflector_that_was_asked_for_is_set_and_read_back() {
     let mut bench = bench_with(EmsconOptions { reflector: Some(9), ..EmsconOptions::default() }, &[]);
     assert_eq!(
         bench.settle().last(),
-        Some(&ProtocolEvent::Lost(Failure::Refused("choosing the reflector: invalid input data (98)".to_owned())))
+        Some(&ProtocolEvent::Lost(Failure::Refused("selecting the reflector: invalid input data (98)".to_owned())))
     );
 }
 
@@ -84,7 +84,7 @@ fn positions_of_the_reflector_are_live_points_and_never_shots() {
     assert_eq!(events.len(), 11);
     for event in events {
         let ProtocolEvent::Live(shot) = event else { panic!("{event:?}") };
-        assert!((shot.point - Cell::point(0)).norm() < 1e-12);
+        assert!((shot.point - MockCell::point(0)).norm() < 1e-12);
     }
 }
 
@@ -108,7 +108,7 @@ fn a_cancelled_shot_is_swallowed_and_the_next_one_is_right() {
     assert_eq!(bench.run_for(Duration::from_millis(400)), []);
     let events = bench.shoot();
     let Some(ProtocolEvent::Shot(shot)) = events.last() else { panic!("{events:?}") };
-    assert!((shot.point - Cell::point(0)).norm() < 1e-12);
+    assert!((shot.point - MockCell::point(0)).norm() < 1e-12);
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn a_result_that_overtakes_the_answer_to_the_stop_is_swallowed() {
     assert_eq!(bench.run_for(Duration::from_secs(1)), []);
     let events = bench.shoot();
     let Some(ProtocolEvent::Shot(shot)) = events.last() else { panic!("{events:?}") };
-    assert!((shot.point - Cell::point(1)).norm() < 1e-12);
+    assert!((shot.point - MockCell::point(1)).norm() < 1e-12);
 }
 
 #[test]

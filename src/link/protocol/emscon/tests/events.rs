@@ -104,7 +104,7 @@ fn events_that_change_what_points_mean_are_followed_by_a_reading_and_others_are_
         let before = bench.sent.len();
         assert_eq!(said(&mut bench, &event(number)), [], "{number}");
         let events = bench.run_for(Duration::from_secs(1));
-        assert_eq!(statuses(&events), ["the settings of the tracker were checked again and are as they should be"]);
+        assert_eq!(statuses(&events), ["the settings of the tracker were checked again and are right"]);
         assert_eq!(commands(&bench).split_off(before), [6, 27, 48, 15, 13, 41, 25, 29, 2], "{number}");
         let mut bench = measuring();
         let events = said(&mut bench, &event(number));
@@ -121,8 +121,8 @@ fn events_that_change_what_points_mean_are_followed_by_a_reading_and_others_are_
 fn an_unusable_point_that_nobody_asked_for_is_not_offered_and_has_the_settings_read() {
     let mut bench = ready(&[]);
     let events = said(&mut bench, &packet(&[&[2][..], &[0; 37]].concat()));
-    let words = "a point that nobody asked for is not used: the reading is no measurement: the point is 0.000000 m from the \
-                 tracker; 0.1 m to 80 m can be measured";
+    let words = "ignored an unrequested point: the reading is not a measurement: the point is 0.000000 m from the \
+                 tracker, which measures from 0.1 m to 80 m";
     assert_eq!(statuses(&events), [words]);
     assert_eq!(events.len(), 1);
     assert_eq!(bench.protocol.next_output(), Some(Command::bare(CommandId::GetUnits).encode()));
@@ -154,7 +154,7 @@ fn a_busy_tracker_is_asked_again_at_growing_pauses_up_to_two_seconds() {
         assert!(!exchange.is_answered_by(CommandId::GetUnits), "it is not sent again yet");
         pauses.push(exchange.deadline().saturating_sub(now).as_millis());
         now = exchange.deadline();
-        assert!(matches!(exchange.due(now), Due::Again(_)));
+        assert!(matches!(exchange.due(now), Due::Resend(_)));
     }
     assert_eq!(pauses, [200, 400, 800, 1600, 2000, 2000, 2000, 2000, 2000, 2000]);
 }

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::super::{Emscon, EmsconOptions, ResultStatus};
 use super::{EmsconBench, bench, bench_with, failure, ready, statuses};
 use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
-use crate::link::simulator::bench::Cell;
+use crate::link::simulator::bench::MockCell;
 use crate::link::simulator::emscon::EmsconFault;
 use crate::link::simulator::fault::Planned;
 
@@ -18,7 +18,7 @@ fn assert_recovered(bench: &mut EmsconBench) {
     let number = bench.cell.shots;
     let events = bench.shoot();
     let Some(ProtocolEvent::Shot(shot)) = events.last() else { panic!("{events:?}") };
-    assert!((shot.point - Cell::point(number)).norm() < 1e-12, "{}", shot.point);
+    assert!((shot.point - MockCell::point(number)).norm() < 1e-12, "{}", shot.point);
 }
 
 /// A shot with a fault fails with words, and the next one is right without a new connection.
@@ -96,39 +96,42 @@ fn failures_of_one_shot_say_what_happened_and_the_next_one_is_right() {
         ),
         (
             Fault::UnlistedError,
-            "the instrument sees no reflector (the measurement ended with error 4242; a broken beam does that)",
+            "the instrument sees no reflector (the measurement ended with error 4242, as after a broken beam)",
         ),
         (
             Fault::LostBeam,
-            "the instrument sees no reflector (the tracker said 'not ready' before the result: the beam is broken)",
+            "the instrument sees no reflector (the tracker reported 'not ready' before the result: the beam is broken)",
         ),
-        (Fault::Silence, "the instrument said nothing for 11 s while the result of the measurement was awaited"),
-        (Fault::TryMode, "the instrument is set differently: the tracker is in try mode; the reading is a rehearsal"),
+        (Fault::Silence, "no answer from the instrument for 11 s while waiting for the result of the measurement"),
+        (
+            Fault::TryMode,
+            "the instrument has a wrong setting: the tracker is in try mode, which does not take real measurements",
+        ),
         (
             Fault::WrongMode,
-            "the instrument is set differently: the measurement mode is sphere centre (4), not stationary",
+            "the instrument has a wrong setting: the measurement mode is sphere centre (4), not stationary",
         ),
         (Fault::BadStatus, "the reading was not stable (the measurement ended: the sensor is not stable (10013))"),
         (
             Fault::ZeroPoint,
-            "the reading is no measurement: the point is 0.000000 m from the tracker; 0.1 m to 80 m can be measured",
+            "the reading is not a measurement: the point is 0.000000 m from the tracker, which measures from 0.1 m to 80 m",
         ),
         (
             Fault::SilentMetres,
-            "the reading is no measurement: the point is 0.001411 m from the tracker; 0.1 m to 80 m can be measured",
+            "the reading is not a measurement: the point is 0.001411 m from the tracker, which measures from 0.1 m to 80 m",
         ),
-        (Fault::NotFinite, "the reading is no measurement: a coordinate is no finite number"),
+        (Fault::NotFinite, "the reading is not a measurement: a coordinate is not a finite number"),
         (
             Fault::ShortResult,
-            "cannot read what the instrument sends: packet 'single measurement result' has 100 bytes, at least 156 are needed",
+            "cannot read the data from the instrument: packet 'single measurement result' has 100 bytes, at least 156 are needed",
         ),
         (
             Fault::UnitsChanged,
-            "the instrument is set differently: the units were changed while a point was being measured",
+            "the instrument has a wrong setting: the units were changed while a point was being measured",
         ),
         (
             Fault::TypeChanged,
-            "the instrument is set differently: the coordinate type was changed while a point was being measured",
+            "the instrument has a wrong setting: the coordinate type was changed while a point was being measured",
         ),
     ];
     for (fault, words) in cases {
@@ -187,15 +190,15 @@ fn faults_that_end_the_connection_say_so_and_a_new_one_is_good() {
     use EmsconFault as Fault;
     let size = |size: i32| {
         format!(
-            "cannot read what the instrument sends: a packet of {size} bytes was announced; sizes from 12 to 65536 exist, so the \
-             stream is out of step"
+            "cannot read the data from the instrument: a packet of {size} bytes was announced; sizes are 12 to 65536, so the \
+             stream is out of sync"
         )
     };
     assert_loses_then_reconnects(Fault::SizeZero, &size(0));
     assert_loses_then_reconnects(Fault::SizeNegative, &size(-1));
     assert_loses_then_reconnects(Fault::SizeHuge, &size(i32::MAX));
-    assert_loses_then_reconnects(Fault::CutAfter20, "the connection is lost: closed by the other side");
-    assert_loses_then_reconnects(Fault::Closing, "the connection is lost: the server closes (998)");
+    assert_loses_then_reconnects(Fault::CutAfter20, "the connection was lost: closed by the other side");
+    assert_loses_then_reconnects(Fault::Closing, "the connection was lost: the server closes (998)");
 }
 
 #[test]
@@ -203,7 +206,7 @@ fn units_that_somebody_changed_are_set_again() {
     let mut bench = ready(&[Planned::once(EmsconFault::UnitsChanged)]);
     bench.shoot();
     let rest = bench.run_for(Duration::from_secs(1));
-    assert!(statuses(&rest).contains(&"the settings of the tracker were checked again and are as they should be"));
+    assert!(statuses(&rest).contains(&"the settings of the tracker were checked again and are right"));
     assert_recovered(&mut bench);
 }
 
@@ -213,7 +216,7 @@ fn a_shot_during_the_re_check_may_be_asked_for_again_at_once() {
     bench.shoot();
     bench.trigger();
     let events = bench.run_until(|event| matches!(event, ProtocolEvent::Failed(_)));
-    let words = "its settings were changed and are being checked again".to_owned();
+    let words = "its settings were changed and are being checked".to_owned();
     assert_eq!(failure(&events), &Failure::NotReady(words));
     assert!(failure(&events).is_transient());
     assert_recovered(&mut bench);
@@ -222,10 +225,13 @@ fn a_shot_during_the_re_check_may_be_asked_for_again_at_once() {
 #[test]
 fn a_frame_or_a_reflector_that_somebody_changed_ends_the_link_because_points_no_longer_fit_together() {
     for (fault, words) in [
-        (EmsconFault::FrameChanged, "the station orientation was changed; points before and after do not fit together"),
+        (
+            EmsconFault::FrameChanged,
+            "the station orientation was changed; points before and after the change do not fit together",
+        ),
         (
             EmsconFault::ReflectorChanged,
-            "reflector: expected 'SIMULATED RRR 1.5in' (0), surface offset 19.0500 mm, the tracker has 'SIMULATED RRR 0.5in' (1), surface offset \
+            "reflector: expected 'SIMULATED RRR 1.5in' (0), surface offset 19.0500 mm, the tracker uses 'SIMULATED RRR 0.5in' (1), surface offset \
              6.3500 mm; points with different reflectors do not fit together",
         ),
     ] {
@@ -239,7 +245,7 @@ fn a_frame_or_a_reflector_that_somebody_changed_ends_the_link_because_points_no_
 #[test]
 fn settings_that_do_not_stick_end_the_set_up() {
     for (fault, words) in [
-        (EmsconFault::Metres, "units: asked for mm, rad, \u{b0}C, mbar, %RH, read back m, rad, \u{b0}C, mbar, %RH"),
+        (EmsconFault::Metres, "units: requested mm, rad, \u{b0}C, mbar, %RH, read back m, rad, \u{b0}C, mbar, %RH"),
         (EmsconFault::TryStuck, "the try mode cannot be switched off"),
     ] {
         let mut bench = bench(&[Planned::once(fault)]);
@@ -262,7 +268,7 @@ fn a_second_program_is_told_that_the_tracker_is_in_use() {
 fn a_laser_that_warms_up_is_waited_for() {
     let mut bench = bench(&[Planned::from(EmsconFault::WarmingUp, 1, 3)]);
     let events = bench.settle();
-    assert_eq!(statuses(&events), ["the laser is warming up; the set-up waits until it is ready"; 3]);
+    assert_eq!(statuses(&events), ["the laser is warming up; waiting until it is ready"; 3]);
     assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))));
     assert_eq!(bench.elapsed(), Duration::from_secs(15));
 }
@@ -272,7 +278,7 @@ fn what_an_instrument_does_not_know_is_a_warning_where_points_do_not_depend_on_i
     let mut bench = bench(&[Planned::always(EmsconFault::NoStationary)]);
     let events = bench.settle();
     let Some(ProtocolEvent::Ready(identity)) = events.last() else { panic!("{events:?}") };
-    let words = "setting the measurement time: not implemented in this instrument (2); the set-up went on without it";
+    let words = "setting the measurement time: not implemented in this instrument (2); continued without it";
     assert_eq!(identity.warnings, [words]);
     assert_recovered(&mut bench);
 }
@@ -292,7 +298,8 @@ fn a_scale_of_the_tracker_ends_the_set_up_and_a_shift_is_a_warning() {
     let mut moved = bench(&[Planned::once(EmsconFault::Moved)]);
     let events = moved.settle();
     let Some(ProtocolEvent::Ready(identity)) = events.last() else { panic!("{events:?}") };
-    let warning = "the tracker transforms its points (scale 1): distances stay right, points are not in its own frame";
+    let warning =
+        "the tracker transforms its points (scale 1): distances stay right, but points are not in its own frame";
     assert_eq!(identity.warnings, [warning]);
 }
 
@@ -311,8 +318,8 @@ fn a_result_that_nobody_asked_for_is_offered_and_never_the_shot() {
     let mut bench = ready(&[Planned::once(EmsconFault::Early)]);
     let events = bench.shoot();
     let [ProtocolEvent::Offered(offered), ProtocolEvent::Shot(shot)] = events.as_slice() else { panic!("{events:?}") };
-    assert!((offered.point - Cell::point(0)).norm() < 1e-12);
-    assert!((shot.point - Cell::point(1)).norm() < 1e-12);
+    assert!((offered.point - MockCell::point(0)).norm() < 1e-12);
+    assert!((shot.point - MockCell::point(1)).norm() < 1e-12);
 }
 
 #[test]
@@ -372,7 +379,7 @@ proptest! {
             let answers = events.iter().filter(|event| matches!(event, ProtocolEvent::Shot(_) | ProtocolEvent::Failed(_)));
             prop_assert!(answers.count() <= 1);
             if let Some(ProtocolEvent::Shot(shot)) = events.last() {
-                let error = (shot.point - Cell::point(bench.cell.shots - 1)).norm();
+                let error = (shot.point - MockCell::point(bench.cell.shots - 1)).norm();
                 prop_assert!(error < 1e-12, "{error} m beside the point");
             }
             let rest = bench.run_for(Duration::from_mins(1));
@@ -397,7 +404,7 @@ fn what_is_no_tracker_is_told_by_its_first_bytes() {
         let lost = std::iter::from_fn(|| protocol.next_event()).last();
         let Some(ProtocolEvent::Lost(failure @ Failure::Foreign(why))) = &lost else { panic!("{lost:?}") };
         assert!(why.contains(part), "{why}");
-        assert!(failure.hint().contains("this kind of instrument, and the right port"), "{}", failure.hint());
+        assert!(failure.hint().contains("check the kind of instrument and the port"), "{}", failure.hint());
     }
 }
 
@@ -408,5 +415,5 @@ fn what_takes_the_connection_and_says_nothing_is_told_soon() {
     protocol.tick(Duration::from_secs(8));
     let lost = std::iter::from_fn(|| protocol.next_event()).last();
     let Some(ProtocolEvent::Lost(Failure::Foreign(why))) = lost else { panic!("{lost:?}") };
-    assert_eq!(why, "it took the connection, but has not answered the first question for 8 s");
+    assert_eq!(why, "it accepted the connection but did not answer the first command within 8 s");
 }

@@ -1,31 +1,31 @@
-//! Whether a robot is at rest.
+//! Detection of a robot at rest.
 
 use super::super::JointState;
 
-/// Watches joint states and says when no joint has moved for some time, by the clock of the controller.
+/// Detects from joint states that no joint has moved for some time, by the controller's clock.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stillness {
+pub struct RestDetector {
     limit: f64,
     seconds: f64,
-    /// Controller time of the first and the last state of the rest under way (s).
+    /// Controller time of the first and the latest state of the current rest (s).
     rest: Option<(f64, f64)>,
 }
 
-impl Default for Stillness {
-    /// Below 0.001 rad/s for half a second.
+impl Default for RestDetector {
+    /// At rest below 0.001 rad/s for half a second.
     fn default() -> Self {
         Self::new(1e-3, 0.5)
     }
 }
 
-impl Stillness {
-    /// At rest: every joint is slower than `limit` (rad/s) for `seconds` (s).
+impl RestDetector {
+    /// At rest once every joint has been slower than `limit` (rad/s) for `seconds` (s).
     pub const fn new(limit: f64, seconds: f64) -> Self {
         Self { limit, seconds, rest: None }
     }
 
-    /// Takes the next state; true where the robot is at rest now. Without speeds, while it is stopped by its safety system, or
-    /// across a gap as long as the rest itself, nobody can say so; a clock that went back begins anew.
+    /// Takes the next state and returns whether the robot is at rest now. It does not count as at rest without speeds, during a
+    /// safety stop, or across a gap as long as the required rest. A clock that goes back restarts the wait.
     pub fn feed(&mut self, state: &JointState) -> bool {
         let is_slow = |speeds: &Vec<f64>| !speeds.is_empty() && speeds.iter().all(|speed| speed.abs() < self.limit);
         let time = state.controller_time;

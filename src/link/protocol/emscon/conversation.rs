@@ -1,73 +1,66 @@
-//! The conversation: at most one command is under way at any time, and answers are matched by command, never by order.
+//! The conversation with a tracker: at most one command is in progress at any time, and answers are matched by command, not by
+//! order.
 
 use std::time::Duration;
 
+use super::super::excerpt::excerpt;
 use super::super::outbox::Outbox;
-use super::super::text::shown;
 use super::super::{Failure, Moment, ProtocolEvent, Severity};
 use super::EmsconOptions;
 use super::command::Command;
-use super::exchange::{Due, Exchange, FIRST, patience};
+use super::exchange::{Due, Exchange, FIRST, time_limit};
 use super::packet::{Framer, Packet, Reply, SingleResult};
 use super::setup::{Outcome, SetUp, WARM_UP_PAUSE};
 use super::shot::{position_of, shot_of};
 use super::status::{CommandId, PacketType, ResultStatus, SystemEvent, TrackerStatus};
 use super::step::reading_of;
 
-/// Re-checks in a row that find yet another change, after which somebody else is at the settings.
+/// Consecutive re-checks that found another change; beyond this another program must be changing the settings.
 const MAX_RECHECKS: u32 = 5;
 
-/// So many bytes of what is no packet are shown.
-const SHOWN: usize = 16;
+/// Bytes of a foreign protocol that are quoted in a message.
+const QUOTED_BYTES: usize = 16;
 
-/// What the link is doing.
+/// State of the link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// Not connected, or of no use any more.
+    /// Not connected, or lost.
     Off,
     /// Setting up or re-checking.
     Settling,
-    /// Ready for a shot. A command under way is a keep-alive.
+    /// Ready for a shot. A command in progress is a keep-alive.
     Idle,
-    /// A shot: asking whether the tracker is ready.
+    /// Shot: asking whether the tracker is ready.
     Asking,
-    /// A shot: waiting for the acceptance.
+    /// Shot: waiting for the acceptance.
     Starting,
-    /// A shot: waiting for the result.
-    Waiting {
-        /// Since when.
-        since: Moment,
-        /// Until when.
-        until: Moment,
-    },
-    /// A shot was given up; whatever comes of it before the answer to the stop is swallowed.
+    /// Shot: waiting for the result.
+    Waiting { since: Moment, until: Moment },
+    /// The shot was cancelled; its results are discarded until the stop command is answered.
     Stopping,
 }
 
-/// One conversation.
 #[derive(Clone, Debug)]
-pub(super) struct Session {
+pub(super) struct Conversation {
     options: EmsconOptions,
-    /// What is to be sent and told.
     pub outbox: Outbox,
     framer: Framer,
     phase: Phase,
     exchange: Option<Exchange>,
     set_up: SetUp,
-    /// The owner was told that the link is ready.
+    /// Whether [`ProtocolEvent::Ready`] was sent.
     is_announced: bool,
-    /// Something that points depend on changed since it was read.
+    /// Whether a setting that points depend on changed since it was read.
     is_dirty: bool,
     rechecks: u32,
     was_not_ready: bool,
     face: Option<u8>,
     last_heard: Moment,
-    /// When a tracker was known by its first packet, if it was over this connection.
+    /// Time of the first packet of this connection, which shows that the other end is a tracker.
     known_since: Option<Moment>,
 }
 
-impl Session {
-    /// A conversation that has not begun.
+impl Conversation {
     pub(super) fn new(options: EmsconOptions) -> Self {
         Self {
             options,
@@ -86,12 +79,12 @@ impl Session {
         }
     }
 
-    /// Whether positions of the reflector come between shots.
+    /// Whether positions of the reflector arrive between shots.
     pub(super) const fn shows_live(&self) -> bool {
         self.options.reflector_positions
     }
 
-    /// A new connection.
+    /// Starts the set-up on a new connection.
     pub(super) fn start(&mut self, now: Moment) {
         *self = Self::new(self.options);
         self.last_heard = now;
@@ -99,7 +92,7 @@ impl Session {
         self.next_step(now);
     }
 
-    /// Bytes from the tracker.
+    /// Takes bytes from the tracker.
     pub(super) fn feed(&mut self, bytes: &[u8], now: Moment) {
         if self.phase == Phase::Off {
             return;
@@ -108,9 +101,9 @@ impl Session {
         self.framer.feed(bytes);
         while self.phase != Phase::Off {
             if self.known_since.is_none() && self.framer.announces_unknown() {
-                // Nothing was understood so far: this never was a tracker.
-                let start = shown(&String::from_utf8_lossy(self.framer.start(SHOWN)));
-                self.lose(Failure::Foreign(format!("no emScon answers there, what comes begins with `{start}`")));
+                // No packet was understood so far, so the other end is not a tracker.
+                let start = excerpt(&String::from_utf8_lossy(self.framer.start(QUOTED_BYTES)));
+                self.lose(Failure::Foreign(format!("it does not use emScon; its data begin with `{start}`")));
                 return;
             }
             match self.framer.next_packet() {
@@ -124,17 +117,17 @@ impl Session {
         }
     }
 
-    /// Time has passed.
+    /// Handles everything that is due.
     pub(super) fn tick(&mut self, now: Moment) {
         if let Phase::Waiting { since, until } = self.phase
             && now >= until
         {
             let seconds = now.saturating_sub(since).as_secs_f64();
-            self.fail(Failure::Silent { what: "the result of the measurement was awaited".to_owned(), seconds });
+            self.fail(Failure::Silent { what: "waiting for the result of the measurement".to_owned(), seconds });
             self.stop(now);
         }
         match self.exchange.as_mut().map(|exchange| exchange.due(now)) {
-            Some(Due::Again(bytes)) => self.outbox.send(bytes),
+            Some(Due::Resend(bytes)) => self.outbox.send(bytes),
             Some(Due::TimedOut) => self.timed_out(now),
             None if self.phase == Phase::Idle && now >= self.keep_alive_at() => {
                 self.send(Command::bare(CommandId::GetTrackerStatus), now);
@@ -143,7 +136,7 @@ impl Session {
         }
     }
 
-    /// Asks for a shot.
+    /// Requests a shot.
     pub(super) fn trigger(&mut self, now: Moment) {
         let too_early = |text: &str| Failure::TooEarly(text.to_owned());
         match self.phase {
@@ -153,18 +146,18 @@ impl Session {
             }
             Phase::Off => self.fail(too_early("the tracker is not connected")),
             Phase::Settling if self.is_announced => {
-                let text = "its settings were changed and are being checked again".to_owned();
+                let text = "its settings were changed and are being checked".to_owned();
                 self.fail(Failure::NotReady(text));
             }
             Phase::Settling => self.fail(too_early("the set-up is not complete")),
             Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {
-                self.fail(too_early("a measurement is under way"));
+                self.fail(too_early("a measurement is in progress"));
             }
-            Phase::Stopping => self.fail(too_early("the measurement before is being stopped")),
+            Phase::Stopping => self.fail(too_early("the previous measurement is being stopped")),
         }
     }
 
-    /// Gives up the shot under way.
+    /// Cancels the shot in progress.
     pub(super) fn cancel(&mut self, now: Moment) {
         match self.phase {
             Phase::Asking => self.phase = Phase::Idle,
@@ -173,7 +166,7 @@ impl Session {
         }
     }
 
-    /// When [`Self::tick`] has something to do.
+    /// The next time at which [`Self::tick`] has something to do.
     pub(super) fn next_deadline(&self) -> Option<Moment> {
         let exchange = self.exchange.as_ref().map(Exchange::deadline);
         match self.phase {
@@ -196,18 +189,18 @@ impl Session {
             Ok(Packet::ReflectorPosition { values, raw }) => self.take_position(values, raw),
             Ok(Packet::Event(event)) => self.take_event(event, now),
             Ok(Packet::Skipped(PacketType::Other(number))) => {
-                self.outbox.say(Severity::Info, format!("skipped a packet of unknown type {number}"));
+                self.outbox.report(Severity::Info, format!("skipped a packet of unknown type {number}"));
             }
             Ok(Packet::Skipped(_)) => {}
             Err(error) if matches!(self.phase, Phase::Waiting { .. }) => {
                 self.fail(Failure::Garbled(error.to_string()));
                 self.stop(now);
             }
-            Err(error) => self.outbox.say(Severity::Warning, error.to_string()),
+            Err(error) => self.outbox.report(Severity::Warning, error.to_string()),
         }
     }
 
-    /// An error packet is the answer to the command that it names; while a result is awaited it ends the measurement.
+    /// Handles an error packet: it answers the command it names, and it ends a measurement whose result is awaited.
     fn take_error(&mut self, command: CommandId, status: ResultStatus, now: Moment) {
         if self.exchange.as_ref().is_some_and(|exchange| exchange.is_answered_by(command)) {
             self.take_answer(command, status, None, now);
@@ -217,7 +210,7 @@ impl Session {
             self.fail(status.measurement_failure());
             if command == CommandId::StartMeasurement { self.settle_or_idle(now) } else { self.stop(now) }
         } else if self.phase != Phase::Stopping {
-            self.outbox.say(Severity::Warning, format!("{command}: {}", status.described()));
+            self.outbox.report(Severity::Warning, format!("{command}: {}", status.described()));
         }
     }
 
@@ -250,7 +243,7 @@ impl Session {
         }
     }
 
-    /// An answer in the set-up.
+    /// Handles an answer in the set-up.
     fn take_step(&mut self, status: ResultStatus, reply: Option<&Reply>, now: Moment) {
         let outcome = match reply {
             Some(reply) if status == ResultStatus::AllOk => self.set_up.answered(reply),
@@ -260,7 +253,7 @@ impl Session {
             Ok(Outcome::Done) => self.next_step(now),
             Ok(Outcome::More) => {}
             Ok(Outcome::Wait(text)) => {
-                self.outbox.say(Severity::Warning, text);
+                self.outbox.report(Severity::Warning, text);
                 if let Some(exchange) = &mut self.exchange {
                     exchange.repeat_after(WARM_UP_PAUSE, now);
                 }
@@ -269,7 +262,7 @@ impl Session {
         }
     }
 
-    /// The answer to whether a shot may start. A tracker that is only busy is asked again.
+    /// Handles the answer to whether a shot may start. A tracker that is only busy is asked again.
     fn take_readiness(&mut self, status: ResultStatus, reply: Option<&Reply>, now: Moment) {
         let fields = reply.filter(|_| status == ResultStatus::AllOk).map(|reply| reply.fields(20));
         let readiness = fields.map(|fields| fields.map(|fields| TrackerStatus::from_number(fields.i32(16))));
@@ -283,7 +276,7 @@ impl Session {
                 return;
             }
             Some(Ok(TrackerStatus::NotReady)) => Failure::NoTarget(
-                "tracker status 'not ready': no reflector is locked, or it is not initialised".to_owned(),
+                "tracker status 'not ready': no reflector is locked, or the tracker is not initialised".to_owned(),
             ),
             Some(Ok(other)) => Failure::NotReady(format!("tracker status: {other}")),
             Some(Err(error)) => Failure::Garbled(error.to_string()),
@@ -298,28 +291,28 @@ impl Session {
             Phase::Off | Phase::Stopping => return,
             Phase::Settling => {
                 self.outbox
-                    .say(Severity::Warning, "a point came while the settings were being checked; it is not used");
+                    .report(Severity::Warning, "ignored a point that arrived while the settings were being checked");
                 return;
             }
             Phase::Idle | Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {}
         }
-        let is_ours = matches!(self.phase, Phase::Waiting { .. });
-        let judged = shot_of(result, &self.options, self.face);
-        self.is_dirty |= matches!(judged, Err(Failure::Settings(_) | Failure::Unusable(_)));
-        match (judged, is_ours) {
+        let is_requested = matches!(self.phase, Phase::Waiting { .. });
+        let checked = shot_of(result, &self.options, self.face);
+        self.is_dirty |= matches!(checked, Err(Failure::Settings(_) | Failure::Unusable(_)));
+        match (checked, is_requested) {
             (Ok(shot), true) => self.outbox.push(ProtocolEvent::Shot(shot)),
             (Err(failure), true) => self.fail(failure),
             (Ok(shot), false) => self.outbox.push(ProtocolEvent::Offered(shot)),
             (Err(failure), false) => {
-                self.outbox.say(Severity::Warning, format!("a point that nobody asked for is not used: {failure}"));
+                self.outbox.report(Severity::Warning, format!("ignored an unrequested point: {failure}"));
             }
         }
-        if is_ours || (self.is_dirty && self.phase == Phase::Idle) {
+        if is_requested || (self.is_dirty && self.phase == Phase::Idle) {
             self.settle_or_idle(now);
         }
     }
 
-    /// A position is shown only while the units are certain.
+    /// Reports a live position, but only while the units are certain.
     fn take_position(&mut self, values: [f64; 3], raw: Vec<u8>) {
         let is_certain = !self.is_dirty && !matches!(self.phase, Phase::Off | Phase::Settling);
         if let Some(shot) = position_of(values, raw, self.face).filter(|_| is_certain) {
@@ -337,39 +330,39 @@ impl Session {
             SystemEvent::MeasStatusNotReady => self.take_not_ready(now),
             SystemEvent::MeasStatusReady if self.was_not_ready => {
                 self.was_not_ready = false;
-                self.outbox.say(Severity::Info, "the tracker is ready again");
+                self.outbox.report(Severity::Info, "the tracker is ready again");
             }
             SystemEvent::LaserWarmedUp
             | SystemEvent::CompensationChanged
             | SystemEvent::InitializationStatusChanged => {
-                self.outbox.say(Severity::Info, event.words());
+                self.outbox.report(Severity::Info, event.words());
             }
             SystemEvent::SensorDisconnected | SystemEvent::BatteryStatus | SystemEvent::ExternalControlActive => {
-                self.outbox.say(Severity::Warning, event.words());
+                self.outbox.report(Severity::Warning, event.words());
             }
             _ if reading_of(event).is_some() => self.take_change(event, now),
             _ => {}
         }
     }
 
-    /// While a shot is under way this is how a broken beam shows.
+    /// Handles *not ready*, which during a shot means a broken beam.
     fn take_not_ready(&mut self, now: Moment) {
         match self.phase {
             Phase::Starting | Phase::Waiting { .. } => {
                 self.fail(Failure::NoTarget(
-                    "the tracker said 'not ready' before the result: the beam is broken".to_owned(),
+                    "the tracker reported 'not ready' before the result: the beam is broken".to_owned(),
                 ));
                 self.stop(now);
             }
             Phase::Idle | Phase::Asking if !self.was_not_ready => {
-                self.outbox.say(Severity::Warning, "the tracker is not ready: the beam may be broken");
+                self.outbox.report(Severity::Warning, "the tracker is not ready: the beam may be broken");
             }
             _ => {}
         }
         self.was_not_ready = true;
     }
 
-    /// Something that points depend on changed: a shot under way is of no use, and everything is read again.
+    /// Handles a change of a setting that points depend on: fails the shot in progress and reads everything again.
     fn take_change(&mut self, event: SystemEvent, now: Moment) {
         match self.phase {
             Phase::Off => return,
@@ -390,15 +383,15 @@ impl Session {
         }
     }
 
-    /// An answer did not come. Without any answer to a status or a stop the tracker is gone.
+    /// Handles a missing answer. A tracker that does not answer a status or a stop command counts as lost.
     fn timed_out(&mut self, now: Moment) {
         let Some(exchange) = self.exchange.take() else { return };
         if self.known_since.is_none() {
             let seconds = FIRST.as_secs();
-            let text = format!("it took the connection, but has not answered the first question for {seconds} s");
+            let text = format!("it accepted the connection but did not answer the first command within {seconds} s");
             return self.lose(Failure::Foreign(text));
         }
-        let seconds = patience(exchange.command.id).as_secs_f64();
+        let seconds = time_limit(exchange.command.id).as_secs_f64();
         let failure = Failure::Silent { what: exchange.command.id.words().to_owned(), seconds };
         if self.phase == Phase::Starting {
             self.fail(failure);
@@ -408,7 +401,7 @@ impl Session {
         }
     }
 
-    /// Goes on with the set-up, or ends it.
+    /// Continues the set-up, or completes it.
     fn next_step(&mut self, now: Moment) {
         if let Some(command) = self.set_up.command() {
             self.send(command, now);
@@ -424,16 +417,16 @@ impl Session {
         let identity = self.set_up.identity();
         if self.is_announced {
             for warning in identity.warnings {
-                self.outbox.say(Severity::Warning, warning);
+                self.outbox.report(Severity::Warning, warning);
             }
-            self.outbox.say(Severity::Info, "the settings of the tracker were checked again and are as they should be");
+            self.outbox.report(Severity::Info, "the settings of the tracker were checked again and are right");
         } else {
             self.is_announced = true;
             self.outbox.push(ProtocolEvent::Ready(identity));
         }
     }
 
-    /// Nothing is under way any more: reads the settings again if they changed.
+    /// Ends an activity: becomes idle, or reads the settings again if they changed.
     fn settle_or_idle(&mut self, now: Moment) {
         self.exchange = None;
         if !self.is_dirty {
@@ -462,7 +455,7 @@ impl Session {
         self.exchange = Some(exchange(command, now));
     }
 
-    /// Answers the trigger.
+    /// Answers the trigger with a failure.
     fn fail(&mut self, failure: Failure) {
         self.outbox.fail(failure);
     }
@@ -479,7 +472,7 @@ impl Session {
 }
 
 #[cfg(test)]
-impl Session {
+impl Conversation {
     pub(super) fn pending(&self) -> usize {
         self.framer.pending()
     }
