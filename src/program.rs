@@ -1,20 +1,20 @@
 //! Robot programs for a plan: text in the controller's own language.
 //!
-//! Every program moves joint by joint (never along a line in space), slowly, to an exact stop, waits at the poses that are
-//! measured, and passes through the others. The head of every program says what to do first: run it in manual mode up to
-//! the first pose, and which joint convention it uses. Nothing here sends a program anywhere or starts one.
+//! Every program uses slow joint moves (never linear ones) to exact stops, waits at the measured poses, and passes through the
+//! others. The header of every program tells the operator to run it in manual mode up to the first pose, and states its joint
+//! convention. This module never sends or starts a program.
 //!
-//! **Joint convention.** A configuration is the pendant joint vector, so controllers get it as it is, FANUC's J3 with its
-//! coupling to J2 too. The exception is ROS: the joints of a URDF turn one link against the one before, so a coupled joint
-//! gets its own value plus the coupled ones (FANUC: J3 + J2), in the sense of the pendant. INFORM counts motor pulses, which no
-//! document at hand explains for coupled axes: such an arm is refused there.
+//! **Joint convention.** A configuration is the pendant joint vector, so controllers get it unchanged, including FANUC's J3 with
+//! its coupling to J2. The exception is ROS: each joint of a URDF turns a link relative to the previous one, so a coupled joint
+//! gets its own value plus the coupled ones (FANUC: J3 + J2), in the direction of the pendant. INFORM uses motor pulses, whose
+//! meaning for coupled axes is not documented publicly, so such arms are refused.
 //!
-//! **Digits.** Values are written with the digits that the controller keeps; the plan's own grid
-//! ([`on_grid`](crate::planning::candidates::on_grid)) fits all of them but pulses. [`Program::largest_rounding`] says how far
-//! the text is from the plan.
+//! **Digits.** Values are written with the digits that the controller stores. The plan's grid
+//! ([`on_grid`](crate::planning::candidates::on_grid)) fits all of them except pulses. [`Program::largest_rounding`] is the
+//! largest difference between the text and the plan.
 //!
-//! **Line ends.** CR LF where the maker's own tools write it (ABB, KUKA, FANUC, Yaskawa, Stäubli), LF for URScript and YAML.
-//! All text is ASCII: what else is in names is replaced.
+//! **Line ends.** CR LF for controllers whose own tools write it (ABB, KUKA, FANUC, Yaskawa, Stäubli), LF for URScript and YAML.
+//! All text is ASCII; other characters in names are replaced.
 
 mod error;
 mod fanuc;
@@ -37,8 +37,9 @@ pub use names::MAX_NAME;
 
 use crate::kinematics::{JointType, KinematicChain};
 use crate::session::plan::{PlannedPose, PoseKind};
+use crate::text::wrapped;
 
-/// A controller's language.
+/// A robot programming language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Dialect {
     /// ABB RAPID module.
@@ -58,7 +59,7 @@ pub enum Dialect {
 }
 
 impl Dialect {
-    /// All of them.
+    /// All dialects.
     pub const ALL: [Self; 7] =
         [Self::Rapid, Self::Krl, Self::Fanuc, Self::Urscript, Self::Val3, Self::Inform, Self::Ros];
 
@@ -90,7 +91,7 @@ impl Dialect {
         }
     }
 
-    /// How to load or start the program, where that is not plain.
+    /// How to load or start the program, if that is not obvious.
     const fn advice(self) -> Option<&'static str> {
         match self {
             Self::Rapid => Some("To start: program pointer to this routine. It has its own name, not 'main'."),
@@ -120,10 +121,10 @@ impl FromStr for Dialect {
     }
 }
 
-/// The arm that the program is for.
+/// The arm for which the program is written.
 #[derive(Clone, Copy, Debug)]
 pub struct Robot<'a> {
-    /// Name of the profile, for the head of the program.
+    /// Name of the profile, for the header of the program.
     pub profile: &'a str,
     /// Joints: types, names and couplings.
     pub chain: &'a KinematicChain,
@@ -136,59 +137,58 @@ pub struct Robot<'a> {
 /// How the program waits while a pose is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pause {
-    /// So long (s).
+    /// For a fixed time (s).
     Dwell(f64),
-    /// Until the operator says to go on.
+    /// Until the operator acknowledges.
     Acknowledge,
 }
 
-/// How the program is written.
+/// Options of the program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Name of the program, shortened and cleaned as the dialect needs it.
+    /// Name of the program; shortened and cleaned for the dialect.
     pub name: String,
-    /// Waiting at the poses that are measured.
+    /// How the program waits at measured poses.
     pub pause: Pause,
-    /// Part of the full speed, above 0 and at most [`MAX_SPEED`].
+    /// Fraction of full speed, above 0 and at most [`MAX_SPEED`].
     pub speed: f64,
-    /// When the plan was made into a program, for heads that have a date.
+    /// Creation time, for headers with a date.
     pub created: DateTime,
-    /// What the arm would run into, for the head.
+    /// Predicted collisions, for the header.
     pub dangers: Vec<String>,
 }
 
-/// Part of full speed unless asked otherwise.
+/// Default fraction of full speed.
 pub const DEFAULT_SPEED: f64 = 0.1;
 
-/// Wait at a pose unless asked otherwise (s): the arm stops swinging in 2 s, a reading takes 1 s.
+/// Default wait at a pose (s): the arm stops swinging in 2 s, a reading takes 1 s.
 pub const DEFAULT_DWELL: f64 = 3.0;
 
-/// Fastest that a measuring program may be, in parts of full speed.
+/// Largest fraction of full speed of a measuring program.
 pub const MAX_SPEED: f64 = 0.5;
 
-/// A text with the name of its file.
+/// A file of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProgramFile {
-    /// Name with extension, without folder.
+    /// File name with extension, without folder.
     pub file_name: String,
-    /// The text, with the line ends of the controller.
+    /// Content, with the line ends of the controller.
     pub text: String,
 }
 
-/// A program, in as many files as the controller wants.
+/// A program, in one or more files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    /// The files.
     pub files: Vec<ProgramFile>,
-    /// Largest difference of a joint value in the text and in the plan (rad, sliding joints m).
+    /// Largest difference between a joint value in the text and in the plan (rad, sliding joints m).
     pub largest_rounding: f64,
 }
 
 /// Writes the program of a plan.
 ///
 /// # Errors
-/// An arm that the dialect is not made for, a number that is missing or makes no sense, an empty plan, a wait for the operator
-/// where there is none.
+/// An arm that the dialect does not support, a missing or invalid number, an empty plan, or a wait for the operator in a dialect
+/// without one.
 pub fn write(
     dialect: Dialect,
     robot: &Robot<'_>,
@@ -227,10 +227,10 @@ pub fn write(
     Ok(Program { files, largest_rounding: job.largest_rounding })
 }
 
-/// Longest wait at a pose (s): beyond it a mistake in the unit is likelier.
+/// Longest wait at a pose (s); a longer one is probably in the wrong unit.
 const MAX_DWELL: f64 = 600.0;
 
-/// What a writer works on.
+/// Input of a dialect's writer, and its largest rounding so far.
 struct Job<'a> {
     dialect: Dialect,
     robot: &'a Robot<'a>,
@@ -240,7 +240,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Refuses an arm that does not have one of these numbers of joints, or has sliding ones where none can be.
+    /// Checks the number of joints, and that no joint slides unless that is allowed.
     fn require_joints(
         &self,
         allowed: std::ops::RangeInclusive<usize>,
@@ -260,7 +260,7 @@ impl Job<'_> {
         }
     }
 
-    /// Joint values at the edge (degree, sliding joints mm) with `decimals`.
+    /// Joint values in degrees (sliding joints mm) with this many decimals.
     fn edge_values(&mut self, pose: &PlannedPose, decimals: usize) -> Vec<String> {
         let joints = self.robot.chain.joints().iter().zip(&pose.configuration);
         let values: Vec<_> = joints.map(|(joint, &q)| (joint.joint_type.quantity(), q)).collect();
@@ -274,8 +274,8 @@ impl Job<'_> {
             .collect()
     }
 
-    /// Values of the inside (rad, m) with `decimals`.
-    fn inside_values(&mut self, values: &[f64], decimals: usize) -> Vec<String> {
+    /// Joint values in radians (sliding joints m) with this many decimals.
+    fn si_values(&mut self, values: &[f64], decimals: usize) -> Vec<String> {
         let write = |&value: &f64| {
             let text = decimal(value, decimals);
             self.note_rounding(text.parse().unwrap_or(f64::NAN), value);
@@ -288,8 +288,8 @@ impl Job<'_> {
         self.largest_rounding = self.largest_rounding.max((written - planned).abs());
     }
 
-    /// What every program says at its beginning, in lines of at most `width` characters.
-    fn head(&self, width: usize) -> Vec<String> {
+    /// Comment at the start of every program, in lines of at most `width` characters.
+    fn header(&self, width: usize) -> Vec<String> {
         let measured = self.poses.iter().filter(|pose| pose.kind.is_measured()).count();
         let mut lines = vec![
             format!("Calibration poses by trupose {}", env!("CARGO_PKG_VERSION")),
@@ -307,7 +307,7 @@ impl Job<'_> {
         ];
         lines.extend(self.options.dangers.iter().map(|danger| format!("DANGER: {}", names::ascii(danger))));
         lines.extend(self.dialect.advice().map(str::to_owned));
-        lines.iter().flat_map(|line| names::wrapped(line, width)).collect()
+        lines.iter().flat_map(|line| wrapped(line, width)).collect()
     }
 
     fn convention(&self) -> &'static str {
@@ -327,7 +327,7 @@ impl Job<'_> {
         }
     }
 
-    /// `pose 12, verification`.
+    /// Label of a pose in comments, such as `pose 12, verification`.
     fn label(pose: &PlannedPose) -> String {
         match pose.kind {
             PoseKind::Home | PoseKind::Via => pose.kind.name().to_owned(),
@@ -345,7 +345,7 @@ impl Job<'_> {
         ProgramFile { file_name: format!("{name}.{extension}"), text }
     }
 
-    /// Time to wait (s) with two decimals, if the program waits for itself.
+    /// Dwell time (s) with two decimals, unless the program waits for the operator.
     fn dwell(&self) -> Option<String> {
         match self.options.pause {
             Pause::Dwell(dwell) => Some(decimal(dwell, 2)),
@@ -353,21 +353,21 @@ impl Job<'_> {
         }
     }
 
-    /// Part of full speed in percent, a whole number from 1.
+    /// Speed in percent of full speed, a whole number of at least 1.
     fn percent(&self) -> String {
         decimal((self.options.speed * 100.0).round().max(1.0), 0)
     }
 }
 
-/// Fixed decimals without the sign of a rounded zero.
+/// A number with fixed decimals, without the sign of a rounded zero.
 fn decimal(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
     if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
-/// Characters of a comment line where the controller has no limit.
-const HEAD_WIDTH: usize = 72;
+/// Length of a comment line if the controller has no limit (characters).
+const COMMENT_WIDTH: usize = 72;
 
 const CRLF: &str = "\r\n";
 const LF: &str = "\n";

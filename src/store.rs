@@ -1,4 +1,4 @@
-//! Files on disk: reading with errors that name the file, and replacing results atomically.
+//! Files on disk: reading with errors that name the file, and atomic replacement of results.
 
 pub mod session;
 
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-/// How the names of files begin that will replace others.
+/// Prefix of temporary files that will replace others.
 const TEMPORARY: &str = ".trupose-";
 
 /// A file that could not be read or written.
@@ -18,40 +18,40 @@ pub enum StoreError {
     /// Reading failed.
     #[error("cannot read '{}'", path.display())]
     Read {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
-    /// Writing failed; what stood there before is untouched.
-    #[error("cannot write '{}' (what was there before is unchanged)", path.display())]
+    /// Writing failed; the previous file is unchanged.
+    #[error("cannot write '{}' (the previous file is unchanged)", path.display())]
     Write {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
-    /// Writing to what is no file failed.
+    /// Writing to a device or pipe failed.
     #[error("cannot write to '{}'", path.display())]
     Into {
-        /// What it is.
+        /// Path of the device or pipe.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
 }
 
-/// Largest file that is read: a million rows are a tenth of it.
+/// Largest file that is read (bytes); a million rows are a tenth of it.
 const LARGEST: u64 = 1 << 30;
 
-/// The bytes of a file.
+/// Reads a file.
 ///
 /// # Errors
-/// It cannot be read.
+/// It cannot be read, or is too large.
 pub fn read(path: &Path) -> Result<Vec<u8>, StoreError> {
     let read = || -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        // Pipes are welcome, endless devices are not.
+        // The limit allows pipes but stops at endless devices.
         File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > LARGEST {
             return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("larger than {} MiB", LARGEST >> 20)));
@@ -61,35 +61,35 @@ pub fn read(path: &Path) -> Result<Vec<u8>, StoreError> {
     read().map_err(|source| StoreError::Read { path: path.to_owned(), source })
 }
 
-/// Makes a folder and those above it.
+/// Creates a folder and its parents.
 ///
 /// # Errors
-/// It cannot be made.
+/// It cannot be created.
 pub fn create_folder(path: &Path) -> Result<(), StoreError> {
     fs::create_dir_all(path).map_err(|source| StoreError::Write { path: path.to_owned(), source })
 }
 
-/// Replaces a file as a whole: the new text is written beside it, forced to disk, and renamed over it. Of a symbolic link the
-/// file that it stands for is replaced. What is no file (a device, a pipe, `/dev/stdout`) is written to as it is.
+/// Replaces a file as a whole: the new text is written to a temporary file in the same folder, synced to disk and renamed. For a
+/// symbolic link, its target is replaced. A device or pipe (such as `/dev/stdout`) is written to directly.
 ///
 /// # Errors
-/// Any step failed; the old file is then still there.
+/// A step failed; the old file is unchanged.
 pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
     replace_bytes(path, text.as_bytes())
 }
 
-/// As [`replace`], for what may be no UTF-8.
+/// As [`replace`], for bytes.
 ///
 /// # Errors
-/// Any step failed; the old file is then still there.
+/// A step failed; the old file is unchanged.
 pub fn replace_bytes(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     replace_through(path, (TEMPORARY, ""), bytes)
 }
 
-/// As [`replace_bytes`], through a file beside it whose name begins and ends so.
+/// As [`replace_bytes`], with this prefix and suffix of the temporary file.
 ///
 /// # Errors
-/// Any step failed; the old file is then still there.
+/// A step failed; the old file is unchanged.
 pub(crate) fn replace_through(path: &Path, temporary: (&str, &str), bytes: &[u8]) -> Result<(), StoreError> {
     let failed = |source| StoreError::Write { path: path.to_owned(), source };
     let into = |written: io::Result<()>| written.map_err(|source| StoreError::Into { path: path.to_owned(), source });
@@ -113,48 +113,48 @@ fn replace_file(path: &Path, (prefix, suffix): (&str, &str), bytes: &[u8]) -> io
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|failed| failed.error)?;
-    // The rename itself must survive a power cut.
+    // Sync the folder too, so that the rename survives a power cut.
     File::open(folder)?.sync_all()
 }
 
-/// What a path stands for.
+/// What a path refers to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Destination {
-    /// A file that is there or will be; not a link.
+    /// An existing or new file; not a link.
     File(PathBuf),
-    /// A device, a pipe, an open file of this process: replaced by a file it would be destroyed.
+    /// A device, a pipe or an open file of this process, which must not be replaced by a file.
     Other(PathBuf),
-    /// The output of this process: who opens it anew writes over what is there.
+    /// Standard output. It must not be opened again, because that would overwrite earlier output.
     Out,
-    /// Where this process tells errors.
+    /// Standard error.
     Err,
 }
 
-/// Symbolic links that are followed one after the other; the system has the same limit.
+/// Most symbolic links that are followed; the system has the same limit.
 const MOST_LINKS: usize = 40;
 
-/// Finds what `path` stands for, link by link: one may lead to a file that is not there yet.
+/// Resolves `path` link by link, because a link may lead to a file that does not exist yet.
 fn destination(path: &Path) -> io::Result<Destination> {
-    let mut place = path.to_owned();
+    let mut current = path.to_owned();
     for _ in 0..MOST_LINKS {
-        if let Some(open) = open_file(&place) {
+        if let Some(open) = open_file(&current) {
             return Ok(open);
         }
-        match fs::symlink_metadata(&place) {
+        match fs::symlink_metadata(&current) {
             Ok(found) if found.is_symlink() => {
-                let folder = place.parent().map_or_else(PathBuf::new, Path::to_owned);
-                place = folder.join(fs::read_link(&place)?);
+                let folder = current.parent().map_or_else(PathBuf::new, Path::to_owned);
+                current = folder.join(fs::read_link(&current)?);
             }
-            Ok(found) if found.is_file() || found.is_dir() => return Ok(Destination::File(place)),
-            Ok(_) => return Ok(Destination::Other(place)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Destination::File(place)),
+            Ok(found) if found.is_file() || found.is_dir() => return Ok(Destination::File(current)),
+            Ok(_) => return Ok(Destination::Other(current)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Destination::File(current)),
             Err(error) => return Err(error),
         }
     }
     Err(io::Error::other("too many symbolic links, or they lead in a circle"))
 }
 
-/// `/dev/fd/1`, `/proc/self/fd/1`: what a process has open, under a name.
+/// Resolves paths of open files of this process, such as `/dev/fd/1` or `/proc/self/fd/1`.
 fn open_file(path: &Path) -> Option<Destination> {
     let (folder, name) = (path.parent()?, path.file_name()?.to_str()?);
     let own = format!("/proc/{}/fd", std::process::id());
@@ -168,7 +168,7 @@ fn open_file(path: &Path) -> Option<Destination> {
     }
 }
 
-/// Temporary files that will be results: not private as the library's are, but for whom the process allows it.
+/// Builder of temporary files that become results. The library makes them private; these get the usual permissions of the process.
 fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
     #[cfg_attr(not(unix), expect(unused_mut, reason = "only Unix has modes"))]
     let mut builder = tempfile::Builder::new();
@@ -260,6 +260,6 @@ mod tests {
     #[test]
     fn a_missing_folder_is_named() {
         let error = replace(Path::new("/nowhere/at/all.ron"), "text").unwrap_err();
-        assert_eq!(error.to_string(), "cannot write '/nowhere/at/all.ron' (what was there before is unchanged)");
+        assert_eq!(error.to_string(), "cannot write '/nowhere/at/all.ron' (the previous file is unchanged)");
     }
 }

@@ -1,4 +1,4 @@
-//! Why there is no program.
+//! Errors of programs.
 
 use thiserror::Error;
 
@@ -8,13 +8,12 @@ use super::{Dialect, MAX_DWELL, MAX_SPEED};
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ProgramError {
-    /// A dialect that is not known.
+    /// Unknown dialect.
     #[error("there is no dialect '{text}'; dialects: {}", Dialect::ALL.map(Dialect::name).join(", "))]
     UnknownDialect {
-        /// What was asked for.
         text: String,
     },
-    /// Nothing to write.
+    /// The plan is empty.
     #[error("the plan has no poses")]
     EmptyPlan,
     /// A pose of another robot.
@@ -22,17 +21,15 @@ pub enum ProgramError {
         "pose '{pose}' has {joints} joint values, but the robot has {robot_joints} joints; use the profile of the plan"
     )]
     PoseJoints {
-        /// Name of the pose.
         pose: String,
-        /// Its values.
+        /// Number of its joint values.
         joints: usize,
-        /// Joints of the robot.
+        /// Number of joints of the robot.
         robot_joints: usize,
     },
-    /// A joint value that is no number.
+    /// A joint value that is not finite.
     #[error("pose '{pose}' has a joint value that is not a finite number")]
     NotFinite {
-        /// Name of the pose.
         pose: String,
     },
     /// A speed out of range.
@@ -41,13 +38,13 @@ pub enum ProgramError {
         100.0 * MAX_SPEED, 100.0 * speed
     )]
     Speed {
-        /// Part of full speed.
+        /// Fraction of full speed.
         speed: f64,
     },
     /// A waiting time out of range.
     #[error("the dwell must be above 0 and at most {MAX_DWELL:.0} s, not {dwell} s")]
     Dwell {
-        /// Time asked for (s).
+        /// Requested time (s).
         dwell: f64,
     },
     /// An arm with too many or too few joints.
@@ -56,72 +53,65 @@ pub enum ProgramError {
         dialect.title(), joint_range(*least, *most)
     )]
     JointCount {
-        /// The dialect.
         dialect: Dialect,
-        /// Joints of the arm.
+        /// Number of joints of the arm.
         joints: usize,
-        /// Fewest.
         least: usize,
-        /// Most.
         most: usize,
     },
-    /// A sliding joint where all must turn.
+    /// A sliding joint in a dialect that does not support it.
     #[error("{} programs are written for arms whose joints all turn, and '{joint}' slides", dialect.title())]
     SlidingJoint {
-        /// The dialect.
         dialect: Dialect,
-        /// Name of the joint.
         joint: String,
     },
-    /// Pulses without their size.
+    /// Pulses per degree are unknown.
     #[error(
         "INFORM programs count pulses, and the profile has no 'pulses_per_degree' for {}; add it: \
          compare the pulse and the degree display of the pendant in two positions of the joint",
-        joints.iter().map(|joint| format!("'{joint}'")).collect::<Vec<_>>().join(", ")
+        quoted(joints)
     )]
     PulsesPerDegree {
-        /// Names of the joints.
         joints: Vec<String>,
     },
-    /// Pulses of a coupled joint.
+    /// A coupled joint in a dialect with pulses.
     #[error(
-        "joint '{joint}' is coupled to another one, and whether its pulse count includes the coupling is not known; \
+        "joint '{joint}' is coupled to another one, and it is not documented whether its pulse count includes the coupling; \
          INFORM programs are written for uncoupled arms only"
     )]
     CoupledPulses {
-        /// Name of the joint.
         joint: String,
     },
-    /// More pulses than a job holds.
+    /// More pulses than a job can store.
     #[error("joint '{joint}' would need {pulses:.0} pulses in pose '{pose}'; check 'pulses_per_degree'")]
     TooManyPulses {
-        /// Name of the joint.
         joint: String,
-        /// Name of the pose.
         pose: String,
-        /// Pulses.
         pulses: f64,
     },
-    /// A time that cannot be computed.
-    #[error("a ROS trajectory needs times, and the profile has no highest speed for {}; add it", joints.iter().map(|joint| format!("'{joint}'")).collect::<Vec<_>>().join(", "))]
+    /// The highest speed is unknown, so times cannot be computed.
+    #[error("a ROS trajectory needs times, and the profile has no highest speed for {}; add it", quoted(joints))]
     MaxSpeed {
-        /// Names of the joints.
         joints: Vec<String>,
     },
-    /// Nobody to wait for.
+    /// A wait for the operator in a dialect that has none.
     #[error("a ROS trajectory cannot wait for the operator; use a dwell that is long enough to measure")]
     NoOperator,
-    /// A program that is no text.
-    #[error("the program has zero bytes: it is no text, or UTF-16; export it as plain text")]
+    /// The program is not plain text.
+    #[error("the program contains zero bytes, so it is binary or UTF-16; export it as plain text")]
     NotText,
-    /// A trajectory for other joints.
-    #[error("the trajectory has the joints {}; the arm has {}; name those of the arm in the order from base to flange", found.join(", "), expected.join(", "))]
+    /// The trajectory is for other joints.
+    #[error("the trajectory has the joints {}; the arm has {}; name the joints of the trajectory in the order from base to flange", found.join(", "), expected.join(", "))]
     JointNames {
-        /// Names in the trajectory.
+        /// Joint names in the trajectory.
         found: Vec<String>,
-        /// Names of the arm.
+        /// Joint names of the arm.
         expected: Vec<String>,
     },
+}
+
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("'{name}'")).collect::<Vec<_>>().join(", ")
 }
 
 fn joint_range(least: usize, most: usize) -> String {

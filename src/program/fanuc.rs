@@ -1,23 +1,23 @@
 //! FANUC TP program as ASCII (`.LS`): joint positions, `J` moves in percent, `FINE`.
 //!
-//! J3 is the pendant's, coupled to J2. Loading ASCII needs the option for it, or the maker's conversion tool. Names have
-//! at most eight characters for old controllers, remarks at most 32. `UF` and `UT` are written because the format wants them;
-//! they do not matter for joint positions.
+//! J3 is the pendant's, coupled to J2. Loading ASCII needs the option for it, or the manufacturer's conversion tool. Names have
+//! at most eight characters for old controllers, remarks at most 32. `UF` and `UT` are required by the format but have no effect
+//! on joint positions.
 
 use super::names::{ascii, identifier};
 use super::{CRLF, Job, ProgramError, ProgramFile};
 use crate::kinematics::JointType;
 
-/// The digits of a TP position.
+/// Decimals of a TP position.
 const DECIMALS: usize = 3;
 
-/// Characters of a remark.
+/// Longest remark (characters).
 const REMARK: usize = 32;
 
 pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(4..=6, true)?;
     let name = identifier(&job.options.name, 8).to_uppercase();
-    let mut body: Vec<String> = job.head(REMARK).iter().map(|line| format!("!{line}")).collect();
+    let mut body: Vec<String> = job.header(REMARK).iter().map(|line| format!("!{line}")).collect();
     let mut positions = Vec::new();
     for (number, pose) in (1..).zip(job.poses) {
         let label: String = Job::label(pose).chars().take(REMARK).collect();

@@ -1,16 +1,17 @@
 //! Yaskawa INFORM job (`.JBI`): positions in encoder pulses, `MOVJ` in percent.
 //!
-//! Without `PL` a `MOVJ` may be rounded off by the controller's setting, so `PL=0` (exact) is written. Pulses are whole: see
+//! Without `PL`, the controller's settings may round off the corner of a `MOVJ`, so `PL=0` (exact) is written. Pulses are whole
+//! numbers: see
 //! [`Program::largest_rounding`](super::Program::largest_rounding).
 
 use super::names::{ascii, identifier};
 use super::{CRLF, Job, ProgramError, ProgramFile};
 use crate::units::{from_deg, to_deg};
 
-/// Characters of a job name on old controllers.
+/// Longest job name on old controllers (characters).
 const LONGEST_NAME: usize = 8;
 
-/// Characters of a comment line.
+/// Longest comment line (characters).
 const REMARK: usize = 32;
 
 pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
@@ -34,7 +35,7 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
     lines.push("//INST".to_owned());
     lines.push(job.options.created.strftime("///DATE %Y/%m/%d %H:%M").to_string());
     lines.extend(["///ATTR SC,RW", "///GROUP1 RB1", "NOP"].map(str::to_owned));
-    lines.extend(job.head(REMARK).iter().map(|line| format!("'{line}")));
+    lines.extend(job.header(REMARK).iter().map(|line| format!("'{line}")));
     for (number, pose) in job.poses.iter().enumerate() {
         let label: String = Job::label(pose).chars().take(REMARK).collect();
         lines.push(format!("'{label}"));

@@ -1,10 +1,10 @@
 //! KUKA KRL (`.src`): axis positions with `PTP`, without approximation (no `C_PTP`), so every point is an exact stop.
 //!
-//! `WAIT SEC` and `HALT` stop the advance run. Cells with external axes must add `E1` to `E6`: an axis that is not in the
-//! aggregate stays where it is. Arms with seven axes have another controller, which is programmed in Java.
+//! `WAIT SEC` and `HALT` stop the advance run. Cells with external axes must add `E1` to `E6`: an axis that is missing in the
+//! aggregate keeps its position. Arms with seven axes have another controller, which is programmed in Java.
 
 use super::names::{MAX_NAME, identifier};
-use super::{CRLF, HEAD_WIDTH, Job, ProgramError, ProgramFile};
+use super::{CRLF, COMMENT_WIDTH, Job, ProgramError, ProgramFile};
 
 const DECIMALS: usize = 5;
 
@@ -12,7 +12,7 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
     job.require_joints(6..=6, false)?;
     let name = identifier(&job.options.name, MAX_NAME);
     let mut lines = vec![format!("DEF {name}()")];
-    lines.extend(job.head(HEAD_WIDTH).iter().map(|line| format!("  ; {line}")));
+    lines.extend(job.header(COMMENT_WIDTH).iter().map(|line| format!("  ; {line}")));
     lines.push("  BAS(#INITMOV,0)".to_owned());
     lines.push(format!("  BAS(#VEL_PTP,{})", job.percent()));
     lines.push("  BAS(#ACC_PTP,20)".to_owned());

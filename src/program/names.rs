@@ -1,19 +1,20 @@
-//! Names that controllers accept.
+//! Names and comments that controllers accept.
 
-/// Longest name that is kept where the controller has no shorter limit.
+/// Longest name if the controller has no shorter limit (characters).
 pub const MAX_NAME: usize = 24;
 
-/// Words that no program may be called: keywords and routines that exist already, in any of the dialects.
+/// Names that are not allowed for programs: keywords and existing routines of any dialect.
 const RESERVED: &[&str] = &[
     "begin", "break", "call", "case", "const", "data", "def", "else", "end", "endif", "exit", "false", "for", "global",
     "goto", "home", "if", "int", "main", "module", "nop", "not", "or", "pose", "proc", "real", "return", "robot",
     "start", "stop", "string", "sys", "system", "task", "thread", "true", "var", "wait", "while",
 ];
 
-/// Used when nothing is left of a name.
+/// Name of a program whose own name has no allowed characters.
 const FALLBACK: &str = "trupose";
 
-/// ASCII letters, digits and `_`, beginning with a letter, at most `longest` characters; other characters become `_`.
+/// A name as an identifier: ASCII letters, digits and `_`, starting with a letter, at most `longest` characters. Other characters
+/// become `_`.
 pub(super) fn identifier(name: &str, longest: usize) -> String {
     let mut cleaned = String::new();
     for c in name.chars() {
@@ -38,28 +39,11 @@ pub(super) fn identifier(name: &str, longest: usize) -> String {
     short
 }
 
-/// `text` in lines of at most `width` characters, broken between words; a longer word is cut.
-pub(super) fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let word: String = word.chars().take(width).collect();
-        match lines.last_mut() {
-            Some(line) if line.is_empty() => line.push_str(&word),
-            Some(line) if line.len() + 1 + word.len() <= width => {
-                line.push(' ');
-                line.push_str(&word);
-            }
-            _ => lines.push(word),
-        }
-    }
-    lines
-}
-
-/// Printable ASCII without quotation marks and what could end a comment: for comments and messages.
+/// Text for comments and messages: printable ASCII without quotation marks and characters that could end a comment.
 pub(super) fn ascii(text: &str) -> String {
-    let harmless =
+    let is_harmless =
         |c: char| (c == ' ' || c.is_ascii_graphic()) && !matches!(c, '"' | '\\' | '\'' | '<' | '>' | '&' | ';');
-    text.chars().take(60).map(|c| if harmless(c) { c } else { '_' }).collect()
+    text.chars().take(60).map(|c| if is_harmless(c) { c } else { '_' }).collect()
 }
 
 #[cfg(test)]

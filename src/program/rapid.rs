@@ -1,19 +1,19 @@
 //! ABB RAPID (`.mod`): joint targets with `MoveAbsJ`, `fine` points.
 //!
-//! RAPID has no speed in percent for one move: full speed is taken as 2500 mm/s and 500 deg/s at the tool, the values
-//! of `vmax`'s usual ceiling and of the predefined speeds, so that 10 % are 250 mm/s.
+//! RAPID has no speed in percent for a single move. Full speed is taken as 2500 mm/s and 500 deg/s at the tool, the usual limit
+//! of `vmax` and the value in the predefined speeds, so that 10 % is 250 mm/s.
 
 use super::names::{MAX_NAME, identifier};
-use super::{CRLF, HEAD_WIDTH, Job, ProgramError, ProgramFile, decimal};
+use super::{CRLF, COMMENT_WIDTH, Job, ProgramError, ProgramFile, decimal};
 
-/// Digits after the point: RAPID's numbers have 23 bits.
+/// Decimals: RAPID's numbers have 23 bits.
 const DECIMALS: usize = 5;
 
 pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(6..=6, false)?;
     let name = identifier(&job.options.name, MAX_NAME);
     let mut lines = vec![format!("MODULE {name}")];
-    lines.extend(job.head(HEAD_WIDTH).iter().map(|line| format!("  ! {line}")));
+    lines.extend(job.header(COMMENT_WIDTH).iter().map(|line| format!("  ! {line}")));
     let speed = job.options.speed;
     let (tool, turn) = (decimal(2500.0 * speed, 0), decimal(500.0 * speed, 0));
     lines.push(format!("  LOCAL CONST speeddata vMeasure:=[{tool},{turn},{tool},{turn}];"));

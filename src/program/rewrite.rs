@@ -1,7 +1,7 @@
-//! Joint targets of existing robot programs: found, and replaced by others. Everything else stays, byte by byte.
+//! Finds and replaces the joint targets of existing robot programs. Everything else stays unchanged, byte by byte.
 //!
-//! Nothing is guessed. What looks like a joint target and cannot be read is named with its line and left; so are Cartesian
-//! targets, which name no configuration. Values are in the convention of the dialect, as the writers of this module use it.
+//! Nothing is guessed. Unreadable joint targets are reported with their line and left unchanged; so are Cartesian targets, which
+//! do not state a configuration. Values follow the convention of the dialect, as in the programs written by this module.
 
 mod dialects;
 mod scanner;
@@ -21,34 +21,33 @@ pub struct JointTarget {
     fields: Vec<Range<usize>>,
 }
 
-/// A place that is left as it is.
+/// A line that is not changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftAlone {
     /// Line, from 1.
     pub line: usize,
-    /// Why.
+    /// Reason why it is not changed.
     pub reason: &'static str,
 }
 
-/// What was found in a program.
+/// Joint targets of a program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scan {
     /// Joint targets in the order of the text.
     pub targets: Vec<JointTarget>,
-    /// Places that look like targets and are not changed.
+    /// Lines that look like targets but are not changed.
     pub left: Vec<LeftAlone>,
 }
 
-/// Why a place is left.
-pub(super) const CARTESIAN: &str = "a Cartesian target; it names no configuration";
+pub(super) const CARTESIAN: &str = "a Cartesian target; it states no configuration";
 pub(super) const UNREADABLE: &str = "looks like a joint target, but is not a list of plain numbers, one per joint";
 pub(super) const RELATIVE: &str = "a relative move";
 
-/// Finds the joint targets of a program. `joint_names` are the names that a ROS trajectory gives the joints, from base to
-/// flange; without them it must have those of the profile.
+/// Finds the joint targets of a program. `joint_names` are the joint names of a ROS trajectory, from base to flange; by default
+/// those of the profile.
 ///
 /// # Errors
-/// Not a text, or an arm whose values in this dialect cannot be told.
+/// The program is not text, or the arm's values in this dialect are unknown.
 pub fn scan(
     dialect: Dialect,
     robot: &Robot<'_>,
@@ -63,8 +62,8 @@ pub fn scan(
     let order = if dialect == Dialect::Ros { ros_order(robot, joint_names, program)? } else { (0..dof).collect() };
     let mut scan = Scan { targets: Vec::new(), left: std::mem::take(&mut found.left) };
     for target in found.targets {
-        // From the order of the text to that of the arm.
-        let fields: Vec<Range<usize>> = order.iter().filter_map(|place| target.fields.get(*place).cloned()).collect();
+        // Reorder the values from the order of the text to that of the arm.
+        let fields: Vec<Range<usize>> = order.iter().filter_map(|index| target.fields.get(*index).cloned()).collect();
         let values: Option<Vec<f64>> = fields.iter().map(|field| number(program, field)).collect();
         match values {
             Some(values) if values.len() == dof && values.iter().all(|value| value.abs() < 1e7) => {
@@ -79,10 +78,10 @@ pub fn scan(
     Ok(scan)
 }
 
-/// The program with other configurations: one entry per target of the scan, none to leave it.
+/// Replaces the configurations of a program. `commands` has one entry per target of the scan; `None` keeps the target.
 ///
 /// # Errors
-/// An arm whose values in this dialect cannot be told.
+/// The arm's values in this dialect are unknown.
 pub fn rewrite(
     dialect: Dialect,
     robot: &Robot<'_>,
@@ -110,7 +109,7 @@ pub fn rewrite(
     Ok(text)
 }
 
-/// A number with the digits that the dialect keeps, or those that were there if they are more; as wide as the old field.
+/// A number with the digits of the dialect, or with those of the old value if it had more; as wide as the old field.
 fn written(dialect: Dialect, old: &[u8], value: f64) -> String {
     let usual = match dialect {
         Dialect::Fanuc => 3,
@@ -118,8 +117,8 @@ fn written(dialect: Dialect, old: &[u8], value: f64) -> String {
         Dialect::Urscript | Dialect::Ros => 8,
         Dialect::Inform => 0,
     };
-    let there = old.iter().rev().position(|byte| *byte == b'.').unwrap_or(0);
-    let decimals = if dialect == Dialect::Inform { 0 } else { usual.max(there).min(12) };
+    let old_decimals = old.iter().rev().position(|byte| *byte == b'.').unwrap_or(0);
+    let decimals = if dialect == Dialect::Inform { 0 } else { usual.max(old_decimals).min(12) };
     let blanks = old.iter().take_while(|byte| **byte == b' ').count();
     let text = decimal(value, decimals);
     if blanks > 0 { format!("{text:>width$}", width = old.len()) } else { text }
@@ -165,8 +164,9 @@ fn to_pendant(dialect: Dialect, robot: &Robot<'_>, values: &[f64]) -> Result<Vec
         Dialect::Urscript => values.to_vec(),
         Dialect::Inform => values.iter().zip(pulses(robot)?).map(|(value, size)| from_deg(value / size)).collect(),
         Dialect::Ros => {
-            // Each link against the one before: a coupled joint has the coupled values in it. Couplings are triangular in
-            // all known arms, so they come off one after the other; a wrong result would show in the check.
+            // A joint of a URDF turns a link relative to the previous one, so its value includes the coupled ones. Couplings are
+            // triangular in all known arms, so this iteration removes one coupling after the other; a wrong result would fail the
+            // later check.
             let mut q = values.to_vec();
             for _ in 0..joints.len() {
                 let links: Vec<f64> = (0..joints.len()).map(|index| link_value(robot, index, &q)).collect();
@@ -195,16 +195,16 @@ fn link_value(robot: &Robot<'_>, index: usize, q: &[f64]) -> f64 {
     robot.chain.joints().get(index).map_or(0.0, |joint| joint.direction * joint.variable(index, q))
 }
 
-/// For each joint of the arm its place in the lists of the trajectory.
+/// For each joint of the arm, its index in the lists of the trajectory.
 fn ros_order(robot: &Robot<'_>, joint_names: Option<&[String]>, program: &[u8]) -> Result<Vec<usize>, ProgramError> {
-    let own: Vec<String> = joint_names.map_or_else(
+    let expected: Vec<String> = joint_names.map_or_else(
         || robot.chain.joints().iter().map(|joint| super::names::ascii(&joint.name)).collect(),
         <[String]>::to_vec,
     );
-    let there = dialects::ros_names(program);
-    let order: Option<Vec<usize>> = own.iter().map(|name| there.iter().position(|known| known == name)).collect();
+    let found = dialects::ros_names(program);
+    let order: Option<Vec<usize>> = expected.iter().map(|name| found.iter().position(|known| known == name)).collect();
     match order {
-        Some(order) if there.len() == own.len() => Ok(order),
-        _ => Err(ProgramError::JointNames { found: there, expected: own }),
+        Some(order) if found.len() == expected.len() => Ok(order),
+        _ => Err(ProgramError::JointNames { found, expected }),
     }
 }

@@ -1,16 +1,15 @@
 //! ROS 2: a `trajectory_msgs/msg/JointTrajectory` as YAML (radian, metre, second).
 //!
-//! Every point has zero velocities, so a controller interpolates with cubics whose peak is 1.5 times the mean speed; the
-//! times are long enough for that. A dwell is the same point again, later. The trajectory begins with its first point:
-//! the arm must stand there, or be brought there by a planner, before it is sent. `joint_names` are those of the profile:
-//! a URDF may call them otherwise.
+//! Every point has zero velocities, so a controller interpolates with cubics whose peak is 1.5 times the mean speed; the times
+//! allow for that. A dwell is written as the same point again, later. The trajectory starts at its first point: the arm must be
+//! there, or a planner must move it there, before it is sent. `joint_names` are those of the profile; a URDF may use others.
 
 use super::names::{MAX_NAME, ascii, identifier};
-use super::{HEAD_WIDTH, Job, LF, Pause, ProgramError, ProgramFile};
+use super::{COMMENT_WIDTH, Job, LF, Pause, ProgramError, ProgramFile};
 
 const DECIMALS: usize = 8;
 
-/// Peak of a cubic between two stops, in parts of its mean speed.
+/// Ratio of the peak to the mean speed of a cubic between two stops.
 const CUBIC_PEAK: f64 = 1.5;
 
 /// Shortest time of a move (s).
@@ -22,7 +21,7 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
     let name = identifier(&job.options.name, MAX_NAME).to_lowercase();
     let joints: Vec<String> =
         job.robot.chain.joints().iter().map(|joint| format!("\"{}\"", ascii(&joint.name))).collect();
-    let mut lines: Vec<String> = job.head(HEAD_WIDTH).iter().map(|line| format!("# {line}")).collect();
+    let mut lines: Vec<String> = job.header(COMMENT_WIDTH).iter().map(|line| format!("# {line}")).collect();
     lines.push(format!("joint_names: [{}]", joints.join(", ")));
     lines.push("points:".to_owned());
     let zeros = vec!["0.0"; joints.len()].join(", ");
@@ -32,11 +31,11 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
         let q = urdf_values(job, &pose.configuration);
         let slowest = before.iter().flatten().zip(&q).zip(&speeds);
         let moving = slowest.map(|((from, to), speed)| CUBIC_PEAK * (to - from).abs() / (speed * job.options.speed));
-        // Nobody knows where the arm stands before the first point: half a turn of every joint, at the speed asked for.
+        // The position before the first point is unknown: allow for half a turn of every joint at the requested speed.
         let first = speeds.iter().map(|speed| CUBIC_PEAK * std::f64::consts::PI / (speed * job.options.speed));
         let first = if before.is_none() { first.fold(LEAST_TIME, f64::max) } else { LEAST_TIME };
         time += moving.fold(first, f64::max);
-        let positions = job.inside_values(&q, DECIMALS).join(", ");
+        let positions = job.si_values(&q, DECIMALS).join(", ");
         let mut point = |time: f64| {
             lines.push(format!("  - positions: [{positions}]"));
             lines.push(format!("    velocities: [{zeros}]"));
@@ -48,20 +47,20 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
             point(time);
         }
         let label = Job::label(pose);
-        let place = lines.len() - if pose.kind.is_measured() { 6 } else { 3 };
-        lines.insert(place, format!("  # {label}"));
+        let index = lines.len() - if pose.kind.is_measured() { 6 } else { 3 };
+        lines.insert(index, format!("  # {label}"));
         before = Some(q);
     }
     Ok(vec![Job::file(&name, "yaml", &lines, LF)])
 }
 
-/// Values of a URDF's joints: couplings resolved, sense as on the pendant.
+/// Joint values of a URDF: couplings resolved, direction as on the pendant.
 fn urdf_values(job: &Job<'_>, q: &[f64]) -> Vec<f64> {
     let joints = job.robot.chain.joints().iter().enumerate();
     joints.map(|(index, joint)| joint.direction * joint.variable(index, q)).collect()
 }
 
-/// Highest speed of each joint. A coupled one is held to its own, though its pendant value moves less.
+/// Highest speed of each joint. A coupled joint keeps its own limit, although its pendant value changes less.
 fn speeds(job: &Job<'_>) -> Result<Vec<f64>, ProgramError> {
     let joints = job.robot.chain.joints();
     let given = |index: usize| job.robot.max_speeds.get(index).copied().flatten().filter(|speed| *speed > 0.0);
@@ -73,7 +72,7 @@ fn speeds(job: &Job<'_>) -> Result<Vec<f64>, ProgramError> {
     Err(ProgramError::MaxSpeed { joints: missing.map(|(_, joint)| ascii(&joint.name)).collect() })
 }
 
-/// Whole seconds and nanoseconds, to a millisecond.
+/// A time as whole seconds and nanoseconds, rounded to a millisecond.
 fn duration(time: f64) -> String {
     let text = super::decimal(time, 3);
     let (seconds, milliseconds) = text.split_once('.').unwrap_or((&text, "0"));

@@ -1,14 +1,14 @@
 //! Universal Robots script: `movej` in radians, each one to a stop (no blend radius).
 //!
-//! The file defines one function and does not call it: sent to a controller as it is, it runs; in a Script node it is called.
+//! The file defines one function without calling it. Sent to a controller directly it runs; in a Script node it must be called.
 
 use super::names::{MAX_NAME, identifier};
-use super::{HEAD_WIDTH, Job, LF, ProgramError, ProgramFile, decimal};
+use super::{COMMENT_WIDTH, Job, LF, ProgramError, ProgramFile, decimal};
 use crate::units::DEGREE;
 
 const DECIMALS: usize = 8;
 
-/// Speed of the slowest joint of the family (rad/s), for a profile that gives none.
+/// Speed of the slowest joint of the family (rad/s), for a profile that states none.
 const FULL_SPEED: f64 = 120.0 * DEGREE;
 
 /// Acceleration (rad/s²): a third of the pendant's default.
@@ -21,10 +21,10 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
     let full = if slowest.is_finite() && slowest > 0.0 { slowest } else { FULL_SPEED };
     let (a, v) = (decimal(ACCELERATION, 2), decimal(full * job.options.speed, 4));
     let mut lines = vec![format!("def {name}():")];
-    lines.extend(job.head(HEAD_WIDTH).iter().map(|line| format!("  # {line}")));
+    lines.extend(job.header(COMMENT_WIDTH).iter().map(|line| format!("  # {line}")));
     for pose in job.poses {
         let label = Job::label(pose);
-        let joints = job.inside_values(&pose.configuration, DECIMALS).join(",");
+        let joints = job.si_values(&pose.configuration, DECIMALS).join(",");
         lines.push(format!("  # {label}"));
         lines.push(format!("  movej([{joints}],a={a},v={v})"));
         if pose.kind.is_measured() {

@@ -1,14 +1,14 @@
 //! Stäubli VAL3: the joint positions as data (`.dtx`), the moves as a program (`.pgx`).
 //!
 //! Both files go into an application (its `.pjx` names them). `waitEndMove` empties the queue of moves, so every point is an
-//! exact stop; blending is off in the motion descriptor. The names of variables are the ones that makers' examples use.
+//! exact stop; blending is off in the motion descriptor. The names of variables follow the manufacturer's examples.
 
 use super::names::identifier;
-use super::{CRLF, HEAD_WIDTH, Job, ProgramError, ProgramFile};
+use super::{CRLF, COMMENT_WIDTH, Job, ProgramError, ProgramFile};
 
 const DECIMALS: usize = 5;
 
-/// Characters of a program's name.
+/// Longest program name (characters).
 const LONGEST_NAME: usize = 15;
 
 pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
@@ -19,9 +19,9 @@ pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>
     Ok(vec![Job::file(&name, "dtx", &data, CRLF), Job::file(&name, "pgx", &code, CRLF)])
 }
 
-/// Lines of a head inside an XML comment, where two hyphens may not stand.
+/// The header as an XML comment, in which two hyphens are not allowed.
 fn comment(job: &Job<'_>) -> Vec<String> {
-    let head = job.head(HEAD_WIDTH);
+    let head = job.header(COMMENT_WIDTH);
     let inside = head.iter().map(|line| format!("  {}", line.replace("--", "__")));
     std::iter::once("<!--".to_owned()).chain(inside).chain(["-->".to_owned()]).collect()
 }
@@ -70,7 +70,7 @@ fn code(job: &Job<'_>, name: &str) -> Vec<String> {
         lines.push("    </Locals>".to_owned());
     }
     lines.push("    <Code><![CDATA[begin".to_owned());
-    lines.extend(job.head(HEAD_WIDTH).iter().map(|line| format!("  // {line}")));
+    lines.extend(job.header(COMMENT_WIDTH).iter().map(|line| format!("  // {line}")));
     if asks {
         lines.push("  userPage()".to_owned());
     }

@@ -1,8 +1,8 @@
-//! The folder of a session on disk: its lock, its journal, its result files.
+//! The folder of a session on disk: its lock, its journal and its result files.
 //!
-//! A line of the journal counts once it is written **and** forced to disk. A write that fails part-way (full disk, broken
-//! medium) is cut off again, so that the next try continues from whole lines; if even that fails, the next try begins with it,
-//! and a reader drops the torn end.
+//! A line of the journal counts once it is written **and** synced to disk. After a partial write (full disk, failing disk) the
+//! incomplete part is cut off again, so that the next attempt continues after complete lines. If that fails too, the next attempt
+//! starts with it, and a reader drops the incomplete end.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Seek as _, SeekFrom, Write as _};
@@ -13,21 +13,21 @@ use thiserror::Error;
 use super::{StoreError, TEMPORARY, create_folder, read, replace};
 use crate::session::journal::{self, FILE_NAME, Journal, JournalError, Line, Sum};
 
-/// Name of the file whose lock says that a program works in the folder.
+/// Name of the lock file, which is locked while a program uses the folder.
 const LOCK_NAME: &str = ".lock";
 
-/// What is said where the journal does not end as this program has left it.
-const FOREIGN: &str = "another program has written to this session; nothing is written here any more: end both programs, and \
-                       look with 'trupose session show' what the journal has";
+/// Message if the end of the journal is not as this program left it.
+const FOREIGN: &str = "another program has written to this session, so no more is written here: close both programs, and check \
+                       the journal with 'trupose session show'";
 
-/// What is said where the journal is not the file any more that was opened.
+/// Message if the journal is no longer the file that was opened.
 const GONE: &str =
-    "the journal was removed or replaced while the session is open; nothing is written to what is left of it";
+    "the journal was removed or replaced while the session was open, so no more is written to it";
 
-/// Incomplete ends of the journal are kept as `journal.torn-1`, `journal.torn-2`, …
+/// Name of the copies of incomplete ends of the journal: `journal.torn-1`, `journal.torn-2`, …
 const TORN_NAME: &str = "journal.torn";
 
-/// Folders of one name are told apart by a number up to this.
+/// Largest number appended to a name that is taken.
 const MOST_OF_ONE_NAME: usize = 1000;
 
 /// A session that cannot be opened or written.
@@ -40,23 +40,21 @@ pub enum SessionError {
     /// The journal cannot be used.
     #[error("'{}'", path.display())]
     Journal {
-        /// Which file.
+        /// The journal.
         path: PathBuf,
-        /// Why.
+        /// What is wrong with it.
         source: JournalError,
     },
-    /// Another program works in the folder.
+    /// Another program uses the folder.
     #[error("session '{}' is open in another program{}", folder.display(), holder(process.as_deref()))]
     Locked {
-        /// Which folder.
         folder: PathBuf,
-        /// Its process number, if it can be told.
+        /// Process number of that program, if it is known.
         process: Option<String>,
     },
-    /// Not a session.
+    /// The folder is not a session.
     #[error("'{}' is not a session: it has no {FILE_NAME}", folder.display())]
     NotASession {
-        /// Which folder.
         folder: PathBuf,
     },
 }
@@ -65,34 +63,34 @@ fn holder(process: Option<&str>) -> String {
     process.map_or_else(String::new, |process| format!(" (process {process})"))
 }
 
-/// Something that a journal is written to.
-pub trait Medium {
-    /// Writes at the end.
+/// Storage of a journal.
+pub trait JournalStorage {
+    /// Appends bytes.
     ///
     /// # Errors
-    /// Nothing, a part or all may have been written.
+    /// None, some or all of the bytes may have been written.
     fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Forces everything to disk.
+    /// Syncs everything to disk.
     ///
     /// # Errors
-    /// It may not be there.
+    /// The bytes may not be on disk.
     fn sync(&mut self) -> io::Result<()>;
 
-    /// Bytes that are there.
+    /// Length in bytes.
     ///
     /// # Errors
-    /// It cannot be told.
+    /// The length cannot be determined.
     fn length(&mut self) -> io::Result<u64>;
 
-    /// Cuts everything behind the first `length` bytes off.
+    /// Truncates to `length` bytes.
     ///
     /// # Errors
-    /// It may still be there.
-    fn cut(&mut self, length: u64) -> io::Result<()>;
+    /// The rest may still exist.
+    fn truncate(&mut self, length: u64) -> io::Result<()>;
 }
 
-impl Medium for File {
+impl JournalStorage for File {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.seek(SeekFrom::End(0))?;
         self.write_all(bytes)
@@ -106,34 +104,34 @@ impl Medium for File {
         self.metadata().map(|found| found.len())
     }
 
-    fn cut(&mut self, length: u64) -> io::Result<()> {
+    fn truncate(&mut self, length: u64) -> io::Result<()> {
         self.set_len(length)
     }
 }
 
 /// Writes a journal line by line.
 #[derive(Debug)]
-pub struct JournalWriter<M> {
-    medium: M,
+pub struct JournalWriter<S> {
+    storage: S,
     sum: Sum,
     length: u64,
-    /// Bytes behind `length` may be there from a write that failed.
-    torn: bool,
-    /// Where the medium ends as this writer has left it; `None`: it could not be told.
+    /// Whether an incomplete write may have left bytes after `length`.
+    is_torn: bool,
+    /// Length of the storage as this writer left it; `None` if it could not be determined.
     end: Option<u64>,
 }
 
-impl<M: Medium> JournalWriter<M> {
-    /// Goes on after the complete lines of `journal`, which `medium` holds.
-    pub fn after(medium: M, journal: &Journal) -> Self {
+impl<S: JournalStorage> JournalWriter<S> {
+    /// Continues after the complete lines of `journal`, which is in `storage`.
+    pub fn after(storage: S, journal: &Journal) -> Self {
         let (length, torn) = (journal.good_bytes as u64, journal.torn_bytes as u64);
-        Self { medium, sum: journal.sum.clone(), length, torn: torn > 0, end: Some(length + torn) }
+        Self { storage, sum: journal.sum.clone(), length, is_torn: torn > 0, end: Some(length + torn) }
     }
 
-    /// Writes lines and forces them to disk: all of them count, or none.
+    /// Writes lines and syncs them to disk: either all of them count, or none.
     ///
     /// # Errors
-    /// None of the lines counts; a later try may succeed. Where another program has written, nothing is written or cut off.
+    /// None of the lines counts; a later attempt may succeed. If another program has written, nothing is written or truncated.
     pub fn append(&mut self, lines: &[Line]) -> io::Result<()> {
         let mut text = String::new();
         let mut sum = self.sum.clone();
@@ -142,15 +140,15 @@ impl<M: Medium> JournalWriter<M> {
             text.push_str(&encoded);
             sum = next;
         }
-        let end = self.medium.length()?;
+        let end = self.storage.length()?;
         if self.end.is_some_and(|own| own != end) {
             return Err(io::Error::other(FOREIGN));
         }
-        if self.torn {
-            self.medium.cut(self.length)?;
-            self.torn = false;
+        if self.is_torn {
+            self.storage.truncate(self.length)?;
+            self.is_torn = false;
         }
-        match self.medium.append(text.as_bytes()).and_then(|()| self.medium.sync()) {
+        match self.storage.append(text.as_bytes()).and_then(|()| self.storage.sync()) {
             Ok(()) => {
                 self.sum = sum;
                 self.length += text.len() as u64;
@@ -158,33 +156,33 @@ impl<M: Medium> JournalWriter<M> {
                 Ok(())
             }
             Err(error) => {
-                self.torn = self.medium.cut(self.length).and_then(|()| self.medium.sync()).is_err();
-                self.end = self.medium.length().ok();
+                self.is_torn = self.storage.truncate(self.length).and_then(|()| self.storage.sync()).is_err();
+                self.end = self.storage.length().ok();
                 Err(error)
             }
         }
     }
 
-    /// What it is written to.
-    pub const fn medium(&self) -> &M {
-        &self.medium
+    /// The storage of the journal.
+    pub const fn storage(&self) -> &S {
+        &self.storage
     }
 }
 
-/// A session's folder, held by this process.
+/// A session's folder, locked by this process.
 #[derive(Debug)]
 pub struct SessionFolder {
     folder: PathBuf,
     writer: JournalWriter<File>,
-    /// Keeps the lock for as long as the folder is held.
+    /// Keeps the folder locked.
     _lock: File,
 }
 
 impl SessionFolder {
-    /// Makes a folder `name` in `root`, or `name-2`, `name-3`, … if that is taken.
+    /// Creates a folder `name` in `root`, or `name-2`, `name-3`, … if that is taken.
     ///
     /// # Errors
-    /// It cannot be made or written.
+    /// It cannot be created or written.
     pub fn create(root: &Path, name: &str) -> Result<Self, SessionError> {
         create_folder(root)?;
         let name_of = |number: usize| if number == 1 { name.to_owned() } else { format!("{name}-{number}") };
@@ -198,7 +196,7 @@ impl SessionFolder {
             }
         };
         Self::begin(root, &folder).inspect_err(|_error| {
-            // Nothing was measured there: a second try on a full disk must not find the name taken by what the first has left.
+            // Nothing was measured yet. Remove the folder, so that a second attempt on a full disk does not find the name taken.
             for file in [FILE_NAME, LOCK_NAME] {
                 drop(fs::remove_file(folder.join(file)));
             }
@@ -206,24 +204,24 @@ impl SessionFolder {
         })
     }
 
-    /// Takes hold of a folder that was just made, with an empty journal.
+    /// Locks a new folder and creates an empty journal.
     fn begin(root: &Path, folder: &Path) -> Result<Self, SessionError> {
         let lock = lock(folder)?;
         let path = folder.join(FILE_NAME);
         let failed = |source| StoreError::Write { path: path.clone(), source };
         let file = OpenOptions::new().read(true).write(true).create_new(true).open(&path).map_err(failed)?;
         lock_journal(&file, folder, &path)?;
-        // The new names themselves must survive a power cut.
-        for place in [folder, root] {
-            File::open(place).and_then(|place| place.sync_all()).map_err(failed)?;
+        // Sync the folders too, so that the new names survive a power cut.
+        for parent in [folder, root] {
+            File::open(parent).and_then(|parent| parent.sync_all()).map_err(failed)?;
         }
         Ok(Self { folder: folder.to_owned(), writer: JournalWriter::after(file, &Journal::default()), _lock: lock })
     }
 
-    /// Opens an existing folder to go on with its session.
+    /// Opens an existing folder to continue its session.
     ///
     /// # Errors
-    /// Not a session, held by another program, not readable or writable, or damaged.
+    /// Not a session, locked by another program, not readable or writable, or damaged.
     pub fn open(folder: &Path) -> Result<(Self, Journal), SessionError> {
         let path = folder.join(FILE_NAME);
         if !path.is_file() {
@@ -246,18 +244,18 @@ impl SessionFolder {
         Ok((Self { folder: folder.to_owned(), writer, _lock: lock }, journal))
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.folder
     }
 
-    /// Writes lines of the journal and forces them to disk: all of them count, or none.
+    /// Writes lines of the journal and syncs them to disk: either all of them count, or none.
     ///
     /// # Errors
     /// None of the lines counts.
     pub fn append(&mut self, lines: &[Line]) -> Result<(), StoreError> {
         let path = self.folder.join(FILE_NAME);
-        let written = match is_same(self.writer.medium(), &path) {
+        let written = match is_same(self.writer.storage(), &path) {
             Ok(true) => self.writer.append(lines),
             Ok(false) => Err(io::Error::other(GONE)),
             Err(error) => Err(error),
@@ -268,13 +266,13 @@ impl SessionFolder {
     /// Replaces a result file.
     ///
     /// # Errors
-    /// What stood there before is still there.
+    /// The previous file is unchanged.
     pub fn replace(&self, name: &str, text: &str) -> Result<(), StoreError> {
         replace(&self.folder.join(name), text)
     }
 }
 
-/// The journal of a session, without holding its folder.
+/// Reads the journal of a session without locking its folder.
 ///
 /// # Errors
 /// Not a session, not readable, or damaged.
@@ -287,7 +285,7 @@ pub fn read_journal(folder: &Path) -> Result<Journal, SessionError> {
     journal::read(&bytes).map_err(|source| SessionError::Journal { path, source })
 }
 
-/// The folders below `root` that hold a journal, by name.
+/// The folders in `root` that contain a journal, sorted by name.
 ///
 /// # Errors
 /// `root` cannot be read.
@@ -305,7 +303,7 @@ pub fn folders(root: &Path) -> Result<Vec<PathBuf>, StoreError> {
     Ok(found)
 }
 
-/// Removes what a program that died while it replaced a file has left. Only for who holds the folder; it may stay if it must.
+/// Removes temporary files of a program that ended while it replaced a file. The folder must be locked. Errors are ignored.
 fn remove_leftovers(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -315,15 +313,14 @@ fn remove_leftovers(folder: &Path) {
     }
 }
 
-/// Keeps a copy of what is about to be cut off the journal. It was never acknowledged; where there is no room, it goes.
+/// Keeps a copy of the incomplete end before it is cut off. It was never acknowledged, so a failed copy is ignored.
 fn set_aside(folder: &Path, torn: &[u8]) {
-    let taken = |path: &PathBuf| path.exists();
-    let name = |number: usize| folder.join(format!("{TORN_NAME}-{number}"));
-    let Some(path) = (1..=MOST_OF_ONE_NAME).map(name).find(|path| !taken(path)) else { return };
+    let mut names = (1..=MOST_OF_ONE_NAME).map(|number| folder.join(format!("{TORN_NAME}-{number}")));
+    let Some(path) = names.find(|path| !path.exists()) else { return };
     drop(OpenOptions::new().write(true).create_new(true).open(path).and_then(|mut file| file.write_all(torn)));
 }
 
-/// Takes the lock of a folder; the system gives it back when the process ends, however it ends.
+/// Locks a folder. The system releases the lock when the process ends, however it ends.
 fn lock(folder: &Path) -> Result<File, SessionError> {
     let path = folder.join(LOCK_NAME);
     let failed = |source| StoreError::Write { path: path.clone(), source };
@@ -338,15 +335,15 @@ fn lock(folder: &Path) -> Result<File, SessionError> {
         }
         Err(TryLockError::Error(source)) => return Err(failed(source).into()),
     }
-    // Who holds it is a help for people only: a full disk must not keep anybody from resuming.
+    // The process number is only for messages, so a full disk must not prevent resuming.
     drop(file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())));
     Ok(file)
 }
 
-/// Takes the lock of the journal itself: that of the folder is gone where somebody removes its file.
+/// Locks the journal itself, because the folder's lock is lost if its file is removed.
 fn lock_journal(file: &File, folder: &Path, path: &Path) -> Result<(), SessionError> {
     if !cfg!(unix) {
-        // Elsewhere who locks a file keeps others from reading it.
+        // On other systems the lock would prevent other programs from reading the journal.
         return Ok(());
     }
     match file.try_lock() {
@@ -356,7 +353,7 @@ fn lock_journal(file: &File, folder: &Path, path: &Path) -> Result<(), SessionEr
     }
 }
 
-/// Whether `path` still is the file that was opened.
+/// Whether `path` is still the file that was opened.
 fn is_same(file: &File, path: &Path) -> io::Result<bool> {
     let found = match fs::metadata(path) {
         Ok(found) => found,

@@ -1,4 +1,4 @@
-//! What a joint target looks like in each language.
+//! The form of joint targets in each language.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -6,22 +6,22 @@ use std::ops::Range;
 use super::scanner::{after_blanks, are_numbers, items, line_of, masked, part};
 use super::{CARTESIAN, Dialect, LeftAlone, RELATIVE, UNREADABLE};
 
-/// Places of the values of a target, in the order of the text.
-pub(super) struct FoundTarget {
+/// The values of a target as ranges of the text, in the order of the text.
+pub(super) struct TargetFields {
     pub(super) line: usize,
     pub(super) fields: Vec<Range<usize>>,
 }
 
-/// What was found.
+/// Targets of a program, and lines that are not changed.
 #[derive(Default)]
-pub(super) struct Found {
-    pub(super) targets: Vec<FoundTarget>,
+pub(super) struct Matches {
+    pub(super) targets: Vec<TargetFields>,
     pub(super) left: Vec<LeftAlone>,
 }
 
-impl Found {
+impl Matches {
     fn target(&mut self, line: usize, fields: Vec<Range<usize>>) {
-        self.targets.push(FoundTarget { line, fields });
+        self.targets.push(TargetFields { line, fields });
     }
 
     fn leave(&mut self, line: usize, reason: &'static str) {
@@ -29,7 +29,7 @@ impl Found {
     }
 }
 
-pub(super) fn find(dialect: Dialect, dof: usize, program: &[u8]) -> Found {
+pub(super) fn find(dialect: Dialect, dof: usize, program: &[u8]) -> Matches {
     match dialect {
         Dialect::Rapid => rapid(dof, &masked(program, "!", None, true)),
         Dialect::Krl => krl(dof, &masked(program, ";", None, true)),
@@ -41,7 +41,7 @@ pub(super) fn find(dialect: Dialect, dof: usize, program: &[u8]) -> Found {
     }
 }
 
-/// Lines with their place in the text.
+/// Lines with their number and offset.
 fn lines(text: &str) -> impl Iterator<Item = (usize, usize, &str)> {
     let mut at = 0;
     text.split('\n').enumerate().map(move |(index, line)| {
@@ -51,9 +51,9 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, usize, &str)> {
     })
 }
 
-/// `[[j1,…,j6],[e1,…,e6]]`.
-fn rapid(dof: usize, text: &str) -> Found {
-    let mut found = Found::default();
+/// Finds `[[j1,…,j6],[e1,…,e6]]`.
+fn rapid(dof: usize, text: &str) -> Matches {
+    let mut matches = Matches::default();
     let mut lines_done = BTreeSet::new();
     for (at, _) in text.match_indices('[') {
         let inner = after_blanks(text, at + 1);
@@ -70,9 +70,9 @@ fn rapid(dof: usize, text: &str) -> Found {
             let line = line_of(text, at);
             lines_done.insert(line);
             if dof == 6 && are_numbers(text, &values) {
-                found.target(line, values);
+                matches.target(line, values);
             } else {
-                found.leave(line, UNREADABLE);
+                matches.leave(line, UNREADABLE);
             }
         }
     }
@@ -80,19 +80,19 @@ fn rapid(dof: usize, text: &str) -> Found {
         let lower = code.to_ascii_lowercase();
         let has_literal = lower.contains('[') || lower.contains(":=");
         if (lower.contains("moveabsj") && lower.contains('[')) || (lower.contains("jointtarget") && has_literal) {
-            found.leave(line, UNREADABLE);
+            matches.leave(line, UNREADABLE);
         } else if lower.contains("robtarget") && has_literal
             || ["movel ", "movej ", "movec "].iter().any(|word| lower.contains(word))
         {
-            found.leave(line, CARTESIAN);
+            matches.leave(line, CARTESIAN);
         }
     }
-    found
+    matches
 }
 
-/// `{A1 …,A2 …,…}`, also with a type in front.
-fn krl(dof: usize, text: &str) -> Found {
-    let mut found = Found::default();
+/// Finds `{A1 …,A2 …,…}`, also after a type.
+fn krl(dof: usize, text: &str) -> Matches {
+    let mut matches = Matches::default();
     for (at, _) in text.match_indices('{') {
         let Some((parts, _)) = items(text, at, '{', '}') else { continue };
         let line = line_of(text, at);
@@ -118,23 +118,23 @@ fn krl(dof: usize, text: &str) -> Found {
         let values: Option<Vec<Range<usize>>> = values.into_iter().collect();
         if axes == 0 {
             if is_cartesian && ["PTP", "LIN", "CIRC", "POS", "SPL"].iter().any(|word| upper.contains(word)) {
-                found.leave(line, CARTESIAN);
+                matches.leave(line, CARTESIAN);
             }
         } else if upper.contains("_REL") {
-            found.leave(line, RELATIVE);
+            matches.leave(line, RELATIVE);
         } else {
             match values {
-                Some(values) if axes == dof && are_numbers(text, &values) => found.target(line, values),
-                _ => found.leave(line, UNREADABLE),
+                Some(values) if axes == dof && are_numbers(text, &values) => matches.target(line, values),
+                _ => matches.leave(line, UNREADABLE),
             }
         }
     }
-    found
+    matches
 }
 
-/// `P[1]{ GP1: … J1= 0.000 deg, … };`, group 1 only.
-fn fanuc(dof: usize, text: &str) -> Found {
-    let mut found = Found::default();
+/// Finds `P[1]{ GP1: … J1= 0.000 deg, … };`, in group 1 only.
+fn fanuc(dof: usize, text: &str) -> Matches {
+    let mut matches = Matches::default();
     let start = text.find("/POS").unwrap_or(text.len());
     let mut at = start;
     while let Some(place) = text.get(at..).and_then(|rest| rest.find("P[")).map(|place| at + place) {
@@ -143,7 +143,7 @@ fn fanuc(dof: usize, text: &str) -> Found {
         let line = line_of(text, place);
         let block = part(text, place..end);
         let Some(group) = block.find("GP1") else {
-            found.leave(line, UNREADABLE);
+            matches.leave(line, UNREADABLE);
             continue;
         };
         let stop = block.find("GP2").unwrap_or(block.len());
@@ -151,18 +151,18 @@ fn fanuc(dof: usize, text: &str) -> Found {
         let values: Vec<Option<Range<usize>>> = (1..=dof).map(|axis| fanuc_value(text, &group, axis)).collect();
         let is_joint = part(text, group.clone()).contains("J1");
         let values: Option<Vec<Range<usize>>> = values.into_iter().collect();
-        // One axis more than the arm has belongs to something that is not in the profile.
+        // More axes than the arm has belong to equipment that is not in the profile.
         let has_more = fanuc_value(text, &group, dof + 1).is_some();
         match values {
-            Some(values) if !has_more => found.target(line, values),
-            _ if is_joint => found.leave(line, UNREADABLE),
-            _ => found.leave(line, CARTESIAN),
+            Some(values) if !has_more => matches.target(line, values),
+            _ if is_joint => matches.leave(line, UNREADABLE),
+            _ => matches.leave(line, CARTESIAN),
         }
     }
-    found
+    matches
 }
 
-/// The number of `J1=   10.000 deg`, with the blanks before it.
+/// The number in `J1=   10.000 deg`, with the blanks before it.
 fn fanuc_value(text: &str, group: &Range<usize>, axis: usize) -> Option<Range<usize>> {
     let mark = format!("J{axis}");
     let inside = part(text, group.clone());
@@ -179,14 +179,14 @@ fn fanuc_value(text: &str, group: &Range<usize>, axis: usize) -> Option<Range<us
     Some(start..start + blanks + length)
 }
 
-/// `movej([…]`, and `name=[…]` where `movej(name` is in the program.
-fn urscript(dof: usize, text: &str) -> Found {
+/// Finds `movej([…]`, and `name=[…]` if the program contains `movej(name`.
+fn urscript(dof: usize, text: &str) -> Matches {
     const MOVES: [&str; 4] = ["movej", "movel", "movep", "servoj"];
-    let mut found = Found::default();
+    let mut matches = Matches::default();
     let mut names: BTreeSet<&str> = BTreeSet::new();
     for (line, start, code) in lines(text) {
         if code.contains("movec(") {
-            found.leave(line, CARTESIAN);
+            matches.leave(line, CARTESIAN);
         }
         for (place, name) in MOVES.iter().flat_map(|name| code.match_indices(*name)) {
             let open = after_blanks(text, start + place + name.len());
@@ -198,16 +198,16 @@ fn urscript(dof: usize, text: &str) -> Found {
             if rest.starts_with('[') {
                 match items(text, argument, '[', ']') {
                     Some((values, _)) if values.len() == dof && are_numbers(text, &values) => {
-                        found.target(line, values);
+                        matches.target(line, values);
                     }
-                    _ => found.leave(line, UNREADABLE),
+                    _ => matches.leave(line, UNREADABLE),
                 }
             } else {
                 let length = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
                 let word = part(text, argument..argument + length);
                 let next = rest.get(length..).unwrap_or_default();
                 if word.is_empty() || next.starts_with(['[', '(']) {
-                    found.leave(line, if word == "p" || word.starts_with("pose") { CARTESIAN } else { UNREADABLE });
+                    matches.leave(line, if word == "p" || word.starts_with("pose") { CARTESIAN } else { UNREADABLE });
                 } else {
                     names.insert(word);
                 }
@@ -222,18 +222,18 @@ fn urscript(dof: usize, text: &str) -> Found {
         }
         let value = start + left.len() + 1 + (right.len() - right.trim_start().len());
         match items(text, value, '[', ']') {
-            Some((values, _)) if values.len() == dof && are_numbers(text, &values) => found.target(line, values),
-            _ if right.trim_start().starts_with("p[") => found.leave(line, CARTESIAN),
-            _ => found.leave(line, UNREADABLE),
+            Some((values, _)) if values.len() == dof && are_numbers(text, &values) => matches.target(line, values),
+            _ if right.trim_start().starts_with("p[") => matches.leave(line, CARTESIAN),
+            _ => matches.leave(line, UNREADABLE),
         }
     }
-    found.targets.sort_by_key(|target| target.line);
-    found
+    matches.targets.sort_by_key(|target| target.line);
+    matches
 }
 
-/// `<Value … j1="…" … j6="…" />`.
-fn val3(dof: usize, text: &str) -> Found {
-    let mut found = Found::default();
+/// Finds `<Value … j1="…" … j6="…" />`.
+fn val3(dof: usize, text: &str) -> Matches {
+    let mut matches = Matches::default();
     for (at, _) in text.match_indices("<Value") {
         let Some(end) = text.get(at..).and_then(|rest| rest.find('>')).map(|end| at + end) else { continue };
         let line = line_of(text, at);
@@ -245,28 +245,28 @@ fn val3(dof: usize, text: &str) -> Found {
         };
         let values: Option<Vec<Range<usize>>> = (1..=dof).map(|axis| attribute(&format!("j{axis}"))).collect();
         match values {
-            Some(values) if are_numbers(text, &values) => found.target(line, values),
+            Some(values) if are_numbers(text, &values) => matches.target(line, values),
             None if attribute("j1").is_none() => {
                 if attribute("rz").is_some() {
-                    found.leave(line, CARTESIAN);
+                    matches.leave(line, CARTESIAN);
                 }
             }
-            _ => found.leave(line, UNREADABLE),
+            _ => matches.leave(line, UNREADABLE),
         }
     }
     for (line, _, code) in lines(text) {
         let is_move = code.contains("movej({") || code.contains("movel({");
         let is_literal = code.contains("={") && code.contains(',');
         if is_move || is_literal {
-            found.leave(line, UNREADABLE);
+            matches.leave(line, UNREADABLE);
         }
     }
-    found
+    matches
 }
 
-/// `C00000=…` in pulses.
-fn inform(dof: usize, text: &str) -> Found {
-    let mut found = Found::default();
+/// Finds `C00000=…` in pulses.
+fn inform(dof: usize, text: &str) -> Matches {
+    let mut matches = Matches::default();
     let mut in_pulses = false;
     for (line, start, code) in lines(text) {
         if let Some(kind) = code.strip_prefix("///POSTYPE") {
@@ -278,32 +278,32 @@ fn inform(dof: usize, text: &str) -> Found {
         if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
             continue;
         }
-        // The rest of the line as a list: the `=` opens it, the line end closes it.
+        // Treat the rest of the line as a list from the `=` to the line end.
         let closed = format!("{}\n", code.trim_end_matches('\r'));
         let values = items(&closed, name.len(), '=', '\n');
         match values {
             Some((values, _)) if in_pulses && values.len() == dof && are_numbers(&closed, &values) => {
-                found.target(line, values.into_iter().map(|item| start + item.start..start + item.end).collect());
+                matches.target(line, values.into_iter().map(|item| start + item.start..start + item.end).collect());
             }
-            _ if in_pulses => found.leave(line, UNREADABLE),
-            _ => found.leave(line, CARTESIAN),
+            _ if in_pulses => matches.leave(line, UNREADABLE),
+            _ => matches.leave(line, CARTESIAN),
         }
     }
-    found
+    matches
 }
 
-/// `positions: […]`.
-fn ros(dof: usize, text: &str) -> Found {
-    let mut found = Found::default();
+/// Finds `positions: […]`.
+fn ros(dof: usize, text: &str) -> Matches {
+    let mut matches = Matches::default();
     for (at, mark) in text.match_indices("positions:") {
         let line = line_of(text, at);
         let list = after_blanks(text, at + mark.len());
         match items(text, list, '[', ']') {
-            Some((values, _)) if values.len() == dof && are_numbers(text, &values) => found.target(line, values),
-            _ => found.leave(line, UNREADABLE),
+            Some((values, _)) if values.len() == dof && are_numbers(text, &values) => matches.target(line, values),
+            _ => matches.leave(line, UNREADABLE),
         }
     }
-    found
+    matches
 }
 
 /// The names of `joint_names`, as a list in brackets or one per line.

@@ -26,7 +26,7 @@ struct State {
 #[derive(Clone, Debug, Default)]
 struct Faulty(Rc<RefCell<State>>);
 
-impl Medium for Faulty {
+impl JournalStorage for Faulty {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         let mut state = self.0.borrow_mut();
         let written = bytes.len().min(state.room);
@@ -45,7 +45,7 @@ impl Medium for Faulty {
         Ok(self.0.borrow().bytes.len() as u64)
     }
 
-    fn cut(&mut self, length: u64) -> io::Result<()> {
+    fn truncate(&mut self, length: u64) -> io::Result<()> {
         let mut state = self.0.borrow_mut();
         if state.cut_fails {
             return Err(io::Error::other("medium error"));
@@ -232,7 +232,7 @@ fn an_append_of_nothing_is_harmless() {
     let medium = Faulty::default();
     let mut writer = JournalWriter::after(medium.clone(), &Journal::default());
     writer.append(&[]).unwrap();
-    assert!(medium.bytes().is_empty() && writer.medium().bytes().is_empty());
+    assert!(medium.bytes().is_empty() && writer.storage().bytes().is_empty());
 }
 
 fn names(root: &Path) -> Vec<String> {

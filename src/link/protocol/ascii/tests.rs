@@ -164,7 +164,7 @@ fn settings_that_cannot_work_are_refused_with_all_reasons() {
     let reasons = bad.validate().unwrap_err();
     for reason in [
         "trigger is empty",
-        "stands twice",
+        "occurs twice",
         "one coordinate",
         "all of sx",
         "comma",

@@ -129,12 +129,12 @@ const fn expected(fault: AsciiFault) -> Option<&'static str> {
         AsciiFault::Halves | AsciiFault::TwoInOne | AsciiFault::CarriageReturnOnly | AsciiFault::EmptyLines => {
             return None;
         }
-        AsciiFault::Cut | AsciiFault::Noise | AsciiFault::Joined | AsciiFault::BitError => "check value",
+        AsciiFault::Cut | AsciiFault::Noise | AsciiFault::Joined | AsciiFault::BitError => "check sum",
         AsciiFault::DecimalComma | AsciiFault::Thousands => "columns",
         AsciiFault::NotANumber => "NaN",
         AsciiFault::LongLine => "without a line end",
         AsciiFault::ErrorText => "refused: $ERR-305",
-        AsciiFault::StaleRepeat => "equal to the point before",
+        AsciiFault::StaleRepeat => "identical to the previous point",
         AsciiFault::DisconnectMidLine => "",
         AsciiFault::Origin => "0, 0, 0",
         AsciiFault::WrongUnit => "check the unit",

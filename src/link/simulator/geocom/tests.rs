@@ -109,7 +109,7 @@ const fn expected(fault: GeocomFault) -> Option<&'static str> {
         GeocomFault::AngleOnly => "code 1285: only angles",
         GeocomFault::NoTarget => "no reflector (code 8710",
         GeocomFault::LicenceMissing => "licence is missing",
-        GeocomFault::StaleRepeat => "equal to the point before",
+        GeocomFault::StaleRepeat => "identical to the previous point",
         GeocomFault::NotANumber => "angle",
         GeocomFault::DisconnectMidLine | GeocomFault::Dead => "",
     })

@@ -391,12 +391,12 @@ proptest! {
 #[test]
 fn what_is_no_tracker_is_told_by_its_first_bytes() {
     for (first, part) in [
-        (&b"HTTP/1.1 400 Bad Request\r\n"[..], "begins with `HTTP/1.1 400 Bad`"),
-        (b"SSH-2.0-OpenSSH", "begins with `SSH-2.0"),
+        (&b"HTTP/1.1 400 Bad Request\r\n"[..], "begin with `HTTP/1.1 400 Bad`"),
+        (b"SSH-2.0-OpenSSH", "begin with `SSH-2.0"),
         // A refused version of RTDE.
-        (&[0, 4, b'V', 0], "no emScon answers there"),
+        (&[0, 4, b'V', 0], "does not use emScon"),
         // A size that may be, a type that no firmware has.
-        (&[0x20, 0, 0, 0, b't', b'e', b'x', b't'], "no emScon answers there"),
+        (&[0x20, 0, 0, 0, b't', b'e', b'x', b't'], "does not use emScon"),
     ] {
         let mut protocol = Emscon::default();
         protocol.start(Duration::ZERO);
