@@ -34,7 +34,7 @@ fn a_robot_that_moves_is_waited_for_and_then_refused() {
     let mut bench = bench(&["moving@1x*"]);
     let before = bench.stage.shots();
     let error = bench.measure().unwrap_err();
-    assert!(matches!(&error, LinkError::Robot(why) if why.contains("still moves")), "{error:?}");
+    assert!(matches!(&error, LinkError::Robot(why) if why.contains("still moving")), "{error:?}");
     assert_eq!(bench.stage.shots(), before, "nothing is measured while it moves");
 }
 
@@ -44,7 +44,7 @@ fn a_robot_that_moves_while_it_is_measured_spoils_the_point() {
     bench.measure().unwrap();
     bench.stage.lock().turns = 0.01;
     let error = bench.measure().unwrap_err();
-    assert!(matches!(&error, LinkError::Robot(why) if why.contains("moved while")), "{error:?}");
+    assert!(matches!(&error, LinkError::Robot(why) if why.contains("moved during")), "{error:?}");
     bench.stage.lock().turns = 0.0;
     bench.measure().unwrap();
 }
@@ -56,7 +56,7 @@ fn a_protective_stop_is_said_at_once_and_nothing_is_measured() {
     let before = bench.stage.shots();
     bench.stage.lock().joints.stopped = Some("protective stop".to_owned());
     let error = bench.measure().unwrap_err();
-    assert!(matches!(&error, LinkError::Robot(why) if why.contains("does not move on")), "{error:?}");
+    assert!(matches!(&error, LinkError::Robot(why) if why.contains("is stopped")), "{error:?}");
     assert_eq!(bench.stage.shots(), before);
     bench.stage.lock().joints.stopped = None;
     bench.measure().unwrap();
@@ -105,7 +105,7 @@ fn a_shot_that_is_asked_for_while_the_controller_is_away_is_refused_at_once() {
 fn what_is_wrong_with_the_controller_is_told_with_what_helps() {
     for (fault, part, hint) in [
         ("old-protocol@1x*", "version 2 of the interface", "PolyScope 3.4"),
-        ("in-use@1x*", "another program", "end the other program"),
+        ("in-use@1x*", "another program", "close the other program"),
         ("not-found@1x*", "does not know", "PolyScope 3.4"),
     ] {
         let mut bench = Bench::with(WireProtocol::Emscon, &Endpoint::Loopback, &[], Some(&[fault]), None);

@@ -86,8 +86,8 @@ fn a_link_that_dies_in_mid_packet_fails_the_shot_comes_back_and_measures_nothing
         bench.measure().unwrap();
         let error = bench.measure().unwrap_err();
         let LinkError::Instrument(failure @ Failure::Disconnected(_)) = &error else { panic!("{protocol}: {error:?}") };
-        assert!(failure.to_string().starts_with("the connection is lost"), "{failure}");
-        assert!(failure.hint().contains("connects again by itself"), "{}", failure.hint());
+        assert!(failure.to_string().starts_with("the connection was lost"), "{failure}");
+        assert!(failure.hint().contains("reconnects automatically"), "{}", failure.hint());
         let taken = bench.stage.shots();
         bench.until(|news| matches!(news, LinkEvent::Up(_)));
         assert_eq!(bench.stage.shots(), taken, "{protocol}: nobody has asked for a shot");
@@ -98,8 +98,8 @@ fn a_link_that_dies_in_mid_packet_fails_the_shot_comes_back_and_measures_nothing
 #[test]
 fn settings_that_lie_are_found_in_the_set_up_and_said() {
     for (fault, part) in [
-        ("metres@1x*", "the instrument is set differently"),
-        ("try-stuck@1x*", "the instrument is set differently"),
+        ("metres@1x*", "the instrument has a wrong setting"),
+        ("try-stuck@1x*", "the instrument has a wrong setting"),
         ("in-use@1x*", "in use by another program"),
         ("warming-up@1x*", "not ready"),
     ] {
@@ -215,7 +215,7 @@ fn a_serial_port_that_is_in_use_or_missing_is_said() {
     let held = serialport::new(&device, 9600).open().unwrap();
     let refused = |address: &str| Wired::new(&choice(address), None).unwrap().connect().unwrap_err().to_string();
     let error = refused(&format!("geocom:serial:{device}"));
-    assert!(error.contains("another program may use it"), "{error}");
+    assert!(error.contains("another program may be using it"), "{error}");
     drop(held);
     let error = refused("geocom:serial:/dev/there-is-no-such-port");
     assert!(error.contains("is the adapter plugged in?"), "{error}");
@@ -226,7 +226,7 @@ fn addresses_of_the_wrong_kind_are_refused_before_anything_is_opened() {
     let refused = |choice: &LinkChoice| Wired::new(choice, None).unwrap_err().to_string();
     assert!(refused(&choice("rtde:127.0.0.1")).contains("not SMR positions"));
     let with_robot = LinkChoice { robot: Some("emscon:127.0.0.1".to_owned()), ..choice("emscon:127.0.0.1") };
-    assert!(refused(&with_robot).contains("is no robot"));
+    assert!(refused(&with_robot).contains("is not a robot controller"));
     let with_options = LinkChoice { options: Some("(speed: 3)".to_owned()), ..choice("emscon:127.0.0.1") };
     assert!(refused(&with_options).contains("speed"));
 }

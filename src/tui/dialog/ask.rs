@@ -275,7 +275,7 @@ mod tests {
         for (texts, part) in [
             (["192.168.0.2", "", "", "no"], "is no address"),
             (["rtde:10.0.0.1", "", "", "no"], "is a robot"),
-            (["emscon:a", "", "emscon:b", "no"], "is no robot"),
+            (["emscon:a", "", "emscon:b", "no"], "is not a robot controller"),
         ] {
             let error = link(&values(&texts)).unwrap_err();
             assert!(error.contains(part), "{error}");
