@@ -10,9 +10,7 @@ use super::{Dialect, MAX_DWELL, MAX_SPEED};
 pub enum ProgramError {
     /// Unknown dialect.
     #[error("there is no dialect '{text}'; dialects: {}", Dialect::ALL.map(Dialect::name).join(", "))]
-    UnknownDialect {
-        text: String,
-    },
+    UnknownDialect { text: String },
     /// The plan is empty.
     #[error("the plan has no poses")]
     EmptyPlan,
@@ -29,9 +27,7 @@ pub enum ProgramError {
     },
     /// A joint value that is not finite.
     #[error("pose '{pose}' has a joint value that is not a finite number")]
-    NotFinite {
-        pose: String,
-    },
+    NotFinite { pose: String },
     /// A speed out of range.
     #[error(
         "the speed must be above 0 and at most {:.0} % of full speed, not {:.1} %: the SMR must not be thrown off",
@@ -61,39 +57,26 @@ pub enum ProgramError {
     },
     /// A sliding joint in a dialect that does not support it.
     #[error("{} programs are written for arms whose joints all turn, and '{joint}' slides", dialect.title())]
-    SlidingJoint {
-        dialect: Dialect,
-        joint: String,
-    },
+    SlidingJoint { dialect: Dialect, joint: String },
     /// Pulses per degree are unknown.
     #[error(
         "INFORM programs count pulses, and the profile has no 'pulses_per_degree' for {}; add it: \
          compare the pulse and the degree display of the pendant in two positions of the joint",
         quoted(joints)
     )]
-    PulsesPerDegree {
-        joints: Vec<String>,
-    },
+    PulsesPerDegree { joints: Vec<String> },
     /// A coupled joint in a dialect with pulses.
     #[error(
         "joint '{joint}' is coupled to another one, and it is not documented whether its pulse count includes the coupling; \
          INFORM programs are written for uncoupled arms only"
     )]
-    CoupledPulses {
-        joint: String,
-    },
+    CoupledPulses { joint: String },
     /// More pulses than a job can store.
     #[error("joint '{joint}' would need {pulses:.0} pulses in pose '{pose}'; check 'pulses_per_degree'")]
-    TooManyPulses {
-        joint: String,
-        pose: String,
-        pulses: f64,
-    },
+    TooManyPulses { joint: String, pose: String, pulses: f64 },
     /// The highest speed is unknown, so times cannot be computed.
     #[error("a ROS trajectory needs times, and the profile has no highest speed for {}; add it", quoted(joints))]
-    MaxSpeed {
-        joints: Vec<String>,
-    },
+    MaxSpeed { joints: Vec<String> },
     /// A wait for the operator in a dialect that has none.
     #[error("a ROS trajectory cannot wait for the operator; use a dwell that is long enough to measure")]
     NoOperator,

@@ -4,7 +4,7 @@
 //! aggregate keeps its position. Arms with seven axes have another controller, which is programmed in Java.
 
 use super::names::{MAX_NAME, identifier};
-use super::{CRLF, COMMENT_WIDTH, Job, ProgramError, ProgramFile};
+use super::{COMMENT_WIDTH, CRLF, Job, ProgramError, ProgramFile};
 
 const DECIMALS: usize = 5;
 

@@ -4,7 +4,7 @@
 //! exact stop; blending is off in the motion descriptor. The names of variables follow the manufacturer's examples.
 
 use super::names::identifier;
-use super::{CRLF, COMMENT_WIDTH, Job, ProgramError, ProgramFile};
+use super::{COMMENT_WIDTH, CRLF, Job, ProgramError, ProgramFile};
 
 const DECIMALS: usize = 5;
 

@@ -21,8 +21,7 @@ const FOREIGN: &str = "another program has written to this session, so no more i
                        the journal with 'trupose session show'";
 
 /// Message if the journal is no longer the file that was opened.
-const GONE: &str =
-    "the journal was removed or replaced while the session was open, so no more is written to it";
+const GONE: &str = "the journal was removed or replaced while the session was open, so no more is written to it";
 
 /// Name of the copies of incomplete ends of the journal: `journal.torn-1`, `journal.torn-2`, …
 const TORN_NAME: &str = "journal.torn";
@@ -54,9 +53,7 @@ pub enum SessionError {
     },
     /// The folder is not a session.
     #[error("'{}' is not a session: it has no {FILE_NAME}", folder.display())]
-    NotASession {
-        folder: PathBuf,
-    },
+    NotASession { folder: PathBuf },
 }
 
 fn holder(process: Option<&str>) -> String {
