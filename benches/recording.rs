@@ -8,13 +8,11 @@
 )]
 
 use std::fs;
-use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use tempfile::TempDir;
 use trupose::recording::{self, Recorder};
 use trupose::session::journal::{Entry, Line};
 use trupose::store::session::read_journal;
@@ -57,59 +55,23 @@ fn places(lines: &[Line]) -> Vec<usize> {
     (0..lines.len()).filter(|place| matches!(lines[*place].entry, Entry::Sample(_))).collect()
 }
 
-/// Bytes of the files of a recording.
-fn size(folder: &Path) -> u64 {
-    recording::files(folder).iter().map(|file| fs::metadata(file).unwrap().len()).sum()
-}
-
-/// A recorder that has written these lines, batch by batch, as a session that is measured does.
-fn recorded<'a>(folder: &TempDir, batches: impl Iterator<Item = &'a [Line]>) -> Recorder {
-    let mut recorder = Recorder::start(folder.path(), Vec::new(), None, |event| println!("{event:?}")).unwrap();
-    batches.for_each(|batch| take_and_wait(&mut recorder, folder, batch));
-    recorder
-}
-
-/// Waits until it is written: the next pose is measured seconds later.
-fn take_and_wait(recorder: &mut Recorder, folder: &TempDir, batch: &[Line]) {
-    let before = size(folder.path());
-    recorder.take(batch).unwrap();
-    while size(folder.path()) == before {
-        std::thread::yield_now();
-    }
-    // All messages of a batch are written before the next can be taken; this one may still be at it.
-    let mut settled = size(folder.path());
-    loop {
-        std::thread::sleep(std::time::Duration::from_millis(20));
-        let now = size(folder.path());
-        if now == settled {
-            return;
-        }
-        settled = now;
-    }
-}
-
-/// Sizes per pose, printed: they are not times.
+/// Sizes, printed: they are not times.
 fn sizes() {
+    let size = |lines: &[Line]| {
+        let folder = tempfile::tempdir().unwrap();
+        recording::rebuild(folder.path(), lines).unwrap().bytes
+    };
     for poses in [56, 180] {
         let lines = demo(poses);
-        let folder = tempfile::tempdir().unwrap();
         let places = places(&lines);
         let (first, last) = (places[0], *places.last().unwrap());
-        let mut recorder = recorded(&folder, std::iter::once(&lines[..first]));
-        let before = size(folder.path());
-        for line in lines[first..=last].chunks(1) {
-            take_and_wait(&mut recorder, &folder, line);
-        }
-        let growth = size(folder.path()) - before;
-        drop(recorder);
-        // The same content as that of the parts joined, however slow the disk is.
-        let folder = tempfile::tempdir().unwrap();
-        recording::rebuild(folder.path(), &lines).unwrap();
-        let (count, whole) = (samples(&lines), size(folder.path()));
+        let count = samples(&lines);
+        let (before, measured, whole) = (size(&lines[..first]), size(&lines[..=last]), size(&lines));
         println!(
-            "{count} samples: {} bytes per pose while recording; {whole} bytes compacted, {} per pose",
-            growth / count as u64,
-            whole / count as u64
+            "{count} samples: {before} bytes before the first pose, {} per pose while measuring; {whole} bytes with the \
+             result, {} per pose",
+            (measured - before) / count,
+            whole / count
         );
     }
 }
@@ -120,11 +82,11 @@ fn take_a_pose(bencher: Bencher<'_, '_>) {
     let lines = session();
     let place = places(lines)[0];
     let folder = tempfile::tempdir().unwrap();
-    let mut recorder = recorded(&folder, std::iter::once(&lines[..place]));
+    let mut recorder = Recorder::start(folder.path(), lines[..place].to_vec(), None, |_event| ()).unwrap();
     bencher.bench_local(|| recorder.take(&lines[place..=place]).unwrap());
 }
 
-/// A recording made anew from its journal.
+/// A recording made from its journal.
 #[divan::bench(sample_count = 10)]
 fn rebuild(bencher: Bencher<'_, '_>) {
     let lines = session();
@@ -137,6 +99,6 @@ fn rebuild(bencher: Bencher<'_, '_>) {
 fn replay_scan(bencher: Bencher<'_, '_>) {
     let lines = session();
     let folder = tempfile::tempdir().unwrap();
-    let path = recording::rebuild(folder.path(), lines).unwrap();
-    bencher.counter(ItemsCount::new(samples(lines))).bench_local(|| recording::read(&path).unwrap().lines().unwrap());
+    let path = recording::rebuild(folder.path(), lines).unwrap().path;
+    bencher.counter(ItemsCount::new(samples(lines))).bench_local(|| recording::read(&path).unwrap());
 }

@@ -11,10 +11,12 @@
 
 mod clock;
 mod engine;
+mod events;
 mod jobs;
 mod links;
 pub mod signals;
 mod store_thread;
 
 pub use clock::Clock;
-pub use engine::{Deed, Engine, Events, Happening, Options};
+pub use engine::{Deed, Engine, Happening, Options};
+pub use events::Events;

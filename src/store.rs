@@ -83,18 +83,10 @@ pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
 /// # Errors
 /// A step failed; the old file is unchanged.
 pub fn replace_bytes(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    replace_through(path, (TEMPORARY, ""), bytes)
-}
-
-/// As [`replace_bytes`], with this prefix and suffix of the temporary file.
-///
-/// # Errors
-/// A step failed; the old file is unchanged.
-pub(crate) fn replace_through(path: &Path, temporary: (&str, &str), bytes: &[u8]) -> Result<(), StoreError> {
     let failed = |source| StoreError::Write { path: path.to_owned(), source };
     let into = |written: io::Result<()>| written.map_err(|source| StoreError::Into { path: path.to_owned(), source });
     match destination(path).map_err(failed)? {
-        Destination::File(file) => replace_file(&file, temporary, bytes).map_err(failed),
+        Destination::File(file) => replace_file(&file, bytes).map_err(failed),
         Destination::Other(place) => {
             into(OpenOptions::new().append(true).open(place).and_then(|mut file| file.write_all(bytes)))
         }
@@ -107,9 +99,9 @@ fn write_out(mut out: impl io::Write, bytes: &[u8]) -> io::Result<()> {
     out.write_all(bytes).and_then(|()| out.flush())
 }
 
-fn replace_file(path: &Path, (prefix, suffix): (&str, &str), bytes: &[u8]) -> io::Result<()> {
+fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let mut file = temporary().prefix(prefix).suffix(suffix).tempfile_in(folder)?;
+    let mut file = temporary().tempfile_in(folder)?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|failed| failed.error)?;
@@ -168,10 +160,24 @@ fn open_file(path: &Path) -> Option<Destination> {
     }
 }
 
+/// Bytes that can still be written to the disk of `folder`; `None` where the system cannot tell.
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    #[cfg(unix)]
+    {
+        let disk = rustix::fs::statvfs(folder).ok()?;
+        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+    }
+    #[cfg(not(unix))]
+    {
+        let _unknown = folder;
+        None
+    }
+}
+
 /// Builder of temporary files that become results. The library makes them private; these get the usual permissions of the process.
 fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
-    #[cfg_attr(not(unix), expect(unused_mut, reason = "only Unix has modes"))]
     let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;

@@ -131,7 +131,7 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
 
 /// Closes the session, touches nothing of the terminal, ends the process.
 fn close_without_terminal(engine: &mut Engine, at_end: AtEnd<'_>) -> ! {
-    engine.hurry();
+    engine.abandon_recording();
     engine.shut_down("the terminal went away (SIGHUP)");
     while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
     engine.release();

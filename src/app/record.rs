@@ -1,6 +1,5 @@
-//! `trupose record rebuild | compact | check`, and the recordings of commands without a session.
+//! `trupose record rebuild`, and the recordings of commands without a session.
 
-use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
@@ -15,7 +14,7 @@ use crate::procedure::identify::{Identified, IdentifyRequest, NamedSample};
 use crate::procedure::joint_types;
 use crate::procedure::points::point_errors;
 use crate::profile::Profile;
-use crate::recording::{self, Check, Compaction, RecordingError};
+use crate::recording::{self, RecordingError, Written};
 use crate::session::calibration::Calibration;
 use crate::session::journal::{
     Entry, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText, SCHEMA, to_edge, to_xyz_mm,
@@ -25,168 +24,30 @@ use crate::session::plan_summary::PlanSummary;
 use crate::session::sha256;
 use crate::session::state::Session;
 use crate::session::summary::IdentificationSummary;
-use crate::store::session::{SessionFolder, read_journal};
+use crate::store::session::SessionFolder;
+use crate::text::{counted, counted_as};
 use crate::units::to_mm;
 
 pub(super) fn run<O: Write, E: Write>(
     command: &RecordCommand,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    match command {
-        RecordCommand::Rebuild { folder } => {
-            // Held, so that no program records into the folder meanwhile.
-            let (_held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
-            let path = recording::rebuild(folder, &journal.lines).map_err(|error| failure(&error))?;
-            console.print(&format!("written: {}\n{}\n", path.display(), described(&check(&path)?)))?;
-            Ok(ExitStatus::Accepted)
-        }
-        RecordCommand::Compact { path } => compact(path, console),
-        RecordCommand::Check { paths } => {
-            let mut all_whole = true;
-            for path in paths {
-                all_whole &= check_one(path, console)?;
-            }
-            Ok(if all_whole { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
-        }
-    }
-}
-
-/// Makes one compact file of a folder's parts, or of a file. What is damaged is not touched: compact it would look whole.
-fn compact<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let before;
-    let file = if path.is_dir() {
-        let (_held, journal) = SessionFolder::open(path).map_err(|error| session_failure(&error))?;
-        before = None;
-        if recording::files(path).is_empty() {
-            let message = format!("there is no recording in '{}'", path.display());
-            return Err(Failure::new(ExitStatus::Usage, message)
-                .hint("'trupose record rebuild DIR' makes one from the journal"));
-        }
-        recording::compact_folder(path, &journal.lines).map_err(|error| failure(&error))?
-    } else {
-        let found = check(path)?;
-        match recording::compact_file(path).map_err(|error| failure(&error))? {
-            Compaction::AsItWas => {}
-            Compaction::DrawnAnew => {
-                console
-                    .print(&format!("its end was torn: all {} entries that it has are drawn anew\n", found.lines))?;
-            }
-            Compaction::Refused => return Err(refused(path, &found)),
-        }
-        before = Some(found.bytes);
-        path.to_owned()
-    };
-    let after = check(&file)?;
-    let change = before.map_or_else(String::new, |before| format!(", {before} bytes before"));
-    console.print(&format!("written: {}\n{}{change}\n", file.display(), described(&after)))?;
-    Ok(ExitStatus::Accepted)
-}
-
-/// Why a file is not made compact.
-fn refused(path: &Path, found: &Check) -> Failure {
-    let message = format!(
-        "'{}' is not whole and stays as it is: {}; compact it would look whole",
+    let RecordCommand::Rebuild { folder } = command;
+    // Held, so that no program records into the folder meanwhile.
+    let (_held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
+    let Written { path, bytes } = recording::rebuild(folder, &journal.lines).map_err(|error| failure(&error))?;
+    let samples = journal.lines.iter().filter(|line| matches!(line.entry, Entry::Sample(_))).count();
+    console.print(&format!(
+        "written: {}\n{bytes} bytes, {}, {}\n",
         path.display(),
-        described(found)
-    );
-    let failure = Failure::new(ExitStatus::NotAccepted, message)
-        .hint("'trupose record rebuild DIR' makes the recording anew from the journal of its session");
-    if found.lines == 0 {
-        return failure;
+        counted_as(journal.lines.len(), "journal entry", "journal entries"),
+        counted(samples, "sample")
+    ))?;
+    let old_parts = recording::remove_old_parts(folder);
+    if old_parts > 0 {
+        console.print(&format!("removed: {} of an earlier version\n", counted(old_parts, "part")))?;
     }
-    let shown = format!("'trupose replay {} --print' prints the entries that it has from the first", path.display());
-    failure.hint(shown)
-}
-
-/// Whether a recording is whole, and says so.
-fn check_one<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<bool, Failure> {
-    if !path.is_dir() {
-        let found = check(path)?;
-        console.print(&format!("{}: {}\n", path.display(), described(&found)))?;
-        return Ok(found.is_whole());
-    }
-    let mut journal = read_journal(path).map_err(|error| session_failure(&error))?;
-    let files = recording::files(path);
-    if files.is_empty() {
-        console.print(&format!(
-            "{}: no recording of {} journal entries; 'trupose record rebuild' makes it\n",
-            path.display(),
-            journal.lines.len()
-        ))?;
-        return Ok(false);
-    }
-    let (mut is_whole, mut is_foreign) = (files.len() == 1, false);
-    let mut lines: BTreeSet<u64> = BTreeSet::new();
-    for file in &files {
-        let found = check(file)?;
-        is_whole &= found.has_index && found.damaged == 0;
-        let recorded = recording::read(file).map_err(|error| failure(&error))?.numbers;
-        // The journal is ahead of the recording, also where a program goes on with both.
-        journal = read_journal(path).map_err(|error| session_failure(&error))?;
-        let foreign = recording::foreign_lines(file, &journal.lines).map_err(|error| failure(&error))?;
-        lines.extend(recorded);
-        console.print(&format!("{}: {}\n", file.display(), described(&found)))?;
-        if let Some(first) = foreign.first() {
-            is_foreign = true;
-            console.print(&format!("{}\n", described_foreign(*first, foreign.len(), journal.lines.len())))?;
-        }
-    }
-    let missing: Vec<String> = journal
-        .lines
-        .iter()
-        .filter(|line| !lines.contains(&line.number))
-        .map(|line| format!("{:>5} {}", line.number, crate::text::printable(&line.entry.describe())))
-        .collect();
-    if is_foreign {
-        console.print(&format!(
-            "'trupose record rebuild {}' makes the recording anew from the journal, in the place of what is there\n",
-            path.display()
-        ))?;
-    } else if !missing.is_empty() {
-        console.print(&format!(
-            "missing of {} journal entries:\n{}\n'trupose record rebuild {}' makes the recording anew\n",
-            journal.lines.len(),
-            missing.join("\n"),
-            path.display()
-        ))?;
-    } else if is_whole {
-        console.print(&format!("all {} entries of the journal are recorded\n", journal.lines.len()))?;
-    } else {
-        console.print(&format!("'trupose record compact {}' makes one file with an index\n", path.display()))?;
-    }
-    Ok(is_whole && !is_foreign && missing.is_empty())
-}
-
-/// What entries of a recording mean that are not in the journal with `entries` entries; `first` is the number of the first of them.
-fn described_foreign(first: i64, count: usize, entries: usize) -> String {
-    if first == 1 {
-        return "it is the recording of another session: its first entry is not that of the journal".to_owned();
-    }
-    let more = if count > 1 { format!(", and {} more", count - 1) } else { String::new() };
-    if usize::try_from(first).is_ok_and(|first| first <= entries) {
-        format!("entry {first} of it differs from the journal{more}")
-    } else {
-        format!("entry {first} of it is not in the journal, which ends with entry {entries}{more}")
-    }
-}
-
-fn check(path: &Path) -> Result<Check, Failure> {
-    recording::check(path).map_err(|error| failure(&error))
-}
-
-fn described(check: &Check) -> String {
-    let mut parts = vec![format!("{} bytes, {} journal entries, {} samples", check.bytes, check.lines, check.samples)];
-    if !check.has_index {
-        let why = if check.is_part { "still being written, or ended by a crash" } else { "its end is missing" };
-        parts.push(format!("no index ({why})"));
-    }
-    if !check.missing.is_empty() {
-        parts.push(format!("entries missing: {:?}", check.missing));
-    }
-    if check.damaged > 0 {
-        parts.push(format!("{} messages cannot be read", check.damaged));
-    }
-    parts.join(", ")
+    Ok(ExitStatus::Accepted)
 }
 
 /// What an error of a recording means to the operator.
@@ -197,7 +58,7 @@ pub(super) fn failure(error: &RecordingError) -> Failure {
 /// Refuses to write a recording over something else, such as the measurements.
 pub(super) fn check_target(path: &Path) -> Result<(), Failure> {
     let size = std::fs::metadata(path).map_or(0, |found| if found.is_file() { found.len() } else { 0 });
-    if size == 0 || recording::read(path).is_ok() {
+    if size == 0 || recording::is_recording(path) {
         return Ok(());
     }
     let message = format!("'{}' is there already and is no recording", path.display());

@@ -18,7 +18,7 @@ use crate::tui::replay::{self, Replay};
 use crate::units::to_mm;
 
 pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let mut journal = journal(&args.folder, console)?;
+    let mut journal = journal(&args.folder)?;
     let damaged = |error: &dyn std::error::Error| {
         Failure::new(ExitStatus::Store, format!("session '{}': {error}", args.folder.display()))
     };
@@ -59,21 +59,11 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
 }
 
 /// The journal of a session's folder, or the one that a recording carries.
-fn journal<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<Journal, Failure> {
+fn journal(path: &Path) -> Result<Journal, Failure> {
     if !path.is_file() {
         return read_journal(path).map_err(|error| session_failure(&error));
     }
-    let recording = recording::read(path).map_err(|error| record::failure(&error))?;
-    if !recording.missing.is_empty() || recording.damaged > 0 {
-        console.remark(&format!(
-            "the recording has gaps ({} entries missing, {} messages damaged); it is shown up to the first one",
-            recording.missing.len(),
-            recording.damaged
-        ));
-    }
-    recording
-        .lines()
-        .map_err(|error| Failure::new(ExitStatus::Store, format!("'{}' carries no session: {error}", path.display())))
+    recording::read(path).map_err(|error| record::failure(&error))
 }
 
 /// The entries, then the points that were measured, with what they say about both arms once these are known.

@@ -29,22 +29,10 @@ pub struct RecordArgs {
 /// What to do with recordings.
 #[derive(Debug, Subcommand)]
 pub enum RecordCommand {
-    /// Make the recording of a session anew from its journal
+    /// Make the recording of a session again from its journal
     Rebuild {
         /// Folder of the session
         #[arg(value_name = "DIR")]
         folder: PathBuf,
-    },
-    /// Make one compact file: of the parts in a session's folder, or of a file
-    Compact {
-        /// Folder of a session, or a recording
-        #[arg(value_name = "DIR|FILE.rrd")]
-        path: PathBuf,
-    },
-    /// Look whether recordings are whole; of a session also whether they have all that its journal has
-    Check {
-        /// Folders of sessions, or recordings
-        #[arg(value_name = "DIR|FILE.rrd", required = true)]
-        paths: Vec<PathBuf>,
     },
 }

@@ -1,25 +1,22 @@
 //! The layout that a viewer opens with.
 //!
-//! The library's layout builder lacks cameras, legends and trails; they are entities of the same store, written beside what
-//! the builder writes.
+//! The library's layout builder lacks cameras, legends and trails, and draws its ids at random. So the entities of a layout are
+//! written here: containers and views, each at a path that contains its id, and what belongs to a view below its path.
 
 use nalgebra::{Point3, Vector3};
-use rerun::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind, PanelState, PlayState};
-use rerun::blueprint::{
-    BarChartView, Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel,
-    Spatial3DView, Tabs, TensorView, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
+use rerun::blueprint::components::{
+    BackgroundKind, ContainerKind, Corner2D, Eye3DKind, PanelState, PlayState, RootContainer,
 };
-use rerun::external::re_log_types::BlueprintActivationCommand;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, VisibleTimeRanges,
+    Background, ContainerBlueprint, EntityBehavior, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
+    TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisibleTimeRanges,
 };
 use rerun::external::re_sdk_types::datatypes;
-use rerun::log::LogMsg;
-use rerun::{AsComponents, Color, RecordingStream, RecordingStreamBuilder};
+use rerun::{AsComponents, Color, TimeCell, TimePoint};
 
-use super::canvas::Canvas;
-use super::scribe::Posture;
-use super::{RecordingError, layout, names};
+use super::canvas::Row;
+use super::posture::Posture;
+use super::{layout, names};
 use crate::profile::Profile;
 
 /// What there is to see of a recording.
@@ -45,113 +42,153 @@ pub(super) enum Purpose {
 /// Background of the picture.
 const BACKGROUND: Color = layout::rgb(24, 28, 33);
 
-/// Something that the layout builder cannot say, at a path of the layout's store.
-type Extra = (String, Box<dyn AsComponents>);
-
-/// Sends the layout for the cell of `profile`.
-pub(super) fn send(canvas: &Canvas, profile: &Profile, contents: Contents) {
-    // A layout that cannot be made leaves the viewer's own: no reason to lose a recording.
-    if let Ok((messages, activation)) = messages(profile, contents) {
-        canvas.stream().send_blueprint(messages, activation);
+/// The layout for the cell of `profile`.
+pub(super) fn rows(profile: &Profile, contents: Contents) -> Vec<Row> {
+    let mut layout = Builder::default();
+    let picture = picture(profile, &mut layout);
+    let (right, timeline) = match contents.purpose {
+        Purpose::Capture => (capturing(contents.has_temperatures, &mut layout), names::POSE),
+        Purpose::Result => (result(contents.has_temperatures, &mut layout), names::POSE),
+        Purpose::Plan => (planning(&mut layout), names::PLAN_ITERATION),
+    };
+    layout.shared(ContainerKind::Horizontal, &[1.45, 1.0], &[picture, right]);
+    // The last container that was made holds all others.
+    let root = RootContainer(datatypes::Uuid { bytes: u128::from(layout.items).to_be_bytes() });
+    let viewport = ViewportBlueprint::new().with_root_container(root).with_auto_layout(false).with_auto_views(false);
+    layout.put("viewport", &viewport);
+    for panel in ["blueprint_panel", "selection_panel"] {
+        layout.put(panel, &PanelBlueprint::new().with_state(PanelState::Collapsed));
     }
+    let time_panel = TimePanelBlueprint::new()
+        .with_state(PanelState::Collapsed)
+        .with_timeline(timeline)
+        .with_fps(4.0)
+        .with_play_state(PlayState::Following);
+    layout.put("time_panel", &time_panel);
+    layout.rows
 }
 
-fn messages(
-    profile: &Profile,
-    contents: Contents,
-) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
-    let mut extras = Vec::new();
-    let picture = picture(profile, &mut extras);
-    let (right, timeline) = match contents.purpose {
-        Purpose::Capture => (capturing(contents.has_temperatures, &mut extras), names::POSE),
-        Purpose::Result => (result(contents.has_temperatures, &mut extras), names::POSE),
-        Purpose::Plan => (planning(&mut extras), names::PLAN_ITERATION),
-    };
-    let root = Horizontal::new([picture, right]).with_column_shares([1.45, 1.0]);
-    let blueprint = Blueprint::new(root)
-        .with_auto_views(false)
-        .with_auto_layout(false)
-        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
-        .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
-        .with_time_panel(
-            TimePanel::new()
-                .with_state(PanelState::Collapsed)
-                .with_timeline(timeline)
-                .with_fps(4.0)
-                .with_play_state(PlayState::Following),
-        );
-    with_extras(&blueprint, &extras)
+/// Collects the entities of a layout. What is made has a path; containers list the paths of what they hold.
+#[derive(Debug, Default)]
+struct Builder {
+    rows: Vec<Row>,
+    /// Containers and views so far: their ids are numbers.
+    items: u64,
+}
+
+impl Builder {
+    fn put(&mut self, path: &str, what: &dyn AsComponents) {
+        let time = TimePoint::default().with_index("blueprint", TimeCell::from_sequence(0));
+        self.rows.push(Row::new(path, time, what));
+    }
+
+    /// The path of a new container or view.
+    fn path(&mut self, kind: &str) -> String {
+        self.items += 1;
+        format!("/{kind}/00000000-0000-0000-0000-{:012x}", self.items)
+    }
+
+    fn view(&mut self, class: &str, name: &str, origin: &str, contents: &[&str]) -> String {
+        let path = self.path("view");
+        self.put(&format!("{path}/ViewContents"), &ViewContents::new(contents.iter().copied()));
+        let view = ViewBlueprint::new(class).with_display_name(name).with_space_origin(format!("/{origin}"));
+        self.put(&path, &view);
+        path
+    }
+
+    /// A view of one entity with everything below it.
+    fn entity(&mut self, class: &str, name: &str, entity: &str) -> String {
+        self.view(class, name, entity, &["$origin/**"])
+    }
+
+    fn container(&mut self, container: &ContainerBlueprint, contents: &[String]) -> String {
+        let path = self.path("container");
+        self.put(&path, &container.clone().with_contents(contents.iter().map(String::as_str)));
+        path
+    }
+
+    /// Tabs or a stack with a name.
+    fn named(&mut self, kind: ContainerKind, name: &str, contents: &[String]) -> String {
+        self.container(&ContainerBlueprint::new(kind).with_display_name(name), contents)
+    }
+
+    /// A row or a stack whose parts take these shares of it.
+    fn shared(&mut self, kind: ContainerKind, shares: &[f32], contents: &[String]) -> String {
+        let container = ContainerBlueprint::new(kind);
+        let shares = shares.iter().copied();
+        let container = match kind {
+            ContainerKind::Horizontal => container.with_col_shares(shares),
+            _ => container.with_row_shares(shares),
+        };
+        self.container(&container, contents)
+    }
 }
 
 /// Beside the picture while there is no result: nothing that would be empty.
-fn capturing(has_temperatures: bool, extras: &mut Vec<Extra>) -> ContainerLike {
-    let plots = Tabs::new([capture(has_temperatures, extras), search(extras)]).with_name("Measurement");
-    Vertical::new([plots.into(), log(), Tabs::new([guide(), report()]).with_name("Texts").into()])
-        .with_row_shares([1.0, 0.7, 1.3])
-        .into()
+fn capturing(has_temperatures: bool, layout: &mut Builder) -> String {
+    let plots = [capture(has_temperatures, layout), search(layout)];
+    let plots = layout.named(ContainerKind::Tabs, "Measurement", &plots);
+    let log = log(layout);
+    let texts = [guide(layout), report(layout)];
+    let texts = layout.named(ContainerKind::Tabs, "Texts", &texts);
+    layout.shared(ContainerKind::Vertical, &[1.0, 0.7, 1.3], &[plots, log, texts])
 }
 
 /// Beside the picture when there is a result.
-fn result(has_temperatures: bool, extras: &mut Vec<Extra>) -> ContainerLike {
-    let (positions, distances) = errors(extras);
-    let plots = Tabs::new([positions, distances, capture(has_temperatures, extras), solver(extras), search(extras)]);
-    let bars = Tabs::new([
-        view(BarChartView::new("Deviations in sigma (bar numbers: see report)").with_origin(names::SIGNIFICANCE)),
-        view(TensorView::new("All pairs, nominal (um)").with_origin(names::MAP_NOMINAL)),
-        view(TensorView::new("All pairs, identified (um)").with_origin(names::MAP_IDENTIFIED)),
-    ]);
-    Vertical::new([
-        ContainerLike::from(plots.with_name("Errors")),
-        bars.with_name("Parameters and pairs").into(),
-        Tabs::new([report(), guide(), log()]).with_name("Texts").into(),
-    ])
-    .with_row_shares([1.1, 0.8, 1.1])
-    .into()
+fn result(has_temperatures: bool, layout: &mut Builder) -> String {
+    let [positions, distances] = errors(layout);
+    let plots = [positions, distances, capture(has_temperatures, layout), solver(layout), search(layout)];
+    let plots = layout.named(ContainerKind::Tabs, "Errors", &plots);
+    let bars = [
+        layout.entity("BarChart", "Deviations in sigma (bar numbers: see report)", names::SIGNIFICANCE),
+        layout.entity("Tensor", "All pairs, nominal (um)", names::MAP_NOMINAL),
+        layout.entity("Tensor", "All pairs, identified (um)", names::MAP_IDENTIFIED),
+    ];
+    let bars = layout.named(ContainerKind::Tabs, "Parameters and pairs", &bars);
+    let texts = [report(layout), guide(layout), log(layout)];
+    let texts = layout.named(ContainerKind::Tabs, "Texts", &texts);
+    layout.shared(ContainerKind::Vertical, &[1.1, 0.8, 1.1], &[plots, bars, texts])
 }
 
 /// Beside the picture of a plan.
-fn planning(extras: &mut Vec<Extra>) -> ContainerLike {
-    Vertical::new([search(extras), Tabs::new([guide(), report(), log()]).with_name("Texts").into()]).into()
+fn planning(layout: &mut Builder) -> String {
+    let search = search(layout);
+    let texts = [guide(layout), report(layout), log(layout)];
+    let texts = layout.named(ContainerKind::Tabs, "Texts", &texts);
+    layout.container(&ContainerBlueprint::new(ContainerKind::Vertical), &[search, texts])
 }
 
-fn report() -> ContainerLike {
-    view(TextDocumentView::new("Report").with_origin(names::REPORT))
+fn report(layout: &mut Builder) -> String {
+    layout.entity("TextDocument", "Report", names::REPORT)
 }
 
-fn guide() -> ContainerLike {
-    view(TextDocumentView::new("How to read this picture").with_origin(names::GUIDE))
+fn guide(layout: &mut Builder) -> String {
+    layout.entity("TextDocument", "How to read this picture", names::GUIDE)
 }
 
-fn log() -> ContainerLike {
-    view(TextLogView::new("Log").with_origin(names::LOG))
+fn log(layout: &mut Builder) -> String {
+    layout.entity("TextLog", "Log", names::LOG)
 }
 
 /// The 3D view.
-fn picture(profile: &Profile, extras: &mut Vec<Extra>) -> ContainerLike {
-    let view: ContainerLike = Spatial3DView::new("Cell").with_origin(names::WORLD).with_contents(["$origin/**"]).into();
-    let Some(path) = path(&view) else { return view };
+fn picture(profile: &Profile, layout: &mut Builder) -> String {
+    let path = layout.entity("3D", "Cell", names::WORLD);
     let (eye, target) = camera(profile);
-    let mut at = |name: &str, what: Box<dyn AsComponents>| extras.push((format!("{path}/{name}"), what));
-    at(
-        "EyeControls3D",
-        Box::new(
-            EyeControls3D::new()
-                .with_kind(Eye3DKind::Orbital)
-                .with_position(layout::at(&eye))
-                .with_look_target(layout::at(&target))
-                .with_eye_up([0.0, 0.0, 1.0]),
-        ),
-    );
-    at("LineGrid3D", Box::new(LineGrid3D::new().with_visible(false)));
-    at("Background", Box::new(Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND)));
-    let mut of = |entity: &str, name: &str, what: Box<dyn AsComponents>| {
-        let _: () = extras.push((format!("{path}/ViewContents/overrides/{entity}{name}"), what));
-    };
-    of(names::MEASURED, "/visualizers", Box::new(trail()));
+    let controls = EyeControls3D::new()
+        .with_kind(Eye3DKind::Orbital)
+        .with_position(layout::at(&eye))
+        .with_look_target(layout::at(&target))
+        .with_eye_up([0.0, 0.0, 1.0]);
+    layout.put(&format!("{path}/EyeControls3D"), &controls);
+    layout.put(&format!("{path}/LineGrid3D"), &LineGrid3D::new().with_visible(false));
+    let background = Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND);
+    layout.put(&format!("{path}/Background"), &background);
+    let visualizers = |entity: &str| format!("{path}/ViewContents/overrides/{entity}/visualizers");
+    layout.put(&visualizers(names::MEASURED), &trail());
     for hidden in [names::PAIRS_NOMINAL, names::PAIRS_IDENTIFIED, names::UNCERTAINTY] {
-        of(hidden, "/visualizers", Box::new(EntityBehavior::new().with_visible(false)));
+        layout.put(&visualizers(hidden), &EntityBehavior::new().with_visible(false));
     }
-    view
+    path
 }
 
 /// All rows up to the time cursor.
@@ -203,108 +240,52 @@ fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
 }
 
 /// Plots of the errors of positions and of distances at the poses.
-fn errors(extras: &mut Vec<Extra>) -> (ContainerLike, ContainerLike) {
-    // Each arm has a plot of its own: beside the nominal errors the identified ones would not be seen.
-    let mut both = |quantity: &str, title: &str, name: &str| {
-        let mut of = |arm: &str| {
+fn errors(layout: &mut Builder) -> [String; 2] {
+    let plots = [
+        ("position", "Position error", "Position errors"),
+        ("distance", "Mean distance error to all others", "Distance errors"),
+    ];
+    plots.map(|(quantity, title, name)| {
+        // Each arm has a plot of its own: beside the nominal errors the identified ones would not be seen.
+        let arms = ["nominal", "identified"].map(|arm| {
             let contents = format!("+ /{}/**", names::all_errors(quantity, arm));
-            series(&format!("{title}, {arm} arm (mm)"), &[&contents], extras)
-        };
-        ContainerLike::from(Vertical::new([of("nominal"), of("identified")]).with_name(name))
-    };
-    let positions = both("position", "Position error", "Position errors");
-    let distances = both("distance", "Mean distance error to all others", "Distance errors");
-    (positions, distances)
+            let plot = series(&format!("{title}, {arm} arm (mm)"), &[&contents], layout);
+            layout.put(&format!("{plot}/PlotLegend"), &PlotLegend::new().with_corner(Corner2D::RightTop));
+            plot
+        });
+        layout.named(ContainerKind::Vertical, name, &arms)
+    })
 }
 
 /// Plots of the solver.
-fn solver(extras: &mut Vec<Extra>) -> ContainerLike {
-    Vertical::new([
-        series("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"], extras),
-        series("Cost and largest step (log10), per solver step", &["+ /solver/cost_and_step_log10"], extras),
-    ])
-    .with_name("Solver")
-    .into()
+fn solver(layout: &mut Builder) -> String {
+    let plots = [
+        series("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"], layout),
+        series("Cost and largest step (log10), per solver step", &["+ /solver/cost_and_step_log10"], layout),
+    ];
+    layout.named(ContainerKind::Vertical, "Solver", &plots)
 }
 
 /// Plots of the search for poses.
-fn search(extras: &mut Vec<Extra>) -> ContainerLike {
+fn search(layout: &mut Builder) -> String {
     let others = ["+ /search/observability_o1_mm", "+ /search/predicted_error_sigma"];
-    Vertical::new([
-        series("Condition number, per sweep", &["+ /search/condition_number"], extras),
-        series("Observability O1 (mm), predicted error (sigma), per sweep", &others, extras),
-    ])
-    .with_name("Search")
-    .into()
+    let plots = [
+        series("Condition number, per sweep", &["+ /search/condition_number"], layout),
+        series("Observability O1 (mm), predicted error (sigma), per sweep", &others, layout),
+    ];
+    layout.named(ContainerKind::Vertical, "Search", &plots)
 }
 
 /// Plots of the capture. Nothing that would be empty: many instruments report no temperature.
-fn capture(has_temperatures: bool, extras: &mut Vec<Extra>) -> ContainerLike {
-    let lengths = series(
-        "Predicted error of a calibration so far, scatter, drift (mm)",
-        &["+ /capture/predicted_error_mm", "+ /capture/scatter_mm", "+ /capture/drift_mm"],
-        extras,
-    );
-    let mut plots = vec![lengths];
+fn capture(has_temperatures: bool, layout: &mut Builder) -> String {
+    let lengths = ["+ /capture/predicted_error_mm", "+ /capture/scatter_mm", "+ /capture/drift_mm"];
+    let mut plots = vec![series("Predicted error of a calibration so far, scatter, drift (mm)", &lengths, layout)];
     if has_temperatures {
-        plots.push(series("Temperature (degC)", &["+ /capture/temperature_degc"], extras));
+        plots.push(series("Temperature (degC)", &["+ /capture/temperature_degc"], layout));
     }
-    Vertical::new(plots).with_name("Capture").into()
+    layout.named(ContainerKind::Vertical, "Capture", &plots)
 }
 
-fn series(name: &str, contents: &[&str], extras: &mut Vec<Extra>) -> ContainerLike {
-    let view: ContainerLike = TimeSeriesView::new(name).with_origin("/").with_contents(contents.iter().copied()).into();
-    let is_crowded = contents.iter().any(|content| content.ends_with("**"));
-    if let (Some(path), true) = (path(&view), is_crowded) {
-        extras.push((format!("{path}/PlotLegend"), Box::new(PlotLegend::new().with_corner(Corner2D::RightTop))));
-    }
-    view
-}
-
-fn view(view: impl Into<ContainerLike>) -> ContainerLike {
-    view.into()
-}
-
-/// Where a view stands in the layout's store.
-fn path(view: &ContainerLike) -> Option<String> {
-    match view {
-        ContainerLike::View(view) => Some(view.blueprint_path().to_string()),
-        _ => None,
-    }
-}
-
-/// The messages of a layout with what its builder cannot say.
-fn with_extras(
-    blueprint: &Blueprint,
-    extras: &[Extra],
-) -> Result<(Vec<LogMsg>, BlueprintActivationCommand), RecordingError> {
-    let failed = |error: rerun::RecordingStreamError| RecordingError::library("making the layout", error);
-    if !rerun::decide_logging_enabled(true) {
-        // The library's builder then makes nothing, and panics about it. Everything else is recorded all the same.
-        return Err(RecordingError::library("making the layout", "the environment variable RERUN forbids it"));
-    }
-    let (carrier, sent) = RecordingStreamBuilder::new(names::APPLICATION).enabled(true).memory().map_err(failed)?;
-    let activation = BlueprintActivation { make_active: true, make_default: true };
-    blueprint.send(&carrier, activation).map_err(failed)?;
-    let mut messages = Vec::new();
-    let mut command = None;
-    for message in sent.take() {
-        match message {
-            LogMsg::BlueprintActivationCommand(activation) => command = Some(activation),
-            message if message.store_id().is_blueprint() => messages.push(message),
-            _ => {}
-        }
-    }
-    let command = command.ok_or_else(|| RecordingError::library("making the layout", "it has no activation"))?;
-    let (own, written): (RecordingStream, _) = RecordingStreamBuilder::from_store_id(&command.blueprint_id)
-        .send_properties(false)
-        .enabled(true)
-        .memory()
-        .map_err(failed)?;
-    own.set_time_sequence("blueprint", 0);
-    for (path, what) in extras {
-        own.log(path.as_str(), what.as_ref()).map_err(failed)?;
-    }
-    messages.extend(written.take().into_iter().filter(|message| matches!(message, LogMsg::ArrowMsg(..))));
-    Ok((messages, command))
+fn series(name: &str, contents: &[&str], layout: &mut Builder) -> String {
+    layout.view("TimeSeries", name, "", contents)
 }

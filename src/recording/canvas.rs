@@ -1,7 +1,8 @@
-//! Where a scribe draws.
+//! Rows of a recording, collected until they are written or shown.
 
 use jiff::Timestamp;
-use rerun::{AsComponents, RecordingStream};
+use rerun::external::re_log_types::EntityPath;
+use rerun::{AsComponents, SerializedComponentBatch, TimeCell, TimePoint};
 
 use super::names;
 
@@ -16,7 +17,7 @@ pub(super) struct Moment {
     pub(super) plan_iteration: Option<i64>,
     /// Step of the solver.
     pub(super) solver_iteration: Option<i64>,
-    /// When it happened.
+    /// Clock time.
     pub(super) time: Option<Timestamp>,
 }
 
@@ -31,9 +32,28 @@ impl Moment {
         Self { solver_iteration: Some(index(step)), ..Self::default() }
     }
 
-    /// At a pose, seen from a result: it has no time of its own.
+    /// At a pose, without a clock time.
     pub(super) fn pose(number: u64) -> Self {
         Self { pose: Some(i64::try_from(number).unwrap_or(i64::MAX)), ..Self::default() }
+    }
+
+    fn time_point(self) -> TimePoint {
+        let sequences = [
+            (names::POSE, self.pose),
+            (names::ENTRY, self.entry),
+            (names::PLAN_ITERATION, self.plan_iteration),
+            (names::SOLVER_ITERATION, self.solver_iteration),
+        ];
+        let mut point = TimePoint::default();
+        for (timeline, value) in sequences {
+            if let Some(value) = value {
+                point.insert_cell(timeline, TimeCell::from_sequence(value));
+            }
+        }
+        if let Some(time) = self.time {
+            point.insert_cell(names::TIME, TimeCell::from_timestamp_nanos_since_epoch(nanoseconds(time)));
+        }
+        point
     }
 }
 
@@ -42,54 +62,51 @@ fn index(value: usize) -> i64 {
     i64::try_from(value).unwrap_or(i64::MAX)
 }
 
-/// One stream of the library, with time set for every single thing.
+/// Nanoseconds since 1970.
+pub(super) fn nanoseconds(time: Timestamp) -> i64 {
+    i64::try_from(time.as_nanosecond()).unwrap_or(i64::MAX)
+}
+
+/// What an entity shows from a time on, or always.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    pub(super) entity: EntityPath,
+    /// Empty: always.
+    pub(super) time: TimePoint,
+    pub(super) components: Vec<SerializedComponentBatch>,
+}
+
+impl Row {
+    pub(super) fn new(path: &str, time: TimePoint, what: &dyn AsComponents) -> Self {
+        Self { entity: path.into(), time, components: what.as_serialized_batches() }
+    }
+}
+
+/// The layout that a viewer opens with.
 #[derive(Debug)]
+pub(super) struct Layout {
+    /// Number of the journal line that asked for it.
+    pub(super) line: u64,
+    pub(super) rows: Vec<Row>,
+}
+
+/// Collects what is drawn.
+#[derive(Debug, Default)]
 pub(super) struct Canvas {
-    stream: RecordingStream,
+    /// Rows in the order in which they were drawn.
+    pub(super) rows: Vec<Row>,
+    /// The last layout.
+    pub(super) layout: Option<Layout>,
 }
 
 impl Canvas {
-    /// Draws on `stream`.
-    pub(super) fn new(stream: RecordingStream) -> Self {
-        // Two recordings of one journal are the same: only its own times count.
-        stream.set_log_time_enabled(false);
-        Self { stream }
-    }
-
     /// Shows something from `moment` on.
-    pub(super) fn draw(&self, moment: Moment, path: &str, what: &dyn AsComponents) {
-        self.stream.reset_time();
-        let sequences = [
-            (names::POSE, moment.pose),
-            (names::ENTRY, moment.entry),
-            (names::PLAN_ITERATION, moment.plan_iteration),
-            (names::SOLVER_ITERATION, moment.solver_iteration),
-        ];
-        for (timeline, value) in sequences {
-            if let Some(value) = value {
-                self.stream.set_time_sequence(timeline, value);
-            }
-        }
-        if let Some(time) = moment.time {
-            let nanoseconds = i64::try_from(time.as_nanosecond()).unwrap_or(i64::MAX);
-            self.stream.set_timestamp_nanos_since_epoch(names::TIME, nanoseconds);
-        }
-        // Whether it was written is asked for when the stream is flushed.
-        drop(self.stream.log(path, what));
+    pub(super) fn draw(&mut self, moment: Moment, path: &str, what: &dyn AsComponents) {
+        self.rows.push(Row::new(path, moment.time_point(), what));
     }
 
-    /// Shows something always; replaces what was there.
-    pub(super) fn fix(&self, path: &str, what: &dyn AsComponents) {
-        drop(self.stream.log_static(path, what));
-    }
-
-    /// Says something about the session as a whole.
-    pub(super) fn property(&self, name: &str, what: &dyn AsComponents) {
-        drop(self.stream.send_property(name, what));
-    }
-
-    /// The stream.
-    pub(super) const fn stream(&self) -> &RecordingStream {
-        &self.stream
+    /// Shows something always, in place of what was always shown there.
+    pub(super) fn fix(&mut self, path: &str, what: &dyn AsComponents) {
+        self.rows.push(Row::new(path, TimePoint::default(), what));
     }
 }

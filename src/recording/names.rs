@@ -3,10 +3,6 @@
 /// Application id of all recordings: layouts belong to it.
 pub(super) const APPLICATION: &str = "trupose";
 
-/// What says that a file is a part, written while a session was measured: it may end anywhere. Files that were made in one go
-/// do not say so: where their end is missing, anything may be missing.
-pub(super) const PART: &str = "trupose, while measuring";
-
 /// Number of the measurement; 0 before the first.
 pub(super) const POSE: &str = "pose";
 /// Sweep of the pose search.
@@ -26,6 +22,13 @@ pub(super) const LOG: &str = "log";
 pub(super) const REPORT: &str = "report";
 /// How to read the picture.
 pub(super) const GUIDE: &str = "guide";
+
+/// Name and start of the recording.
+pub(super) const PROPERTIES: &str = "__properties";
+/// Properties of the session.
+pub(super) const SESSION_PROPERTIES: &str = "__properties/session";
+/// Properties of the last result.
+pub(super) const RESULT_PROPERTIES: &str = "__properties/result";
 
 /// Everything in the picture.
 pub(super) const WORLD: &str = "world";

@@ -1,125 +1,51 @@
-//! The thread that records while a session is worked on. Nobody waits for it, and nothing depends on it.
+//! The thread that keeps the recording up to date while a session is measured. Nobody waits for it, and nothing depends on it.
 
 use std::io;
-use std::iter;
-use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Weak};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, SyncSender, sync_channel};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use rerun::RecordingStream;
-
-use super::RecordingError;
-use super::blueprint::Purpose;
-use super::scribe::Scribe;
-use super::segments::{self, Identity};
+use super::live::{Live, LiveView};
+use super::{RecordingError, file};
 use crate::session::journal::Line;
+use crate::store;
+use crate::text::causes;
 
-/// Batches of lines that wait. A technician makes a few a minute; a disk that is this far behind has failed.
-const WAITING: usize = 1024;
-/// Longest time for a batch to reach the disk.
-const FLUSH: Duration = Duration::from_secs(5);
-/// Longest time for the recording to give its room back.
-const GIVE_BACK: Duration = Duration::from_secs(2);
-/// Longest time to wait at the end for the parts to become one file: a hundred times what a long session takes.
+/// Shortest pause between two files.
+const PAUSE: Duration = Duration::from_secs(3);
+/// The pause is at least this many times as long as the file before took: a long session never costs more than a tenth of a core.
+const PAUSE_PER_FILE: u32 = 9;
+/// Longest wait for the last file: a hundred times what a long session takes.
 const FINISH: Duration = Duration::from_secs(20);
+/// Bytes of the disk that are left for the session: hundreds of times what a day of measuring adds to its journal.
+const RESERVE: u64 = 16 << 20;
 
-/// What the recorder has to say.
+/// Something that the operator should know about the recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RecordingEvent {
-    /// The recording has stopped; the journal has everything.
+    /// The file could not be written.
     Failed(String),
-    /// The live view has stopped; the recording goes on.
+    /// The live view has stopped.
     LiveFailed(String),
-}
-
-/// A port on this machine on which viewers may look at the recording while it grows.
-#[derive(Clone, Copy, Debug)]
-pub struct Live {
-    port: u16,
-}
-
-impl Live {
-    /// Makes sure that the port can be had.
-    ///
-    /// # Errors
-    /// It is taken, or this program was built without the live view.
-    pub fn on(port: u16) -> Result<Self, RecordingError> {
-        if cfg!(not(feature = "live")) {
-            let message = "this program was built without the live view".to_owned();
-            return Err(RecordingError::Port { port, message });
-        }
-        // The library says nothing about a port that is taken.
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
-            .map_err(|error| RecordingError::Port { port, message: error.to_string() })?;
-        let port = listener.local_addr().map_or(port, |address| address.port());
-        Ok(Self { port })
-    }
-
-    /// The port.
-    pub const fn port(&self) -> u16 {
-        self.port
-    }
-
-    /// What a viewer connects to.
-    pub fn url(&self) -> String {
-        format!("rerun+http://127.0.0.1:{}/proxy", self.port)
-    }
-
-    /// A stream to whoever connects, early or late. The server's own limit of 1 GiB is a hundred times a long session.
-    #[cfg(feature = "live")]
-    fn stream(self, identity: &Identity) -> Result<RecordingStream, RecordingError> {
-        identity
-            .builder()
-            .serve_grpc_opts("127.0.0.1", self.port, rerun::external::re_grpc_server::ServerOptions::default())
-            .map_err(|error| RecordingError::library("beginning the live view", error))
-    }
-
-    #[cfg(not(feature = "live"))]
-    fn stream(&self, _identity: &Identity) -> Result<RecordingStream, RecordingError> {
-        let message = "this program was built without the live view".to_owned();
-        Err(RecordingError::Port { port: self.port, message })
-    }
-}
-
-/// What the thread is told.
-#[derive(Debug)]
-enum Message {
-    /// Lines that are on disk.
-    Lines(Vec<Line>),
-    /// The disk is full and the session needs the room. The answer comes when it is given back.
-    GiveRoom(SyncSender<()>),
-}
-
-/// Lets whoever writes the session have the room of its recording. The recorder ends without waiting for it.
-#[derive(Clone, Debug)]
-pub struct Room(Weak<SyncSender<Message>>);
-
-impl Room {
-    /// Ends the recording and gives its room back. Does not wait for long.
-    pub fn give_back(&self) {
-        let Some(recorder) = self.0.upgrade() else { return };
-        let (answer, given) = sync_channel(1);
-        if recorder.try_send(Message::GiveRoom(answer)).is_ok() {
-            // What is not given back by then is missed by a write that fails once more, and says so.
-            let _given_or_not = given.recv_timeout(GIVE_BACK).is_ok();
-        }
-    }
 }
 
 /// Records a session.
 #[derive(Debug)]
 pub struct Recorder {
-    lines: Option<Arc<SyncSender<Message>>>,
-    finished: Receiver<Result<(), String>>,
-    is_hurried: Arc<AtomicBool>,
+    messages: Option<Sender<Message>>,
+}
+
+#[derive(Debug)]
+enum Message {
+    /// Lines that are on disk.
+    Lines(Vec<Line>),
+    /// Write the last file, answer with the outcome, and end.
+    Finish(SyncSender<Result<(), RecordingError>>),
 }
 
 impl Recorder {
-    /// Records into `folder` a session that has the lines `before` so far. `tell` hears of failures, on the recorder's thread.
+    /// Records into `folder` a session whose journal has the lines `before` so far. `report` is called on the recorder's thread.
     ///
     /// # Errors
     /// The system refuses a thread.
@@ -127,222 +53,158 @@ impl Recorder {
         folder: &Path,
         before: Vec<Line>,
         live: Option<Live>,
-        tell: impl Fn(RecordingEvent) + Send + 'static,
+        report: impl Fn(RecordingEvent) + Send + 'static,
     ) -> io::Result<Self> {
-        let (lines, received) = sync_channel(WAITING);
-        let (done, finished) = sync_channel(1);
-        let folder = folder.to_owned();
-        let is_hurried = Arc::new(AtomicBool::new(false));
-        let hurried = Arc::clone(&is_hurried);
+        let (messages, received) = mpsc::channel();
+        let mut work = Work {
+            folder: folder.to_owned(),
+            report,
+            lines: Vec::new(),
+            recorded: 0,
+            next_file: now(),
+            has_failed: false,
+            live,
+            view: None,
+        };
         thread::Builder::new().name("recorder".to_owned()).spawn(move || {
-            let mut work = Work { folder, live, tell, file: None, path: None, view: None, failure: None };
-            if !before.is_empty() {
-                work.begin(&before);
-            }
-            while let Ok(first) = received.recv() {
-                // What has piled up is written at once.
-                let mut lines = Vec::new();
-                for message in iter::once(first).chain(received.try_iter()) {
-                    match message {
-                        Message::Lines(more) => lines.extend(more),
-                        Message::GiveRoom(answer) => {
-                            work.give_room();
-                            // Nobody may be waiting any more.
-                            let _nobody = answer.try_send(()).is_err();
-                        }
-                    }
-                }
-                work.take(&lines);
-            }
-            // Nobody may be waiting any more.
-            let _nobody = done.send(work.end(&hurried));
+            work.take(before);
+            work.run(&received);
         })?;
-        Ok(Self { lines: Some(Arc::new(lines)), finished, is_hurried })
+        Ok(Self { messages: Some(messages) })
     }
 
     /// Takes lines that are on disk. Never waits.
     ///
     /// # Errors
-    /// The recorder cannot take them, and nothing after them.
+    /// The recorder has stopped because of a defect.
     pub fn take(&mut self, lines: &[Line]) -> Result<(), &'static str> {
-        let Some(sender) = &self.lines else { return Ok(()) };
-        let refused = match sender.try_send(Message::Lines(lines.to_vec())) {
-            Ok(()) => return Ok(()),
-            Err(TrySendError::Full(_)) => "the disk is too slow for it",
-            Err(TrySendError::Disconnected(_)) => "an internal error ended it",
-        };
-        self.lines = None;
-        Err(refused)
+        let Some(messages) = &self.messages else { return Ok(()) };
+        messages.send(Message::Lines(lines.to_vec())).map_err(|_gone| {
+            self.messages = None;
+            DEFECT
+        })
     }
 
-    /// What gives its room back when the disk is full.
-    pub fn room(&self) -> Option<Room> {
-        self.lines.as_ref().map(|lines| Room(Arc::downgrade(lines)))
-    }
-
-    /// There is no time to make one file of the parts: they stay, and whoever goes on with the session joins them.
-    pub fn hurry(&self) {
-        self.is_hurried.store(true, Ordering::Relaxed);
-    }
-
-    /// Makes one file of the parts. Waits for it, but not for ever.
+    /// Writes the last file and waits for it, but not for ever. Without it, dropping a recorder leaves the file as it is.
     ///
     /// # Errors
-    /// It was not done; the parts are still there.
+    /// The file does not have the last lines.
     pub fn finish(&mut self) -> Result<(), String> {
-        if self.lines.take().is_none() {
+        let Some(messages) = self.messages.take() else { return Ok(()) };
+        let (answer, outcome) = sync_channel(1);
+        // Where the thread is gone, the channel of the answer is closed as well.
+        drop(messages.send(Message::Finish(answer)));
+        match outcome.recv_timeout(FINISH) {
+            Ok(outcome) => outcome.map_err(|error| causes(&error)),
+            Err(RecvTimeoutError::Timeout) => Err("the disk is too slow".to_owned()),
+            Err(RecvTimeoutError::Disconnected) => Err(DEFECT.to_owned()),
+        }
+    }
+}
+
+/// What is said when the thread has panicked.
+const DEFECT: &str = "a defect of this program has stopped it";
+
+/// The state of the thread.
+struct Work<R> {
+    folder: PathBuf,
+    report: R,
+    /// All lines of the journal.
+    lines: Vec<Line>,
+    /// How many of them are in the file.
+    recorded: usize,
+    /// When the next file may be written.
+    next_file: Instant,
+    /// Writing has failed. Then there is one last try at the end.
+    has_failed: bool,
+    /// The live view that was asked for, until the first line.
+    live: Option<Live>,
+    view: Option<LiveView>,
+}
+
+impl<R: Fn(RecordingEvent)> Work<R> {
+    fn run(mut self, received: &Receiver<Message>) {
+        loop {
+            let until_due = self.next_file.saturating_duration_since(now());
+            let next = match self.is_behind() && !self.has_failed {
+                true if until_due.is_zero() => {
+                    self.update();
+                    continue;
+                }
+                true => received.recv_timeout(until_due),
+                false => received.recv().map_err(RecvTimeoutError::from),
+            };
+            match next {
+                Ok(Message::Lines(lines)) => self.take(lines),
+                Ok(Message::Finish(answer)) => {
+                    // The receiver may have given up.
+                    let _gone = answer.send(self.write()).is_err();
+                    break;
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        if let Some(view) = self.view {
+            view.end();
+        }
+    }
+
+    /// Whether the file lacks lines.
+    const fn is_behind(&self) -> bool {
+        self.recorded < self.lines.len()
+    }
+
+    fn take(&mut self, lines: Vec<Line>) {
+        if let (Some(live), Some(first)) = (self.live, lines.first()) {
+            self.live = None;
+            match LiveView::start(live, first) {
+                Ok(view) => self.view = Some(view),
+                Err(error) => (self.report)(RecordingEvent::LiveFailed(causes(&error))),
+            }
+        }
+        if let Some(view) = &mut self.view {
+            view.show(&lines);
+        }
+        self.lines.extend(lines);
+    }
+
+    /// Writes a file and decides when the next one may follow. A failure is reported once.
+    fn update(&mut self) {
+        let begun = now();
+        if let Err(error) = self.write() {
+            self.has_failed = true;
+            (self.report)(RecordingEvent::Failed(causes(&error)));
+        }
+        let end = now();
+        self.next_file = end + PAUSE.max(PAUSE_PER_FILE * (end - begun));
+    }
+
+    /// Writes the file if it lacks lines.
+    fn write(&mut self) -> Result<(), RecordingError> {
+        if !self.is_behind() {
             return Ok(());
         }
-        match self.finished.recv_timeout(FINISH) {
-            Ok(result) => result,
-            Err(RecvTimeoutError::Timeout) => Err("the disk is too slow to make one file of it".to_owned()),
-            Err(RecvTimeoutError::Disconnected) => Err("an internal error ended it".to_owned()),
+        if store::free_bytes(&self.folder).is_some_and(|free| free < RESERVE) {
+            return Err(RecordingError::NoRoom { reserve: RESERVE });
         }
+        file::rebuild(&self.folder, &self.lines)?;
+        self.recorded = self.lines.len();
+        Ok(())
     }
 }
 
-impl Drop for Recorder {
-    fn drop(&mut self) {
-        // Whoever wants to know has asked before.
-        drop(self.finish());
-    }
-}
-
-struct Work<T: Fn(RecordingEvent)> {
-    folder: PathBuf,
-    live: Option<Live>,
-    tell: T,
-    file: Option<Scribe>,
-    /// Where it writes.
-    path: Option<PathBuf>,
-    view: Option<Scribe>,
-    /// Why it has stopped.
-    failure: Option<String>,
-}
-
-impl<T: Fn(RecordingEvent)> Work<T> {
-    /// Begins a part, and draws what earlier parts lack.
-    fn begin(&mut self, before: &[Line]) {
-        let Some(first) = before.first() else { return };
-        let identity = Identity::of(first);
-        if let Some(live) = self.live.take() {
-            match live.stream(&identity) {
-                Ok(stream) => {
-                    let mut scribe = Scribe::new(stream, Purpose::Capture, &[]);
-                    for line in before {
-                        scribe.take(line);
-                    }
-                    self.view = Some(scribe);
-                }
-                Err(error) => (self.tell)(RecordingEvent::LiveFailed(text(&error))),
-            }
-        }
-        match self.part(&identity, before) {
-            Ok(scribe) => self.file = Some(scribe),
-            Err(error) => self.fail(text(&error)),
-        }
-        self.flush();
-    }
-
-    /// A part that goes on where the files of the folder end. What a crash left is drawn anew, and removed once that is on disk.
-    fn part(&mut self, identity: &Identity, before: &[Line]) -> Result<Scribe, RecordingError> {
-        segments::clean(&self.folder);
-        let earlier = segments::earlier(&self.folder, before);
-        let (drawn, missing) = before.split_at(earlier.lines.min(before.len()));
-        let path = segments::next_part(&self.folder);
-        let stream = identity.file(self.path.insert(path))?;
-        let mut scribe = Scribe::new(stream, Purpose::Capture, drawn);
-        for line in missing {
-            scribe.take(line);
-        }
-        if !earlier.void.is_empty() {
-            scribe
-                .stream()
-                .flush_with_timeout(FLUSH)
-                .map_err(|error| RecordingError::library("writing the recording", error))?;
-            segments::remove(&earlier.void)?;
-        }
-        Ok(scribe)
-    }
-
-    fn take(&mut self, lines: &[Line]) {
-        if lines.is_empty() {
-            return;
-        }
-        if self.file.is_none() && self.view.is_none() {
-            // The first lines of a session, or all has failed.
-            if self.failure.is_none() {
-                self.begin(lines);
-            }
-            return;
-        }
-        for scribe in self.file.iter_mut().chain(&mut self.view) {
-            for line in lines {
-                scribe.take(line);
-            }
-        }
-        self.flush();
-    }
-
-    /// Forces the file to disk.
-    fn flush(&mut self) {
-        let flushed = self.file.as_ref().map(|scribe| scribe.stream().flush_with_timeout(FLUSH));
-        if let Some(Err(error)) = flushed {
-            self.fail(error.to_string());
-        }
-    }
-
-    fn fail(&mut self, message: String) {
-        self.failure = Some(message.clone());
-        self.file = None;
-        if let Some(path) = self.path.take() {
-            // It has a gap, and the journal may need the room.
-            drop(std::fs::remove_file(path));
-        }
-        (self.tell)(RecordingEvent::Failed(message));
-    }
-
-    /// Ends the recording, whose room the session needs.
-    fn give_room(&mut self) {
-        if self.failure.is_none() {
-            self.fail("the disk is full, and the session needs its room".to_owned());
-        }
-        // Also those of earlier programs.
-        segments::remove_parts(&self.folder);
-    }
-
-    /// Ends the part and makes one file of all.
-    fn end(&mut self, is_hurried: &AtomicBool) -> Result<(), String> {
-        if let Some(view) = self.view.take() {
-            // It may wait for a viewer that does not answer.
-            drop(thread::Builder::new().name("live-end".to_owned()).spawn(move || drop(view)));
-        }
-        match self.file.take() {
-            // The next program goes on from its parts.
-            None => self.failure.take().map_or(Ok(()), Err),
-            Some(file) => {
-                drop(file);
-                if is_hurried.load(Ordering::Relaxed) {
-                    return Ok(());
-                }
-                segments::merge(&self.folder).map(drop).map_err(|error| text(&error))
-            }
-        }
-    }
-}
-
-/// An error with its cause.
-fn text(error: &RecordingError) -> String {
-    let cause = std::error::Error::source(error).map(|cause| format!(": {cause}")).unwrap_or_default();
-    format!("{error}{cause}")
+#[expect(clippy::disallowed_methods, reason = "when files are written is no input of a calibration")]
+fn now() -> Instant {
+    Instant::now()
 }
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::disallowed_methods, reason = "deadlines of tests")]
-
+    use std::fs;
     use std::sync::mpsc::channel;
 
+    use super::super::read;
     use super::*;
     use crate::session::journal::{Entry, SCHEMA};
 
@@ -351,74 +213,84 @@ mod tests {
         vec![Line { number: 1, time: jiff::Timestamp::UNIX_EPOCH, entry }]
     }
 
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
     #[test]
-    fn a_folder_that_is_gone_is_told_within_a_second_and_nobody_waits() {
+    fn a_folder_that_is_gone_is_reported_once_and_nobody_waits() {
         let folder = tempfile::tempdir().unwrap();
         let gone = folder.path().join("gone");
-        let (told, heard) = channel();
-        let mut recorder = Recorder::start(&gone, Vec::new(), None, move |event| drop(told.send(event))).unwrap();
+        let (report, reported) = channel();
+        let mut recorder = Recorder::start(&gone, Vec::new(), None, move |event| drop(report.send(event))).unwrap();
         recorder.take(&opened()).unwrap();
-        let event = heard.recv_timeout(Duration::from_secs(1)).unwrap();
+        let event = reported.recv_timeout(Duration::from_secs(5)).unwrap();
         assert!(matches!(&event, RecordingEvent::Failed(cause) if cause.contains("No such file")), "{event:?}");
-        // What comes later is taken and dropped.
-        for _ in 0..2 * WAITING {
-            if recorder.take(&opened()).is_err() {
-                break;
-            }
+        for _ in 0..100 {
+            recorder.take(&opened()).unwrap();
         }
-        // Why it has stopped, if the channel never was full.
-        let ended = recorder.finish();
-        assert!(ended.is_ok() || ended.as_ref().is_err_and(|cause| cause.contains("No such file")), "{ended:?}");
-        assert!(heard.recv_timeout(Duration::from_secs(1)).is_err(), "it is told once");
+        let cause = recorder.finish().unwrap_err();
+        assert!(cause.contains("No such file"), "{cause}");
+        assert!(reported.recv_timeout(Duration::from_secs(1)).is_err(), "it is reported once");
     }
 
     #[test]
     fn a_recorder_that_has_died_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
-        let tell = |_event| std::panic::resume_unwind(Box::new("a defect"));
-        let mut recorder = Recorder::start(&folder.path().join("gone"), Vec::new(), None, tell).unwrap();
-        recorder.take(&opened()).unwrap();
-        let died = recorder.finished.recv_timeout(Duration::from_secs(5));
-        assert_eq!(died, Err(RecvTimeoutError::Disconnected));
-        assert_eq!(recorder.take(&opened()), Err("an internal error ended it"));
+        let (died, dead) = channel();
+        let report = move |_event| {
+            died.send(()).unwrap();
+            std::panic::resume_unwind(Box::new("a defect"));
+        };
+        let mut recorder = Recorder::start(&folder.path().join("gone"), opened(), None, report).unwrap();
+        dead.recv_timeout(Duration::from_secs(5)).unwrap();
+        let begun = now();
+        while recorder.take(&opened()).is_ok() {
+            assert!(begun.elapsed() < Duration::from_secs(5));
+        }
         recorder.finish().unwrap();
     }
 
     #[test]
-    fn the_session_gets_the_room_of_its_recording() {
+    fn what_cannot_be_written_leaves_no_temporary_file_and_is_tried_again_at_the_end() {
         let folder = tempfile::tempdir().unwrap();
-        let (told, heard) = channel();
+        let path = folder.path().join(file::FILE_NAME);
+        fs::create_dir(&path).unwrap();
+        let (report, reported) = channel();
         let mut recorder =
-            Recorder::start(folder.path(), Vec::new(), None, move |event| drop(told.send(event))).unwrap();
-        recorder.take(&opened()).unwrap();
-        let room = recorder.room().unwrap();
-        room.give_back();
-        assert!(segments::files(folder.path()).is_empty());
-        let event = heard.recv_timeout(Duration::from_secs(1)).unwrap();
-        assert!(matches!(&event, RecordingEvent::Failed(cause) if cause.contains("the disk is full")), "{event:?}");
-        room.give_back();
-        recorder.take(&opened()).unwrap();
-        assert!(recorder.finish().unwrap_err().contains("the disk is full"));
-        assert!(segments::files(folder.path()).is_empty());
-        assert!(heard.recv_timeout(Duration::from_secs(1)).is_err(), "it is told once");
-        // Nobody is there any more.
-        room.give_back();
+            Recorder::start(folder.path(), opened(), None, move |event| drop(report.send(event))).unwrap();
+        let event = reported.recv_timeout(Duration::from_secs(5)).unwrap();
+        assert!(matches!(&event, RecordingEvent::Failed(cause) if cause.contains(file::FILE_NAME)), "{event:?}");
+        assert_eq!(names(folder.path()), [file::FILE_NAME]);
+        fs::remove_dir(&path).unwrap();
+        recorder.finish().unwrap();
+        assert!(path.is_file());
     }
 
     #[test]
-    fn what_cannot_be_joined_stays_in_parts_and_is_told() {
+    fn the_file_comes_at_once_then_after_a_pause_and_always_at_the_end() {
         let folder = tempfile::tempdir().unwrap();
-        let mut recorder = Recorder::start(folder.path(), Vec::new(), None, |_event| ()).unwrap();
-        recorder.take(&opened()).unwrap();
-        let begun = std::time::Instant::now();
-        while segments::files(folder.path()).is_empty() {
-            assert!(begun.elapsed() < Duration::from_secs(5));
-            thread::yield_now();
-        }
-        // In the way of the one file.
-        std::fs::create_dir(folder.path().join(segments::FILE_NAME)).unwrap();
-        let cause = recorder.finish().unwrap_err();
-        assert!(cause.contains(segments::FILE_NAME), "{cause}");
-        assert!(segments::files(folder.path()).len() > 1);
+        let path = folder.path().join(file::FILE_NAME);
+        let recorded = || read(&path).map_or(0, |journal| journal.lines.len());
+        let begin = || {
+            let mut recorder = Recorder::start(folder.path(), opened(), None, |_event| ()).unwrap();
+            let begun = now();
+            while recorded() != 1 {
+                assert!(begun.elapsed() < Duration::from_secs(5));
+            }
+            recorder.take(&[Line { number: 2, ..opened().remove(0) }]).unwrap();
+            thread::sleep(Duration::from_millis(200));
+            assert_eq!(recorded(), 1, "the pause is not over");
+            recorder
+        };
+        begin().finish().unwrap();
+        assert_eq!(recorded(), 2);
+        // A recorder that is dropped leaves the file as it is.
+        drop(begin());
+        thread::sleep(Duration::from_millis(200));
+        assert_eq!(recorded(), 1);
     }
 }

@@ -5,18 +5,20 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
 use super::clock::Clock;
+use super::events::{Events, Message};
 use super::jobs;
 use super::links::LinkThread;
-use super::store_thread::{Command, SharedRoom, StoreThread};
+use super::store_thread::{Command, StoreThread};
 use crate::link::RawLog;
-use crate::recording::{Live, Recorder, RecordingEvent};
+use crate::recording::{self, Live, Recorder, RecordingEvent};
 use crate::session::journal::{Journal, Line};
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
+use crate::text::counted;
 use crate::wizard::{Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard};
 
 /// Events that wait; answers wait at their thread when it is full, progress reports are dropped.
@@ -44,40 +46,6 @@ impl Options {
     }
 }
 
-/// What ends a wait.
-#[derive(Debug)]
-enum Message {
-    /// For the wizard.
-    Event(Event),
-    /// For the driver: look at what else there is.
-    Wake,
-}
-
-/// Where threads send what has happened.
-#[derive(Clone, Debug)]
-pub struct Events(SyncSender<Message>);
-
-impl Events {
-    /// Sends; waits for room. `false` if the engine is gone.
-    pub fn send(&self, event: Event) -> bool {
-        self.0.send(Message::Event(event)).is_ok()
-    }
-
-    /// Ends the driver's wait without an event: there is something else to look at, such as a key. `false` if the engine is
-    /// gone. Nothing is lost when there is no room: then the driver is not waiting.
-    pub fn wake(&self) -> bool {
-        !matches!(self.0.try_send(Message::Wake), Err(TrySendError::Disconnected(_)))
-    }
-
-    /// Sends if there is room.
-    pub(super) fn offer(&self, event: Event) {
-        match self.0.try_send(Message::Event(event)) {
-            // The next report says more than this one.
-            Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
-        }
-    }
-}
-
 /// What a driver may want to show.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Happening {
@@ -101,8 +69,6 @@ pub struct Deed {
 struct Recording {
     is_wanted: bool,
     live: Option<Live>,
-    /// Where who writes the session finds the recording's room.
-    room: SharedRoom,
     recorder: Option<Recorder>,
 }
 
@@ -159,13 +125,12 @@ impl Engine {
     fn with(wizard: Wizard, folder: Option<SessionFolder>, options: Options) -> io::Result<Self> {
         let (sender, events) = sync_channel(WAITING);
         let sender = Events(sender);
-        let room = SharedRoom::default();
         Ok(Self {
             wizard,
             clock: options.clock,
-            store: StoreThread::start(options.sessions, folder, sender.clone(), room.clone())?,
+            store: StoreThread::start(options.sessions, folder, sender.clone())?,
             link: LinkThread::start(sender.clone(), options.raw_log)?,
-            recording: Recording { is_wanted: options.is_recorded, live: options.live, room, recorder: None },
+            recording: Recording { is_wanted: options.is_recorded, live: options.live, recorder: None },
             sender,
             events,
             cancelled: BTreeMap::new(),
@@ -248,19 +213,16 @@ impl Engine {
         self.store.finish();
     }
 
-    /// There is little time to end: the recording stays in its parts.
-    pub fn hurry(&self) {
-        if let Some(recorder) = &self.recording.recorder {
-            recorder.hurry();
-        }
+    /// Leaves the recording as it is, because there is little time to end. Resuming the session makes it again.
+    pub fn abandon_recording(&mut self) {
+        self.recording.recorder = None;
     }
 
-    /// Makes one file of the recording while the session's folder is still held. Says what the operator should know if that
-    /// fails; the parts stay then, and the next program joins them.
+    /// Writes the last recording while the session's folder is still held. Returns what the operator should know if that fails.
     pub fn end_recording(&mut self) -> Option<String> {
         let mut recorder = self.recording.recorder.take()?;
         let cause = recorder.finish().err()?;
-        Some(format!("the 3D recording is not complete: {cause}; 'trupose record rebuild' mends it"))
+        Some(format!("the 3D recording is not complete: {cause}; 'trupose record rebuild' makes it from the journal"))
     }
 
     /// What has happened since it was asked last.
@@ -273,15 +235,17 @@ impl Engine {
         if !std::mem::take(&mut self.recording.is_wanted) {
             return;
         }
+        let parts = recording::remove_old_parts(folder);
+        if parts > 0 {
+            let notice =
+                format!("the 3D recording is made again: {} of an earlier version removed", counted(parts, "part"));
+            self.sender.offer(Event::Remark(Notice::info(notice)));
+        }
         let events = self.sender.clone();
         // Nobody waits for the recorder, and the recorder does not wait for the wizard.
         let tell = move |event: RecordingEvent| events.offer(Event::Remark(remark(&event)));
         match Recorder::start(folder, before, self.recording.live.take(), tell) {
             Ok(recorder) => {
-                // A session is recorded once.
-                if let Some(room) = recorder.room() {
-                    self.recording.room.get_or_init(|| room);
-                }
                 self.recording.recorder = Some(recorder);
             }
             Err(error) => self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(error.to_string())))),
@@ -377,11 +341,11 @@ impl Engine {
 fn remark(event: &RecordingEvent) -> Notice {
     match event {
         RecordingEvent::Failed(cause) => Notice::attention(format!(
-            "the 3D recording has stopped: {cause}; the session itself is complete and goes on"
+            "the 3D recording has stopped: {cause}; the session itself is complete and continues"
         ))
-        .hint("'trupose record rebuild' makes the recording anew from the journal, at any time"),
+        .hint("'trupose record rebuild' makes the recording from the journal, at any time"),
         RecordingEvent::LiveFailed(cause) => {
-            Notice::attention(format!("the live view has stopped: {cause}; recording and session go on"))
+            Notice::attention(format!("the live view has stopped: {cause}; recording and session continue"))
         }
     }
 }

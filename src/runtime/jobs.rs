@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use super::engine::Events;
+use super::events::Events;
 use crate::procedure;
 use crate::profile::{Profile, builtin, builtin_names};
 use crate::session::plan;

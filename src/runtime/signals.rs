@@ -11,7 +11,7 @@ use std::thread;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use super::engine::Events;
+use super::events::Events;
 use crate::wizard::Event;
 
 /// Which signal has arrived, and who is told.

@@ -3,20 +3,16 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 
-use super::engine::Events;
-use crate::recording::Room;
+use super::events::Events;
 use crate::session::journal::Line;
 use crate::store::session::{SessionError, SessionFolder};
+use crate::text::causes;
 use crate::wizard::{Answer, Event, Problem, RequestId, StoreEvent};
 
 /// Commands that wait; the wizard never has more than one under way.
 const WAITING: usize = 4;
-
-/// The room of the recording, once there is one.
-pub(super) type SharedRoom = Arc<OnceLock<Room>>;
 
 /// What the thread is asked for.
 #[derive(Debug)]
@@ -35,17 +31,10 @@ pub(super) struct StoreThread {
 
 impl StoreThread {
     /// Begins with a folder that is held already, or makes one below `root` when asked.
-    /// `room` is the recording's, once there is one: the session goes first.
-    pub(super) fn start(
-        root: PathBuf,
-        folder: Option<SessionFolder>,
-        events: Events,
-        room: SharedRoom,
-    ) -> io::Result<Self> {
+    pub(super) fn start(root: PathBuf, folder: Option<SessionFolder>, events: Events) -> io::Result<Self> {
         let (commands, received) = sync_channel(WAITING);
-        let thread = thread::Builder::new()
-            .name("store".to_owned())
-            .spawn(move || work(&root, folder, &received, &events, &room))?;
+        let thread =
+            thread::Builder::new().name("store".to_owned()).spawn(move || work(&root, folder, &received, &events))?;
         Ok(Self { commands: Some(commands), thread: Some(thread) })
     }
 
@@ -72,13 +61,7 @@ impl Drop for StoreThread {
     }
 }
 
-fn work(
-    root: &Path,
-    mut held: Option<SessionFolder>,
-    commands: &Receiver<Command>,
-    events: &Events,
-    room: &SharedRoom,
-) {
+fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Command>, events: &Events) {
     while let Ok(command) = commands.recv() {
         let event = match command {
             Command::Create { id, name } => Event::Store(match SessionFolder::create(root, &name) {
@@ -88,18 +71,18 @@ fn work(
                     held = Some(folder);
                     StoreEvent::Created { id, folder: path, name }
                 }
-                Err(error) => StoreEvent::Failed { id, message: chain(&error) },
+                Err(error) => StoreEvent::Failed { id, message: causes(&error) },
             }),
             Command::Append { id, lines } => {
-                let written = held.as_mut().map(|folder| with_room(room, || folder.append(&lines)));
+                let written = held.as_mut().map(|folder| folder.append(&lines));
                 Event::Store(match written {
                     Some(Ok(())) => StoreEvent::Written { id },
-                    Some(Err(error)) => StoreEvent::Failed { id, message: chain(&SessionError::from(error)) },
+                    Some(Err(error)) => StoreEvent::Failed { id, message: causes(&SessionError::from(error)) },
                     None => StoreEvent::Failed { id, message: "the session has no folder".to_owned() },
                 })
             }
             Command::Replace { id, files, left_out } => {
-                Event::Answer { id, answer: replace(held.as_ref(), &files, left_out, room) }
+                Event::Answer { id, answer: replace(held.as_ref(), &files, left_out) }
             }
         };
         if !events.send(event) {
@@ -108,52 +91,14 @@ fn work(
     }
 }
 
-/// Writes; where the disk is full, once more in the room of the recording.
-fn with_room<E: std::error::Error + 'static>(
-    room: &SharedRoom,
-    mut write: impl FnMut() -> Result<(), E>,
-) -> Result<(), E> {
-    match write() {
-        Err(error) if is_full(&error) => {
-            if let Some(room) = room.get() {
-                room.give_back();
-            }
-            write()
-        }
-        written => written,
-    }
-}
-
-/// Whether there was no room on the disk.
-fn is_full(error: &(dyn std::error::Error + 'static)) -> bool {
-    let mut chain = std::iter::successors(Some(error), |error| error.source());
-    chain.any(|error| error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::StorageFull))
-}
-
-fn replace(
-    held: Option<&SessionFolder>,
-    files: &[(String, String)],
-    left_out: Vec<String>,
-    room: &SharedRoom,
-) -> Answer {
+fn replace(held: Option<&SessionFolder>, files: &[(String, String)], left_out: Vec<String>) -> Answer {
     let Some(folder) = held else {
         return Answer::Failed(Problem { message: "the session has no folder".to_owned(), hints: Vec::new() });
     };
     for (name, text) in files {
-        if let Err(error) = with_room(room, || folder.replace(name, text)) {
-            return Answer::Failed(Problem { message: chain(&error), hints: Vec::new() });
+        if let Err(error) = folder.replace(name, text) {
+            return Answer::Failed(Problem { message: causes(&error), hints: Vec::new() });
         }
     }
     Answer::Delivered { files: files.iter().map(|(name, _)| name.clone()).collect(), left_out }
-}
-
-/// An error with its causes.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text = format!("{text}: {cause}");
-        source = cause.source();
-    }
-    text
 }

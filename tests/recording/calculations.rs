@@ -3,15 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::text;
-use trupose::recording;
 use trupose::session::state::Session;
 
 use super::content::{TEMPERATURES, compare_frames, enlarged, opens_on, views};
-use super::crashes::{one_by_one, torn_part};
-use super::reading::{numbers, results, rows};
-use super::running::{begun, recorded, session_of, succeeded};
+use super::reading::{numbers, results, rows, whole};
+use super::running::{begun, plain, recorded, session_of, succeeded};
 use crate::support::place::Place;
+use crate::support::text;
 
 #[test]
 fn an_identification_from_files_is_recorded() {
@@ -23,9 +21,8 @@ fn an_identification_from_files_is_recorded() {
         place.run(&["identify", "--profile", "soochow", "--measurements", "measured.csv", "--record", "out.rrd"]);
     assert!([0, 1].contains(&output.status.code().unwrap()), "{}", text(&output.stderr));
     let path = place.path("out.rrd");
-    let journal = recording::read(&path).unwrap().lines().unwrap();
+    let journal = whole(&path);
     let session = Session::of(&journal).unwrap();
-    assert!(recording::check(&path).unwrap().is_whole());
     let (_, measured) = session_of(&place.session());
     assert_eq!(session.samples.len(), measured.counted().count());
     let profile = session.mounted_profile().unwrap();
@@ -42,6 +39,12 @@ fn an_identification_from_files_is_recorded() {
     let output = place.run(&["plan", "--profile", "soochow", "--record", "measured.csv"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("'measured.csv' is there already and is no recording"));
+    // Nor is the recording of another program.
+    let other = place.path("other.rrd");
+    drop(rerun::RecordingStreamBuilder::new("other_program").enabled(true).save(&other).unwrap());
+    let bytes = fs::read(&other).unwrap();
+    assert_eq!(place.run(&["plan", "--profile", "soochow", "--record", "other.rrd"]).status.code(), Some(2));
+    assert!(fs::read(&other).unwrap() == bytes);
     // An instrument that knows the temperature.
     let rows = text(&table.stdout);
     let lines = rows.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).enumerate();
@@ -101,23 +104,17 @@ fn a_rejected_sample_spoils_no_scale_no_mean_and_no_pair() {
 }
 
 #[test]
-fn a_recording_is_replayed_like_its_session_also_when_it_is_half_written() {
-    let place = Place::new();
-    let script = place.write_script("run.script.ron", &format!("{} {}", begun(""), one_by_one(6)));
-    let half = &torn_part(&place, &script);
-    assert!(!recording::check(half).unwrap().has_index);
-    let last = recording::read(half).unwrap().numbers.last().unwrap().to_string();
-    let rest = place.write_script("rest.script.ron", "CaptureAll(Fail)");
-    // The file goes when the session goes on.
-    fs::copy(half, place.path("half.rrd")).unwrap();
-    succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
-    fs::copy(place.recording(), place.path("whole.rrd")).unwrap();
+fn a_recording_is_replayed_like_its_session_also_when_its_end_is_missing() {
+    let place = recorded(&plain());
+    let bytes = fs::read(place.recording()).unwrap();
+    fs::write(place.path("whole.rrd"), &bytes).unwrap();
+    fs::write(place.path("cut.rrd"), &bytes[..bytes.len() * 9 / 10]).unwrap();
     for format in ["--print", "--csv"] {
-        for (file, more) in [("whole.rrd", &[] as &[&str]), ("half.rrd", &["--entry", &last])] {
-            let (shown, expected) =
-                (place.run(&["replay", file, format]), place.run(&[&["replay", "sessions/s", format], more].concat()));
+        let expected = place.run(&["replay", "sessions/s", format]);
+        succeeded(&expected);
+        for file in ["whole.rrd", "cut.rrd"] {
+            let shown = place.run(&["replay", file, format]);
             succeeded(&shown);
-            succeeded(&expected);
             assert!(shown.stdout.len() > 200);
             assert_eq!(text(&shown.stdout), text(&expected.stdout), "{file} {format}");
         }
@@ -142,13 +139,12 @@ fn a_plan_is_recorded_and_opens_on_its_search() {
     ]);
     succeeded(&output);
     let path = place.path("p.rrd");
-    assert!(recording::check(&path).unwrap().is_whole());
+    let journal = whole(&path);
     assert_eq!(opens_on(&path), "[plan_iteration]");
     let search = numbers(&path, "/search/condition_number", "plan_iteration", "Scalars:scalars");
     assert!(search.len() > 1, "{search:?}");
     let steps: Vec<i64> = search.iter().map(|(step, _)| *step).collect();
     assert_eq!(steps, (1..).take(steps.len()).collect::<Vec<i64>>());
-    let journal = recording::read(&path).unwrap().lines().unwrap();
     let planned = rows(&path, false)
         .into_iter()
         .find(|(entity, _, values)| entity == "/world/plan/poses" && values.contains_key("Points3D:positions"));

@@ -1,15 +1,17 @@
 //! What stands in a recording, without the code that wrote it.
 
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use rerun::external::arrow::array::Array as _;
 use rerun::external::arrow::util::display::array_value_to_string;
-use rerun::external::re_log_encoding::DecoderApp;
+use rerun::external::re_log_encoding::{Decodable as _, DecoderApp, StreamFooter};
 use rerun::log::{Chunk, LogMsg};
+use rerun::{TextDocument, TimelineName};
+use trupose::recording;
 use trupose::session::journal::{Entry, IdentifiedText, Journal};
 
 /// Positions are 32-bit floats in a recording (m).
@@ -74,9 +76,35 @@ pub(super) fn rows_in_order(path: &Path, of_layout: bool) -> Vec<(String, Row)> 
     temporal
 }
 
-/// The same without the time at which the file was begun.
-pub(super) fn content(path: &Path) -> Vec<Row> {
-    rows(path, false).into_iter().filter(|(_, _, values)| !values.contains_key("RecordingInfo:start_time")).collect()
+/// The lines of the journal in a recording, as text.
+pub(super) fn journal_text(path: &Path) -> String {
+    let mut lines: Vec<(i64, String)> = Vec::new();
+    let text = TextDocument::descriptor_text().component;
+    for chunk in chunks(path, false).iter().filter(|chunk| chunk.entity_path().to_string() == "/journal") {
+        let at = chunk.iter_component_indices(TimelineName::from_static_str("entry"), text);
+        let texts = chunk.iter_slices::<String>(text);
+        lines.extend(at.zip(texts).map(|((time, _), text)| (time.as_i64(), text[0].to_string())));
+    }
+    lines.sort();
+    lines.into_iter().map(|(_, text)| text).collect()
+}
+
+/// Bytes before the index: its kind and its size.
+const INDEX_HEADER: usize = 16;
+
+/// The bytes of a recording before its index, whose order the library draws at random.
+pub(super) fn data(path: &Path) -> Vec<u8> {
+    let mut bytes = fs::read(path).unwrap();
+    let footer = StreamFooter::from_rrd_bytes(&bytes[bytes.len() - StreamFooter::ENCODED_SIZE_BYTES..]);
+    let index = footer.unwrap().entries[0].rrd_footer_byte_span_from_start_excluding_header.start;
+    bytes.truncate(usize::try_from(index).unwrap() - INDEX_HEADER);
+    bytes
+}
+
+/// The journal of a recording with an index.
+pub(super) fn whole(path: &Path) -> Journal {
+    assert!(!data(path).is_empty());
+    recording::read(path).unwrap()
 }
 
 /// Numbers of a component on a timeline. Of several rows at one time the last counts, as in a viewer.

@@ -28,15 +28,6 @@ impl Place {
         let script = self.write_script("run.script.ron", steps);
         self.run(&[&["--script", &script, "--json"], more].concat())
     }
-
-    pub(super) fn check(&self) -> (Option<i32>, String) {
-        self.check_file("sessions/s")
-    }
-
-    pub(super) fn check_file(&self, path: &str) -> (Option<i32>, String) {
-        let output = self.run(&["record", "check", path]);
-        (output.status.code(), text(&output.stdout))
-    }
 }
 
 pub(super) fn succeeded(output: &Output) {

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3};
 use rerun::{Boxes3D, FillMode, LineStrips3D};
 
-use super::{Posture, cell};
 use crate::profile::Profile;
 use crate::recording::canvas::{Canvas, Moment};
+use crate::recording::posture::{Posture, rest};
 use crate::recording::{layout, names};
 use crate::session::journal::{Entry, IdentifiedText, from_xyz_mm};
 use crate::session::state::Session;
@@ -69,7 +69,7 @@ impl Station {
     }
 
     /// Draws the tracker.
-    pub(super) fn draw(&self, canvas: &Canvas, profile: &Profile) {
+    pub(super) fn draw(&self, canvas: &mut Canvas, profile: &Profile) {
         let label = if self.drawn.is_some() { "tracker" } else { "tracker (as planned)" };
         let body = Boxes3D::from_centers_and_half_sizes([layout::at(&self.place(profile))], [TRACKER_SIZE])
             .with_colors([layout::TRACKER])
@@ -79,21 +79,21 @@ impl Station {
     }
 
     /// Draws the beam to the reflector of the nominal arm.
-    pub(super) fn beam(&self, canvas: &Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
+    pub(super) fn beam(&self, canvas: &mut Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
         let beam = [layout::at(&self.place(profile)), layout::at(&posture.reflector)];
         canvas.draw(moment, names::BEAM, &LineStrips3D::update_fields().with_strips([beam]));
     }
 
     /// Draws the tracker and all beams of `session` anew, but that of the sample number `but`.
-    pub(super) fn draw_all(&self, canvas: &Canvas, session: &Session, but: Option<u64>) {
+    pub(super) fn draw_all(&self, canvas: &mut Canvas, session: &Session, but: Option<u64>) {
         let Some(profile) = session.mounted_profile() else { return };
         self.draw(canvas, &profile);
-        let rest = Posture::nominal(&profile, &cell::rest(&profile));
+        let posture = Posture::nominal(&profile, &rest(&profile));
         for moment in [Moment::pose(0), Moment::search(0)] {
-            self.beam(canvas, &profile, &rest, moment);
+            self.beam(canvas, &profile, &posture, moment);
         }
         if session.identified.is_some() {
-            self.beam(canvas, &profile, &rest, Moment::solver(0));
+            self.beam(canvas, &profile, &posture, Moment::solver(0));
         }
         for sample in session.samples.iter().filter(|sample| Some(sample.noted.number) != but) {
             let posture = Posture::nominal(&profile, &session.configuration_of(sample));

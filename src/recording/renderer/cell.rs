@@ -7,17 +7,18 @@ use rerun::{
 };
 
 use super::tracker::Station;
-use super::{Posture, reach};
 use crate::kinematics::Convention;
 use crate::profile::{Capsule, Profile};
 use crate::recording::canvas::{Canvas, Moment};
+use crate::recording::latin::plain;
+use crate::recording::posture::{Posture, reach, rest};
 use crate::recording::{layout, names};
 
 /// Lines of the floor are this far apart (m).
 const FLOOR_STEP: f64 = 0.5;
 
 /// Draws the cell of `profile` and its arm in the middle of its ranges.
-pub(super) fn draw(canvas: &Canvas, profile: &Profile, station: &Station) {
+pub(super) fn draw(canvas: &mut Canvas, profile: &Profile, station: &Station) {
     canvas.fix(names::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP());
     floor(canvas, profile);
     station.draw(canvas, profile);
@@ -30,7 +31,7 @@ pub(super) fn draw(canvas: &Canvas, profile: &Profile, station: &Station) {
 }
 
 /// Looks that never change are said once: every row is smaller without them.
-fn styles(canvas: &Canvas, profile: &Profile) {
+fn styles(canvas: &mut Canvas, profile: &Profile) {
     let beam = LineStrips3D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
     canvas.fix(names::BEAM, &beam);
     let points =
@@ -56,16 +57,8 @@ pub(super) fn skeleton(posture: &Posture) -> LineStrips3D {
     LineStrips3D::update_fields().with_strips([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
 }
 
-/// The middle of each range ((rad) or (m)).
-pub(super) fn rest(profile: &Profile) -> Vec<f64> {
-    let middle = |range: &crate::profile::JointRange| {
-        range.planning_limits.or(range.limits).map_or(0.0, |(low, high)| f64::midpoint(low, high))
-    };
-    profile.joints().iter().map(middle).collect()
-}
-
 /// The nominal arm at the pendant configuration `q` ((rad) or (m)), with the beam to its reflector.
-pub(super) fn pose(canvas: &Canvas, profile: &Profile, station: &Station, q: &[f64], moment: Moment) {
+pub(super) fn pose(canvas: &mut Canvas, profile: &Profile, station: &Station, q: &[f64], moment: Moment) {
     let posture = Posture::nominal(profile, q);
     for (index, frame) in posture.frames.iter().enumerate() {
         canvas.draw(moment, names::NOMINAL_FRAMES, &layout::frame(frame, &names::frame("nominal", index)));
@@ -78,7 +71,7 @@ pub(super) fn pose(canvas: &Canvas, profile: &Profile, station: &Station, q: &[f
     station.beam(canvas, profile, &posture, lines);
 }
 
-fn floor(canvas: &Canvas, profile: &Profile) {
+fn floor(canvas: &mut Canvas, profile: &Profile) {
     let height = profile.floor().unwrap_or(0.0);
     let tracker = profile.tracker().position_in_base;
     let side = (1.3 * reach(profile)).max(tracker.x.abs().max(tracker.y.abs()) + FLOOR_STEP);
@@ -106,14 +99,14 @@ fn floor(canvas: &Canvas, profile: &Profile) {
     canvas.fix(names::BASE, &base);
 }
 
-fn keep_out(canvas: &Canvas, profile: &Profile) {
+fn keep_out(canvas: &mut Canvas, profile: &Profile) {
     let boxes = profile.keep_out();
     if boxes.is_empty() {
         return;
     }
     let centres = boxes.iter().map(|one| layout::at(&nalgebra::center(&one.min, &one.max)));
     let halves = boxes.iter().map(|one| layout::vector(&((one.max - one.min) / 2.0)));
-    let names: Vec<String> = boxes.iter().map(|one| crate::recording::read::plain(&one.name)).collect();
+    let names: Vec<String> = boxes.iter().map(|one| plain(&one.name)).collect();
     let drawn = Boxes3D::from_centers_and_half_sizes(centres, halves)
         .with_colors([layout::OUT])
         .with_radii([Radius::new_ui_points(1.5)])
@@ -122,7 +115,7 @@ fn keep_out(canvas: &Canvas, profile: &Profile) {
 }
 
 /// Castings and joint axes of the nominal arm, fixed to its frames: one entity per frame.
-fn arm(canvas: &Canvas, profile: &Profile) {
+fn arm(canvas: &mut Canvas, profile: &Profile) {
     // A joint turns about or slides along the z axis of the frame before it, or of its own.
     let before = usize::from(profile.chain().convention() == Convention::Modified);
     let half = 0.13 * reach(profile);
@@ -139,7 +132,7 @@ fn arm(canvas: &Canvas, profile: &Profile) {
                 .with_origins([layout::vector(&Vector3::new(0.0, 0.0, -half))])
                 .with_radii([Radius::new_ui_points(1.0)])
                 .with_colors([layout::AXIS])
-                .with_labels([crate::recording::read::plain(&joint.name)])
+                .with_labels([plain(&joint.name)])
         });
         let mut parts: Vec<&dyn AsComponents> = vec![&name];
         if !bodies.is_empty() {
@@ -164,7 +157,7 @@ fn capsules(bodies: &[&Capsule], color: Color) -> Capsules3D {
 }
 
 /// How the identified arm with its enlarged deviations looks: glassy, so that the nominal arm is seen in it.
-pub(super) fn enlarged_style(canvas: &Canvas, profile: &Profile) {
+pub(super) fn enlarged_style(canvas: &mut Canvas, profile: &Profile) {
     if profile.bodies().is_empty() {
         canvas.fix(names::ENLARGED, &skeleton_style(profile, layout::IDENTIFIED));
     } else {
@@ -176,7 +169,7 @@ pub(super) fn enlarged_style(canvas: &Canvas, profile: &Profile) {
 
 /// The identified arm with its enlarged deviations at a pose. All castings are one entity, placed in the base: that takes a
 /// third of the room that frames would.
-pub(super) fn enlarged(canvas: &Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
+pub(super) fn enlarged(canvas: &mut Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
     if profile.bodies().is_empty() {
         canvas.draw(moment, names::ENLARGED, &skeleton(posture));
         return;

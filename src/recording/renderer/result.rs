@@ -10,10 +10,11 @@ use rerun::{
 };
 
 use super::tracker::Station;
-use super::{Posture, cell, document, reach};
+use super::{cell, document};
 use crate::geometry::{enlargement, register};
 use crate::profile::Profile;
 use crate::recording::canvas::{Canvas, Moment};
+use crate::recording::posture::{Posture, reach, rest};
 use crate::recording::{layout, names};
 use crate::session::calibration::Calibration;
 use crate::session::journal::{IdentifiedText, PointErrorText, from_xyz_mm};
@@ -50,7 +51,7 @@ struct Judged<'a> {
 
 /// Draws result number `run` of `session`.
 pub(super) fn draw(
-    canvas: &Canvas,
+    canvas: &mut Canvas,
     session: &Session,
     station: &Station,
     identified: &IdentifiedText,
@@ -74,7 +75,7 @@ pub(super) fn draw(
     series(canvas, session, &judged, run);
     pairs(canvas, &judged);
     ellipsoids(canvas, &judged, scales.ellipsoid);
-    cell::pose(canvas, &profile, station, &cell::rest(&profile), Moment::solver(0));
+    cell::pose(canvas, &profile, station, &rest(&profile), Moment::solver(0));
     solver(canvas, &profile, identified, calibration, &judged, &scales);
     note(canvas, &profile, &scales);
 }
@@ -148,7 +149,7 @@ fn drawn_error(profile: &Profile, one: &Judged<'_>, error: &Vector3<f64>, scale:
 }
 
 /// Errors as arrows from where the identified arm has the point. Not on the timeline of the solver, which has its own.
-fn vectors(canvas: &Canvas, profile: &Profile, judged: &[Judged<'_>], scales: &Scales, time: Timestamp) {
+fn vectors(canvas: &mut Canvas, profile: &Profile, judged: &[Judged<'_>], scales: &Scales, time: Timestamp) {
     let moment = Moment { time: Some(time), ..Moment::pose(0) };
     let arrows = |scale: f64, pick: fn(&Judged<'_>) -> Vector3<f64>| {
         Arrows3D::update_fields()
@@ -173,7 +174,7 @@ fn arrow_style(color: Color) -> Arrows3D {
 }
 
 /// The identified arm at every pose, as it is and enlarged.
-fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Calibration, enlarged: f64) {
+fn arms(canvas: &mut Canvas, session: &Session, profile: &Profile, calibration: &Calibration, enlarged: f64) {
     let deviations: Vec<f64> = calibration.parameters.iter().map(|parameter| parameter.deviation).collect();
     let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * enlarged).collect();
     let (Some(arm), Some(bent)) = (calibration.arm_with(profile, &deviations), calibration.arm_with(profile, &larger))
@@ -183,7 +184,7 @@ fn arms(canvas: &Canvas, session: &Session, profile: &Profile, calibration: &Cal
     cell::enlarged_style(canvas, profile);
     if let Some(target) = bent.targets.first() {
         // Before the first pose, and while the search goes on.
-        let posture = Posture::new(&bent.chain, target, &cell::rest(profile));
+        let posture = Posture::new(&bent.chain, target, &rest(profile));
         cell::enlarged(canvas, profile, &posture, Moment::pose(0));
         cell::enlarged(canvas, profile, &posture, Moment::search(0));
     }
@@ -219,7 +220,7 @@ impl Group {
 }
 
 /// Errors at each pose. What the identification has seen is a residual, and is named so.
-fn series(canvas: &Canvas, session: &Session, judged: &[Judged<'_>], run: usize) {
+fn series(canvas: &mut Canvas, session: &Session, judged: &[Judged<'_>], run: usize) {
     let is_verification = |one: &Judged<'_>| session.kind_of(one.sample) == PoseKind::Verification;
     let group_of = |one: &Judged<'_>| match one.text.rejected {
         true => Group::Rejected,
@@ -253,7 +254,7 @@ fn series(canvas: &Canvas, session: &Session, judged: &[Judged<'_>], run: usize)
         }
         for one in &members {
             let moment = Moment::pose(one.sample.noted.number);
-            let plot = |quantity: &str, arm: &str, error: f64| {
+            let mut plot = |quantity: &str, arm: &str, error: f64| {
                 canvas.draw(moment, &names::errors(run, quantity, arm, suffix), &Scalars::new([to_mm(error)]));
             };
             plot("position", "nominal", one.nominal.norm());
@@ -289,7 +290,7 @@ fn pair(one: &Judged<'_>, other: &Judged<'_>) -> (f64, f64) {
 type Pick = fn(&(f64, f64)) -> f64;
 
 /// The worst pairs as lines, and the errors of all pairs as a picture.
-fn pairs(canvas: &Canvas, judged: &[Judged<'_>]) {
+fn pairs(canvas: &mut Canvas, judged: &[Judged<'_>]) {
     let trusted: Vec<&Judged<'_>> = judged.iter().filter(|one| !one.text.rejected).collect();
     let step = trusted.len().div_ceil(MAP_SIZE).max(1);
     let shown: Vec<&Judged<'_>> = trusted.into_iter().step_by(step).collect();
@@ -343,7 +344,7 @@ fn covariance(text: &PointErrorText) -> Option<Matrix3<f64>> {
     Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * MICROMETRE.powi(2))
 }
 
-fn ellipsoids(canvas: &Canvas, judged: &[Judged<'_>], scale: f64) {
+fn ellipsoids(canvas: &mut Canvas, judged: &[Judged<'_>], scale: f64) {
     let known: Vec<_> =
         judged.iter().filter_map(|one| Some((one.identified_at, layout::ellipsoid(&covariance(one.text)?)))).collect();
     let drawn = Ellipsoids3D::from_centers_and_half_sizes(
@@ -359,14 +360,14 @@ fn ellipsoids(canvas: &Canvas, judged: &[Judged<'_>], scale: f64) {
 
 /// The solver, step by step: the arm bends from nominal to identified, and the errors shrink.
 fn solver(
-    canvas: &Canvas,
+    canvas: &mut Canvas,
     profile: &Profile,
     identified: &IdentifiedText,
     calibration: &Calibration,
     judged: &[Judged<'_>],
     scales: &Scales,
 ) {
-    let rest = cell::rest(profile);
+    let middle = rest(profile);
     let nothing = vec![0.0; calibration.parameters.len()];
     canvas.fix(names::ERRORS_SOLVING, &arrow_style(layout::NOMINAL_ERROR));
     canvas.fix(names::COST_AND_STEP, &SeriesLines::new().with_names(["cost", "largest step"]));
@@ -382,7 +383,7 @@ fn solver(
         let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * scales.arm).collect();
         let Some(bent) = calibration.arm_with(profile, &larger) else { continue };
         if let Some(target) = bent.targets.first() {
-            cell::enlarged(canvas, profile, &Posture::new(&bent.chain, target, &rest), moment);
+            cell::enlarged(canvas, profile, &Posture::new(&bent.chain, target, &middle), moment);
         }
         let Some(arm) = calibration.arm_with(profile, deviations) else { continue };
         let predicted: Vec<Point3<f64>> = judged
@@ -414,7 +415,7 @@ fn solver(
 }
 
 /// Deviations of the parameters as bars, in units of their standard deviation.
-fn parameters(canvas: &Canvas, identified: &IdentifiedText) {
+fn parameters(canvas: &mut Canvas, identified: &IdentifiedText) {
     let parameters = &identified.summary.parameters;
     let of_sigma: Vec<f64> = parameters
         .iter()
@@ -430,7 +431,7 @@ const fn finite(value: f64) -> f64 {
 }
 
 /// What the enlargements are, above the robot.
-fn note(canvas: &Canvas, profile: &Profile, scales: &Scales) {
+fn note(canvas: &mut Canvas, profile: &Profile, scales: &Scales) {
     let text = format!(
         "drawn larger:\nred errors (nominal) {} x\ngreen errors (identified) {} x\ngreen arm's deviations {} x",
         scales.nominal, scales.identified, scales.arm

@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use rerun::{AnyValues, TextDocument};
 
 use crate::recording::canvas::Canvas;
-use crate::recording::{names, read::plain};
+use crate::recording::{latin::plain, names};
 use crate::session::journal::IdentifiedText;
 use crate::session::state::Session;
 use crate::session::summary::{ModelSummary, StatisticsSummary, VerdictStatus};
@@ -43,12 +43,12 @@ The maps of all pairs show the size of every distance error: row and column are 
 ";
 
 /// The first texts of a session.
-pub(super) fn opening(canvas: &Canvas, program: &str, name: &str, opened: Timestamp) {
+pub(super) fn opening(canvas: &mut Canvas, program: &str, name: &str, opened: Timestamp) {
     let about = AnyValues::default()
         .with_component_from_data("program", text(program))
         .with_component_from_data("session", text(name))
         .with_component_from_data("opened", text(&opened.to_string()));
-    canvas.property("session", &about);
+    canvas.fix(names::SESSION_PROPERTIES, &about);
     canvas.fix(names::GUIDE, &TextDocument::from_markdown(GUIDE));
     let waiting = format!("# {}\n\nNot identified yet.\n", plain(name));
     canvas.fix(names::REPORT, &TextDocument::from_markdown(waiting));
@@ -60,7 +60,7 @@ fn text(value: &str) -> std::sync::Arc<dyn rerun::external::arrow::array::Array>
 }
 
 /// The result.
-pub(super) fn report(canvas: &Canvas, session: &Session, identified: &IdentifiedText, time: Timestamp) {
+pub(super) fn report(canvas: &mut Canvas, session: &Session, identified: &IdentifiedText, time: Timestamp) {
     let summary = &identified.summary;
     let about = AnyValues::default()
         .with_component_from_data("robot", text(&summary.provenance.robot))
@@ -68,7 +68,7 @@ pub(super) fn report(canvas: &Canvas, session: &Session, identified: &Identified
         .with_component_from_data("profile_sha256", text(&summary.provenance.profile_sha256))
         .with_component_from_data("verdict", text(verdict(summary.verdict.status)))
         .with_component_from_data("identified", text(&time.to_string()));
-    canvas.property("result", &about);
+    canvas.fix(names::RESULT_PROPERTIES, &about);
     canvas.fix(names::REPORT, &TextDocument::from_markdown(plain(&markdown(session, identified, time))));
 }
 

@@ -5,10 +5,11 @@ use nalgebra::Point3;
 use rerun::{Points3D, Scalars};
 
 use super::tracker::Station;
-use super::{Posture, cell, pose_moment};
+use super::{cell, pose_moment};
 use crate::profile::Profile;
 use crate::recording::canvas::Canvas;
-use crate::recording::read::plain;
+use crate::recording::latin::plain;
+use crate::recording::posture::Posture;
 use crate::recording::{layout, names};
 use crate::session::journal::MeasuredText;
 use crate::session::plan::PoseKind;
@@ -16,7 +17,7 @@ use crate::session::state::{Sample, Session};
 use crate::units::to_mm;
 
 /// Draws a sample that `session` has taken already.
-pub(super) fn sample(canvas: &Canvas, session: &Session, station: &Station, noted: &MeasuredText, time: Timestamp) {
+pub(super) fn sample(canvas: &mut Canvas, session: &Session, station: &Station, noted: &MeasuredText, time: Timestamp) {
     let (Some(profile), Some(sample)) = (session.mounted_profile(), session.sample(noted.number)) else { return };
     let moment = pose_moment(noted.number, time);
     let q = session.configuration_of(sample);

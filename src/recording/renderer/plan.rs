@@ -3,15 +3,16 @@
 use nalgebra::Point3;
 use rerun::{Points3D, Radius, Scalars};
 
-use super::Posture;
 use crate::planning::Figures;
 use crate::recording::canvas::{Canvas, Moment};
+use crate::recording::latin::plain;
+use crate::recording::posture::Posture;
 use crate::recording::{layout, names};
 use crate::session::state::{SampleState, Session};
 use crate::units::to_mm;
 
 /// Draws the progress of the search, sweep by sweep.
-pub(super) fn search(canvas: &Canvas, steps: &[Figures]) {
+pub(super) fn search(canvas: &mut Canvas, steps: &[Figures]) {
     for (index, step) in steps.iter().enumerate() {
         let moment = Moment::search(index + 1);
         canvas.draw(moment, names::CONDITION, &Scalars::new([step.condition_number]));
@@ -21,7 +22,7 @@ pub(super) fn search(canvas: &Canvas, steps: &[Figures]) {
 }
 
 /// Where the poses of the plan are. Those that are measured are covered by their points.
-pub(super) fn poses(canvas: &Canvas, session: &Session) {
+pub(super) fn poses(canvas: &mut Canvas, session: &Session) {
     let Some(profile) = session.mounted_profile() else { return };
     let planned = session.rows.iter().filter(|row| !row.skipped);
     let places = planned.map(|row| Posture::nominal(&profile, &row.planned.configuration).reflector);
@@ -32,7 +33,7 @@ pub(super) fn poses(canvas: &Canvas, session: &Session) {
 }
 
 /// Which pose is next, and what is not used. `is_new`: something may be used again.
-pub(super) fn points(canvas: &Canvas, session: &Session, is_new: bool) {
+pub(super) fn points(canvas: &mut Canvas, session: &Session, is_new: bool) {
     let Some(profile) = session.mounted_profile() else { return };
     let at = |q: &[f64]| Posture::nominal(&profile, q).reflector;
     let moment = Moment::pose(session.measurements);
@@ -41,7 +42,7 @@ pub(super) fn points(canvas: &Canvas, session: &Session, is_new: bool) {
     let next = shown.and_then(|row| session.rows.get(*row)).map(|row| &row.planned);
     let point = Points3D::update_fields()
         .with_positions(next.map(|next| layout::at(&at(&next.configuration))))
-        .with_labels(next.map(|next| crate::recording::read::plain(&format!("next: {}", next.pose))));
+        .with_labels(next.map(|next| plain(&format!("next: {}", next.pose))));
     canvas.draw(moment, names::NEXT, &point);
     let skipped = session.rows.iter().filter(|row| row.skipped).map(|row| row.planned.configuration.clone());
     let out = session

@@ -1,0 +1,69 @@
+//! The file of a recording: written whole, and replaced only when the new one is on disk.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::blueprint::Purpose;
+use super::{RecordingError, rrd};
+use crate::session::journal::Line;
+use crate::store;
+
+/// Name of the recording in a session's folder.
+pub const FILE_NAME: &str = "recording.rrd";
+
+/// Earlier versions wrote recordings in parts, `recording.part-001.rrd` and so on, and joined them through a temporary file:
+/// how the names of such files begin and end.
+const OLD_PARTS: [(&str, &str); 2] = [("recording.part-", ".rrd"), (".recording-", ".tmp")];
+
+/// A recording that was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Size of the file.
+    pub bytes: usize,
+}
+
+/// Makes the recording in `folder` again from the lines of its journal.
+///
+/// # Errors
+/// It cannot be written; the old one stays as it was.
+pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<Written, RecordingError> {
+    let path = folder.join(FILE_NAME);
+    let bytes = rrd::encode(lines, Purpose::Capture)?;
+    store::replace_bytes(&path, &bytes)?;
+    Ok(Written { path, bytes: bytes.len() })
+}
+
+/// Writes a recording of these lines to `path`. `of_plan`: it opens on the search for the poses.
+///
+/// # Errors
+/// There are no lines, or the file cannot be written.
+pub fn write(path: &Path, lines: &[Line], of_plan: bool) -> Result<(), RecordingError> {
+    let bytes = rrd::encode(lines, if of_plan { Purpose::Plan } else { Purpose::Capture })?;
+    Ok(store::replace_bytes(path, &bytes)?)
+}
+
+/// Removes the parts of a recording that an earlier version has left in `folder`, and returns their number: [`rebuild`] makes one file
+/// of the whole journal. A part that cannot be removed does no harm.
+pub fn remove_old_parts(folder: &Path) -> usize {
+    let is_old = |name: &str| OLD_PARTS.iter().any(|(begin, end)| name.starts_with(begin) && name.ends_with(end));
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let old = entries.filter(|entry| entry.file_name().to_str().is_some_and(is_old));
+    old.filter(|entry| fs::remove_file(entry.path()).is_ok()).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_an_earlier_version_are_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["recording.part-001.rrd", ".recording-x.tmp", "recording.part-of-mine.txt", FILE_NAME] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(remove_old_parts(folder.path()), 2);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+}

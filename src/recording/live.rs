@@ -1,0 +1,108 @@
+//! The live view: viewers connect to a port of this machine and see the recording grow.
+
+use std::net::{Ipv4Addr, TcpListener};
+use std::thread;
+
+use rerun::RecordingStream;
+use rerun::log::PendingRow;
+
+use super::RecordingError;
+use super::blueprint::Purpose;
+use super::identity::Identity;
+use super::renderer::Renderer;
+use super::rrd::{Ids, layout_messages};
+use crate::session::journal::Line;
+
+/// A port on this machine on which viewers may look at the recording while it grows.
+#[derive(Clone, Copy, Debug)]
+pub struct Live {
+    port: u16,
+}
+
+impl Live {
+    /// Makes sure that the port is free.
+    ///
+    /// # Errors
+    /// It is taken, or this program was built without the live view.
+    pub fn on(port: u16) -> Result<Self, RecordingError> {
+        if cfg!(not(feature = "live")) {
+            return Err(not_built_in(port));
+        }
+        // The library does not report a port that is taken.
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+            .map_err(|error| RecordingError::Port { port, message: error.to_string() })?;
+        let port = listener.local_addr().map_or(port, |address| address.port());
+        Ok(Self { port })
+    }
+
+    /// The port.
+    pub const fn port(&self) -> u16 {
+        self.port
+    }
+
+    /// What a viewer connects to.
+    pub fn url(&self) -> String {
+        format!("rerun+http://127.0.0.1:{}/proxy", self.port)
+    }
+
+    /// A stream to viewers, whether they connect early or late. The server's own limit of 1 GiB is a hundred times a long session.
+    #[cfg(feature = "live")]
+    fn stream(self, identity: &Identity) -> Result<RecordingStream, RecordingError> {
+        use rerun::external::re_grpc_server::ServerOptions;
+
+        // The environment does not decide whether there is a stream.
+        identity
+            .stream_builder()
+            .enabled(true)
+            .serve_grpc_opts("127.0.0.1", self.port, ServerOptions::default())
+            .map_err(|error| RecordingError::library("starting the live view", error))
+    }
+
+    #[cfg(not(feature = "live"))]
+    fn stream(self, _identity: &Identity) -> Result<RecordingStream, RecordingError> {
+        Err(not_built_in(self.port))
+    }
+}
+
+fn not_built_in(port: u16) -> RecordingError {
+    RecordingError::Port { port, message: "this program was built without the live view".to_owned() }
+}
+
+/// The recording as connected viewers see it.
+#[derive(Debug)]
+pub(super) struct LiveView {
+    stream: RecordingStream,
+    identity: Identity,
+    renderer: Renderer,
+}
+
+impl LiveView {
+    /// Serves the recording of a journal that begins with `first`; no line is shown yet.
+    pub(super) fn start(live: Live, first: &Line) -> Result<Self, RecordingError> {
+        let identity = Identity::of(first);
+        let stream = live.stream(&identity)?;
+        Ok(Self { stream, renderer: Renderer::new(&identity, Purpose::Capture), identity })
+    }
+
+    /// Shows lines. Never waits for a viewer.
+    pub(super) fn show(&mut self, lines: &[Line]) {
+        let Some(last) = lines.last() else { return };
+        for line in lines {
+            self.renderer.take(line);
+        }
+        let drawn = self.renderer.drawn();
+        if let Some(layout) = drawn.layout {
+            // A layout that cannot be encoded leaves the viewer's own arrangement.
+            let messages = layout_messages(&self.identity, layout, &mut Ids::after(last)).into_iter().flatten();
+            messages.for_each(|message| self.stream.record_msg(message));
+        }
+        for row in drawn.rows {
+            self.stream.record_row(row.entity, PendingRow::from_iter(row.time, row.components), false);
+        }
+    }
+
+    /// Ends the view. The library may wait for a viewer that does not answer, so it does that on a thread that nobody joins.
+    pub(super) fn end(self) {
+        drop(thread::Builder::new().name("live-end".to_owned()).spawn(move || drop(self)));
+    }
+}
