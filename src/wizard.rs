@@ -1,19 +1,19 @@
 //! The guided calibration as a pure state machine.
 //!
 //! ```text
-//!            Event ──► Wizard::update ──► Effects        intents(): what can be done now
-//!                          │                             view():    what is shown
+//!            Event ──► Wizard::update ──► Effects        intents(): what the operator can do now
+//!                          │                             view():    what the screen shows
 //!              Session = fold of the journal
 //! ```
 //!
 //! Steps: Profile → Instrument → Target → Plan → Capture → Identify → Verify → Deliver. Every step is a small machine of its own
-//! (`step`) that owns only what is not in the session. It answers with actions; only this module gives them ids, orders them
+//! (`step`) that owns only what is not in the session. It returns actions; only this module assigns ids to them, orders them
 //! and turns them into [`Effect`]s.
 //!
-//! - **Journal first**: a change is an entry; it is applied to the [`Session`] when the store says that it is on disk, and only
-//!   then does anything that depends on it happen or show. What the operator does meanwhile waits in a short queue.
-//! - **One request at a time**: planning, measuring, identifying. Its answer carries its id; an answer to anything else is
-//!   dropped. It can always be cancelled.
+//! - **Journal first**: a change is an entry. It is applied to the [`Session`] once the store reports it on disk, and only then
+//!   does anything that depends on it happen or show. Intents that arrive meanwhile wait in a short queue.
+//! - **One request at a time**: planning, measuring, identifying. Its answer carries its id; any other answer is dropped. A
+//!   request can always be cancelled.
 //! - The session is all that survives: [`Wizard::resume`] with the fold of the journal continues where the journal ends.
 //!
 //! No clock, thread, file, key or terminal here, and no randomness: the same events give the same states and effects.
@@ -33,7 +33,7 @@ use std::collections::VecDeque;
 
 use jiff::Timestamp;
 
-pub use effect::{Answer, CircleConfigurations, Effect, Event, Progress, Request, RequestId, StoreEvent};
+pub use effect::{Answer, CircleConfigurations, Effect, Event, Request, RequestId, RequestProgress, StoreEvent};
 pub use intent::{Danger, Intent, IntentInfo, PlanSettings};
 pub use notice::{Notice, Problem, Severity};
 pub use view::ViewModel;
@@ -42,10 +42,11 @@ use crate::session::journal::{Entry, Line, SCHEMA};
 use crate::session::reading::LiveReading;
 use crate::session::set_up::{InstrumentChoice, Step};
 use crate::session::state::Session;
+use crate::text::{counted, counted_as};
 use live::Live;
 use step::{Action, Connection, Cx, Phase};
 
-/// Intents that wait while the journal is being written; more than a person can type in that time.
+/// Limit of the intent queue while the journal is being written; more than a person can type in that time.
 const MOST_WAITING: usize = 64;
 
 /// Name and version of the program, for the journal.
@@ -59,7 +60,7 @@ pub struct Wizard {
     session: Session,
     phase: Phase,
     connection: Option<Connection>,
-    /// Where the session is on disk; none before it has a folder.
+    /// Folder of the session; `None` before the first entry is written.
     folder: Option<String>,
     now: Timestamp,
     last_id: u64,
@@ -72,21 +73,21 @@ pub struct Wizard {
     ended: Option<String>,
 }
 
-/// The request that is under way.
+/// The running request.
 #[derive(Clone, Debug)]
 struct Busy {
     id: RequestId,
     what: &'static str,
-    progress: Option<Progress>,
+    progress: Option<RequestProgress>,
     cancelled: bool,
 }
 
-/// What the store is asked for.
+/// The write that the store is working on.
 #[derive(Clone, Debug)]
 struct Writing {
     id: RequestId,
     what: Write,
-    /// What the store said when it failed; it waits for [`Intent::Retry`].
+    /// Error of a failed write, which waits for [`Intent::Retry`].
     failed: Option<String>,
 }
 
@@ -117,20 +118,20 @@ impl Wizard {
         }
     }
 
-    /// Goes on with a session that `folder` holds, and with which `torn_bytes` were lost at the end of its journal.
+    /// Resumes the session in `folder`, whose journal lost `torn_bytes` at its end.
     pub fn resume(session: Session, folder: String, torn_bytes: usize, now: Timestamp) -> (Self, Vec<Effect>) {
         let mut wizard = Self::new(now);
         wizard.phase = Phase::enter(session.step, &session);
         wizard.folder = Some(folder);
         wizard.session = session;
         let mut notice = Notice::info(format!(
-            "session '{}' goes on: {}",
+            "Resumed session '{}' ({})",
             wizard.session.name,
-            counted(wizard.session.counted().count(), "sample", "samples")
+            counted(wizard.session.counted().count(), "sample")
         ));
         if torn_bytes > 0 {
             notice = notice.hint(format!(
-                "the end of the journal was incomplete or damaged ({torn_bytes} bytes): it was set aside as 'journal.torn-…'. An entry that was not completely on disk was never shown as saved"
+                "the end of the journal was incomplete or damaged ({torn_bytes} bytes) and was set aside as 'journal.torn-…'. Nothing that was shown as saved is affected"
             ));
         }
         wizard.actions.push_back(Action::Write(vec![Entry::Resumed { program: program(), torn_bytes }]));
@@ -148,30 +149,30 @@ impl Wizard {
         &self.session
     }
 
-    /// Where the session is on disk.
+    /// Folder of the session.
     pub fn folder(&self) -> Option<&str> {
         self.folder.as_deref()
     }
 
-    /// Whether nothing is under way: every further change needs an intent, a tick or a shutdown.
+    /// Whether neither a request nor a write is running: only an intent, a tick or a shutdown changes anything.
     pub const fn is_idle(&self) -> bool {
         self.busy.is_none() && self.writing.is_none()
     }
 
-    /// Whether the program is to end, and why.
+    /// Why the program ends, if it does.
     pub fn ended(&self) -> Option<&str> {
         self.ended.as_deref()
     }
 
-    /// What the operator is to be told.
+    /// The current message to the operator.
     pub const fn notice(&self) -> Option<&Notice> {
         self.notice.as_ref()
     }
 
-    /// Takes note of an event.
+    /// Handles an event and returns the effects to carry out.
     pub fn update(&mut self, event: Event) -> Vec<Effect> {
         match event {
-            // Clocks are set; time that runs backwards is taken as it is, nothing here depends on its order.
+            // A clock can be set back. Time is taken as it comes: nothing here depends on its order.
             Event::Tick(now) => {
                 self.now = now;
                 Vec::new()
@@ -194,7 +195,7 @@ impl Wizard {
         }
     }
 
-    /// A look through the instrument. It may be time to measure.
+    /// Handles a live reading, which may trigger an automatic measurement.
     fn on_live(&mut self, reading: LiveReading) -> Vec<Effect> {
         let last_sample = self.session.samples.last().map(|sample| self.session.point_of(sample));
         self.live.take(reading, last_sample);
@@ -211,19 +212,19 @@ impl Wizard {
         self.on_intent(Intent::Measure)
     }
 
-    /// What can be done now, with what cannot and why.
+    /// All intents of this moment; those that are not possible carry the reason.
     pub fn intents(&self) -> Vec<IntentInfo> {
         if self.ended.is_some() {
             return Vec::new();
         }
         let quit = IntentInfo::new(Intent::Quit, "quit").with_danger(Danger::Leaves);
         if self.is_stuck() {
-            return vec![IntentInfo::new(Intent::Retry, "write again").default_action(), quit];
+            return vec![IntentInfo::new(Intent::Retry, "retry").default_action(), quit];
         }
         let mut intents = Vec::new();
-        let busy = self.busy.as_ref().map(|busy| format!("{} is under way", busy.what));
+        let busy = self.busy.as_ref().map(|busy| format!("{} is still running", busy.what));
         if let Some(busy) = &self.busy {
-            let blocked = busy.cancelled.then(|| "it is being cancelled".to_owned());
+            let blocked = busy.cancelled.then(|| "already being cancelled".to_owned());
             intents.push(IntentInfo::new(Intent::Cancel, format!("cancel {}", busy.what)).unless(blocked));
         }
         for mut info in self.phase.intents(&self.cx()) {
@@ -242,7 +243,7 @@ impl Wizard {
         intents
     }
 
-    /// What there is to see.
+    /// The current view.
     pub fn view(&self) -> ViewModel {
         view::build(self)
     }
@@ -251,7 +252,14 @@ impl Wizard {
         Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now }
     }
 
-    /// Whether the store has failed and the operator must decide.
+    /// The step, mutable, beside what it may read.
+    fn phase_and_cx(&mut self) -> (&mut Phase, Cx<'_>) {
+        let cx =
+            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now };
+        (&mut self.phase, cx)
+    }
+
+    /// Whether a write has failed and the operator must decide.
     fn is_stuck(&self) -> bool {
         self.writing.as_ref().is_some_and(|writing| writing.failed.is_some())
     }
@@ -262,9 +270,9 @@ impl Wizard {
         }
         if self.is_stuck() {
             return if intent == Intent::Retry {
-                self.write_again()
+                self.retry_write()
             } else if intent == Intent::Quit {
-                self.end("quit; the last change could not be saved".to_owned())
+                self.end("quit; the last change was not saved".to_owned())
             } else {
                 Vec::new()
             };
@@ -285,9 +293,9 @@ impl Wizard {
             self.notice = None;
             return Vec::new();
         }
-        // The offers are the one place that decides what can be done.
+        // `intents` alone decides what is possible, so that footer, help and scripts agree with what happens.
         let blocked = match self.intents().into_iter().find(|info| info.intent.name() == intent.name()) {
-            None => Some(format!("'{}' has no meaning in the step {}", intent.name(), self.phase.step())),
+            None => Some(format!("'{}' is not available in the step {}", intent.name(), self.phase.step())),
             Some(info) => info.blocked,
         };
         if let Some(reason) = blocked {
@@ -296,11 +304,10 @@ impl Wizard {
         }
         self.notice = None;
         if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo) {
-            self.live.stays();
+            self.live.hold_until_moved();
         }
-        let cx =
-            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now };
-        let actions = self.phase.on_intent(intent, &cx);
+        let (phase, cx) = self.phase_and_cx();
+        let actions = phase.on_intent(intent, &cx);
         self.actions.extend(actions);
         self.run()
     }
@@ -322,10 +329,9 @@ impl Wizard {
         self.busy = None;
         if let Answer::Connected { identity, warnings, recorded } = &answer {
             if !warnings.is_empty() {
-                // One message: of several only the last would be seen.
-                let notice =
-                    Notice::attention(format!("the instrument is not as it should be: {}", warnings.join("; ")))
-                        .hint("it measures; mend this before the first point, or go on if it is meant so");
+                // All warnings go into one message: a second one would replace the first.
+                let notice = Notice::attention(format!("check the instrument: {}", warnings.join("; ")))
+                    .hint("The instrument works. Fix this before the first point, or continue if it is intended");
                 self.actions.push_back(Action::Say(notice));
             }
             self.connection = Some(Connection { identity: identity.clone(), recorded: recorded.clone() });
@@ -334,9 +340,8 @@ impl Wizard {
                 self.actions.push_back(Action::Write(vec![Entry::Connected { identity: identity.clone() }]));
             }
         }
-        let cx =
-            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now };
-        let actions = self.phase.on_answer(answer, &cx);
+        let (phase, cx) = self.phase_and_cx();
+        let actions = phase.on_answer(answer, &cx);
         self.actions.extend(actions);
         self.run()
     }
@@ -345,7 +350,7 @@ impl Wizard {
         let id = match &event {
             StoreEvent::Created { id, .. } | StoreEvent::Written { id } | StoreEvent::Failed { id, .. } => *id,
         };
-        // What has failed waits for the operator: a late word about it changes nothing.
+        // A failed write waits for the operator; a late event about it changes nothing.
         let is_awaited = |writing: &mut Writing| writing.id == id && writing.failed.is_none();
         let Some(mut writing) = self.writing.take_if(is_awaited) else { return Vec::new() };
         match (event, writing.what) {
@@ -355,11 +360,11 @@ impl Wizard {
                     return vec![Effect::Exit];
                 }
                 self.waiting.clear();
-                let on_disk = counted(self.session.samples.len(), "sample is", "samples are");
+                let saved = counted_as(self.session.samples.len(), "sample is", "samples are");
                 self.notice = Some(
-                    Notice::stop(format!("not saved: {message}"))
-                        .hint(format!("{on_disk} safely on disk; nothing of that is lost"))
-                        .hint("make room or mend the disk, then write again; or quit, and resume the session later"),
+                    Notice::stop(format!("could not save: {message}"))
+                        .hint(format!("{saved} already saved; nothing has been lost"))
+                        .hint("free some disk space and retry, or quit and resume the session later"),
                 );
                 writing.failed = Some(message);
                 self.writing = Some(Writing { what, ..writing });
@@ -382,7 +387,7 @@ impl Wizard {
                 }
                 effects
             }
-            // An answer of the wrong kind answers nothing.
+            // An event of the wrong kind does not complete the write.
             (StoreEvent::Created { .. } | StoreEvent::Written { .. }, what) => {
                 self.writing = Some(Writing { what, ..writing });
                 Vec::new()
@@ -390,30 +395,25 @@ impl Wizard {
         }
     }
 
-    /// Takes a line that is on disk into the session.
+    /// Applies a line that is on disk to the session.
     fn apply(&mut self, line: &Line) {
         if let Err(error) = self.session.apply(line) {
-            // The wizard writes only what fits; if it ever does not, the operator must know.
-            self.notice = Some(Notice::stop(format!("the journal does not fit together: {error}")));
+            // The wizard only writes entries that fit. If one ever does not, the operator must know.
+            self.notice = Some(Notice::stop(format!("the journal is inconsistent: {error}")));
             return;
         }
         if let Entry::Step(step) = line.entry {
             self.phase = Phase::enter(step, &self.session);
         } else {
-            let cx = Cx {
-                session: &self.session,
-                connection: self.connection.as_ref(),
-                down: self.live.down(),
-                now: self.now,
-            };
-            let actions = self.phase.on_applied(&line.entry, &cx);
+            let (phase, cx) = self.phase_and_cx();
+            let actions = phase.on_applied(&line.entry, &cx);
             if self.ended.is_none() {
                 self.actions.extend(actions);
             }
         }
     }
 
-    fn write_again(&mut self) -> Vec<Effect> {
+    fn retry_write(&mut self) -> Vec<Effect> {
         let Some(writing) = self.writing.take() else { return Vec::new() };
         self.notice = None;
         match writing.what {
@@ -425,7 +425,7 @@ impl Wizard {
         self.run()
     }
 
-    /// Does what is to be done, until something has to be waited for.
+    /// Carries out queued actions until one has to wait for the disk.
     fn run(&mut self) -> Vec<Effect> {
         let mut effects = Vec::new();
         while self.writing.is_none()
@@ -471,13 +471,13 @@ impl Wizard {
         effects
     }
 
-    /// What to say about lines that do not fit the session: they are never written, a journal with them could not be read.
+    /// The message about lines that do not fit the session. They are never written: a journal with them could not be read.
     fn misfit(&self, lines: &[Line]) -> Option<Notice> {
         let mut session = self.session.clone();
         let error = lines.iter().find_map(|line| session.apply(line).err())?;
         Some(
             Notice::stop(format!("not done: {error}"))
-                .hint("nothing was written, the session is intact; please report this with its journal"),
+                .hint("nothing was written and the session is intact; please report this with its journal"),
         )
     }
 
@@ -486,14 +486,14 @@ impl Wizard {
         RequestId(self.last_id)
     }
 
-    /// Ends in good order: what is under way is cancelled, the journal is closed.
+    /// Shuts down cleanly: cancels the running request and closes the journal.
     fn shut_down(&mut self, cause: String) -> Vec<Effect> {
         if self.ended.is_some() {
-            // Told a second time, nothing is waited for any more: nor is anything done with what is still answered.
+            // A second shutdown waits for nothing, and answers that still arrive are ignored.
             self.drop_everything();
             return vec![Effect::Exit];
         }
-        // What is on its way to the disk is waited for: an opened session is closed in good order.
+        // A pending write is awaited, so that an opened session is closed cleanly.
         let has_session = self.session.opened.is_some() || self.writing.is_some();
         if !has_session || self.is_stuck() {
             return self.end(cause);
@@ -501,7 +501,7 @@ impl Wizard {
         let mut effects = self.cancel();
         self.busy = None;
         self.waiting.clear();
-        // A reading that waits for a note to be on disk is not lost.
+        // Entries that wait behind a pending write are still written: a reading among them must not be lost.
         self.actions.retain(|action| matches!(action, Action::Write(_)));
         self.actions.push_back(Action::Write(vec![Entry::Closed { reason: cause.clone() }]));
         self.actions.push_back(Action::Exit);
@@ -518,18 +518,13 @@ impl Wizard {
         effects
     }
 
-    /// Nothing is under way any more, and whatever is still answered means nothing.
+    /// Forgets all pending work, so that answers that still arrive are ignored.
     fn drop_everything(&mut self) {
         self.busy = None;
         self.writing = None;
         self.waiting.clear();
         self.actions.clear();
     }
-}
-
-/// `1 sample`, `2 samples`.
-fn counted(count: usize, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 #[cfg(test)]

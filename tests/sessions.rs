@@ -434,7 +434,7 @@ fn says_what_is_safe(place: &Place, output: &Output, reason: &str) {
     assert_ne!(output.status.code(), Some(0));
     assert!(output.status.code().is_some(), "{:?}", output.status);
     assert!(
-        errors.contains("not saved: cannot write") && errors.contains("journal.ron") && errors.contains(reason),
+        errors.contains("could not save: cannot write") && errors.contains("journal.ron") && errors.contains(reason),
         "{errors}"
     );
     let notices: Vec<String> = records(&output.stdout)
@@ -448,7 +448,7 @@ fn says_what_is_safe(place: &Place, output: &Output, reason: &str) {
     assert_eq!(journal.lines.len(), saved, "what was not acknowledged is cut off");
     let count = checked(&place.session()).1.samples.len();
     let safe = if count == 1 { "1 sample is".to_owned() } else { format!("{count} samples are") };
-    assert!(told.contains(&format!("{safe} safely on disk")), "{told}");
+    assert!(told.contains(&format!("{safe} already saved")), "{told}");
 }
 
 /// A limit of the size of a file is a disk that is full at exactly that byte, and needs no rights.

@@ -25,7 +25,7 @@ use trupose::session::simulation::Simulation;
 use trupose::session::state::Session;
 use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
 use trupose::wizard::{
-    Answer, CircleConfigurations, Effect, Event, Intent, PlanSettings, Problem, Progress, Request, RequestId,
+    Answer, CircleConfigurations, Effect, Event, Intent, PlanSettings, Problem, Request, RequestId, RequestProgress,
     StoreEvent, Wizard,
 };
 
@@ -116,7 +116,7 @@ impl Cell {
                 let sweeping = matches!(request, Request::Plan { .. });
                 self.open.push(Effect::Start { id, request });
                 let search = trupose::procedure::plan::Progress::Unreachable { poses: usize::from(sweeping) };
-                Event::Progress { id, progress: Progress::Search(search) }
+                Event::Progress { id, progress: RequestProgress::Search(search) }
             }
             Effect::Start { id, request } => Event::Answer { id, answer: self.answer(&request) },
             Effect::Cancel(id) => {

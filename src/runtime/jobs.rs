@@ -13,7 +13,7 @@ use crate::profile::{Profile, builtin, builtin_names};
 use crate::session::plan;
 use crate::store;
 use crate::text::causes;
-use crate::wizard::{Answer, CircleConfigurations, Event, Problem, Progress, Request, RequestId};
+use crate::wizard::{Answer, CircleConfigurations, Event, Problem, Request, RequestId, RequestProgress};
 
 /// Starts a request; `false` if the system refuses a thread.
 pub(super) fn start(id: RequestId, request: Request, cancelled: Arc<AtomicBool>, events: Events) -> bool {
@@ -71,7 +71,7 @@ impl Job {
     fn plan(&self, profile: &Profile, text: &str, request: &procedure::plan::PlanRequest) -> Result<Answer, Problem> {
         let keep_going = || !self.is_cancelled();
         let told = |progress: procedure::plan::Progress| {
-            self.events.offer(Event::Progress { id: self.id, progress: Progress::Search(progress) });
+            self.events.offer(Event::Progress { id: self.id, progress: RequestProgress::Search(progress) });
         };
         let summary = procedure::plan::plan(profile, text, request, &keep_going, &told).map_err(Problem::from)?;
         let rows = procedure::plan::rows(&summary, &procedure::joint_types(profile));
@@ -83,7 +83,7 @@ impl Job {
 
     fn identify(&self, request: &procedure::identify::IdentifyRequest) -> Result<Answer, Problem> {
         let identified = procedure::identify::identify(request, &mut |iteration| {
-            self.events.offer(Event::Progress { id: self.id, progress: Progress::Solver(*iteration) });
+            self.events.offer(Event::Progress { id: self.id, progress: RequestProgress::Solver(*iteration) });
             if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         Ok(Answer::Identified(Box::new(identified.map_err(Problem::from)?)))

@@ -1,4 +1,4 @@
-//! What the wizard hears ([`Event`]) and what it wants done ([`Effect`]).
+//! Inputs of the wizard ([`Event`]) and the work that it asks for ([`Effect`]).
 
 use jiff::Timestamp;
 
@@ -16,66 +16,54 @@ use crate::session::plan_summary::PlanSummary;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::set_up::InstrumentChoice;
 
-/// Tells answers apart: an answer to anything but the open request is dropped.
+/// Identifies a request, so that an answer to anything but the running one can be dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RequestId(pub u64);
 
-/// Something that happened.
+/// An input of the wizard.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// The operator wants something.
     Intent(Intent),
     /// The time. The wizard has no clock of its own.
     Tick(Timestamp),
-    /// About the journal.
     Store(StoreEvent),
     /// A request has ended.
     Answer {
-        /// Which.
         id: RequestId,
-        /// How.
         answer: Answer,
     },
-    /// A request goes on.
+    /// A running request reports how far it is.
     Progress {
-        /// Which.
         id: RequestId,
-        /// How far it is.
-        progress: Progress,
+        progress: RequestProgress,
     },
-    /// What the link sees while nothing is measured.
+    /// The link's reading between measurements.
     Live(LiveReading),
-    /// Something beside the calibration that the operator should know, such as a recording that stopped.
+    /// A message that does not concern the calibration itself, such as a recording that stopped.
     Remark(Notice),
     /// The program has to end.
     Shutdown {
-        /// Why, such as `SIGTERM`.
+        /// Reason in words, such as `SIGTERM`.
         cause: String,
     },
 }
 
-/// What the store says.
+/// A report of the session store.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StoreEvent {
-    /// The session's folder was made and is held.
+    /// The session folder was created and locked.
     Created {
-        /// Which request.
         id: RequestId,
-        /// Where it is.
         folder: String,
-        /// Its name, which may carry a number.
+        /// Name of the session, which may have a number appended.
         name: String,
     },
     /// The lines are on disk.
-    Written {
-        /// Which request.
-        id: RequestId,
-    },
+    Written { id: RequestId },
     /// Nothing was written.
     Failed {
-        /// Which request.
         id: RequestId,
-        /// Why, and where.
+        /// Reason and place.
         message: String,
     },
 }
@@ -83,145 +71,115 @@ pub enum StoreEvent {
 /// How a request ended.
 #[derive(Clone, Debug)]
 pub enum Answer {
-    /// A profile's text.
+    /// The text of a profile.
     Profile {
         /// Name or path that was asked for.
         source: String,
-        /// Its text.
         text: String,
     },
-    /// The instrument answers.
+    /// The instrument responds.
     Connected {
-        /// Who it says it is.
+        /// Identity reported by the instrument.
         identity: String,
-        /// What the operator has to see before measuring, such as a frame that is not the instrument's own.
+        /// Problems to see before measuring, such as a frame that is not the instrument's own.
         warnings: Vec<String>,
-        /// The poses of recorded measurements.
+        /// Poses of recorded measurements.
         recorded: Vec<PlannedPose>,
     },
-    /// A reading.
     Measured(Reading),
     /// Poses to measure.
     Planned {
-        /// The numbers; none for a plan from a file.
+        /// Figures of the plan; `None` for a plan from a file.
         summary: Option<Box<PlanSummary>>,
-        /// The rows.
         rows: Vec<PlannedPose>,
-        /// Where they come from.
+        /// Source of the plan in words.
         origin: String,
     },
     /// Configurations for the circle-point analysis, one list per joint turned.
     CirclesPlanned(Vec<CircleConfigurations>),
-    /// A result.
     Identified(Box<Identified>),
-    /// The models are written and proven, in memory.
+    /// The models are written and verified, in memory.
     Modelled(Box<Models>),
-    /// Files were written.
+    /// The result files are on disk.
     Delivered {
-        /// Their names.
+        /// Names of the files.
         files: Vec<String>,
         /// Models that were left out, with the reason.
         left_out: Vec<String>,
     },
-    /// It could not be done.
     Failed(Problem),
-    /// It was cancelled.
     Cancelled,
 }
 
 /// Configurations that turn one joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CircleConfigurations {
-    /// Which joint, from 0.
+    /// Index of the joint, from 0.
     pub joint: usize,
     /// Pendant values (rad, sliding joints m), in order.
     pub configurations: Vec<Vec<f64>>,
 }
 
-/// How far a request is.
+/// Progress of a running request.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Progress {
-    /// A pose search.
+pub enum RequestProgress {
+    /// Progress of a pose search.
     Search(procedure::plan::Progress),
-    /// An identification.
+    /// Progress of an identification.
     Solver(Iteration),
 }
 
-/// Something to be done outside.
+/// Work for the outside world.
 #[derive(Clone, Debug)]
 pub enum Effect {
-    /// Make the folder of a session and hold it.
-    Create {
-        /// Answered with this.
-        id: RequestId,
-        /// Its name.
-        name: String,
-    },
-    /// Write lines of the journal and force them to disk.
-    Append {
-        /// Answered with this.
-        id: RequestId,
-        /// The lines.
-        lines: Vec<Line>,
-    },
-    /// Start something that takes time.
-    Start {
-        /// Answered with this.
-        id: RequestId,
-        /// What.
-        request: Request,
-    },
-    /// Stop it; it is answered all the same.
+    /// Create the folder of a session and lock it.
+    Create { id: RequestId, name: String },
+    /// Append lines to the journal and force them to disk.
+    Append { id: RequestId, lines: Vec<Line> },
+    /// Start a request.
+    Start { id: RequestId, request: Request },
+    /// Cancel a request, which still ends with an answer.
     Cancel(RequestId),
-    /// The end.
+    /// End the program.
     Exit,
 }
 
-/// Something that takes time.
+/// A task that takes time.
 #[derive(Clone, Debug)]
 pub enum Request {
-    /// Read a profile by name or path.
     LoadProfile {
         /// Name or path.
         source: String,
     },
-    /// Connect the instrument.
     Connect {
-        /// What measures.
         instrument: InstrumentChoice,
-        /// The robot that it looks at.
+        /// Profile of the robot in front of the instrument.
         profile: Box<Profile>,
     },
-    /// Measure.
     Measure(MeasureRequest),
     /// Choose poses.
     Plan {
-        /// The robot, with the target as chosen.
+        /// Profile with the target as chosen.
         profile: Box<Profile>,
-        /// Text of the profile.
         profile_text: String,
-        /// How many poses, and so on.
         request: Box<PlanRequest>,
     },
     /// Read the poses of a file.
     LoadPlan {
-        /// Its path.
         file: String,
-        /// The robot.
         profile: Box<Profile>,
     },
     /// Find configurations for the circle-point analysis.
     PlanCircles {
-        /// The robot.
         profile: Box<Profile>,
     },
-    /// Identify, and verify where there are verification samples.
+    /// Identify the arm, and verify it if there are verification samples.
     Identify(Box<IdentifyRequest>),
-    /// Write the identified arm in the formats of others, and prove each.
+    /// Write the identified arm in other formats, and verify each.
     Model(Box<ModelsRequest>),
-    /// Replace result files in the session's folder.
+    /// Replace the result files in the session folder.
     Deliver {
-        /// Name and text of each.
+        /// Name and text of each file.
         files: Vec<(String, String)>,
         /// Models that were left out, with the reason.
         left_out: Vec<String>,
@@ -229,7 +187,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// What it does, for a busy line.
+    /// The activity in words, for a busy line.
     pub const fn what(&self) -> &'static str {
         match self {
             Self::LoadProfile { .. } => "reading the profile",

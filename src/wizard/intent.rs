@@ -1,84 +1,82 @@
-//! What the operator wants. Keys, menus and scripts all come down to these.
+//! Intents: what the operator can ask for. Keys, menus and scripts all send these.
 
 use serde::{Deserialize, Serialize};
 
 use crate::session::set_up::{About, InstrumentChoice, TargetChoice};
 
-/// Something the operator wants done.
+/// A command of the operator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Intent {
-    /// Go on to the next step.
+    /// Continue to the next step.
     Next,
-    /// Back to the step before; nothing measured is lost.
+    /// Go back to the previous step; nothing measured is lost.
     Back,
     /// Stop what is running.
     Cancel,
-    /// Leave the program; the session can be resumed.
+    /// Quit the program; the session can be resumed.
     Quit,
-    /// Take note of the message.
+    /// Dismiss the message.
     Dismiss,
-    /// Try again what failed.
+    /// Retry what failed.
     Retry,
 
-    /// Take this robot: name of a shipped profile, or path of a file.
+    /// Choose a robot by the name of a bundled profile or the path of a file.
     ChooseProfile(String),
-    /// Give the session this name.
     NameSession(String),
-    /// Measure with this.
     ChooseInstrument(InstrumentChoice),
-    /// Take the SMR to be here.
+    /// Choose where the SMR sits on the flange.
     ChooseTarget(TargetChoice),
-    /// Find the SMR by circle-point analysis.
+    /// Locate the SMR by circle-point analysis.
     StartCircles,
-    /// Take the result of the circle-point analysis.
+    /// Use the result of the circle-point analysis.
     UseCircles,
-    /// Measure the circles again from the start.
+    /// Discard the measured circles and start again.
     DiscardCircles,
 
     /// Choose poses.
     MakePlan(PlanSettings),
-    /// Take the poses of a file.
+    /// Load the poses from a file.
     LoadPlan(String),
-    /// Take the poses of the recorded measurements that are played.
+    /// Use the poses of the recorded measurements that are played back.
     PlanFromRecording,
-    /// Measure this plan.
+    /// Accept the proposed plan for measuring.
     AcceptPlan,
 
     /// Measure at the pose shown.
     Measure,
-    /// The coordinates that the instrument shows, typed or pasted.
+    /// Enter the coordinates shown by the instrument, typed or pasted.
     TypeReading(String),
-    /// Take a reading that the gates have held back.
+    /// Accept a reading that the checks have held back.
     AcceptReading,
-    /// The sample in question counts as it is.
+    /// Keep the questioned sample as it is.
     Keep,
-    /// The sample in question does not count.
+    /// Exclude the questioned sample.
     LeaveOut,
-    /// Measure the pose in question again.
+    /// Measure the pose of the questioned sample again.
     MeasureAgain,
-    /// Set right what was found, as proposed.
+    /// Apply the proposed correction.
     ApplyRemedy,
-    /// Do not measure the pose shown.
+    /// Skip the pose shown.
     Skip,
-    /// Take the last sample back.
+    /// Undo the last sample.
     Undo,
-    /// Show another pose of the plan, by name.
+    /// Go to another pose of the plan, by name.
     GoToPose(String),
-    /// Write a remark to the pose shown.
+    /// Attach a note to the pose shown.
     Note(String),
-    /// Add so many more poses that tell most after those measured.
+    /// Add this many poses, the most informative ones after those measured.
     SuggestPoses(usize),
 
-    /// Identify the arm from what is measured.
+    /// Identify the arm from the samples.
     Identify,
-    /// Say serial number, operator and place for the report.
+    /// Set serial number, operator and place for the report.
     About(About),
     /// Write the result files.
     Deliver,
 }
 
 impl Intent {
-    /// Its name, as in scripts.
+    /// Name of the intent, as in scripts.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Next => "Next",
@@ -117,19 +115,18 @@ impl Intent {
     }
 }
 
-/// How many poses, and of what kind.
+/// Settings of a pose search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlanSettings {
-    /// Poses to identify from.
+    /// Number of identification poses.
     pub poses: usize,
-    /// Poses to verify with.
+    /// Number of verification poses.
     pub verification: usize,
-    /// Candidates to choose from.
+    /// Number of candidates to choose from.
     pub candidates: usize,
-    /// Seed of all random decisions.
     pub seed: u64,
-    /// The first pose is measured again after so many; 0: never.
+    /// The first pose is measured again after this many poses; 0: never.
     pub drift_every: usize,
 }
 
@@ -139,61 +136,60 @@ impl Default for PlanSettings {
     }
 }
 
-/// What doing something would mean.
+/// Consequence of an intent that needs a confirmation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Danger {
-    /// Nothing to fear.
+    /// No confirmation needed.
     #[default]
     None,
-    /// It takes a sample out of the result; it stays in the journal.
+    /// Removes a sample from the result; it stays in the journal.
     DropsData,
-    /// It ends the program.
+    /// Ends the program.
     Leaves,
 }
 
-/// An intent on offer: the one source of footer, help and script checks.
+/// An intent on offer, from which footer, help and script checks are made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntentInfo {
-    /// The intent; one with an argument carries a proposal for it.
+    /// The intent itself; an argument carries a proposed value.
     pub intent: Intent,
-    /// What it does, in two or three words.
+    /// Effect of the intent in two or three words.
     pub label: String,
-    /// Why it cannot be done now; `None`: it can.
+    /// Reason why it is not possible now; `None` if it is.
     pub blocked: Option<String>,
-    /// What it would mean.
     pub danger: Danger,
-    /// The sensible thing to do next.
+    /// Whether this is the sensible next action.
     pub is_default: bool,
 }
 
 impl IntentInfo {
-    /// An intent that can be done.
+    /// An intent that is possible.
     pub fn new(intent: Intent, label: impl Into<String>) -> Self {
         Self { intent, label: label.into(), blocked: None, danger: Danger::None, is_default: false }
     }
 
-    /// Only possible where `reason` is `None`.
+    /// Blocks the intent if there is a reason.
     #[must_use]
     pub fn unless(mut self, reason: Option<String>) -> Self {
         self.blocked = reason;
         self
     }
 
-    /// Marks it as the sensible next thing, if it can be done.
+    /// Marks the intent as the sensible next action, if it is possible.
     #[must_use]
     pub const fn default_action(mut self) -> Self {
         self.is_default = self.blocked.is_none();
         self
     }
 
-    /// With what it would mean.
+    /// Sets the danger level.
     #[must_use]
     pub const fn with_danger(mut self, danger: Danger) -> Self {
         self.danger = danger;
         self
     }
 
-    /// Whether it can be done now.
+    /// Whether the intent is possible now.
     pub const fn is_enabled(&self) -> bool {
         self.blocked.is_none()
     }

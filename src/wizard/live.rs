@@ -1,5 +1,5 @@
-//! What the instrument sees while nothing is measured: is the SMR still, is it where it should be, does the robot stand as
-//! planned. From it the wizard may measure by itself.
+//! Live readings between measurements: whether the SMR is at rest and where it should be, and whether the robot is at the planned
+//! configuration. They can trigger an automatic measurement.
 
 use std::collections::VecDeque;
 
@@ -13,35 +13,36 @@ use crate::units::{DEGREE, MILLIMETRE, to_deg, to_mm};
 
 use super::view::{LivePoint, LiveView};
 
-/// Points are kept for this long (s).
+/// Time for which points are kept (s).
 const KEPT: f64 = 5.0;
-/// Most points kept.
+/// Largest number of points kept.
 const MOST: usize = 128;
-/// The SMR rests if it stays within this of where it is now (m).
+/// Radius around the present position within which the SMR counts as being at rest (m).
 const REST: f64 = 0.1 * MILLIMETRE;
-/// It has to rest so long before the wizard measures by itself (s).
+/// Rest time that triggers an automatic measurement (s).
 pub(super) const REST_TIME: f64 = 2.0;
-/// It has to move by so much before the wizard measures by itself again (m).
+/// Distance that the SMR has to move before the next automatic measurement (m).
 const MOVED: f64 = 5.0 * MILLIMETRE;
-/// The SMR is near if it is within this of its predicted place (m), or within [`NEAR_SPREADS`] of what samples miss.
+/// Distance from its predicted position within which the SMR is at the pose shown (m).
 const NEAR: f64 = 30.0 * MILLIMETRE;
+/// The same as a multiple of the registration residual, if that is larger.
 const NEAR_SPREADS: f64 = 4.0;
-/// The robot stands as planned if no joint is off by more (rad).
+/// Largest difference of a joint from the plan at which the robot is at the planned configuration (rad).
 pub(super) const AS_PLANNED: f64 = 0.05 * DEGREE;
 
-/// The last seconds of a link.
+/// The last seconds of live readings.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Live {
     latest: Option<LiveReading>,
     points: VecDeque<(f64, Point3<f64>)>,
-    /// Where was measured last, or where a sample was taken back, until the SMR is seen elsewhere.
+    /// Position of the last measurement or undo, until the SMR is seen elsewhere.
     measured_at: Option<Point3<f64>>,
-    /// Something was seen since the link is there.
+    /// Whether the SMR was seen since the link was established.
     has_seen: bool,
 }
 
 impl Live {
-    /// Takes a look. `last_sample`: where the session measured last (m).
+    /// Takes a reading. `last_sample` is the last point of the session (m).
     pub(super) fn take(&mut self, reading: LiveReading, last_sample: Option<Point3<f64>>) {
         let restarted = self.latest.as_ref().is_some_and(|before| reading.seconds < before.seconds);
         if restarted || reading.point.is_none() {
@@ -61,17 +62,17 @@ impl Live {
         self.latest = Some(reading);
     }
 
-    /// Why the link cannot be asked now.
+    /// Why the link is down, if it is.
     pub(super) fn down(&self) -> Option<&str> {
         self.latest.as_ref()?.down.as_deref()
     }
 
-    /// Nothing is seen any more.
+    /// Forgets all readings.
     pub(super) fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// How long the SMR has rested where it is (s), and how much it scattered meanwhile (m, root mean square).
+    /// How long the SMR has been at rest (s), and its scatter during that time (m, RMS).
     fn rest(&self) -> Option<(f64, f64)> {
         let (now, here) = *self.points.back()?;
         let still: Vec<(f64, Point3<f64>)> =
@@ -83,7 +84,7 @@ impl Live {
         Some((now - since, square.sqrt()))
     }
 
-    /// Distance of the SMR from where it should be at row `row` (m).
+    /// Distance of the SMR from its predicted position at `row`, and the registration residual (m, RMS).
     fn off_predicted(&self, session: &Session, row: usize) -> Option<(f64, f64)> {
         let (_, here) = *self.points.back()?;
         let registered = station::registration(session)?;
@@ -91,7 +92,7 @@ impl Live {
         Some(((registered.to_from_from * here - predicted).norm(), registered.rms))
     }
 
-    /// Largest difference of a joint from the plan (rad), and which joint.
+    /// The joint that is farthest from the plan, and its difference (rad).
     fn joint_difference(&self, session: &Session, row: usize) -> Option<(usize, f64)> {
         let joints = self.latest.as_ref()?.joints.as_ref()?;
         let planned = &session.rows.get(row)?.planned.configuration;
@@ -102,42 +103,50 @@ impl Live {
         differences.enumerate().max_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
-    /// Whether the wizard should measure row `row` by itself now.
+    /// Whether to measure `row` automatically now.
     pub(super) fn is_time(&self, session: &Session, row: usize) -> bool {
-        let is_up = self.latest.as_ref().is_some_and(|latest| latest.down.is_none());
-        let rests = self.rest().is_some_and(|(seconds, _)| seconds >= REST_TIME);
-        let stands = self.latest.as_ref().and_then(|latest| latest.is_still) != Some(false);
-        let by_joints = self.joint_difference(session, row).map(|(_, difference)| difference <= AS_PLANNED);
-        let by_place = self.off_predicted(session, row).map(|(distance, rms)| distance <= NEAR.max(NEAR_SPREADS * rms));
-        // Without the robot's joints and before the tracker's place is known, nobody can tell which pose this is.
-        let is_there =
-            by_joints.unwrap_or(true) && by_place.unwrap_or(true) && (by_joints.is_some() || by_place.is_some());
-        is_up && self.measured_at.is_none() && rests && stands && is_there
+        let Some(latest) = self.latest.as_ref().filter(|latest| latest.down.is_none()) else { return false };
+        let smr_rests = self.rest().is_some_and(|(seconds, _)| seconds >= REST_TIME);
+        let robot_rests = latest.is_still != Some(false);
+        self.measured_at.is_none() && smr_rests && robot_rests && self.is_at(session, row)
     }
 
-    /// Here is measured, or a sample taken back: the wizard does not measure by itself until the SMR has moved.
-    pub(super) fn stays(&mut self) {
+    /// Whether the robot is at the pose of `row`. Without joint values, and before the tracker is registered, nothing tells
+    /// which pose this is.
+    fn is_at(&self, session: &Session, row: usize) -> bool {
+        let by_joints = self.joint_difference(session, row).map(|(_, difference)| difference <= AS_PLANNED);
+        let by_point = self.off_predicted(session, row).map(|(distance, rms)| distance <= NEAR.max(NEAR_SPREADS * rms));
+        match (by_joints, by_point) {
+            (Some(joints), Some(point)) => joints && point,
+            (Some(one), None) | (None, Some(one)) => one,
+            (None, None) => false,
+        }
+    }
+
+    /// Suspends automatic measuring until the SMR has moved, after a measurement or an undo at this position.
+    pub(super) fn hold_until_moved(&mut self) {
         self.measured_at = self.points.back().map(|(_, point)| *point).or(self.measured_at);
     }
 
-    /// What there is to see, at row `row` of the plan.
+    /// The view at `row` of the plan.
     pub(super) fn view(&self, session: &Session, row: Option<usize>) -> Option<LiveView> {
         let latest = self.latest.as_ref()?;
         let rest = self.rest();
         let centre = self.points.back().map(|(_, point)| *point);
         let last = self.points.back().map_or(0.0, |(at, _)| *at);
-        let row_view = |pick: &dyn Fn(usize) -> Option<f64>| row.and_then(pick);
         Some(LiveView {
             point_mm: latest.point.map(|point| point.coords.map(to_mm).into()),
             is_blind: latest.is_blind,
             silent_s: latest.silent,
             rest_s: rest.map(|(seconds, _)| seconds),
             scatter_mm: rest.map(|(_, scatter)| to_mm(scatter)),
-            from_predicted_mm: row_view(&|row| self.off_predicted(session, row).map(|(distance, _)| to_mm(distance))),
+            from_predicted_mm: row
+                .and_then(|row| self.off_predicted(session, row))
+                .map(|(distance, _)| to_mm(distance)),
             joints: latest.joints.clone(),
-            joint_difference: row.and_then(|row| {
-                self.joint_difference(session, row).map(|(joint, difference)| (joint, to_deg(difference)))
-            }),
+            joint_difference: row
+                .and_then(|row| self.joint_difference(session, row))
+                .map(|(joint, difference)| (joint, to_deg(difference))),
             is_still: latest.is_still,
             down: latest.down.clone(),
             track: self
@@ -152,7 +161,7 @@ impl Live {
     }
 }
 
-/// Where the nominal arm has the reflector (m).
+/// Position of the SMR as predicted by the nominal arm (m).
 fn predicted(session: &Session, q: &[f64]) -> Option<Point3<f64>> {
     let profile = session.mounted_profile()?;
     let target = profile.targets().first()?.position_in_flange;

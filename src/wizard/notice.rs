@@ -1,53 +1,48 @@
-//! Messages to the operator: what happened, and what to do about it.
+//! Messages to the operator: what happened and what to do about it.
 
 use serde::Serialize;
 
-/// How much a message matters.
+/// Importance of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Severity {
-    /// For information.
+    /// Information only.
     Info,
-    /// To be looked at before going on.
+    /// To be looked at before continuing.
     Attention,
-    /// What was asked for could not be done.
+    /// A request could not be carried out.
     Error,
-    /// Nothing goes on before it is resolved.
+    /// Nothing continues until the problem is resolved.
     Stop,
 }
 
-/// A message.
+/// A message to the operator.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Notice {
-    /// How much it matters.
     pub severity: Severity,
     /// What happened, with names and numbers.
     pub what: String,
-    /// What to do.
+    /// Possible remedies.
     pub hints: Vec<String>,
 }
 
 impl Notice {
-    /// For information.
     pub fn info(what: impl Into<String>) -> Self {
         Self { severity: Severity::Info, what: what.into(), hints: Vec::new() }
     }
 
-    /// To be looked at.
     pub fn attention(what: impl Into<String>) -> Self {
         Self { severity: Severity::Attention, what: what.into(), hints: Vec::new() }
     }
 
-    /// What was asked for could not be done.
     pub fn error(what: impl Into<String>) -> Self {
         Self { severity: Severity::Error, what: what.into(), hints: Vec::new() }
     }
 
-    /// Nothing goes on before it is resolved.
     pub fn stop(what: impl Into<String>) -> Self {
         Self { severity: Severity::Stop, what: what.into(), hints: Vec::new() }
     }
 
-    /// With what to do.
+    /// Adds a remedy.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hints.push(hint.into());
@@ -60,7 +55,7 @@ impl Notice {
 pub struct Problem {
     /// What happened.
     pub message: String,
-    /// What to do.
+    /// Possible remedies.
     pub hints: Vec<String>,
 }
 

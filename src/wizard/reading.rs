@@ -1,40 +1,41 @@
-//! Readings: coordinates as people type and paste them, and the gates that every reading passes.
+//! Readings: parsing of typed or pasted coordinates, and the checks that every reading passes.
 
 use nalgebra::Point3;
 
 use crate::session::reading::Reading;
 use crate::session::set_up::CoordinateUnit;
+use crate::text::{counted, printable, shortened};
 use crate::units::{MILLIMETRE, to_mm};
 
-/// Shots scatter by at most this many times what the instrument's σ lets expect.
+/// Largest scatter of the shots, as a multiple of the scatter expected from the instrument's σ.
 const SCATTER_FACTOR: f64 = 5.0;
-/// Scatter that every instrument may have (m).
+/// Scatter that is accepted from every instrument (m).
 const SCATTER_ALWAYS: f64 = 0.03 * MILLIMETRE;
-/// Longer text that was typed is not repeated as a whole.
-const LONGEST_QUOTED: usize = 40;
-/// No instrument measures farther (m).
+/// Columns of the typed text that a message quotes.
+const QUOTED: usize = 41;
+/// Range that no instrument exceeds (m).
 const FARTHEST: f64 = 1000.0;
 
 /// Reads three coordinates in `unit`: `1234.5 -20 88.1`, `x=1 y=2 z=3`, `1.5; 2.5; 3.5`, `[1, 2, 3]`, `1,5; 2,5; 3,5`, with or
 /// without `mm` behind the numbers.
 ///
 /// # Errors
-/// What is wrong, and how it should read.
+/// What is wrong with the text, and how it should read.
 pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
     let expected = || {
-        format!("'{}' is not a point; type three numbers in {}, such as '1234.567 -20.1 88'", short(text), unit.sign())
+        format!("'{}' is not a point; type three numbers in {}, such as '1234.567 -20.1 88'", quoted(text), unit.sign())
     };
     let cleaned: String = text
         .chars()
         .map(|c| match c {
-            // Signs that people and programs put around coordinates.
+            // Characters that people and programs put around coordinates.
             '(' | ')' | '[' | ']' | '{' | '}' | '<' | '>' | '\t' | '\r' | '\n' | '|' | '\u{a0}' => ' ',
             '\u{2212}' => '-',
             c => c,
         })
         .collect();
     let separated =
-        separate(&cleaned).map_err(|advice| format!("'{}' can be read in several ways; {advice}", short(text)))?;
+        separate(&cleaned).map_err(|advice| format!("'{}' can be read in several ways; {advice}", quoted(text)))?;
     let mut values = Vec::with_capacity(3);
     let mut axes = String::new();
     for word in separated {
@@ -67,28 +68,28 @@ pub fn parse(text: &str, unit: CoordinateUnit) -> Result<Point3<f64>, String> {
         [_, _, _, ..] => Err(format!(
             "found {} numbers in '{}': one point at a time, three numbers in {}",
             values.len(),
-            short(text),
+            quoted(text),
             unit.sign()
         )),
-        _ => Err(format!("{}; found {}", expected(), super::counted(values.len(), "number", "numbers"))),
+        _ => Err(format!("{}; found {}", expected(), counted(values.len(), "number"))),
     }
 }
 
-/// Whether a text would be taken as the coordinates of a measured point in `unit`.
+/// Checks that a text would be accepted as the coordinates of a measured point in `unit`.
 ///
 /// # Errors
-/// Why not: it is no point, or a point that no instrument measures.
+/// Why the text was rejected.
 pub fn check(text: &str, unit: CoordinateUnit) -> Result<(), String> {
     let point = parse(text, unit)?;
     gate(&point, None).map_or(Ok(()), Err)
 }
 
-/// What to do about numbers that can be read in several ways.
+/// Advice on numbers that can be read in several ways.
 const SEPARATE: &str = "separate the numbers by blanks or ';'";
 const NO_THOUSANDS: &str = "leave out the thousands separator";
 const ONE_DECIMAL_SIGN: &str = "write all decimals with a point";
 
-/// The words of a point. A comma separates numbers, or stands before decimals: which one must be clear, else what to do.
+/// The words of a point. A comma is a separator or a decimal sign; where it is not clear which, returns advice instead.
 fn separate(text: &str) -> Result<Vec<String>, &'static str> {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let has_both = |text: &str| text.contains(',') && text.contains('.');
@@ -98,7 +99,7 @@ fn separate(text: &str) -> Result<Vec<String>, &'static str> {
         if numbers.iter().any(is_long) { NO_THOUSANDS } else { ONE_DECIMAL_SIGN }
     };
     if text.contains(';') {
-        // Between numbers stands ';', so a comma is a decimal sign, unless there are points as well.
+        // Numbers are separated by ';', so a comma is a decimal sign, unless there are points as well.
         let numbers = text.replace(';', " ");
         return if has_both(text) { Err(mixed(&words(&numbers))) } else { Ok(words(&numbers.replace(',', "."))) };
     }
@@ -108,7 +109,7 @@ fn separate(text: &str) -> Result<Vec<String>, &'static str> {
     let parts = words(text);
     let has_outer_commas = parts.iter().any(|part| part.ends_with(',') || part.starts_with(','));
     if has_outer_commas {
-        // `1, 2, 3`: separators; a comma inside a word would be a second meaning.
+        // `1, 2, 3`: separators. A comma inside a word would then be ambiguous.
         let inner: Vec<&String> = parts.iter().filter(|part| part.trim_matches(',').contains(',')).collect();
         return match inner.as_slice() {
             [] => Ok(words(&text.replace(',', " "))),
@@ -117,7 +118,7 @@ fn separate(text: &str) -> Result<Vec<String>, &'static str> {
         };
     }
     if parts.len() >= 3 {
-        // `1,5 2,5 3,5`: decimal commas, if there is no decimal point. One comma with three digits behind may mean thousands.
+        // `1,5 2,5 3,5`: decimal commas, if there is no decimal point. A single comma before three digits may mean thousands.
         let with_comma: Vec<&String> = parts.iter().filter(|part| part.contains(',')).collect();
         let thousands = match with_comma.as_slice() {
             [only] => {
@@ -131,13 +132,13 @@ fn separate(text: &str) -> Result<Vec<String>, &'static str> {
             (false, false) => Ok(words(&text.replace(',', "."))),
         };
     }
-    // `1.5,2.5,3.5`: separators, if every part can be a number of its own.
+    // `1.5,2.5,3.5`: separators, if every part can be a number by itself.
     let parts: Vec<&str> = text.split(',').collect();
     let is_clear = parts.len() == 3 && (text.contains('.') || parts.iter().all(|part| part.trim().len() > 3));
     if is_clear { Ok(words(&text.replace(',', " "))) } else { Err(SEPARATE) }
 }
 
-/// `x=12`, `X:12`: the name goes, to `axes`.
+/// Strips the name of the axis from `x=12` or `X:12`, and appends it to `axes`.
 fn strip_name<'a>(word: &'a str, axes: &mut String) -> &'a str {
     let name = word.chars().next().map(|c| c.to_ascii_lowercase()).filter(|c| matches!(c, 'x' | 'y' | 'z'));
     match (name, word.get(1..)) {
@@ -149,22 +150,18 @@ fn strip_name<'a>(word: &'a str, axes: &mut String) -> &'a str {
     }
 }
 
-/// The beginning of what was typed.
-fn short(text: &str) -> String {
+/// The beginning of the typed text, on one line.
+fn quoted(text: &str) -> String {
     let words: Vec<&str> = text.split_whitespace().collect();
-    let text = crate::text::printable(&words.join(" "));
-    match text.char_indices().nth(LONGEST_QUOTED) {
-        Some((end, _)) => format!("{}…", text.get(..end).unwrap_or_default().trim_end()),
-        None => text,
-    }
+    shortened(&printable(&words.join(" ")), QUOTED)
 }
 
-/// A reading that was typed in.
+/// A reading from typed coordinates.
 pub(super) const fn typed(point: Point3<f64>) -> Reading {
     Reading { point, sigma: None, scatter: None, shots: 1, temperature: None, configuration: None, seconds: 0.0 }
 }
 
-/// Why a reading is no measurement at all.
+/// Why a reading is not a measurement at all.
 pub(super) fn gate(point: &Point3<f64>, previous: Option<&Point3<f64>>) -> Option<String> {
     if !point.coords.iter().all(|value| value.is_finite()) {
         return Some("the reading is not a number".to_owned());
@@ -177,18 +174,18 @@ pub(super) fn gate(point: &Point3<f64>, previous: Option<&Point3<f64>>) -> Optio
     }
     if previous.is_some_and(|previous| previous == point) {
         return Some(
-            "the reading is the same to the last digit as the one before: the instrument has not measured again"
+            "identical to the previous reading to the last digit: the instrument did not take a new measurement"
                 .to_owned(),
         );
     }
     None
 }
 
-/// Why joint values that came with a reading cannot be those of a robot with so many joints.
+/// Why the joint values that came with a reading are not valid for a robot with `joints` joints.
 pub(super) fn foreign_joints(reading: &Reading, joints: usize) -> Option<String> {
     let reported = reading.configuration.as_ref()?;
     let fits = reported.len() == joints && reported.iter().all(|value| value.is_finite());
-    (!fits).then(|| format!("the robot reported {} joint values that cannot be its own", reported.len()))
+    (!fits).then(|| format!("the robot reported {} joint values that are not valid for this arm", reported.len()))
 }
 
 /// Largest scatter (m) of the shots of a robot at rest, for an instrument with `sigma` (m) per coordinate.
@@ -196,10 +193,10 @@ pub(super) fn scatter_limit(sigma: Option<f64>) -> f64 {
     sigma.map_or(SCATTER_ALWAYS, |sigma| (SCATTER_FACTOR * 3.0_f64.sqrt() * sigma).max(SCATTER_ALWAYS))
 }
 
-/// What to say about shots that scatter too much.
+/// The message about shots that scatter too much.
 pub(super) fn scatter_message(scatter: f64, limit: f64) -> String {
     format!(
-        "the shots scatter by {:.3} mm, {:.3} mm is usual: the robot still moved, or something shakes",
+        "the shots scatter by {:.3} mm, up to {:.3} mm is usual: the robot was still moving, or something vibrates",
         to_mm(scatter),
         to_mm(limit)
     )

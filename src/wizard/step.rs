@@ -1,11 +1,11 @@
-//! The steps: each a small machine that owns only what is not in the session.
+//! The steps: small state machines that own only what is not in the session.
 //!
-//! A step is made anew whenever it is entered, from the session alone: going back and forth, or resuming, loses nothing but a
-//! proposal that was not accepted. It answers intents and results with [`Action`]s and never touches the session itself.
+//! A step is created from the session alone whenever it is entered. Going back and forth, or resuming, therefore loses nothing but
+//! a proposal that was not accepted. A step answers intents and results with [`Action`]s and never changes the session itself.
 
 #![expect(
     clippy::wildcard_enum_match_arm,
-    reason = "a step answers its own intents, answers and entries; all others mean nothing to it"
+    reason = "a step handles its own intents, answers and entries, and ignores all others"
 )]
 
 mod capture;
@@ -28,62 +28,84 @@ use crate::session::plan::PlannedPose;
 use crate::session::set_up::Step;
 use crate::session::state::{Robot, Session};
 
-/// What a step may look at.
+/// What a step may read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cx<'a> {
     pub(super) session: &'a Session,
     pub(super) connection: Option<&'a Connection>,
-    /// Why the link to the instrument cannot be asked now, while it is being connected again.
+    /// Why the link to the instrument is down, while it is being reconnected.
     pub(super) down: Option<&'a str>,
     pub(super) now: Timestamp,
 }
 
 impl Cx<'_> {
-    /// The robot; a step behind the first one always has it.
+    /// The robot; every step after the first has one.
     pub(super) fn robot(&self) -> Option<&Robot> {
         self.session.robot.as_ref()
     }
 
-    /// The profile with the target as it was chosen.
+    /// The profile with the chosen target.
     pub(super) fn profile(&self) -> Option<Profile> {
         self.session.mounted_profile()
     }
 }
 
-/// An instrument that answers.
+/// An instrument that responds.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Connection {
-    /// Who it says it is.
+    /// Identity reported by the instrument.
     pub(super) identity: String,
-    /// The poses of recorded measurements.
+    /// Poses of recorded measurements.
     pub(super) recorded: Vec<PlannedPose>,
 }
 
-/// What a step wants done.
+/// Work that a step asks the wizard to do.
 #[derive(Clone, Debug)]
 pub(super) enum Action {
-    /// Make the session's folder, with these entries after the opening one.
-    Create { name: String, entries: Vec<Entry> },
-    /// Write entries; what comes after waits until they are on disk.
+    /// Create the session folder, with these entries after the opening one.
+    Create {
+        name: String,
+        entries: Vec<Entry>,
+    },
+    /// Write entries; later actions wait until they are on disk.
     Write(Vec<Entry>),
-    /// Start something that takes time.
+    /// Start a request.
     Ask(Request),
-    /// Forget the instrument.
+    /// Drop the connection to the instrument.
     Disconnect,
-    /// Tell the operator.
+    /// Show a message.
     Say(Notice),
-    /// End the program.
     Exit,
 }
 
+/// A condition for an intent: met, or the reason why the intent is not possible.
+type Condition = Result<(), String>;
+
+fn require(is_met: bool, reason: &str) -> Condition {
+    if is_met { Ok(()) } else { Err(reason.to_owned()) }
+}
+
+/// Offers an intent that is possible if all conditions are met; the first one that is not gives the reason.
+fn offer<const N: usize>(intent: Intent, label: &str, conditions: [Condition; N]) -> IntentInfo {
+    IntentInfo::new(intent, label).unless(conditions.into_iter().find_map(Result::err))
+}
+
+/// Marks the sensible next action among `intents`, if it is possible.
+fn with_default(mut intents: Vec<IntentInfo>, next: &Intent) -> Vec<IntentInfo> {
+    for info in intents.iter_mut().filter(|info| info.intent == *next) {
+        info.is_default = info.is_enabled();
+    }
+    intents
+}
+
 impl Action {
-    /// Goes to a step.
+    /// The action that goes to a step.
     pub(super) fn go(step: Step) -> Self {
         Self::Write(vec![Entry::Step(step)])
     }
 }
 
-/// The step that the wizard is in.
+/// The current step with its state.
 #[derive(Clone, Debug)]
 pub(super) enum Phase {
     Profile(profile::ProfileStep),
@@ -96,7 +118,7 @@ pub(super) enum Phase {
     Deliver(deliver::DeliverStep),
 }
 
-/// Calls the step inside, whichever it is.
+/// Calls a method of the step inside.
 macro_rules! each {
     ($phase:expr, $step:ident => $call:expr) => {
         match $phase {
@@ -113,7 +135,7 @@ macro_rules! each {
 }
 
 impl Phase {
-    /// Begins a step from the session alone.
+    /// Enters a step, from the session alone.
     pub(super) fn enter(step: Step, session: &Session) -> Self {
         match step {
             Step::Profile => Self::Profile(profile::ProfileStep::default()),
@@ -127,7 +149,7 @@ impl Phase {
         }
     }
 
-    /// Row of the plan that is shown, where there is one.
+    /// Row of the plan that is shown, if any.
     pub(super) const fn shown_row(&self) -> Option<usize> {
         match self {
             Self::Capture(step) => step.shown_row(),
@@ -141,7 +163,7 @@ impl Phase {
         }
     }
 
-    /// Which one it is.
+    /// The name of the step.
     pub(super) const fn step(&self) -> Step {
         match self {
             Self::Profile(_) => Step::Profile,
@@ -155,7 +177,7 @@ impl Phase {
         }
     }
 
-    /// What can be done in it.
+    /// Intents that the step offers.
     pub(super) fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let mut intents = each!(self, step => step.intents(cx));
         if self.step() != Step::Profile {
@@ -164,7 +186,7 @@ impl Phase {
         intents
     }
 
-    /// The operator wants something that is on offer.
+    /// Handles an intent that is on offer.
     pub(super) fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
         if intent == Intent::Back {
             return self.step().previous().map(Action::go).into_iter().collect();
@@ -172,7 +194,7 @@ impl Phase {
         each!(self, step => step.on_intent(intent, cx))
     }
 
-    /// The open request has ended.
+    /// Handles the answer to the running request.
     pub(super) fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
         match answer {
             Answer::Failed(problem) => each!(self, step => step.on_failure(problem, cx)),
@@ -184,40 +206,40 @@ impl Phase {
         }
     }
 
-    /// An entry is on disk and in the session.
+    /// Called when an entry is on disk and in the session.
     pub(super) fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
         each!(self, step => step.on_applied(entry, cx))
     }
 
-    /// What it shows.
+    /// The step's part of the view.
     pub(super) fn content(&self, cx: &Cx<'_>) -> Content {
         each!(self, step => step.content(cx))
     }
 }
 
-/// What every step does.
+/// Interface of a step.
 pub(super) trait StepMachine {
-    /// What can be done.
+    /// Intents that the step offers.
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo>;
 
-    /// The operator wants something that is on offer.
+    /// Handles an intent that is on offer.
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action>;
 
-    /// A request has been answered. Answers that another step asked for (it was left meanwhile) mean nothing here.
+    /// Handles an answer. An answer to a request of a step that was left meanwhile is ignored.
     fn on_answer(&mut self, _answer: Answer, _cx: &Cx<'_>) -> Vec<Action> {
         Vec::new()
     }
 
-    /// A request has failed or was cancelled.
+    /// Handles a request that failed or was cancelled.
     fn on_failure(&mut self, problem: super::Problem, _cx: &Cx<'_>) -> Vec<Action> {
         vec![Action::Say(problem.into())]
     }
 
-    /// An entry is on disk and in the session.
+    /// Called when an entry is on disk and in the session.
     fn on_applied(&mut self, _entry: &Entry, _cx: &Cx<'_>) -> Vec<Action> {
         Vec::new()
     }
 
-    /// What there is to see.
+    /// The step's part of the view.
     fn content(&self, cx: &Cx<'_>) -> Content;
 }

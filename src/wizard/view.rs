@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::intent::{IntentInfo, PlanSettings};
 use super::notice::{Notice, Severity};
-use super::{Progress, Wizard};
+use super::{RequestProgress, Wizard};
 use crate::planning::{Figures, Stage};
 use crate::procedure::plan;
 use crate::profile::{Level, Profile};
@@ -536,13 +536,13 @@ pub(crate) const fn purpose(step: Step) -> &'static str {
     }
 }
 
-fn progress_text(progress: &Progress) -> String {
+fn progress_text(progress: &RequestProgress) -> String {
     match progress {
-        Progress::Search(plan::Progress::Searching) => "the candidates are known".to_owned(),
-        Progress::Search(plan::Progress::Unreachable { poses }) => {
+        RequestProgress::Search(plan::Progress::Searching) => "the candidates are known".to_owned(),
+        RequestProgress::Search(plan::Progress::Unreachable { poses }) => {
             format!("{poses} poses cannot be reached without a collision: choosing again")
         }
-        Progress::Search(plan::Progress::Sweep { found, starts, .. }) => {
+        RequestProgress::Search(plan::Progress::Sweep { found, starts, .. }) => {
             let stage = match found.stage {
                 Stage::Prediction => "predicting",
                 Stage::Objective { .. } => "choosing",
@@ -554,27 +554,28 @@ fn progress_text(progress: &Progress) -> String {
                 found.figures.predicted_error
             )
         }
-        Progress::Solver(iteration) => {
+        RequestProgress::Solver(iteration) => {
             format!("cost {:.6e}, largest change {:.1e} expected deviations", iteration.cost, iteration.step)
         }
     }
 }
 
 /// Figures of merit of the best pose set after a sweep of a search.
-const fn figures(progress: &Progress) -> Option<Figures> {
+const fn figures(progress: &RequestProgress) -> Option<Figures> {
     match progress {
-        Progress::Search(plan::Progress::Sweep { found, .. }) => Some(found.figures),
-        Progress::Search(_) | Progress::Solver(_) => None,
+        RequestProgress::Search(plan::Progress::Sweep { found, .. }) => Some(found.figures),
+        RequestProgress::Search(_) | RequestProgress::Solver(_) => None,
     }
 }
 
 /// Part of the stage of a search that is done.
-fn part_done(progress: &Progress) -> Option<f64> {
+fn part_done(progress: &RequestProgress) -> Option<f64> {
     match progress {
-        Progress::Search(plan::Progress::Sweep { done, sweeps, .. }) => {
+        RequestProgress::Search(plan::Progress::Sweep { done, sweeps, .. }) => {
             Some((*done as f64 / (*sweeps).max(1) as f64).min(1.0))
         }
-        Progress::Search(plan::Progress::Searching | plan::Progress::Unreachable { .. }) | Progress::Solver(_) => None,
+        RequestProgress::Search(plan::Progress::Searching | plan::Progress::Unreachable { .. })
+        | RequestProgress::Solver(_) => None,
     }
 }
 

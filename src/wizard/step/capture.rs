@@ -1,18 +1,19 @@
-//! Capture: pose by pose, every point checked against all earlier ones.
+//! Step Capture: pose by pose, every point checked against all earlier ones.
 
 mod checks;
 mod prediction;
 mod show;
 
 use super::plan::{plan_request, plan_text};
-use super::{Action, Cx, StepMachine};
+use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::session::journal::{
-    Correction, Decision, Entry, FindingCause, FindingText, Line, MeasuredText, to_edge, to_xyz_mm,
+    Correction, Decision, Entry, FindingCause, FindingText, Line, MeasuredText, from_xyz_mm, to_edge, to_xyz_mm,
 };
 use crate::session::plan::PoseKind;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
-use crate::session::state::{Robot, Sample, SampleState, Session};
+use crate::session::state::{Robot, Row, Sample, SampleState, Session};
+use crate::text::printable;
 use crate::units::{from_mm, to_mm};
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Danger, Intent, IntentInfo, PlanSettings};
@@ -27,7 +28,7 @@ pub(super) use prediction::fewest_samples;
 const SETTLE: f64 = 2.0;
 /// Shots per pose.
 const SHOTS: u32 = 3;
-/// Poses that are proposed at a time.
+/// Number of poses that are suggested at a time.
 const SUGGESTED: usize = 5;
 
 /// The capture step.
@@ -35,32 +36,36 @@ const SUGGESTED: usize = 5;
 pub(in crate::wizard) struct CaptureStep {
     /// Row of the plan that is shown.
     row: Option<usize>,
-    /// A reading that the gates hold back.
-    held: Option<Held>,
-    /// The sample that the operator has to look at.
-    question: Option<u64>,
-    /// A measurement is under way; what else fails is no refused measurement.
+    /// A reading that the checks hold back.
+    held: Option<HeldReading>,
+    /// Measurement number of the questioned sample, about which the operator has to decide.
+    questioned: Option<u64>,
+    /// Whether a measurement is running. Only then is a failed request a refused measurement.
     measuring: bool,
-    /// Fewest identification samples; neither robot nor SMR change while it is measured.
+    /// Fewest identification samples, if known. Neither robot nor SMR change during this step.
     fewest: Option<usize>,
-    /// What the samples so far let expect.
+    /// Prediction from the samples so far.
     prediction: Prediction,
-    /// The same with the measurement of this number, which is being written.
+    /// The prediction that includes the measurement of this number, which is being written.
     expected: Option<(u64, Prediction)>,
 }
 
-/// A reading that is good enough only if the operator says so.
+/// A reading that counts only if the operator accepts it.
 #[derive(Clone, Debug)]
-struct Held {
+struct HeldReading {
     noted: MeasuredText,
     reason: String,
 }
 
-/// Why there are too few identification samples to identify from, if it takes `fewest`.
-pub(super) fn too_few(session: &Session, fewest: Option<usize>) -> Option<String> {
-    let fewest = fewest?;
+/// Whether there are enough identification samples, if it takes `fewest`.
+pub(super) fn has_enough(session: &Session, fewest: Option<usize>) -> Condition {
     let measured = session.counted_of(PoseKind::Identification).count();
-    (measured < fewest).then(|| format!("{measured} of at least {fewest} identification poses are measured"))
+    match fewest {
+        Some(fewest) if measured < fewest => {
+            Err(format!("{measured} of at least {fewest} identification poses have been measured"))
+        }
+        Some(_) | None => Ok(()),
+    }
 }
 
 impl CaptureStep {
@@ -69,30 +74,30 @@ impl CaptureStep {
         self.row
     }
 
-    /// Begins where the operator was last, or at the next row that waits to be measured.
+    /// Enters the step at the row that was shown last, or at the next one that is open.
     pub(super) fn enter(session: &Session) -> Self {
         let last = session.shown.unwrap_or(0);
         let mut step = Self {
             row: session.open_rows().find(|row| *row >= last).or_else(|| session.open_rows().next()),
             held: None,
-            question: None,
+            questioned: None,
             measuring: false,
             fewest: fewest_samples(session),
             prediction: Prediction::of(session),
             expected: None,
         };
-        step.ask(session);
+        step.question_last_doubt(session);
         step
     }
 
-    /// Asks about the last sample that is in doubt, if there is one, and shows its row.
-    fn ask(&mut self, session: &Session) {
+    /// Questions the last sample that is in doubt, if there is one, and shows its row.
+    fn question_last_doubt(&mut self, session: &Session) {
         let doubt = session.doubts().map(|(sample, _)| (sample.noted.number, sample.row)).last();
-        self.question = doubt.map(|(number, _)| number);
+        self.questioned = doubt.map(|(number, _)| number);
         self.row = doubt.map(|(_, row)| row).or(self.row);
     }
 
-    /// The row after the one shown that waits to be measured, or the first one.
+    /// The next open row after the one shown, or else the first open row.
     fn following(&self, session: &Session) -> Option<usize> {
         let after = self.row.map_or(0, |row| row + 1);
         session.open_rows().find(|row| *row >= after).or_else(|| session.open_rows().find(|row| Some(*row) != self.row))
@@ -117,7 +122,7 @@ impl CaptureStep {
         }))]
     }
 
-    /// A reading of the row shown: held back, refused, or written.
+    /// Takes a reading of the row shown: refuses it, holds it back, or writes it as a sample.
     fn take(&mut self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
         let (Some(row), Some(robot)) = (self.row, cx.robot()) else { return Vec::new() };
         let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
@@ -146,8 +151,8 @@ impl CaptureStep {
             findings: Vec::new(),
         };
         let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
-        let previous = previous.map(crate::session::journal::from_xyz_mm);
-        let gate = reading::gate(&crate::session::journal::from_xyz_mm(noted.xyz_mm), previous.as_ref());
+        let previous = previous.map(from_xyz_mm);
+        let gate = reading::gate(&from_xyz_mm(noted.xyz_mm), previous.as_ref());
         if let Some(reason) = gate.or_else(|| reading::foreign_joints(reading, robot.joint_types.len())) {
             let notice = Notice::error(format!("pose {}: {reason}", noted.pose)).hint("measure again");
             return vec![Action::Write(vec![refused(&noted, reason)]), Action::Say(notice)];
@@ -160,9 +165,9 @@ impl CaptureStep {
         {
             let reason = reading::scatter_message(scatter, limit);
             let entry = refused(&noted, reason.clone());
-            self.held = Some(Held { noted, reason: reason.clone() });
+            self.held = Some(HeldReading { noted, reason: reason.clone() });
             let notice = Notice::attention(reason)
-                .hint("wait until it is at rest and measure again; or take the reading as it is");
+                .hint("wait until the robot is at rest and measure again, or accept the reading");
             return vec![Action::Write(vec![entry]), Action::Say(notice)];
         }
         let mut noted = noted;
@@ -171,7 +176,7 @@ impl CaptureStep {
         [Action::Write(vec![self.sample(noted, cx)])].into_iter().chain(remark.map(Action::Say)).collect()
     }
 
-    /// A sample with what a calibration from all samples up to it would be worth.
+    /// The entry of a sample, with the error predicted for a calibration from all samples up to this one.
     fn sample(&mut self, mut noted: MeasuredText, cx: &Cx<'_>) -> Entry {
         let mut with = cx.session.clone();
         let line = Line { number: with.lines + 1, time: cx.now, entry: Entry::Sample(noted.clone()) };
@@ -183,34 +188,31 @@ impl CaptureStep {
         Entry::Sample(noted)
     }
 
-    /// The sample in question with what was found about it.
-    fn asked<'a>(&self, session: &'a Session) -> Option<(&'a Sample, &'a FindingText)> {
-        let number = self.question?;
+    /// The questioned sample with its finding.
+    fn doubt<'a>(&self, session: &'a Session) -> Option<(&'a Sample, &'a FindingText)> {
+        let number = self.questioned?;
         session.doubts().filter(|(sample, _)| sample.noted.number == number).last()
     }
 
-    fn decide(&self, decision: Decision) -> Vec<Action> {
-        self.question.map(|sample| Action::Write(vec![Entry::Decision { sample, decision }])).into_iter().collect()
+    /// Shows the row of the questioned sample, if there is one.
+    fn show_questioned(&mut self, session: &Session) {
+        let questioned = self.questioned.and_then(|number| session.sample(number));
+        self.row = questioned.map(|sample| sample.row).or(self.row);
     }
 
-    /// Shows a row by the name of its pose: one that waits, else one that is skipped, else one that is done.
+    fn decide(&self, decision: Decision) -> Vec<Action> {
+        self.questioned.map(|sample| Action::Write(vec![Entry::Decision { sample, decision }])).into_iter().collect()
+    }
+
+    /// Shows a row by the name of its pose. A skipped pose is no longer skipped.
     fn go_to(pose: &str, session: &Session) -> Vec<Action> {
-        let named = |row: &usize| {
-            session.rows.get(*row).is_some_and(|row| row.planned.pose == pose && row.planned.kind.is_measured())
-        };
-        let rows: Vec<usize> = (0..session.rows.len()).filter(named).collect();
-        let active = |row: &&usize| session.rows.get(**row).is_some_and(|row| row.active);
-        let skipped = |row: &&usize| active(row) && session.rows.get(**row).is_some_and(|row| row.skipped);
-        let found = rows.iter().find(|row| session.is_open(**row)).or_else(|| rows.iter().find(skipped));
-        // Of those that are done the pose itself, not its repetitions for drift.
-        let found = found.or_else(|| rows.iter().find(active)).or_else(|| rows.last()).copied();
-        let Some(row) = found else {
-            let pose = crate::text::printable(pose);
+        let Some(row) = row_of_pose(pose, session) else {
+            let pose = printable(pose);
             return vec![Action::Say(Notice::error(format!("there is no pose '{pose}' in the plan")))];
         };
         let is_skipped = session.rows.get(row).is_some_and(|row| row.skipped);
-        let after_all = is_skipped.then_some(Entry::Skipped { row, skipped: false });
-        vec![Action::Write(after_all.into_iter().chain([Entry::Row(row)]).collect())]
+        let unskip = is_skipped.then_some(Entry::Skipped { row, skipped: false });
+        vec![Action::Write(unskip.into_iter().chain([Entry::Row(row)]).collect())]
     }
 
     fn manual_unit(cx: &Cx<'_>) -> Option<CoordinateUnit> {
@@ -221,7 +223,20 @@ impl CaptureStep {
     }
 }
 
-/// What to say about a robot that stands elsewhere than shown. What it tells counts; both are kept.
+/// The row of a pose by its name: an open one, else a skipped one, else one that is done.
+fn row_of_pose(pose: &str, session: &Session) -> Option<usize> {
+    let rows = session.rows.iter().enumerate();
+    let named: Vec<(usize, &Row)> =
+        rows.filter(|(_, row)| row.planned.pose == pose && row.planned.kind.is_measured()).collect();
+    // The first active row is the pose itself; its repetitions for drift come later.
+    let found = (named.iter().find(|(index, _)| session.is_open(*index)))
+        .or_else(|| named.iter().find(|(_, row)| row.active && row.skipped))
+        .or_else(|| named.iter().find(|(_, row)| row.active))
+        .or_else(|| named.last());
+    found.map(|(index, _)| *index)
+}
+
+/// The message about a robot that is not at the configuration shown. The reported values are used; both are kept.
 fn not_as_planned(noted: &MeasuredText, robot: &Robot) -> Option<Notice> {
     let reported = noted.reported_joints.as_ref()?;
     let differences = reported.iter().zip(&noted.joints).map(|(reported, shown)| (reported - shown).abs());
@@ -230,79 +245,127 @@ fn not_as_planned(noted: &MeasuredText, robot: &Robot) -> Option<Notice> {
     let quantity = joint.joint_type.quantity();
     (quantity.from_edge(difference) > AS_PLANNED).then(|| {
         Notice::attention(format!(
-            "pose {}: the robot stands {difference:.3} {} away from the plan at joint {}",
+            "pose {}: joint {} is {difference:.3} {} away from the plan",
             noted.pose,
-            quantity.unit(),
-            joint.name
+            joint.name,
+            quantity.unit()
         ))
-        .hint("what the robot tells counts, the plan is kept beside it; measure again if this was not meant")
+        .hint("the joint values reported by the robot are used; the planned ones are kept for reference. Remeasure if this was unintended")
     })
 }
 
-/// A reading that is no sample.
+/// The entry of a reading that is refused.
 fn refused(noted: &MeasuredText, reason: String) -> Entry {
     let xyz_mm =
         [noted.xyz_mm.0, noted.xyz_mm.1, noted.xyz_mm.2].iter().all(|value| value.is_finite()).then_some(noted.xyz_mm);
     Entry::Refused { number: noted.number, pose: noted.pose.clone(), reason, xyz_mm }
 }
 
+/// Conditions for the intents of the capture step, each with the reason if it is not met.
+struct Conditions<'a> {
+    step: &'a CaptureStep,
+    cx: &'a Cx<'a>,
+}
+
+impl Conditions<'_> {
+    fn at_a_pose(&self) -> Condition {
+        require(self.step.row.is_some(), "all poses of the plan have been measured")
+    }
+
+    fn connected(&self) -> Condition {
+        require(self.cx.connection.is_some(), "the instrument is not responding; go back to the instrument step")
+    }
+
+    /// The link works. A key pressed now must not trigger a measurement later.
+    fn online(&self) -> Condition {
+        self.cx.down.map_or(Ok(()), |cause| Err(format!("the link is down: {cause}; reconnecting")))
+    }
+
+    /// The instrument supplies the coordinates.
+    fn automatic(&self) -> Condition {
+        require(CaptureStep::manual_unit(self.cx).is_none(), "the coordinates are typed in")
+    }
+
+    /// The operator types the coordinates.
+    fn typed(&self) -> Condition {
+        require(CaptureStep::manual_unit(self.cx).is_some(), "the instrument supplies the coordinates")
+    }
+
+    fn questioned(&self) -> Condition {
+        require(self.step.doubt(self.cx.session).is_some(), "no sample is in question")
+    }
+
+    /// No sample is questioned.
+    fn resolved(&self) -> Condition {
+        require(
+            self.step.doubt(self.cx.session).is_none(),
+            "resolve the questioned sample first: keep it, remeasure it or exclude it",
+        )
+    }
+
+    fn at_a_pose_or_questioned(&self) -> Condition {
+        self.questioned().or_else(|_| self.at_a_pose())
+    }
+
+    /// The finding about the questioned sample proposes a correction.
+    fn correctable(&self) -> Condition {
+        let doubt = self.step.doubt(self.cx.session);
+        require(doubt.is_some_and(|(_, finding)| finding.remedy.is_some()), "no correction is proposed")
+    }
+
+    fn held(&self) -> Condition {
+        require(self.step.held.is_some(), "no reading is held back")
+    }
+
+    /// At least one sample counts.
+    fn sampled(&self) -> Condition {
+        require(self.cx.session.counted().next().is_some(), "nothing has been measured yet")
+    }
+}
+
 impl StepMachine for CaptureStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let session = cx.session;
-        let no_row = self.row.is_none().then(|| "all poses of the plan are measured".to_owned());
-        let manual = Self::manual_unit(cx).is_some();
-        let by_hand = manual.then(|| "the coordinates are typed in".to_owned());
-        let not_by_hand = (!manual).then(|| "the instrument measures by itself".to_owned());
-        let no_instrument = cx
-            .connection
-            .is_none()
-            .then(|| "the instrument does not answer; go back to the instrument step".to_owned());
-        // A key that is pressed now must not measure later, when nobody expects it any more.
-        let is_down = cx.down.map(|cause| format!("the link is down: {cause}; it is being connected again"));
-        let asked = self.asked(session);
-        let no_question = asked.is_none().then(|| "no sample is in question".to_owned());
-        let question = asked
-            .is_some()
-            .then(|| "decide first about the sample in question: keep it, measure again, or leave it out".to_owned());
-        let no_remedy = asked
-            .and_then(|(_, finding)| finding.remedy.as_ref())
-            .is_none()
-            .then(|| "there is no correction to propose".to_owned());
-        let not_held = self.held.is_none().then(|| "no reading is held back".to_owned());
-        let no_sample = session.counted().next().is_none().then(|| "nothing is measured yet".to_owned());
-        let blocked = no_row.clone().or_else(|| no_instrument.clone());
-        let pose =
-            self.row.and_then(|row| session.rows.get(row)).map_or_else(String::new, |row| row.planned.pose.clone());
-        let has_more = session.open_rows().next().is_some();
-        let measure = IntentInfo::new(Intent::Measure, "measure").unless(
-            blocked.clone().or_else(|| by_hand.clone()).or_else(|| question.clone()).or_else(|| is_down.clone()),
-        );
-        let skip_blocked = no_row.clone().or_else(|| question.clone());
-        let type_in = IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates")
-            .unless(not_by_hand.or_else(|| if asked.is_some() { no_instrument.clone() } else { blocked.clone() }));
-        let again_blocked = no_question.clone().or(by_hand).or_else(|| no_instrument.clone()).or(is_down);
-        let next = IntentInfo::new(Intent::Next, "go on to identify").unless(too_few(session, self.fewest));
-        let mut intents = vec![
-            if has_more && !manual { measure.default_action() } else { measure },
-            if manual && (has_more || asked.is_some()) { type_in.default_action() } else { type_in },
-            IntentInfo::new(Intent::AcceptReading, "take the reading as it is").unless(not_held),
-            IntentInfo::new(Intent::MeasureAgain, "measure again").unless(again_blocked).default_action(),
-            IntentInfo::new(Intent::Keep, "keep the sample").unless(no_question.clone()),
-            IntentInfo::new(Intent::LeaveOut, "leave the sample out")
-                .unless(no_question)
-                .with_danger(Danger::DropsData),
-            IntentInfo::new(Intent::ApplyRemedy, "correct it as proposed").unless(no_remedy),
-            IntentInfo::new(Intent::Skip, "skip this pose").unless(skip_blocked),
-            IntentInfo::new(Intent::Undo, "take the last sample back")
-                .unless(no_sample.clone())
-                .with_danger(Danger::DropsData),
-            IntentInfo::new(Intent::GoToPose(pose), "show another pose")
-                .unless(session.rows.is_empty().then(|| "there is no plan".to_owned())),
-            IntentInfo::new(Intent::Note(String::new()), "write a note"),
-            IntentInfo::new(Intent::SuggestPoses(SUGGESTED), "add the next best poses").unless(no_sample),
+        let is = Conditions { step: self, cx };
+        let shown = self.row.and_then(|row| session.rows.get(row));
+        let pose = shown.map(|row| row.planned.pose.clone()).unwrap_or_default();
+        let type_in = Intent::TypeReading(String::new());
+        let intents = vec![
+            offer(
+                Intent::Measure,
+                "measure",
+                [is.at_a_pose(), is.connected(), is.automatic(), is.resolved(), is.online()],
+            ),
+            offer(type_in.clone(), "type the coordinates", [is.typed(), is.at_a_pose_or_questioned(), is.connected()]),
+            offer(Intent::AcceptReading, "accept the reading", [is.held()]),
+            offer(
+                Intent::MeasureAgain,
+                "measure again",
+                [is.questioned(), is.automatic(), is.connected(), is.online()],
+            ),
+            offer(Intent::Keep, "keep the sample", [is.questioned()]),
+            offer(Intent::LeaveOut, "exclude this sample", [is.questioned()]).with_danger(Danger::DropsData),
+            offer(Intent::ApplyRemedy, "apply the correction", [is.correctable()]),
+            offer(Intent::Skip, "skip this pose", [is.at_a_pose(), is.resolved()]),
+            offer(Intent::Undo, "undo the last sample", [is.sampled()]).with_danger(Danger::DropsData),
+            offer(
+                Intent::GoToPose(pose),
+                "go to another pose",
+                [require(!session.rows.is_empty(), "there is no plan")],
+            ),
+            offer(Intent::Note(String::new()), "write a note", []),
+            offer(Intent::SuggestPoses(SUGGESTED), "add more poses", [is.sampled()]),
+            offer(Intent::Next, "continue to Identify", [has_enough(session, self.fewest)]),
         ];
-        intents.push(if has_more || asked.is_some() { next } else { next.default_action() });
-        intents
+        let is_manual = Self::manual_unit(cx).is_some();
+        let has_open = session.open_rows().next().is_some();
+        let next = match (self.doubt(session), has_open) {
+            (Some(_), _) | (None, true) if is_manual => type_in,
+            (Some(_), _) => Intent::MeasureAgain,
+            (None, true) => Intent::Measure,
+            (None, false) => Intent::Next,
+        };
+        with_default(intents, &next)
     }
 
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
@@ -314,19 +377,18 @@ impl StepMachine for CaptureStep {
             }
             Intent::TypeReading(text) => match reading::parse(&text, Self::manual_unit(cx).unwrap_or_default()) {
                 Ok(point) => {
-                    // While a sample is in question, typing is measuring it again.
-                    let asked = self.question.and_then(|number| session.sample(number)).map(|sample| sample.row);
-                    self.row = asked.or(self.row);
+                    // Typing a reading remeasures the questioned sample.
+                    self.show_questioned(session);
                     self.take(&reading::typed(point), cx)
                 }
                 Err(message) => vec![Action::Say(Notice::error(message))],
             },
             Intent::AcceptReading => {
-                let Some(Held { mut noted, reason }) = self.held.take() else { return Vec::new() };
+                let Some(HeldReading { mut noted, reason }) = self.held.take() else { return Vec::new() };
                 let number = session.measurements + 1;
                 noted.number = number;
                 checks::judge(cx, &mut noted);
-                // Taking it as it is settles that it scatters; what its distances say is another question.
+                // Accepting settles the scatter. A finding about its distances is a separate question.
                 let is_settled = noted.findings.is_empty();
                 noted.findings.push(FindingText {
                     about: number,
@@ -341,18 +403,15 @@ impl StepMachine for CaptureStep {
                 vec![Action::Write(entries.collect())]
             }
             Intent::MeasureAgain => {
-                let row = self.question.and_then(|number| session.sample(number)).map(|sample| sample.row);
-                self.row = row.or(self.row);
+                self.show_questioned(session);
                 self.row.map_or_else(Vec::new, |row| self.measure(cx, row))
             }
             Intent::Keep => self.decide(Decision::Keep),
             Intent::LeaveOut => self.decide(Decision::LeaveOut),
             Intent::ApplyRemedy => {
-                let remedy = self.asked(session).and_then(|(_, finding)| finding.remedy.clone());
-                remedy
-                    .map(|remedy| Action::Write(vec![Entry::Correction(ended(remedy, session))]))
-                    .into_iter()
-                    .collect()
+                let remedy = self.doubt(session).and_then(|(_, finding)| finding.remedy.clone());
+                let entry = remedy.map(|remedy| Entry::Correction(bounded(remedy, session)));
+                entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
             }
             Intent::Skip => {
                 self.held = None;
@@ -364,7 +423,7 @@ impl StepMachine for CaptureStep {
             }
             Intent::GoToPose(pose) => Self::go_to(&pose, session),
             Intent::Note(text) => {
-                let text = crate::text::printable(text.trim());
+                let text = printable(text.trim());
                 let pose = self.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.pose.clone());
                 let entry = (!text.is_empty()).then_some(Entry::Note { pose, text });
                 entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
@@ -384,7 +443,7 @@ impl StepMachine for CaptureStep {
             Answer::Measured(reading) if was_measuring => self.take(&reading, cx),
             Answer::Planned { summary, rows, .. } => {
                 let new: Vec<_> = rows.into_iter().filter(|row| row.kind != PoseKind::Home).collect();
-                let origin = format!("{} next best poses", new.iter().filter(|row| row.kind.is_measured()).count());
+                let origin = format!("{} suggested poses", new.iter().filter(|row| row.kind.is_measured()).count());
                 vec![Action::Write(vec![Entry::PlanExtended(plan_text(cx, summary.as_deref(), &new, origin))])]
             }
             _ => Vec::new(),
@@ -410,13 +469,13 @@ impl StepMachine for CaptureStep {
                     Some((number, prediction)) if number == noted.number => prediction,
                     _ => Prediction::of(session),
                 };
-                self.ask(session);
-                match noted.findings.first() {
-                    Some(finding) if self.question.is_some() => {
+                self.question_last_doubt(session);
+                match (self.questioned, noted.findings.first()) {
+                    (Some(_), Some(finding)) => {
                         return vec![Action::Say(Notice::attention(finding.message.clone()))];
                     }
-                    _ if self.question.is_none() => self.advance(session),
-                    _ => {}
+                    (Some(_), None) => {}
+                    (None, _) => self.advance(session),
                 }
                 if let Some(factor) = noted.factor {
                     return vec![Action::Say(other_unit(noted, factor))];
@@ -428,12 +487,12 @@ impl StepMachine for CaptureStep {
                     Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
                     Decision::Keep | Decision::LeaveOut => self.advance(session),
                 }
-                self.ask(session);
+                self.question_last_doubt(session);
             }
             Entry::Correction(correction) => {
                 self.prediction = Prediction::of(session);
                 self.row = session.open_rows().next();
-                self.ask(session);
+                self.question_last_doubt(session);
                 return vec![Action::Say(Notice::info(corrected(correction)))];
             }
             Entry::Row(row) => {
@@ -455,10 +514,10 @@ impl StepMachine for CaptureStep {
     }
 }
 
-/// A correction of a unit is about what is measured, not about what will be.
-fn ended(remedy: Correction, session: &Session) -> Correction {
+/// Ends a correction of the unit at the last measurement: it must not convert measurements to come.
+fn bounded(remedy: Correction, session: &Session) -> Correction {
     match remedy {
-        // Proposed by an earlier version.
+        // Earlier versions proposed it without an end.
         Correction::Scale { since, factor, until: None } => {
             Correction::Scale { since, factor, until: Some(session.measurements) }
         }
@@ -466,17 +525,18 @@ fn ended(remedy: Correction, session: &Session) -> Correction {
     }
 }
 
-/// Takes a sample back, and the corrections that it led to.
+/// The entries that undo a sample and the corrections that it led to.
 fn undo(sample: u64, session: &Session) -> Vec<Entry> {
     let corrections = session.corrections_since(sample);
     let taken_back = corrections.map(|corrected| Entry::Correction(Correction::TakenBack { line: corrected.line }));
     taken_back.chain([Entry::Decision { sample, decision: Decision::Undo }]).collect()
 }
 
-/// What to say about a sample that is in another unit like the one before.
+/// The message about a sample that is still in the unit from which the previous one was converted.
 fn other_unit(noted: &MeasuredText, factor: f64) -> Notice {
-    let what = format!("pose {}: still in the other unit; its coordinates count {factor} times", noted.pose);
-    Notice::attention(what).hint("set the unit of the instrument back; a point in the right unit counts as it is")
+    let what = format!("pose {}: still in the wrong unit; its coordinates are multiplied by {factor}", noted.pose);
+    Notice::attention(what)
+        .hint("switch the instrument back to the expected unit; points in that unit are taken as they are")
 }
 
 fn corrected(correction: &Correction) -> String {
@@ -487,13 +547,13 @@ fn corrected(correction: &Correction) -> String {
                 Some(until) if until == since => format!("of measurement {since}"),
                 Some(until) => format!("of measurements {since} to {until}"),
             };
-            format!("coordinates {which} count {factor} times; what was noted stays in the journal")
+            format!("coordinates {which} are multiplied by {factor}; the original values stay in the journal")
         }
-        Correction::Swap { first, second } => format!("measurements {first} and {second} changed places"),
-        Correction::Row { sample, .. } => format!("measurement {sample} counts for the pose where the robot stood"),
-        Correction::Joints { sample, .. } => format!("measurement {sample} counts with the corrected joint values"),
+        Correction::Swap { first, second } => format!("measurements {first} and {second} were swapped"),
+        Correction::Row { sample, .. } => format!("measurement {sample} was assigned to the pose where the robot was"),
+        Correction::Joints { sample, .. } => format!("measurement {sample} now uses the corrected joint values"),
         Correction::TakenBack { .. } => {
-            "the correction that the measurement led to is taken back with it; both stay in the journal".to_owned()
+            "the correction that followed from the measurement is undone with it; both stay in the journal".to_owned()
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Deliver: the results as files in the session's folder.
+//! Step Deliver: the results as files in the session folder.
 
-use super::{Action, Cx, StepMachine};
+use super::{Action, Cx, StepMachine, offer, require};
 use crate::procedure::deliver;
 use crate::procedure::models::{Models, ModelsRequest};
 use crate::session::journal::Entry;
@@ -14,7 +14,7 @@ use crate::wizard::view::{Content, DeliverView};
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct DeliverStep;
 
-/// Asks for all files to be written.
+/// The action that writes all files.
 fn write_files(cx: &Cx<'_>, models: Models) -> Action {
     match deliver::files(cx.session, models.files) {
         Ok(files) => Action::Ask(Request::Deliver { files, left_out: models.left_out }),
@@ -24,8 +24,8 @@ fn write_files(cx: &Cx<'_>, models: Models) -> Action {
 
 impl StepMachine for DeliverStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
-        let stale = (!cx.session.is_current()).then(|| "the samples have changed since: identify again".to_owned());
-        let deliver = IntentInfo::new(Intent::Deliver, "write the files").unless(stale);
+        let is_current = require(cx.session.is_current(), "the samples have changed since then: identify again");
+        let deliver = offer(Intent::Deliver, "write the files", [is_current]);
         let about = IntentInfo::new(Intent::About(cx.session.about.clone()), "serial number, operator, place");
         vec![if cx.session.delivered.is_empty() { deliver.default_action() } else { deliver }, about]
     }
@@ -34,8 +34,8 @@ impl StepMachine for DeliverStep {
         if let Intent::About(about) = intent {
             let about = about.trimmed();
             if !about.is_usable() {
-                let hint = format!("each of them may have up to {} characters", About::LONGEST);
-                return vec![Action::Say(Notice::error("that is too long for a report").hint(hint))];
+                let what = format!("too long for the report (at most {} characters each)", About::LONGEST);
+                return vec![Action::Say(Notice::error(what))];
             }
             return vec![Action::Write(vec![Entry::About(about)])];
         }
@@ -50,11 +50,11 @@ impl StepMachine for DeliverStep {
 
     fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
         match answer {
-            // The step may have been left meanwhile, and entered again with other samples.
+            // The step may have been left meanwhile and entered again with other samples.
             Answer::Modelled(models) if cx.session.is_current() => vec![write_files(cx, *models)],
             Answer::Delivered { files, left_out } => {
                 let notice = (!left_out.is_empty()).then(|| {
-                    let hint = "all other files are written; 'trupose export --help' shows what can be done";
+                    let hint = "all other files were written";
                     Action::Say(Notice::info(format!("left out: {}", left_out.join("; "))).hint(hint))
                 });
                 let write = Action::Write(vec![Entry::Delivered { files, left_out }]);
@@ -67,7 +67,7 @@ impl StepMachine for DeliverStep {
     fn on_failure(&mut self, problem: Problem, _cx: &Cx<'_>) -> Vec<Action> {
         let notice: Notice = problem.into();
         vec![Action::Say(
-            notice.hint("everything measured is safe in the journal; make room and write the files again"),
+            notice.hint("all measurements are safe in the journal; free some disk space and write the files again"),
         )]
     }
 

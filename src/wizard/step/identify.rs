@@ -1,6 +1,6 @@
-//! Identify and Verify: from samples to a result, and what it is worth on points that it never saw.
+//! Steps Identify and Verify: a result from the samples, and its accuracy at points that the identification did not use.
 
-use super::{Action, Cx, StepMachine};
+use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::identification::PointSample;
 use crate::kinematics::Place;
 use crate::procedure::EstimationSettings;
@@ -19,13 +19,13 @@ use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::Notice;
 use crate::wizard::view::{Content, IdentifyView, VerifyView};
 
-/// Fewer verification samples than this say nothing.
+/// Fewest verification samples from which accuracy can be stated.
 const FEWEST_VERIFICATION: usize = 3;
 
 /// The identify step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct IdentifyStep {
-    /// Fewest identification samples.
+    /// Fewest identification samples, if known.
     fewest: Option<usize>,
 }
 
@@ -39,7 +39,7 @@ impl IdentifyStep {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct VerifyStep;
 
-/// The samples of a kind that count, as the maths takes them.
+/// The samples of a kind that count, as input of the identification.
 pub(super) fn samples(session: &Session, kind: PoseKind) -> Vec<NamedSample> {
     session
         .counted_of(kind)
@@ -88,23 +88,24 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
     })))
 }
 
-/// What a reader of the result must know about how it was measured.
+/// What a reader of the result must know about how the samples were measured.
 fn remarks(session: &Session) -> Vec<Warning> {
     let simulated = session.simulation().map(|said| Warning::simulated(&said));
     simulated.into_iter().chain(left_out(session, PoseKind::Identification)).collect()
 }
 
-/// The samples of a kind that the operator left out and did not measure again.
+/// A warning about samples of a kind that the operator excluded and did not measure again.
 fn left_out(session: &Session, kind: PoseKind) -> Option<Warning> {
     let is_left_out = |sample: &&Sample| sample.state == SampleState::LeftOut && session.kind_of(sample) == kind;
     let poses: Vec<&str> = session.samples.iter().filter(is_left_out).map(|sample| session.pose_of(sample)).collect();
     if poses.is_empty() {
         return None;
     }
-    // An arm that is only verified where it is good is not verified.
+    // Verification poses that were selected by their errors verify nothing.
     let is_verification = kind == PoseKind::Verification;
-    let advice = if is_verification { "; measure them again, or the verification is a choice" } else { "" };
-    let message = format!("the operator left out {} of the {kind} poses: {}{advice}", poses.len(), poses.join(", "));
+    let advice =
+        if is_verification { "; measure them again, because a selection of poses verifies nothing" } else { "" };
+    let message = format!("the operator excluded {} of the {kind} poses: {}{advice}", poses.len(), poses.join(", "));
     Some(Warning::new("left_out", message, is_verification))
 }
 
@@ -112,21 +113,31 @@ fn result<'a>(cx: &Cx<'a>) -> Option<&'a IdentifiedText> {
     cx.session.identified.as_deref()
 }
 
+/// Whether there is a result from exactly the samples that count now.
+fn has_current_result(cx: &Cx<'_>) -> Condition {
+    match result(cx) {
+        None => Err("identify first".to_owned()),
+        Some(_) if !cx.session.is_current() => Err("the samples have changed since then: identify again".to_owned()),
+        Some(_) => Ok(()),
+    }
+}
+
+/// Whether the result has a solution that can be applied.
+fn has_solution(cx: &Cx<'_>) -> Condition {
+    let is_usable = result(cx).is_some_and(|result| result.calibration.is_some());
+    require(is_usable, "no usable solution found; check the warnings, then go back and remeasure the affected poses")
+}
+
 impl StepMachine for IdentifyStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
-        let few = super::capture::too_few(cx.session, self.fewest);
-        let is_current = cx.session.is_current();
-        let stale = match result(cx) {
-            None => Some("identify first".to_owned()),
-            Some(_) if !is_current => Some("the samples have changed since: identify again".to_owned()),
-            Some(result) if result.calibration.is_none() => {
-                Some("there is no usable solution: see the warnings, go back and measure what is wrong".to_owned())
-            }
-            Some(_) => None,
-        };
-        let identify = IntentInfo::new(Intent::Identify, "identify the arm").unless(few);
-        let next = IntentInfo::new(Intent::Next, "go on to verify").unless(stale);
-        if is_current { vec![next.default_action(), identify] } else { vec![identify.default_action(), next] }
+        let has_enough = super::capture::has_enough(cx.session, self.fewest);
+        let identify = offer(Intent::Identify, "identify the arm", [has_enough]);
+        let next = offer(Intent::Next, "continue to Verify", [has_current_result(cx), has_solution(cx)]);
+        if cx.session.is_current() {
+            with_default(vec![next, identify], &Intent::Next)
+        } else {
+            with_default(vec![identify, next], &Intent::Identify)
+        }
     }
 
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
@@ -159,7 +170,7 @@ impl StepMachine for IdentifyStep {
         Content::Identify(IdentifyView {
             samples: cx.session.counted_of(PoseKind::Identification).count(),
             is_current: cx.session.is_current(),
-            // What the verification says is for the next step.
+            // The verification belongs to the next step.
             summary: result(cx).map(|result| {
                 let mut summary = result.summary.clone();
                 summary.verification = None;
@@ -172,14 +183,7 @@ impl StepMachine for IdentifyStep {
 
 impl StepMachine for VerifyStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
-        let stale = match result(cx) {
-            None => Some("identify first".to_owned()),
-            Some(_) if !cx.session.is_current() => {
-                Some("the samples have changed since: go back and identify again".to_owned())
-            }
-            Some(_) => None,
-        };
-        vec![IntentInfo::new(Intent::Next, "go on to deliver").unless(stale).default_action()]
+        vec![offer(Intent::Next, "continue to Deliver", [has_current_result(cx)]).default_action()]
     }
 
     fn on_intent(&mut self, intent: Intent, _cx: &Cx<'_>) -> Vec<Action> {
@@ -195,7 +199,7 @@ impl StepMachine for VerifyStep {
             samples,
             is_current: cx.session.is_current(),
             too_few: (samples < FEWEST_VERIFICATION).then(|| {
-                "there are no or too few verification poses: nothing can be said about accuracy; go back to measure some".to_owned()
+                "there are too few verification poses to state the accuracy; go back and measure some".to_owned()
             }),
             verification: result(cx).and_then(|result| result.summary.verification.clone()).map(Box::new),
             verdict: result(cx).map(|result| Box::new(result.summary.verdict.clone())),

@@ -1,4 +1,4 @@
-//! Instrument: what measures.
+//! Step Instrument: what measures.
 
 use super::{Action, Cx, StepMachine};
 use crate::session::journal::{Entry, instrument_text};
@@ -8,17 +8,17 @@ use crate::wizard::effect::Request;
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::view::{Content, InstrumentView};
 
-/// The instrument step. What it waits for is in the session: a choice without a connection.
+/// The instrument step. All of its state is in the session and the connection.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct InstrumentStep;
 
-/// Connects what the session has chosen.
+/// Connects the instrument of the session.
 fn connect(cx: &Cx<'_>) -> Vec<Action> {
     let (Some(instrument), Some(robot)) = (&cx.session.instrument, cx.robot()) else { return Vec::new() };
     vec![Action::Ask(Request::Connect { instrument: instrument.clone(), profile: Box::new(robot.profile.clone()) })]
 }
 
-/// What the profile says about the instrument's wire.
+/// The link that the profile describes.
 fn link(cx: &Cx<'_>) -> Option<LinkChoice> {
     cx.robot().and_then(|robot| robot.profile.link()).map(LinkChoice::from)
 }
@@ -27,22 +27,23 @@ impl StepMachine for InstrumentStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let none = match (&cx.session.instrument, cx.connection) {
             (None, _) => Some("choose an instrument first".to_owned()),
-            (Some(_), None) => Some("the instrument does not answer: connect again, or choose another".to_owned()),
+            (Some(_), None) => Some("the instrument is not responding: reconnect, or choose another".to_owned()),
             (Some(_), Some(_)) => None,
         };
         let nothing_to_retry = match (&cx.session.instrument, cx.connection) {
             (Some(_), None) => None,
-            _ => Some("there is nothing to connect again".to_owned()),
+            _ => Some("there is nothing to reconnect".to_owned()),
         };
         let fixed = cx.session.has_measurements().then(|| {
-            "points of another instrument cannot be mixed with those measured; start another session".to_owned()
+            "points from another instrument cannot be mixed with those already measured; start another session"
+                .to_owned()
         });
         let proposal =
             link(cx).map_or(InstrumentChoice::Manual { unit: CoordinateUnit::Millimetre }, InstrumentChoice::Linked);
         vec![
-            IntentInfo::new(Intent::Next, "measure with this").unless(none).default_action(),
+            IntentInfo::new(Intent::Next, "use this instrument").unless(none).default_action(),
             IntentInfo::new(Intent::ChooseInstrument(proposal), "choose an instrument").unless(fixed),
-            IntentInfo::new(Intent::Retry, "connect again").unless(nothing_to_retry),
+            IntentInfo::new(Intent::Retry, "reconnect").unless(nothing_to_retry),
         ]
     }
 

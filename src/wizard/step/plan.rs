@@ -1,6 +1,6 @@
-//! Plan: which poses to measure.
+//! Step Plan: which poses to measure.
 
-use super::{Action, Cx, StepMachine};
+use super::{Action, Cx, StepMachine, offer, require, with_default};
 use crate::procedure::plan::PlanRequest;
 use crate::session::journal::{Entry, PlanText};
 use crate::session::plan::{PlannedPose, PoseKind};
@@ -12,11 +12,11 @@ use crate::wizard::intent::{Intent, IntentInfo, PlanSettings};
 use crate::wizard::notice::Notice;
 use crate::wizard::view::{Content, PlanFigures, PlanView};
 
-/// The plan step: a proposal that is not accepted yet.
+/// The plan step with a proposal that is not yet accepted.
 #[derive(Clone, Debug, Default)]
 pub(in crate::wizard) struct PlanStep {
     settings: PlanSettings,
-    /// The file that was asked for last.
+    /// The file that was requested last.
     file: Option<String>,
     proposal: Option<Proposal>,
 }
@@ -28,12 +28,12 @@ struct Proposal {
     summary: Option<Box<PlanSummary>>,
 }
 
-/// A plan for the journal.
+/// A plan as it is written to the journal.
 pub(super) fn plan_text(cx: &Cx<'_>, summary: Option<&PlanSummary>, rows: &[PlannedPose], origin: String) -> PlanText {
     PlanText::new(origin, summary, rows, cx.robot().map_or(&[][..], |robot| &robot.joint_types))
 }
 
-/// Poses that are measured and count, for a plan that continues from them.
+/// Poses whose samples count, for a plan that builds on them.
 pub(super) fn measured_poses(cx: &Cx<'_>) -> Vec<PlannedPose> {
     let session = cx.session;
     session
@@ -68,40 +68,35 @@ pub(super) fn plan_request(cx: &Cx<'_>, settings: &PlanSettings) -> Option<Reque
     })
 }
 
-/// The highest number that is the name of a pose in any plan: new poses continue from there.
+/// The highest number that names a pose of any plan. New poses are numbered from there.
 fn highest_pose_number(cx: &Cx<'_>) -> u64 {
     cx.session.rows.iter().filter_map(|row| row.planned.pose.parse().ok()).max().unwrap_or(0)
 }
 
 impl StepMachine for PlanStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
-        let no_proposal = self.proposal.is_none().then(|| "there is no new plan to accept".to_owned());
-        let no_plan = (!cx.session.rows.iter().any(|row| row.active)).then(|| "accept a plan first".to_owned());
-        let not_recorded = cx
-            .connection
-            .is_none_or(|connection| connection.recorded.is_empty())
-            .then(|| "the instrument plays no recorded measurements".to_owned());
         let has_proposal = self.proposal.is_some();
-        let has_plan = no_plan.is_none();
-        let mut intents = vec![
-            IntentInfo::new(Intent::AcceptPlan, "measure this plan").unless(no_proposal),
-            IntentInfo::new(Intent::MakePlan(self.settings), "choose poses"),
-            IntentInfo::new(
-                Intent::LoadPlan(self.file.clone().unwrap_or_else(|| "plan.csv".to_owned())),
-                "take the poses of a file",
-            ),
-            IntentInfo::new(Intent::PlanFromRecording, "take the recorded poses").unless(not_recorded),
-            IntentInfo::new(Intent::Next, "go on to measuring").unless(no_plan),
-        ];
-        let default = match (has_proposal, has_plan) {
-            (true, _) => 0,
-            (false, true) => 4,
-            (false, false) => 1,
+        let has_plan = cx.session.rows.iter().any(|row| row.active);
+        let has_recorded = cx.connection.is_some_and(|connection| !connection.recorded.is_empty());
+        let make = Intent::MakePlan(self.settings);
+        let file = self.file.clone().unwrap_or_else(|| "plan.csv".to_owned());
+        let next = match (has_proposal, has_plan) {
+            (true, _) => &Intent::AcceptPlan,
+            (false, true) => &Intent::Next,
+            (false, false) => &make,
         };
-        if let Some(info) = intents.get_mut(default) {
-            info.is_default = info.is_enabled();
-        }
-        intents
+        let intents = vec![
+            offer(Intent::AcceptPlan, "measure this plan", [require(has_proposal, "there is no new plan to accept")]),
+            offer(make.clone(), "choose poses", []),
+            offer(Intent::LoadPlan(file), "load poses from a file", []),
+            offer(
+                Intent::PlanFromRecording,
+                "use the recorded poses",
+                [require(has_recorded, "the instrument does not play back recorded measurements")],
+            ),
+            offer(Intent::Next, "continue to Capture", [require(has_plan, "accept a plan first")]),
+        ];
+        with_default(intents, next)
     }
 
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
@@ -145,14 +140,8 @@ impl StepMachine for PlanStep {
             .unwrap_or_default();
         let plan = plan_text(cx, summary.as_deref(), &rows, origin);
         self.proposal = Some(Proposal { plan, summary });
-        match warnings.split_first() {
-            None => Vec::new(),
-            Some((first, rest)) => {
-                let notice =
-                    rest.iter().fold(Notice::attention(first.clone()), |notice, more| notice.hint(more.clone()));
-                vec![Action::Say(notice)]
-            }
-        }
+        let Some((first, rest)) = warnings.split_first() else { return Vec::new() };
+        vec![Action::Say(Notice { hints: rest.to_vec(), ..Notice::attention(first) })]
     }
 
     fn content(&self, cx: &Cx<'_>) -> Content {
@@ -178,19 +167,19 @@ impl StepMachine for PlanStep {
     }
 }
 
-/// What is wrong with settings that no search should begin with.
+/// Why a search cannot be started with these settings.
 fn out_of_range(settings: &PlanSettings) -> Option<String> {
     const MOST_POSES: usize = 10_000;
     const MOST_CANDIDATES: usize = 1_000_000;
     let PlanSettings { poses, verification, candidates, .. } = *settings;
     if poses == 0 || poses.saturating_add(verification) > MOST_POSES {
-        return Some(format!("{poses} and {verification} poses cannot be planned; give 1 to {MOST_POSES} in all"));
+        return Some(format!("{poses} and {verification} poses cannot be planned; use 1 to {MOST_POSES} in total"));
     }
     (!(10..=MOST_CANDIDATES).contains(&candidates))
-        .then(|| format!("{candidates} candidates: give 10 to {MOST_CANDIDATES}"))
+        .then(|| format!("{candidates} candidates cannot be searched; use 10 to {MOST_CANDIDATES}"))
 }
 
-/// Rows of the present plan of a kind.
+/// Number of rows of a kind in the current plan.
 fn count(cx: &Cx<'_>, kind: PoseKind) -> usize {
     cx.session.rows.iter().filter(|row| row.active && row.planned.kind == kind).count()
 }

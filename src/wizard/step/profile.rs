@@ -1,24 +1,25 @@
-//! Profile: which robot.
+//! Step Profile: which robot.
 
 use super::{Action, Cx, StepMachine};
 use crate::profile::{Profile, builtin_names};
 use crate::session::journal::Entry;
 use crate::session::set_up::Step;
 use crate::session::sha256;
+use crate::text::printable;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::Notice;
 use crate::wizard::view::{Content, ProfileCard, ProfileView};
 
-/// The profile step: a profile that is looked at and not yet taken.
+/// The profile step with a profile that is loaded but not yet confirmed.
 #[derive(Clone, Debug, Default)]
 pub(in crate::wizard) struct ProfileStep {
-    chosen: Option<Box<Chosen>>,
+    chosen: Option<Box<LoadedProfile>>,
     name: Option<String>,
 }
 
 #[derive(Clone, Debug)]
-struct Chosen {
+struct LoadedProfile {
     source: String,
     text: String,
     profile: Profile,
@@ -40,16 +41,15 @@ impl ProfileStep {
 
 impl StepMachine for ProfileStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
-        let fixed = cx
-            .session
-            .has_measurements()
-            .then(|| "something is measured already: a session has one robot; start another session".to_owned());
+        let fixed = cx.session.has_measurements().then(|| {
+            "points have already been measured: a session has only one robot; start another session".to_owned()
+        });
         let none = (self.chosen.is_none() && cx.robot().is_none()).then(|| "choose a robot first".to_owned());
-        let named = cx.session.opened.is_some().then(|| "the session has its name".to_owned());
+        let named = cx.session.opened.is_some().then(|| "the session already has a name".to_owned());
         let first = builtin_names().next().unwrap_or_default().to_owned();
         let proposal = self.session_name(cx).unwrap_or_default();
         vec![
-            IntentInfo::new(Intent::Next, "take this robot").unless(none).default_action(),
+            IntentInfo::new(Intent::Next, "use this robot").unless(none).default_action(),
             IntentInfo::new(Intent::ChooseProfile(first), "choose a robot").unless(fixed),
             IntentInfo::new(Intent::NameSession(proposal), "name the session").unless(named),
         ]
@@ -67,10 +67,10 @@ impl StepMachine for ProfileStep {
                     self.name = Some(name);
                     return Vec::new();
                 }
-                let name = crate::text::printable(&name);
+                let name = printable(&name);
                 vec![Action::Say(
-                    Notice::error(format!("'{name}' cannot be the name of a session"))
-                        .hint("use up to 64 letters, digits, '-', '_' and '.', beginning with a letter or digit"),
+                    Notice::error(format!("'{name}' is not a valid session name"))
+                        .hint("use up to 64 letters, digits, '-', '_' and '.', starting with a letter or digit"),
                 )]
             }
             Intent::Next => {
@@ -81,7 +81,7 @@ impl StepMachine for ProfileStep {
                 if let (None, Some(name)) = (cx.session.opened, self.session_name(cx)) {
                     return vec![Action::Create { name, entries }];
                 }
-                // An instrument that looked at the robot before does not know this one.
+                // A connected instrument was set up for the previous robot.
                 let profile = Box::new(chosen.profile.clone());
                 let instrument = cx.session.instrument.clone();
                 let connect = instrument.map(|instrument| Action::Ask(Request::Connect { instrument, profile }));
@@ -96,12 +96,12 @@ impl StepMachine for ProfileStep {
         match Profile::parse(&text, &source) {
             Ok((profile, warnings)) => {
                 let warnings = warnings.iter().map(ToString::to_string).collect();
-                self.chosen = Some(Box::new(Chosen { source, text, profile, warnings }));
+                self.chosen = Some(Box::new(LoadedProfile { source, text, profile, warnings }));
                 Vec::new()
             }
             Err(errors) => {
                 let what = format!("profile '{source}' cannot be used\n{errors}");
-                vec![Action::Say(Notice::error(what).hint("mend the file, then choose it again"))]
+                vec![Action::Say(Notice::error(what).hint("fix the file, then select it again"))]
             }
         }
     }

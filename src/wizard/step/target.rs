@@ -1,11 +1,11 @@
-//! Target: where the SMR sits on the flange.
+//! Step Target: where the SMR sits on the flange.
 
 use nalgebra::Point3;
 
-use super::{Action, Cx, StepMachine};
+use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::identification::circle_point::{CirclePointError, CircleSeries, TargetLocation, locate_target};
 use crate::profile::{FREE_TARGET_UNCERTAINTY, Level};
-use crate::session::journal::{CirclePointText, Entry, from_edge, target_text, to_edge, to_xyz_mm};
+use crate::session::journal::{CirclePointText, Entry, from_edge, from_xyz_mm, target_text, to_edge, to_xyz_mm};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step, TargetChoice};
 use crate::session::state::{Robot, Session};
@@ -21,14 +21,14 @@ const SETTLE: f64 = 2.0;
 /// Shots per point.
 const SHOTS: u32 = 3;
 
-/// The target step: the circles to be measured. What is measured of them is in the session.
+/// The target step with the planned circles. The measured points of the circles are in the session.
 #[derive(Clone, Debug, Default)]
 pub(in crate::wizard) struct TargetStep {
     plan: Vec<CircleConfigurations>,
 }
 
-/// A point of a circle that is to be measured.
-struct Next<'a> {
+/// The next point of a circle to measure.
+struct NextPoint<'a> {
     joint: usize,
     configuration: &'a [f64],
     following: Option<&'a [f64]>,
@@ -36,38 +36,38 @@ struct Next<'a> {
 }
 
 impl TargetStep {
-    /// Begins; circles that were begun are planned again when they are gone on with.
+    /// Enters the step. Circles that were started are planned again when they are continued.
     pub(super) fn enter(_session: &Session) -> Self {
         Self::default()
     }
 
-    /// All points of the plan, in order.
+    /// All planned points, in order.
     fn points(&self) -> Vec<(usize, &[f64])> {
         self.plan.iter().flat_map(|circle| circle.configurations.iter().map(|q| (circle.joint, q.as_slice()))).collect()
     }
 
-    /// The first point that is not measured.
-    fn next<'a>(&'a self, session: &Session) -> Option<Next<'a>> {
+    /// The first point that has not been measured.
+    fn next<'a>(&'a self, session: &Session) -> Option<NextPoint<'a>> {
         let index = session.circle_points.len();
         let points = self.points();
         let (joint, configuration) = *points.get(index)?;
         let following = points.get(index + 1).map(|(_, q)| *q);
-        Some(Next { joint, configuration, following, index })
+        Some(NextPoint { joint, configuration, following, index })
     }
 
     fn take(&self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
         let (Some(next), Some(robot)) = (self.next(cx.session), cx.robot()) else { return Vec::new() };
         let number = cx.session.measurements + 1;
-        let previous = cx.session.circle_points.last().map(|point| crate::session::journal::from_xyz_mm(point.xyz_mm));
+        let previous = cx.session.circle_points.last().map(|point| from_xyz_mm(point.xyz_mm));
         let sigma = reading.sigma.or_else(|| robot.profile.instrument().map(|instrument| instrument.sigma));
         let limit = reading::scatter_limit(sigma);
-        let shaky = reading.scatter.filter(|scatter| scatter.is_nan() || *scatter > limit);
-        let shaky = shaky.map(|scatter| reading::scatter_message(scatter, limit));
-        // As it will be noted: the one before was rounded as well.
+        let too_much = reading.scatter.filter(|scatter| scatter.is_nan() || *scatter > limit);
+        // Compared as it will be written, because the previous point was rounded as well.
         let xyz_mm = to_xyz_mm(&reading.point, 9);
-        let gate = reading::gate(&crate::session::journal::from_xyz_mm(xyz_mm), previous.as_ref())
-            .or_else(|| reading::foreign_joints(reading, robot.joint_types.len()));
-        if let Some(reason) = gate.or(shaky) {
+        let refusal = reading::gate(&from_xyz_mm(xyz_mm), previous.as_ref())
+            .or_else(|| reading::foreign_joints(reading, robot.joint_types.len()))
+            .or_else(|| too_much.map(|scatter| reading::scatter_message(scatter, limit)));
+        if let Some(reason) = refusal {
             let pose = pose_name(robot, next.joint, next.index);
             let notice = Notice::error(reason.clone()).hint("measure again");
             return vec![
@@ -85,65 +85,78 @@ impl TargetStep {
     }
 }
 
-/// Name of a point of a circle.
+/// Pose name of a point of a circle.
 fn pose_name(robot: &Robot, joint: usize, index: usize) -> String {
     let name = robot.profile.chain().joints().get(joint).map_or("?", |joint| joint.name.as_str());
     format!("circle-{name}-{}", index + 1)
 }
 
-/// A joint with the configurations (rad) that turned it and the points (m) measured there.
-type Measured = (usize, Vec<Vec<f64>>, Vec<Point3<f64>>);
+/// The measured part of a circle.
+struct MeasuredCircle {
+    /// Joint that was turned.
+    joint: usize,
+    /// Configurations (rad).
+    configurations: Vec<Vec<f64>>,
+    /// Points measured there (m).
+    points: Vec<Point3<f64>>,
+}
 
-/// What the measured circles say; `None` before both are complete.
+impl MeasuredCircle {
+    fn series(&self) -> CircleSeries<'_> {
+        CircleSeries { joint: self.joint, configurations: &self.configurations, points: &self.points }
+    }
+}
+
+/// Locates the SMR from the measured circles; `None` before both are complete.
 fn locate(session: &Session) -> Option<Result<TargetLocation, CirclePointError>> {
     let robot = session.robot.as_ref()?;
-    let mut series: Vec<Measured> = Vec::new();
+    let mut circles: Vec<MeasuredCircle> = Vec::new();
     for point in &session.circle_points {
         let configuration = from_edge(&point.joints, &robot.joint_types);
         let measured = session.point_of_circle(point);
-        match series.iter_mut().find(|(joint, ..)| *joint == point.joint) {
-            Some((_, configurations, points)) => {
-                configurations.push(configuration);
-                points.push(measured);
+        match circles.iter_mut().find(|circle| circle.joint == point.joint) {
+            Some(circle) => {
+                circle.configurations.push(configuration);
+                circle.points.push(measured);
             }
-            None => series.push((point.joint, vec![configuration], vec![measured])),
+            None => circles.push(MeasuredCircle {
+                joint: point.joint,
+                configurations: vec![configuration],
+                points: vec![measured],
+            }),
         }
     }
-    let [(first, a, a_points), (second, b, b_points)] = series.as_slice() else { return None };
+    let [first, second] = circles.as_slice() else { return None };
     let profile = &robot.profile;
     let distance = profile.tracker().position_in_base.coords.norm();
     let sigma = profile.instrument().map(|instrument| instrument.sigma_at(distance));
     Some(locate_target(
         profile.chain(),
-        &CircleSeries { joint: *first, configurations: a, points: a_points },
-        &CircleSeries { joint: *second, configurations: b, points: b_points },
+        &first.series(),
+        &second.series(),
         sigma,
         &profile.free_parameters(Level::Geometric),
     ))
 }
 
-/// Why the circles cannot be used yet.
-fn unusable(step: &TargetStep, session: &Session) -> Option<String> {
-    if session.circle_points.is_empty() {
-        return Some("no circle is measured".to_owned());
-    }
-    if step.next(session).is_some() || step.plan.is_empty() && locate(session).is_none() {
-        return Some("the circles are not complete".to_owned());
-    }
+/// Whether the circles have a result that can be used.
+fn has_result(step: &TargetStep, session: &Session) -> Condition {
+    let is_complete = step.next(session).is_none();
     match locate(session) {
-        Some(Ok(_)) => None,
-        Some(Err(error)) => Some(error.to_string()),
-        None => Some("the circles are not complete".to_owned()),
+        _ if session.circle_points.is_empty() => Err("no circle has been measured".to_owned()),
+        Some(Ok(_)) if is_complete => Ok(()),
+        Some(Err(error)) if is_complete => Err(error.to_string()),
+        _ => Err("the circles are not complete".to_owned()),
     }
 }
 
-/// Whether a choice has numbers that can be meant.
-fn is_sensible(choice: &TargetChoice) -> bool {
-    let near = |(x, y, z): (f64, f64, f64)| [x, y, z].iter().all(|value| value.abs() < 5000.0);
+/// Whether the numbers of a choice are plausible.
+fn is_plausible(choice: &TargetChoice) -> bool {
+    let is_near = |(x, y, z): (f64, f64, f64)| [x, y, z].iter().all(|value| value.abs() < 5000.0);
     match *choice {
         TargetChoice::Profile => true,
         TargetChoice::Known { xyz_mm, sigma_mm } | TargetChoice::Circles { xyz_mm, sigma_mm } => {
-            near(xyz_mm) && (0.0..=1000.0).contains(&sigma_mm)
+            is_near(xyz_mm) && (0.0..=1000.0).contains(&sigma_mm)
         }
         TargetChoice::Free { sigma_mm } => sigma_mm > 0.0 && sigma_mm <= 1000.0,
     }
@@ -152,51 +165,65 @@ fn is_sensible(choice: &TargetChoice) -> bool {
 impl StepMachine for TargetStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let session = cx.session;
-        let manual = matches!(session.instrument, Some(InstrumentChoice::Manual { .. }));
-        let fixed = (!session.samples.is_empty())
-            .then(|| "samples are measured with this SMR; another mounting is another session".to_owned());
-        let no_choice = session.target.is_none().then(|| "say where the SMR is first".to_owned());
-        let no_point = self.next(session).is_none().then(|| "start the circles first".to_owned());
-        let no_instrument = cx.connection.is_none().then(|| "the instrument does not answer".to_owned());
-        let by_hand = manual.then(|| "the coordinates are typed in".to_owned());
-        let not_by_hand = (!manual).then(|| "the instrument measures by itself".to_owned());
-        let blocked = no_point.clone().or_else(|| no_instrument.clone());
-        let started = (!self.plan.is_empty()).then(|| "the circles are under way".to_owned());
-        let start = if session.circle_points.is_empty() { "find it by circles" } else { "go on with the circles" };
-        let no_circles = session.circle_points.is_empty().then(|| "no circle is measured".to_owned());
-        let free = TargetChoice::Free { sigma_mm: to_mm(FREE_TARGET_UNCERTAINTY) };
-        let in_circles = no_point.is_none();
-        let has_choice = no_choice.is_none();
-        let mut intents = vec![
-            IntentInfo::new(Intent::Next, "go on to the plan").unless(no_choice),
-            IntentInfo::new(Intent::ChooseTarget(TargetChoice::Profile), "as the profile says").unless(fixed.clone()),
-            IntentInfo::new(Intent::ChooseTarget(free), "leave it free").unless(fixed.clone()),
-            IntentInfo::new(Intent::StartCircles, start).unless(fixed.clone().or(started).or(no_instrument)),
-            IntentInfo::new(Intent::Measure, "measure").unless(blocked.clone().or(by_hand)),
-            IntentInfo::new(Intent::TypeReading(String::new()), "type the coordinates").unless(blocked.or(not_by_hand)),
-            IntentInfo::new(Intent::UseCircles, "take the result of the circles")
-                .unless(fixed.clone().or_else(|| unusable(self, session))),
-            IntentInfo::new(Intent::DiscardCircles, "measure the circles anew").unless(fixed.or(no_circles)),
-        ];
-        let default = match (in_circles, manual, has_choice) {
-            (true, false, _) => 4,
-            (true, true, _) => 5,
-            (false, _, true) => 0,
-            (false, _, false) => 1,
+        let is_manual = matches!(session.instrument, Some(InstrumentChoice::Manual { .. }));
+        let is_measuring_circles = self.next(session).is_some();
+        let has_circles = !session.circle_points.is_empty();
+        let can_change = || {
+            require(
+                session.samples.is_empty(),
+                "samples were measured with this SMR; a different mounting needs a new session",
+            )
         };
-        if let Some(info) = intents.get_mut(default) {
-            info.is_default = info.is_enabled();
-        }
-        intents
+        let has_choice = || require(session.target.is_some(), "choose where the SMR is first");
+        let has_point = || require(is_measuring_circles, "start the circles first");
+        let is_connected = || require(cx.connection.is_some(), "the instrument is not responding");
+
+        let start = if has_circles { "continue the circles" } else { "find it by circles" };
+        let as_profile = Intent::ChooseTarget(TargetChoice::Profile);
+        let free = Intent::ChooseTarget(TargetChoice::Free { sigma_mm: to_mm(FREE_TARGET_UNCERTAINTY) });
+        let type_in = Intent::TypeReading(String::new());
+        let next = match (is_measuring_circles, is_manual) {
+            (true, false) => &Intent::Measure,
+            (true, true) => &type_in,
+            (false, _) if session.target.is_some() => &Intent::Next,
+            (false, _) => &as_profile,
+        };
+        let intents = vec![
+            offer(Intent::Next, "continue to Plan", [has_choice()]),
+            offer(as_profile.clone(), "as the profile says", [can_change()]),
+            offer(free, "leave it free", [can_change()]),
+            offer(
+                Intent::StartCircles,
+                start,
+                [can_change(), require(self.plan.is_empty(), "the circles are already being measured"), is_connected()],
+            ),
+            offer(
+                Intent::Measure,
+                "measure",
+                [has_point(), is_connected(), require(!is_manual, "the coordinates are typed in")],
+            ),
+            offer(
+                type_in.clone(),
+                "type the coordinates",
+                [has_point(), is_connected(), require(is_manual, "the instrument supplies the coordinates")],
+            ),
+            offer(Intent::UseCircles, "use the result of the circles", [can_change(), has_result(self, session)]),
+            offer(
+                Intent::DiscardCircles,
+                "restart the circles",
+                [can_change(), require(has_circles, "no circle has been measured")],
+            ),
+        ];
+        with_default(intents, next)
     }
 
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
         let session = cx.session;
         match intent {
-            Intent::ChooseTarget(choice) if is_sensible(&choice) => vec![Action::Write(vec![Entry::Target(choice)])],
+            Intent::ChooseTarget(choice) if is_plausible(&choice) => vec![Action::Write(vec![Entry::Target(choice)])],
             Intent::ChooseTarget(_) => {
-                let notice = Notice::error("the SMR cannot be there")
-                    .hint("give coordinates below 5 m and a standard deviation of 0 to 1000 mm");
+                let notice = Notice::error("this is not a plausible SMR position")
+                    .hint("coordinates must be below 5 m, and the standard deviation from 0 to 1000 mm");
                 vec![Action::Say(notice)]
             }
             Intent::StartCircles => {
@@ -260,12 +287,12 @@ impl StepMachine for TargetStep {
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
         match entry {
-            // The last point of the last circle shows whether the result can be used.
+            // Only the last point of the last circle shows whether the result can be used.
             Entry::CirclePoint(_) if self.next(cx.session).is_none() => match locate(cx.session) {
                 Some(Ok(found)) => vec![Action::Say(verdict(&found, cx.session))],
                 Some(Err(error)) => {
                     vec![Action::Say(
-                        Notice::error(error.to_string()).hint("measure the circles anew, or leave the SMR free"),
+                        Notice::error(error.to_string()).hint("measure the circles again, or leave the SMR free"),
                     )]
                 }
                 None => Vec::new(),
@@ -288,29 +315,29 @@ impl StepMachine for TargetStep {
     }
 }
 
-/// What to say about complete circles.
+/// The message about complete circles.
 fn verdict(found: &TargetLocation, session: &Session) -> Notice {
-    /// Residuals larger than expected by this factor are called out.
+    /// Ratio to the expected residual from which the residual is reported.
     const TOO_LARGE: f64 = 3.0;
     let (rms, expected) = (to_mm(found.rms), to_mm(found.expected_rms));
     if found.rms > TOO_LARGE * found.expected_rms {
         return Notice::attention(format!(
-            "the points miss the circles by {rms:.3} mm (RMS), {expected:.3} mm can be expected: a joint value may be wrong, or the SMR has moved"
+            "the points are {rms:.3} mm (RMS) off the circles, {expected:.3} mm can be expected: a joint value may be wrong, or the SMR has moved"
         ))
-        .hint("measure the circles anew");
+        .hint("measure the circles again");
     }
-    // With perpendicular last axes a reversed joint leaves no residual: only the expected place shows it.
+    // With perpendicular last axes a reversed joint leaves no residual. Only the expected position reveals it.
     let target = session.robot.as_ref().and_then(|robot| robot.profile.targets().first());
     if let Some(target) = target {
         let off = (found.point_in_flange - target.position_in_flange).norm();
         let allowed = FREE_TARGET_UNCERTAINTY.max(target.uncertainty);
         if off > allowed {
             return Notice::attention(format!(
-                "the SMR comes out {:.0} mm away from where the profile has it, {:.0} mm can be expected: another mounting, a joint that turns the other way, or a left-handed frame",
+                "the SMR is {:.0} mm away from the position in the profile, {:.0} mm can be expected: a different mounting, a joint that turns the other way, or a left-handed frame",
                 to_mm(off),
                 to_mm(allowed)
             ))
-            .hint("look at the flange: is the SMR where the result says? If not, check the joint signs and the frame of the tracker");
+            .hint("look at the flange: is the SMR where the result says? If not, check the joint signs and the tracker frame");
         }
     }
     Notice::info(format!(

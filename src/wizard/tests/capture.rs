@@ -23,18 +23,18 @@ fn the_first_pose_is_shown_with_all_that_can_be_done() {
         offers(&bench.wizard),
         [
             "Measure*",
-            "TypeReading -- the instrument measures by itself",
+            "TypeReading -- the instrument supplies the coordinates",
             "AcceptReading -- no reading is held back",
             "MeasureAgain -- no sample is in question",
             "Keep -- no sample is in question",
             "LeaveOut -- no sample is in question",
-            "ApplyRemedy -- there is no correction to propose",
+            "ApplyRemedy -- no correction is proposed",
             "Skip",
-            "Undo -- nothing is measured yet",
+            "Undo -- nothing has been measured yet",
             "GoToPose",
             "Note",
-            "SuggestPoses -- nothing is measured yet",
-            "Next -- 0 of at least 9 identification poses are measured",
+            "SuggestPoses -- nothing has been measured yet",
+            "Next -- 0 of at least 9 identification poses have been measured",
             "Back",
             "Quit"
         ]
@@ -81,7 +81,7 @@ fn a_whole_plan_is_measured_in_its_order() {
     let [drift] = &view.drift[..] else { panic!() };
     assert_eq!((drift.pose.as_str(), drift.measurement), ("1", 15));
     assert!(drift.moved_mm < 0.03, "{}", drift.moved_mm);
-    assert_eq!(blocked(&bench.wizard, "Measure"), "all poses of the plan are measured");
+    assert_eq!(blocked(&bench.wizard, "Measure"), "all poses of the plan have been measured");
     assert!(offers(&bench.wizard).contains(&"Next*".to_owned()));
     let prediction = view.prediction.unwrap();
     assert_eq!(prediction.curve_sigma.last().unwrap().0, IDENTIFICATION);
@@ -93,7 +93,7 @@ fn a_whole_plan_is_measured_in_its_order() {
 fn too_few_samples_block_identifying_with_numbers() {
     let mut bench = Bench::at(Step::Capture);
     bench.measure(8);
-    let few = "8 of at least 9 identification poses are measured";
+    let few = "8 of at least 9 identification poses have been measured";
     assert_eq!(blocked(&bench.wizard, "Next"), few);
     assert_eq!(bench.capture().too_few.as_deref(), Some(few));
     bench.measure(1);
@@ -125,7 +125,7 @@ fn an_smr_that_is_identified_as_well_needs_no_more_samples() {
     bench.does(Intent::ChooseTarget(crate::session::set_up::TargetChoice::Free { sigma_mm: 50.0 }));
     bench.does(Intent::Next);
     bench.pass(&super::bench::simulated());
-    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 9 identification poses are measured");
+    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 9 identification poses have been measured");
 }
 
 #[test]
@@ -188,9 +188,9 @@ fn skipping_everything_leaves_nothing_to_measure() {
     }
     assert_eq!(bench.capture().row, None);
     for name in ["Measure", "Skip"] {
-        assert_eq!(blocked(&bench.wizard, name), "all poses of the plan are measured");
+        assert_eq!(blocked(&bench.wizard, name), "all poses of the plan have been measured");
     }
-    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 9 identification poses are measured");
+    assert_eq!(blocked(&bench.wizard, "Next"), "0 of at least 9 identification poses have been measured");
     bench.does(go_to("3"));
     bench.does(Intent::Measure);
     assert_eq!(bench.capture().measured, 1);
@@ -235,7 +235,7 @@ fn a_result_is_stale_as_soon_as_a_sample_changes() {
     bench.does(Intent::Back);
     bench.does(Intent::Undo);
     bench.does(Intent::Next);
-    assert_eq!(blocked(&bench.wizard, "Next"), "the samples have changed since: identify again");
+    assert_eq!(blocked(&bench.wizard, "Next"), "the samples have changed since then: identify again");
     assert_eq!(offers(&bench.wizard)[0], "Identify*");
     bench.does(Intent::Identify);
     bench.does(Intent::Next);

@@ -31,10 +31,7 @@ fn what_is_no_measurement_is_refused_and_noted() {
         (Point3::new(1.0, f64::INFINITY, 1.0), "the reading is not a number"),
         (Point3::origin(), "the reading is 0, 0, 0: the instrument has no target"),
         (Point3::new(2000.0, 0.0, 0.0), "the reading is 2000 m away: no instrument measures that far"),
-        (
-            previous,
-            "the reading is the same to the last digit as the one before: the instrument has not measured again",
-        ),
+        (previous, "identical to the previous reading to the last digit: the instrument has not measured again"),
     ];
     for (number, (point, reason)) in (2..).zip(cases) {
         let effects = measure(&mut bench, |reading| reading.point = point);
@@ -199,10 +196,10 @@ fn a_sample_in_question_has_to_be_decided_about() {
     assert!((first.measured_mm - first.predicted_mm - first.difference_mm).abs() < 1e-9);
     assert!(finding.message.contains(&format!("{:.2} mm", first.difference_mm.abs())), "{}", finding.message);
     assert_eq!(view.pose.as_deref(), Some("13"), "the pose in question stays on the screen");
-    let first = "decide first about the sample in question: keep it, measure again, or leave it out";
+    let first = "resolve the questioned sample first: keep it, remeasure it or exclude it";
     assert_eq!(blocked(&bench.wizard, "Measure"), first);
     assert_eq!(blocked(&bench.wizard, "Skip"), first);
-    assert_eq!(blocked(&bench.wizard, "ApplyRemedy"), "there is no correction to propose");
+    assert_eq!(blocked(&bench.wizard, "ApplyRemedy"), "no correction is proposed");
     let offers = offers(&bench.wizard);
     for offer in ["MeasureAgain*", "Keep", "LeaveOut", "Undo"] {
         assert!(offers.contains(&offer.to_owned()), "{offer}: {offers:?}");

@@ -68,7 +68,7 @@ fn what_is_wanted_meanwhile_is_done_in_order() {
             "append 13 note to pose 2: third",
         ]
     );
-    assert_eq!((bench.told().as_str(), bench.step()), ("not now: measuring is under way", Step::Capture));
+    assert_eq!((bench.told().as_str(), bench.step()), ("not now: measuring is still running", Step::Capture));
 }
 
 #[test]
@@ -97,8 +97,8 @@ fn a_full_disk_stops_everything_but_trying_again_and_leaving() {
     assert!(bench.intend(Intent::Skip).is_empty());
     assert!(bench.failed(id).is_empty());
     let notice = bench.wizard.notice().unwrap();
-    assert_eq!((notice.severity, notice.what.as_str()), (Severity::Stop, "not saved: no space left"));
-    assert_eq!(notice.hints[0], "3 samples are safely on disk; nothing of that is lost");
+    assert_eq!((notice.severity, notice.what.as_str()), (Severity::Stop, "could not save: no space left"));
+    assert_eq!(notice.hints[0], "3 samples are already saved; nothing of that is lost");
     assert!(bench.wizard.view().is_stopped());
     assert_eq!(offers(&bench.wizard), ["Retry*", "Quit"]);
     assert_eq!(*bench.wizard.session(), session);
@@ -135,7 +135,7 @@ fn leaving_with_a_full_disk_ends() {
     let (id, _) = appended(&effects);
     bench.failed(id);
     assert_eq!(texts(&bench.intend(Intent::Quit)), ["exit"]);
-    assert_eq!(bench.wizard.ended(), Some("quit; the last change could not be saved"));
+    assert_eq!(bench.wizard.ended(), Some("quit; the last change was not saved"));
     let ended = state(&bench.wizard);
     assert!(bench.wizard.update(Event::Store(StoreEvent::Written { id })).is_empty());
     assert!(bench.intend(Intent::Retry).is_empty());

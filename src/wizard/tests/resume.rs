@@ -1,4 +1,4 @@
-//! A session goes on from whatever its journal holds.
+//! A session resumes from whatever its journal holds.
 
 use super::bench::{Bench, FOLDER, fold, offers, simulated, start, started, texts};
 use crate::session::journal::Entry;
@@ -95,7 +95,7 @@ fn resuming_is_journaled_then_said_then_the_instrument_is_connected() {
     assert_eq!(bench.wizard.notice(), None);
     effects = bench.perform(effects.remove(0));
     assert_eq!(texts(&effects), ["start connecting"]);
-    assert_eq!(bench.told(), "session 'soochow-20260301-0915' goes on: 0 samples");
+    assert_eq!(bench.told(), "Resumed session 'soochow-20260301-0915' (0 samples)");
     bench.settle(effects);
     assert_eq!(bench.wizard.view().header.instrument.as_deref(), Some("bench instrument"));
     assert_eq!(bench.wizard.session().resumed, 1);

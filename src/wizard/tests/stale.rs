@@ -2,7 +2,7 @@
 
 use super::bench::{Bench, answer, appended, failure, offers, started, state, texts};
 use crate::session::set_up::Step;
-use crate::wizard::{Answer, Effect, Event, Intent, PlanSettings, Progress, RequestId, StoreEvent};
+use crate::wizard::{Answer, Effect, Event, Intent, PlanSettings, RequestId, RequestProgress, StoreEvent};
 
 /// Events with an id that nobody waits for.
 fn strangers(id: RequestId) -> Vec<Event> {
@@ -14,7 +14,7 @@ fn strangers(id: RequestId) -> Vec<Event> {
             answer: Answer::Connected { identity: "another".to_owned(), warnings: Vec::new(), recorded: Vec::new() },
         },
         Event::Answer { id, answer: Answer::Delivered { files: vec!["x".to_owned()], left_out: Vec::new() } },
-        Event::Progress { id, progress: Progress::Search(crate::procedure::plan::Progress::Searching) },
+        Event::Progress { id, progress: RequestProgress::Search(crate::procedure::plan::Progress::Searching) },
         Event::Store(StoreEvent::Written { id }),
         Event::Store(StoreEvent::Failed { id, message: "late".to_owned() }),
         Event::Store(StoreEvent::Created { id, folder: "elsewhere".to_owned(), name: "x".to_owned() }),
@@ -94,7 +94,7 @@ fn progress_is_shown_while_it_lasts() {
     let mut bench = Bench::at(Step::Plan);
     let effects = bench.intend(Intent::MakePlan(PlanSettings::default()));
     let (id, _) = started(&effects);
-    let progress = Progress::Search(crate::procedure::plan::Progress::Unreachable { poses: 3 });
+    let progress = RequestProgress::Search(crate::procedure::plan::Progress::Unreachable { poses: 3 });
     assert!(bench.wizard.update(Event::Progress { id, progress }).is_empty());
     let busy = bench.wizard.view().busy.unwrap();
     assert_eq!(busy.what, "choosing poses");
@@ -111,7 +111,7 @@ fn cancelled(bench: &mut Bench, intent: Intent) -> RequestId {
     let effects = bench.intend(Intent::Cancel);
     assert!(matches!(effects[..], [Effect::Cancel(cancelled)] if cancelled == id));
     assert!(bench.wizard.view().busy.unwrap().is_cancelled);
-    assert_eq!(offers(&bench.wizard)[0], "Cancel -- it is being cancelled");
+    assert_eq!(offers(&bench.wizard)[0], "Cancel -- already being cancelled");
     assert!(bench.intend(Intent::Cancel).is_empty());
     id
 }
@@ -193,6 +193,6 @@ fn an_instrument_that_is_gone_after_resuming_is_no_refused_measurement() {
     assert_eq!((bench.told().as_str(), bench.capture().refused.len()), ("no route to host", 0));
     assert_eq!(
         super::bench::blocked(&bench.wizard, "Measure"),
-        "the instrument does not answer; go back to the instrument step"
+        "the instrument is not responding; go back to the instrument step"
     );
 }

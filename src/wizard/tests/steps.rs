@@ -84,7 +84,7 @@ fn instrument_connects_as_soon_as_it_is_chosen() {
         [
             "Next -- choose an instrument first",
             "ChooseInstrument",
-            "Retry -- there is nothing to connect again",
+            "Retry -- there is nothing to reconnect",
             "Back",
             "Quit"
         ]
@@ -97,10 +97,10 @@ fn instrument_connects_as_soon_as_it_is_chosen() {
         offers(&bench.wizard),
         [
             "Cancel",
-            "Next -- the instrument does not answer: connect again, or choose another",
-            "ChooseInstrument -- connecting is under way",
-            "Retry -- connecting is under way",
-            "Back -- connecting is under way",
+            "Next -- the instrument is not responding: reconnect, or choose another",
+            "ChooseInstrument -- connecting is still running",
+            "Retry -- connecting is still running",
+            "Back -- connecting is still running",
             "Quit"
         ]
     );
@@ -120,7 +120,7 @@ fn an_instrument_that_does_not_answer_can_be_tried_again() {
     let (id, _) = started(&effects);
     assert!(bench.answer(id, super::bench::failure("no route to host")).is_empty());
     assert_eq!(bench.told(), "no route to host");
-    assert_eq!(blocked(&bench.wizard, "Next"), "the instrument does not answer: connect again, or choose another");
+    assert_eq!(blocked(&bench.wizard, "Next"), "the instrument is not responding: reconnect, or choose another");
     bench.does(Intent::Retry);
     assert_eq!(bench.wizard.view().header.instrument, Some(text("bench instrument")));
 }
@@ -132,7 +132,7 @@ fn another_robot_is_shown_to_the_instrument() {
     bench.does(Intent::Back);
     bench.does(Intent::ChooseProfile(text("ur5")));
     let Content::Profile(view) = bench.wizard.view().content else { panic!() };
-    assert_eq!(view.session, "soochow-20260301-0915", "the session has its name");
+    assert_eq!(view.session, "soochow-20260301-0915", "the session already has a name");
     let mut effects = bench.intend(Intent::Next);
     effects = bench.perform(effects.remove(0));
     let (_, request) = started(&effects);
@@ -144,10 +144,10 @@ fn another_robot_is_shown_to_the_instrument() {
 #[test]
 fn target_says_where_the_smr_is() {
     let mut bench = Bench::at(Step::Target);
-    assert_eq!(blocked(&bench.wizard, "Next"), "say where the SMR is first");
-    assert_eq!(blocked(&bench.wizard, "UseCircles"), "no circle is measured");
+    assert_eq!(blocked(&bench.wizard, "Next"), "choose where the SMR is first");
+    assert_eq!(blocked(&bench.wizard, "UseCircles"), "no circle has been measured");
     bench.does(Intent::ChooseTarget(TargetChoice::Free { sigma_mm: f64::NAN }));
-    assert_eq!(bench.told(), "the SMR cannot be there");
+    assert_eq!(bench.told(), "this is not a plausible SMR position");
     assert_eq!(bench.wizard.session().target, None);
     let known = TargetChoice::Known { xyz_mm: (1.0, 2.0, 3.0), sigma_mm: 0.5 };
     bench.does(Intent::ChooseTarget(known));
@@ -185,7 +185,7 @@ fn plan_is_proposed_then_accepted() {
             "AcceptPlan -- there is no new plan to accept",
             "MakePlan*",
             "LoadPlan",
-            "PlanFromRecording -- the instrument plays no recorded measurements",
+            "PlanFromRecording -- the instrument does not play back recorded measurements",
             "Next -- accept a plan first",
             "Back",
             "Quit"
@@ -346,7 +346,7 @@ fn going_back_and_forth_loses_nothing_measured() {
 fn what_is_not_on_offer_is_answered_with_a_reason() {
     let mut bench = Bench::at(Step::Plan);
     assert!(bench.intend(Intent::Measure).is_empty());
-    assert_eq!(bench.told(), "not now: 'Measure' has no meaning in the step Plan");
+    assert_eq!(bench.told(), "not now: 'Measure' is not available in the step Plan");
     assert!(bench.intend(Intent::Next).is_empty());
     assert_eq!(bench.told(), "not now: accept a plan first");
     assert!(offers(&bench.wizard).contains(&text("Dismiss")));
@@ -363,23 +363,23 @@ fn what_is_measured_fixes_robot_instrument_and_target() {
         bench.does(Intent::Back);
     }
     assert_eq!(bench.step(), Step::Target);
-    let fixed = "samples are measured with this SMR; another mounting is another session";
+    let fixed = "samples were measured with this SMR; a different mounting needs a new session";
     assert_eq!(blocked(&bench.wizard, "ChooseTarget"), fixed);
     assert_eq!(blocked(&bench.wizard, "StartCircles"), fixed);
     assert!(bench.intend(Intent::ChooseTarget(TargetChoice::Profile)).is_empty());
     bench.does(Intent::Back);
     assert_eq!(
         blocked(&bench.wizard, "ChooseInstrument"),
-        "points of another instrument cannot be mixed with those measured; start another session"
+        "points from another instrument cannot be mixed with those already measured; start another session"
     );
     assert!(bench.intend(Intent::ChooseInstrument(MANUAL)).is_empty());
     bench.does(Intent::Back);
     assert_eq!(
         blocked(&bench.wizard, "ChooseProfile"),
-        "something is measured already: a session has one robot; start another session"
+        "points have already been measured: a session has only one robot; start another session"
     );
     assert!(bench.intend(Intent::ChooseProfile(text("ur5"))).is_empty());
-    assert_eq!(blocked(&bench.wizard, "NameSession"), "the session has its name");
+    assert_eq!(blocked(&bench.wizard, "NameSession"), "the session already has a name");
     let Content::Profile(view) = bench.wizard.view().content else { panic!() };
     assert!(view.is_fixed);
     assert_eq!(view.chosen.unwrap().name, "soochow");

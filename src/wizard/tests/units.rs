@@ -102,7 +102,7 @@ fn an_instrument_that_stays_in_the_other_unit_is_asked_about_once() {
     assert!(told[0].contains("times 25.4, in the unit of the one before"), "the journal says so: {told:?}");
     assert_eq!(cause(&bench), None);
     assert_eq!(bench.wizard.notice().unwrap().severity, Severity::Attention);
-    assert_eq!(bench.told(), "pose 10: still in the other unit; its coordinates count 25.4 times");
+    assert_eq!(bench.told(), "pose 10: still in the wrong unit; its coordinates count 25.4 times");
     // Across the pose that is measured again for drift.
     while bench.capture().measured < 16 {
         inches(&mut bench);

@@ -1,4 +1,4 @@
-//! What the checks say about a new point: live triage by distance, and drift where a pose is measured again.
+//! Checks of a new point: live triage by distance, and drift where a pose is measured again.
 
 use crate::identification::PointSample;
 use crate::identification::triage::{Cause, Finding, Names, PairDeviation, Triage, triage};
@@ -12,24 +12,24 @@ use crate::session::state::{Sample, Session};
 use crate::units::{MILLIMETRE, to_mm};
 use crate::wizard::step::Cx;
 
-/// σ of a coordinate (m) where nothing is stated.
+/// σ of a coordinate (m) if the profile states no instrument.
 const UNKNOWN_SIGMA: f64 = 0.05 * MILLIMETRE;
-/// A pose that is measured again may be off by this many standard deviations of a distance …
+/// Drift below this many standard deviations of a distance is not reported.
 const DRIFT_FACTOR: f64 = 6.0;
-/// … and by what a robot does not repeat (m).
+/// Drift below the repeatability of a robot is not reported (m).
 const REPEATABILITY: f64 = 0.1 * MILLIMETRE;
-/// Factors between units that differ by less than this are the same.
+/// Relative difference below which two unit factors are the same.
 const SAME_FACTOR: f64 = 1e-9;
 
-/// What the distances say about a point.
-struct Found {
+/// A finding from the distances to earlier points.
+struct DistanceFinding {
     text: FindingText,
-    /// Something else is as likely.
+    /// Whether another cause is equally likely.
     is_ambiguous: bool,
 }
 
-/// Judges a point that is about to be written: writes into it all that is found, the most important first, and what its
-/// coordinates count times where it is in the other unit still that the measurement before was corrected to.
+/// Checks a point that is about to be written, and adds the findings to it, the most important first. A point in the wrong unit
+/// that was already corrected for the previous measurement gets the same factor instead.
 pub(super) fn judge(cx: &Cx<'_>, noted: &mut MeasuredText) {
     let Some(profile) = cx.profile() else { return };
     let mut found = by_distance(cx, noted, &profile);
@@ -38,15 +38,15 @@ pub(super) fn judge(cx: &Cx<'_>, noted: &mut MeasuredText) {
         found = by_distance(cx, noted, &profile);
     }
     let found = found.map(|found| found.text);
-    // How far a point in an unknown unit has moved cannot be told.
+    // Drift cannot be judged for a point in an unknown unit.
     let has_unit = !matches!(found.as_ref().and_then(|found| found.remedy.as_ref()), Some(Correction::Scale { .. }));
     let drift = drift(cx.session, noted, &profile).filter(|_| has_unit);
     noted.findings = drift.into_iter().chain(found).collect();
 }
 
-/// What the coordinates of a new point count times if it is found to be in another unit, and for sure in the one that the
-/// measurement before was corrected to. Once corrected, the operator is not asked again for every point.
-fn unit_before(session: &Session, noted: &MeasuredText, found: &Found) -> Option<f64> {
+/// The unit factor of the previous measurement, if the new point is certainly in the same wrong unit. After the first correction
+/// the operator is not asked again for every point.
+fn unit_before(session: &Session, noted: &MeasuredText, found: &DistanceFinding) -> Option<f64> {
     let Some(Correction::Scale { since, factor, .. }) = found.text.remedy else { return None };
     let before = session.scale_noted(&session.counted().last()?.noted);
     let is_same = (session.scale_noted(noted) * factor / before - 1.0).abs() < SAME_FACTOR;
@@ -59,11 +59,11 @@ fn stated_sigma(profile: &Profile) -> f64 {
     profile.instrument().map_or(UNKNOWN_SIGMA, |instrument| instrument.sigma_at(distance))
 }
 
-/// What the distances to all earlier points say.
-fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<Found> {
+/// The finding from the distances to all earlier points, if they do not fit.
+fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<DistanceFinding> {
     let session = cx.session;
     let robot = cx.robot()?;
-    // A sample of the same row is about to be superseded.
+    // An earlier sample of the same row is about to be superseded.
     let earlier: Vec<&Sample> = session.counted().filter(|sample| sample.row != noted.row).collect();
     let point_sample = |configuration: Vec<f64>, point, sigma| PointSample {
         at: Place { configuration, target: noted.target },
@@ -100,7 +100,7 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
         scatter: None,
     })?;
     let number = |index: usize| earlier.get(index).map_or(noted.number, |sample| sample.noted.number);
-    // A drift pose has the name of the pose that it repeats.
+    // A drift pose has the same name as the pose that it repeats.
     let pose = |index: usize| {
         let (name, kind) = earlier
             .get(index)
@@ -121,10 +121,10 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<F
         remedy: remedy(&found, cx, &number, &samples, &rows),
         worst: worst(&found, &number, &samples),
     };
-    Some(Found { text, is_ambiguous: found.is_ambiguous() })
+    Some(DistanceFinding { text, is_ambiguous: found.is_ambiguous() })
 }
 
-/// The distances that fit least.
+/// The distances that fit worst.
 fn worst(found: &Finding, number: &dyn Fn(usize) -> u64, samples: &[PointSample]) -> Vec<PairText> {
     let text = |pair: &PairDeviation| {
         let measured = (samples.get(found.sample)?.point - samples.get(pair.other)?.point).norm();
@@ -138,7 +138,7 @@ fn worst(found: &Finding, number: &dyn Fn(usize) -> u64, samples: &[PointSample]
     found.worst.iter().filter_map(text).collect()
 }
 
-/// What would set it right, where something short of measuring again does.
+/// The correction that fixes the sample, if it does not need to be measured again.
 fn remedy(
     found: &Finding,
     cx: &Cx<'_>,
@@ -148,9 +148,9 @@ fn remedy(
 ) -> Option<Correction> {
     match &found.cause {
         Cause::Unit { factor, since } => {
-            // From the first sample on means from the first measurement on: refused ones and circles came the same way.
+            // From the first sample means from the first measurement: refused readings and circles had the same unit.
             let since = if *since == 0 { 1 } else { number(*since) };
-            // Up to this one: in which unit those are that follow must show.
+            // Up to this measurement: later ones are checked again.
             Some(Correction::Scale { since, factor: *factor, until: Some(number(samples.len() - 1)) })
         }
         Cause::SwappedRows { with } => Some(Correction::Swap { first: number(*with), second: number(found.sample) }),
@@ -173,7 +173,7 @@ fn remedy(
     }
 }
 
-/// How far a pose that is measured again has moved, where that is too far.
+/// A finding about a repeated pose that has moved too far.
 fn drift(session: &Session, noted: &MeasuredText, profile: &Profile) -> Option<FindingText> {
     if noted.kind != PoseKind::Drift {
         return None;
@@ -183,7 +183,7 @@ fn drift(session: &Session, noted: &MeasuredText, profile: &Profile) -> Option<F
     let first = session.counted().find(is_first)?;
     let moved = (session.point_noted(noted) - session.point_of(first)).norm();
     let sigma = session.sigma_noted(noted).unwrap_or_else(|| stated_sigma(profile));
-    // Six coordinates scatter.
+    // The difference of two points has the scatter of six coordinates.
     let expected = 6.0_f64.sqrt() * sigma;
     let limit = (DRIFT_FACTOR * expected).max(REPEATABILITY);
     (moved > limit).then(|| FindingText {
@@ -191,7 +191,7 @@ fn drift(session: &Session, noted: &MeasuredText, profile: &Profile) -> Option<F
         cause: FindingCause::Drift,
         ratio: (moved / expected * 10.0).round() / 10.0,
         message: format!(
-            "pose {}: measured {:.3} mm away from where it was at measurement {}; up to {:.3} mm is usual. The tracker, the robot's base or the SMR has moved, or something warms up: look for it; what was measured since may have to be measured again",
+            "pose {}: now {:.3} mm away from measurement {} of the same pose; up to {:.3} mm is usual. The tracker, the robot base or the SMR has moved, or something is warming up: find the cause; poses measured since then may have to be measured again",
             noted.pose,
             to_mm(moved),
             first.noted.number,

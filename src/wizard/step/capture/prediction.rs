@@ -1,4 +1,4 @@
-//! How good a calibration from the samples so far would be, and whether more of them are worth the time.
+//! The error predicted for a calibration from the samples so far, and whether more samples are worth the time.
 
 use crate::kinematics::Place;
 use crate::planning::{Information, JointBox, fewest_poses, findable, random};
@@ -10,20 +10,20 @@ use crate::session::state::Session;
 const FRESH_POSES: usize = 200;
 /// Seed of the fresh poses: the same for every session, so that figures can be compared.
 const FRESH_SEED: u64 = 0x5eed;
-/// The rest of the plan is not worth its time if it improves the prediction by less than this part.
+/// Relative improvement below which the rest of the plan is not worth the time.
 const WORTHWHILE: f64 = 0.05;
 
 /// Predicted RMS position error at fresh poses, per σ of the instrument.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Prediction {
-    /// After so many identification samples; from the first number on with which all that can be found is determined.
+    /// Error by number of identification samples, from the first number that determines all identifiable parameters.
     pub(super) curve: Vec<(usize, f64)>,
-    /// With the rest of the plan as well.
+    /// Error with the rest of the plan included.
     pub(super) with_all: Option<f64>,
 }
 
 impl Prediction {
-    /// Of the samples of a session.
+    /// Predicts from the samples of a session.
     pub(super) fn of(session: &Session) -> Self {
         Self::try_of(session).unwrap_or_default()
     }
@@ -45,12 +45,12 @@ impl Prediction {
         Some(Self { curve, with_all: of_first(pool.len()) })
     }
 
-    /// Of the samples so far.
+    /// Error with the samples so far.
     pub(super) fn now(&self) -> Option<f64> {
         self.curve.last().map(|(_, error)| *error)
     }
 
-    /// Whether the rest of the plan would improve it by too little to be worth its time.
+    /// Whether the rest of the plan improves the error too little to be worth the time.
     pub(super) fn is_enough(&self) -> bool {
         match (self.now(), self.with_all) {
             (Some(now), Some(with_all)) => with_all > (1.0 - WORTHWHILE) * now,
@@ -59,8 +59,8 @@ impl Prediction {
     }
 }
 
-/// Fewest identification samples that can determine what distances can find, by the same rule as planning. Where that is not
-/// clear all free parameters count.
+/// Fewest identification samples that can determine all identifiable parameters, by the same rule as planning. If the rank is
+/// unclear, all free parameters count.
 pub(in crate::wizard::step) fn fewest_samples(session: &Session) -> Option<usize> {
     let profile = &session.mounted_profile()?;
     let parameters = profile.free_parameters(Level::Geometric);
@@ -72,12 +72,12 @@ fn at(configuration: Vec<f64>) -> Place {
     Place { configuration, target: 0 }
 }
 
-/// Poses all over the range in which the robot is to be accurate.
+/// Random poses over the range in which the robot has to be accurate.
 fn fresh(profile: &Profile) -> Option<Vec<Place>> {
     Some(random(&joint_box(profile)?, FRESH_SEED).take(FRESH_POSES).map(at).collect())
 }
 
-/// The range in which the robot is to be accurate.
+/// The range in which the robot has to be accurate.
 fn joint_box(profile: &Profile) -> Option<JointBox> {
     let limits: Option<Vec<(f64, f64)>> =
         profile.joints().iter().map(|range| range.planning_limits.or(range.limits)).collect();

@@ -1,6 +1,6 @@
-//! What the capture step shows.
+//! The view of the capture step.
 
-use super::{CaptureStep, too_few};
+use super::{CaptureStep, has_enough};
 use crate::session::journal::PairText;
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, SampleState, Session};
@@ -35,7 +35,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         minutes_left: minutes_left(session, open),
         last: session.samples.last().map(|sample| sample_view(session, sample)),
         held: step.held.as_ref().map(|held| held.reason.clone()),
-        finding: step.asked(session).map(|(about, finding)| FindingView {
+        finding: step.doubt(session).map(|(about, finding)| FindingView {
             pose: session.pose_of(about).to_owned(),
             measurement: about.noted.number,
             cause: finding.cause,
@@ -46,14 +46,14 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         drift: drift(session),
         prediction: prediction(step, session),
         typed_unit: CaptureStep::manual_unit(cx).map(|unit| unit.sign().to_owned()),
-        too_few: too_few(session, step.fewest),
+        too_few: has_enough(session, step.fewest).err(),
         rows,
         notes: session.notes.iter().map(|note| (note.pose.clone(), note.text.clone())).collect(),
         refused: session.refused.iter().map(|refused| (refused.pose.clone(), refused.reason.clone())).collect(),
     }
 }
 
-/// The configuration to go to, with the joint that moves most.
+/// The configuration to go to. The joint that moves most is marked.
 fn joints(step: &CaptureStep, cx: &Cx<'_>) -> Vec<JointShown> {
     let (Some(row), Some(robot)) = (step.row.and_then(|row| cx.session.rows.get(row)), cx.robot()) else {
         return Vec::new();
@@ -138,7 +138,7 @@ fn pair_view(session: &Session, pair: &PairText) -> PairView {
     }
 }
 
-/// How far the pose that is measured again and again has moved since its first measurement.
+/// Movement of each repeated pose since its first measurement.
 fn drift(session: &Session) -> Vec<DriftView> {
     let mut found = Vec::new();
     for sample in session.counted_of(PoseKind::Drift) {
@@ -169,10 +169,10 @@ fn prediction(step: &CaptureStep, session: &Session) -> Option<PredictionView> {
     })
 }
 
-/// Minutes for the rest, at the pace so far: the median time from sample to sample.
+/// Minutes for the remaining rows at the pace so far, the median time from sample to sample.
 fn minutes_left(session: &Session, open: usize) -> Option<f64> {
     let times: Vec<f64> = session.samples.iter().map(|sample| sample.time.as_millisecond() as f64 / 60_000.0).collect();
-    // Clocks jump: a step back, or a lunch break, is not the pace.
+    // A clock that was set back, or a lunch break, says nothing about the pace.
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).map(|step| step * open as f64)
