@@ -151,7 +151,7 @@ fn scripts_with_defects_are_refused_with_their_place() {
         ("(title: \"x\", steps: [Do(Nex)])", "'test.script.ron': line 1, column 25"),
         ("(title: \"x\", step: [])", "Unexpected field named `step`"),
         ("(title: \"x\", clock: Some(\"noon\"), steps: [])", "'noon' is not a time"),
-        ("(title: \"x\", steps: [Say(\"${who}\")])", "needs a value for 'who': give it with '--set who=…'"),
+        ("(title: \"x\", steps: [Say(\"${who}\")])", "needs a value for 'who': use '--set who=…'"),
     ] {
         let (_folder, output) = run_script(script, &[]);
         let error = text(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");

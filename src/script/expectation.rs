@@ -1,4 +1,4 @@
-//! What a script expects to see.
+//! Expectations of a script.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -8,22 +8,22 @@ use crate::wizard::ViewModel;
 /// A condition on one value of the view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Check {
-    /// It reads exactly so.
+    /// Is exactly this text.
     Is(String),
-    /// It contains this text.
+    /// Contains this text.
     Contains(String),
-    /// It is a number below this.
+    /// Is a number below this limit.
     Below(f64),
-    /// It is a number above this.
+    /// Is a number above this limit.
     Above(f64),
-    /// It is there.
+    /// Is present and not empty.
     Exists,
-    /// It is not there, or empty.
+    /// Is absent or empty.
     Absent,
 }
 
 impl Check {
-    /// Whether it is met by the value at `path` of the view; if not, what was expected and what was seen.
+    /// Tests the value at `path` of the view. The error says what was expected and what was seen.
     pub(super) fn test(&self, view: &ViewModel, path: &str) -> Result<(), String> {
         let root = serde_json::to_value(view).map_err(|error| error.to_string())?;
         let found = find(&root, path);
@@ -44,21 +44,21 @@ impl Check {
         if is_met { Ok(()) } else { Err(format!("expected {path} {}; seen: {seen}", self.words())) }
     }
 
-    /// As it reads in a message.
+    /// The condition in words.
     fn words(&self) -> String {
         match self {
             Self::Is(text) => format!("to be '{text}'"),
             Self::Contains(text) => format!("to contain '{text}'"),
             Self::Below(limit) => format!("to be below {limit}"),
             Self::Above(limit) => format!("to be above {limit}"),
-            Self::Exists => "to be there".to_owned(),
+            Self::Exists => "to be present".to_owned(),
             Self::Absent => "to be absent".to_owned(),
         }
     }
 }
 
-/// The value at a path such as `capture.rows.0.pose`; paths into the step's own part need no `content.`. The error says where
-/// the path ends and what there is.
+/// The value at a path such as `capture.rows.0.pose`; paths into the step's own part need no `content.`. The error says where the
+/// path ends and which names exist there.
 fn find<'a>(root: &'a Value, path: &str) -> Result<&'a Value, String> {
     let mut parts = path.split('.').peekable();
     let mut at = root;
@@ -75,8 +75,8 @@ fn find<'a>(root: &'a Value, path: &str) -> Result<&'a Value, String> {
             Err(_) => at.get(part),
         };
         at = next.ok_or_else(|| {
-            let place = if walked.is_empty() { "the view".to_owned() } else { walked.join(".") };
-            format!("no '{part}' in {place}, which has {}", names_in(at))
+            let parent = if walked.is_empty() { "the view".to_owned() } else { walked.join(".") };
+            format!("no '{part}' in {parent}, which has {}", names_in(at))
         })?;
         walked.push(part);
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::grammar::ScriptError;
+use super::error::ScriptError;
 
 /// The text with all placeholders replaced. Comments are left alone.
 pub(super) fn fill(text: &str, values: &BTreeMap<String, String>) -> Result<String, ScriptError> {
@@ -57,7 +57,7 @@ mod tests {
     fn what_is_missing_or_unknown_is_named() {
         assert_eq!(fill("${file}", &values(&[])), Err(ScriptError::MissingValue { name: "file".to_owned() }));
         let unknown = fill("${seed:1}", &values(&[("sed", "1")])).unwrap_err();
-        assert_eq!(unknown.to_string(), "the script has no placeholder 'sed'; it knows: seed");
+        assert_eq!(unknown.to_string(), "the script has no placeholder 'sed'; it has: seed");
         assert_eq!(fill("\n${seed", &values(&[])), Err(ScriptError::OpenPlaceholder { line: 2 }));
     }
 }

@@ -9,36 +9,34 @@ use super::transcript::Transcript;
 use crate::runtime::{Engine, Happening};
 use crate::session::state::Session;
 use crate::session::summary::IdentificationSummary;
+use crate::text::shortened;
 use crate::wizard::{Intent, IntentInfo, Severity, ViewModel};
 
-/// Longest real time in which nothing at all happens while something is under way; a search reports far more often.
+/// Longest time without any event while a request is running. A search reports far more often.
 const PATIENCE: Duration = Duration::from_mins(5);
-/// A measurement that fails is tried again so often.
+/// Attempts at a measurement that fails.
 const TRIES: usize = 3;
-/// Why the wizard ends when the script says so.
+/// Cause of the wizard's end when the script quits.
 const QUIT: &str = "quit";
-/// Characters of an intent in the transcript.
-const LONGEST_INTENT: usize = 120;
+/// Columns of an intent in the transcript.
+const LONGEST_INTENT: usize = 121;
 
 /// How a script ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// All steps were done and all expectations met.
+    /// All steps succeeded.
     Done,
-    /// A step could not be done, or an expectation was not met.
+    /// A step failed, or an expectation was not met.
     Failed {
         /// Number of the step, from 1.
         step: usize,
         /// What was expected and what was seen.
         message: String,
-        /// The session could not be written: what was measured up to then is safe.
+        /// Whether the session could not be written. What was measured before is safe.
         not_saved: bool,
     },
-    /// The program was told to end, by a signal or by `Quit`.
-    Ended {
-        /// Why.
-        cause: String,
-    },
+    /// The program was ended by a signal or by `Quit`.
+    Ended { cause: String },
 }
 
 /// Why a step ends the script.
@@ -55,7 +53,7 @@ impl From<io::Error> for Stop {
     }
 }
 
-/// A script under way.
+/// Runs a script with an engine.
 pub struct Runner<'a, W: Write> {
     engine: Engine,
     transcript: Transcript<'a, W>,
@@ -70,7 +68,6 @@ impl<W: Write> std::fmt::Debug for Runner<'_, W> {
 }
 
 impl<'a, W: Write> Runner<'a, W> {
-    /// A runner for an engine.
     pub fn new(
         engine: Engine,
         transcript: Transcript<'a, W>,
@@ -79,27 +76,27 @@ impl<'a, W: Write> Runner<'a, W> {
         Self { engine, transcript, reopen, done: Vec::new() }
     }
 
-    /// The session.
+    /// The session as it is on disk.
     pub fn session(&self) -> &Session {
         self.engine.wizard().session()
     }
 
-    /// Where the session is on disk.
+    /// Folder of the session.
     pub fn folder(&self) -> Option<&str> {
         self.engine.wizard().folder()
     }
 
-    /// What was done, in order, as steps of a script.
+    /// Intents that were executed, in order, as steps of a script.
     pub fn done(&self) -> &[ScriptStep] {
         &self.done
     }
 
-    /// The last result.
+    /// The latest identification result.
     pub fn summary(&self) -> Option<&IdentificationSummary> {
         self.session().identified.as_ref().map(|result| &result.summary)
     }
 
-    /// Runs the steps, then closes the session in good order, whatever has happened.
+    /// Runs the steps, then closes the session cleanly in any case.
     ///
     /// # Errors
     /// The transcript cannot be written.
@@ -115,7 +112,7 @@ impl<'a, W: Write> Runner<'a, W> {
 
     fn steps(&mut self, script: &Script) -> io::Result<Outcome> {
         self.transcript.event("script", &script.title)?;
-        // What resuming has set in motion comes first; a signal after the last step is still heard.
+        // A resumed session settles before the first step, and a signal after the last step is still handled.
         let steps = std::iter::once(None).chain(script.steps.iter().map(Some)).chain(std::iter::once(None));
         for (index, step) in steps.enumerate() {
             let result = match step {
@@ -132,14 +129,15 @@ impl<'a, W: Write> Runner<'a, W> {
                 Err(Stop::Failed(message)) => (message, false),
                 Err(Stop::NotSaved(message)) => (message, true),
             };
-            let text = step.map_or_else(String::new, |step| format!(" ({})", short(&format!("{step:?}"))));
+            let text =
+                step.map_or_else(String::new, |step| format!(" ({})", shortened(&format!("{step:?}"), LONGEST_INTENT)));
             self.transcript.event("failed", &format!("step {index}{text}: {message}"))?;
             return Ok(Outcome::Failed { step: index, message, not_saved });
         }
         Ok(Outcome::Done)
     }
 
-    /// A table for people, after the last line.
+    /// Prints a table after the last line, in the text format only.
     ///
     /// # Errors
     /// It cannot be written.
@@ -147,7 +145,7 @@ impl<'a, W: Write> Runner<'a, W> {
         self.transcript.table(text)
     }
 
-    /// A line of the transcript.
+    /// Prints a line of the transcript.
     ///
     /// # Errors
     /// It cannot be written.
@@ -155,7 +153,7 @@ impl<'a, W: Write> Runner<'a, W> {
         self.transcript.event(event, text)
     }
 
-    /// Ends the wizard and waits until its last entry is on disk. What is under way is cancelled.
+    /// Quits the wizard and waits until its last entry is on disk. A running request is cancelled.
     fn end(&mut self) {
         if self.engine.wizard().ended().is_none() {
             self.engine.intend(Intent::Quit);
@@ -180,12 +178,12 @@ impl<'a, W: Write> Runner<'a, W> {
         }
     }
 
-    /// What the wizard offers for an intent.
+    /// The wizard's offer for an intent.
     fn offer(&self, intent: &Intent) -> Option<IntentInfo> {
         self.engine.wizard().intents().into_iter().find(|info| info.intent.name() == intent.name())
     }
 
-    /// Does an intent, which must be possible, and waits until nothing is under way. Returns why it could not be done.
+    /// Sends an intent, which must be possible, and waits until it is finished. Returns the reason if it failed.
     fn perform(&mut self, intent: &Intent) -> Result<Option<String>, Stop> {
         match self.offer(intent) {
             None => {
@@ -198,7 +196,7 @@ impl<'a, W: Write> Runner<'a, W> {
             Some(_) => {}
         }
         let text = ron::to_string(intent).unwrap_or_else(|_error| intent.name().to_owned());
-        self.transcript.event("do", &short(&text))?;
+        self.transcript.event("do", &shortened(&text, LONGEST_INTENT))?;
         Ok(self.act(intent)?.map(|message| format!("{} failed: {message}", intent.name())))
     }
 
@@ -208,15 +206,15 @@ impl<'a, W: Write> Runner<'a, W> {
                 Ok(self.transcript.event("expect", &format!("{} fails with '{text}'", intent.name()))?)
             }
             Some(failure) => Err(Stop::Failed(format!("expected a failure with '{text}'; seen: {failure}"))),
-            None => Err(Stop::Failed(format!("expected {} to fail with '{text}'; it was done", intent.name()))),
+            None => Err(Stop::Failed(format!("expected {} to fail with '{text}'; it succeeded", intent.name()))),
         }
     }
 
-    /// As [`Self::perform`], without a line of its own.
+    /// Like [`Self::perform`], without a line in the transcript.
     fn act(&mut self, intent: &Intent) -> Result<Option<String>, Stop> {
         self.engine.intend(intent.clone());
         self.settle()?;
-        // Doing something takes the message before it away: an error is this intent's own.
+        // An intent clears the previous message, so an error belongs to this intent.
         let notice = self.engine.wizard().notice().filter(|notice| notice.severity == Severity::Error);
         let error = notice.map(|notice| notice.what.clone());
         self.done.push(match &error {
@@ -231,9 +229,9 @@ impl<'a, W: Write> Runner<'a, W> {
         infos.iter().filter(|info| info.is_enabled()).map(|info| info.intent.name()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Waits until nothing is under way, printing what happens.
+    /// Waits until the wizard is idle, and prints events meanwhile.
     fn settle(&mut self) -> Result<(), Stop> {
-        // Signals arrive also while nothing is under way.
+        // Signals also arrive while the wizard is idle.
         while self.engine.wait(Duration::ZERO) {}
         loop {
             self.report()?;
@@ -291,14 +289,14 @@ impl<'a, W: Write> Runner<'a, W> {
             Some(IntentInfo { blocked: Some(blocked), .. }) if blocked.contains(reason) => {
                 return Ok(self.transcript.event("expect", &format!("{} is blocked: {blocked}", intent.name()))?);
             }
-            Some(IntentInfo { blocked: Some(blocked), .. }) => format!("it is not, because: {blocked}"),
+            Some(IntentInfo { blocked: Some(blocked), .. }) => format!("it is blocked because: {blocked}"),
             Some(_) => "it is possible".to_owned(),
             None => "it is not offered at all".to_owned(),
         };
-        Err(Stop::Failed(format!("expected {} not to be possible because '{reason}'; {seen}", intent.name())))
+        Err(Stop::Failed(format!("expected {} to be blocked because '{reason}'; {seen}", intent.name())))
     }
 
-    /// Measures poses that wait, up to `count`.
+    /// Measures open poses, up to `count`.
     fn capture(&mut self, count: usize, on_finding: OnFinding) -> Result<(), Stop> {
         let mut taken = 0;
         let mut failed = 0;
@@ -317,23 +315,19 @@ impl<'a, W: Write> Runner<'a, W> {
                 failed += 1;
                 if failed >= TRIES {
                     let what = self.engine.wizard().notice().map_or_else(String::new, |notice| notice.what.clone());
-                    return Err(Stop::Failed(format!("no sample after {TRIES} tries: {what}")));
+                    return Err(Stop::Failed(format!("no sample after {TRIES} attempts: {what}")));
                 }
                 continue;
             }
             failed = 0;
             taken += 1;
         }
-        // A finding that stops capturing is an end as well; too few poses are not.
+        // A finding may end capturing early; too few open poses must not.
         let is_short = count != usize::MAX && taken < count && self.session().open_rows().next().is_none();
-        if is_short {
-            Err(Stop::Failed(format!("only {taken} of {count} poses waited to be measured")))
-        } else {
-            Ok(())
-        }
+        if is_short { Err(Stop::Failed(format!("only {taken} of {count} poses were open"))) } else { Ok(()) }
     }
 
-    /// Decides about samples in question; `false`: capturing is to stop.
+    /// Resolves questioned samples. Returns `false` if capturing has to stop.
     fn resolve(&mut self, on_finding: OnFinding) -> Result<bool, Stop> {
         let mut again = 0;
         while let Some(info) = self.offer(&Intent::Keep).filter(IntentInfo::is_enabled) {
@@ -371,31 +365,23 @@ impl<'a, W: Write> Runner<'a, W> {
             self.act(&Intent::Measure)?;
             failed = if self.session().circle_points.len() == before { failed + 1 } else { 0 };
             if failed >= TRIES {
-                return Err(Stop::Failed(format!("no point after {TRIES} tries")));
+                return Err(Stop::Failed(format!("no point after {TRIES} attempts")));
             }
         }
         let is_complete = Check::Exists.test(&self.view(), "target.circles.result").is_ok();
         if is_complete { Ok(()) } else { Err(Stop::Failed("the circles have no result".to_owned())) }
     }
 
-    /// Ends the program and resumes from disk.
+    /// Ends the program and resumes the session from disk.
     fn restart(&mut self) -> Result<(), Stop> {
         let folder =
             self.folder().ok_or_else(|| Stop::Failed("there is no session to resume yet".to_owned()))?.to_owned();
         self.end();
         self.report()?;
         self.transcript.event("restart", "the program ends and resumes the session")?;
-        // The lock must be free before it is taken again.
+        // The lock must be released before it is acquired again.
         self.engine.release();
         self.engine = (self.reopen)(&folder).map_err(Stop::Failed)?;
         self.settle()
     }
-}
-
-fn short(text: &str) -> String {
-    let mut short: String = text.chars().take(LONGEST_INTENT).collect();
-    if text.chars().count() > LONGEST_INTENT {
-        short.push('…');
-    }
-    short
 }

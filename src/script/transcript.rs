@@ -1,4 +1,4 @@
-//! What a script prints: one line per thing that happens, stable enough to be compared.
+//! Output of a script: one line per event, stable enough to be compared.
 
 use std::io::{self, Write};
 
@@ -7,22 +7,22 @@ use serde::Serialize;
 
 use crate::text::printable;
 
-/// How it is printed.
+/// Format of a transcript.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
-    /// Lines for people.
+    /// Lines of text.
     #[default]
     Text,
     /// One JSON object per line.
     Json,
 }
 
-/// Prints what happens.
+/// Prints events.
 #[derive(Debug)]
 pub struct Transcript<'a, W: Write> {
     out: &'a mut W,
     format: Format,
-    /// Times are printed only where they are the same in every run.
+    /// Whether times are printed, which makes sense only if they are the same in every run.
     with_time: bool,
 }
 
@@ -49,12 +49,12 @@ impl<'a, W: Write> Transcript<'a, W> {
         self.line("saved", time, Some(number), text)
     }
 
-    /// Something else: `script`, `do`, `notice`, `expect`, `say`, `failed`, `done`.
+    /// Any other event: `script`, `do`, `notice`, `expect`, `say`, `failed`, `done`.
     pub(super) fn event(&mut self, event: &str, text: &str) -> io::Result<()> {
         self.line(event, None, None, text)
     }
 
-    /// A text as it is, for people only.
+    /// A text as it is, in the text format only.
     pub(super) fn table(&mut self, text: &str) -> io::Result<()> {
         match self.format {
             Format::Text => {
@@ -71,7 +71,7 @@ impl<'a, W: Write> Transcript<'a, W> {
             Format::Text => {
                 let number = entry.map_or_else(|| "     ".to_owned(), |number| format!("{number:>4} "));
                 let clock = time.as_deref().map_or_else(String::new, |time| {
-                    // `2026-01-01T08:03:12Z`: the time of day tells enough.
+                    // `2026-01-01T08:03:12Z`: the time of day is enough.
                     let time: String = time.chars().skip(11).take(8).collect();
                     format!("{time} ")
                 });
