@@ -15,7 +15,7 @@ pub use names::UnknownName;
 pub(crate) use names::{names, names_of_option, written_as_text};
 
 /// Marks a place where text was cut off.
-const ELLIPSIS: char = '…';
+pub const ELLIPSIS: char = '…';
 
 /// Whether a character keeps its place in a terminal line: no control character, and no invisible one that reorders text.
 pub fn is_printable(character: char) -> bool {

@@ -6,12 +6,12 @@
 //! work threads ── Event ─┘                        └── frame, content, footer ─► terminal
 //! ```
 //!
-//! - One place to wait: the engine's channel; keys only wake it. Nothing ticks when nothing happens.
-//! - Drawing is a function of the `ViewModel` and of what is local in [`ui::Ui`]; it happens when one of them changed, at most
-//!   twenty times a second.
-//! - The terminal is entered and left in `tui::terminal` only. When it goes away, it is left alone, the session is closed and the
-//!   process ends with 129.
-//! - Roles instead of colours ([`theme`]), signs with an ASCII form ([`glyphs`]), one table of keys ([`keymap`]).
+//! - The driver waits in one place, the engine's channel; keys only wake it. Nothing runs while nothing happens.
+//! - Drawing is a function of the `ViewModel` and of the local state in [`ui::Ui`]. It happens when one of them has changed, at
+//!   most twenty times a second.
+//! - Only `tui::terminal` enters and leaves the terminal. When the terminal is lost, nothing more is written to it, the session
+//!   is closed and the process exits with 129.
+//! - Roles instead of colours ([`theme`]), symbols with an ASCII form ([`glyphs`]), one table of keys ([`keymap`]).
 
 pub mod dialog;
 pub mod form;
@@ -43,29 +43,29 @@ use crate::runtime::{Deed, Engine, signals};
 use input::Input;
 use terminal::TerminalGuard;
 use theme::Theme;
-use ui::{Ui, Wish};
+use ui::{Command, Ui};
 
-/// Shortest time between two frames: more would only fill an SSH line.
+/// Shortest time between two frames. More frames would only fill an SSH line.
 const FRAME: Duration = Duration::from_millis(50);
-/// The same where a key has changed something, without the picture of the robot: whoever presses it looks.
+/// Shortest time before a frame that a key has caused, without the picture of the robot: the operator is looking at it.
 const FRAME_OF_KEY: Duration = Duration::from_millis(25);
-/// What is under way gets this long to end before the change is drawn: saving an entry is shown only where it takes longer.
+/// Time for running work to finish before a change is drawn, so that saving an entry is only shown if it takes longer.
 const SETTLE: Duration = Duration::from_millis(40);
-/// Longest wait when there is nothing to do; something always ends it.
+/// Longest wait when there is nothing to do. An event always ends it.
 const IDLE: Duration = Duration::from_hours(1);
-/// Longest wait for the last entry of the journal when the terminal is gone.
+/// Longest wait for the last entry of the journal after the terminal is lost.
 const LAST_ENTRY: Duration = Duration::from_secs(10);
-/// Number of the signal that says so.
+/// Number of the signal for a lost terminal.
 const SIGHUP: i32 = 1;
 
-/// How the terminal is used.
+/// Options of the terminal.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// Colours and signs.
+    /// Colours and glyphs.
     pub theme: Theme,
-    /// Whether the mouse is taken from the terminal.
+    /// Whether the program handles the mouse instead of the terminal.
     pub has_mouse: bool,
-    /// Colours even if the environment is against them.
+    /// Whether to use colours even if the environment disables them.
     pub forces_colour: bool,
     /// Whether the bell rings when a reading needs attention.
     pub has_bell: bool,
@@ -74,20 +74,20 @@ pub struct Options {
 /// Why the program ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Exit {
-    /// In words.
+    /// Reason in words.
     pub cause: String,
-    /// The signal that asked for it.
+    /// The signal that ended the program, if any.
     pub signal: Option<i32>,
-    /// Where the session is.
+    /// Folder of the session.
     pub folder: Option<String>,
-    /// What could not be said while the screen was up.
+    /// Messages that could not be printed while the screen was up.
     pub remarks: Vec<String>,
 }
 
 /// What is done with the operator's deeds before the program ends, however it ends.
 pub type AtEnd<'a> = &'a mut dyn FnMut(&[Deed]);
 
-/// Runs the wizard in the terminal until it ends. When the terminal goes away, the process ends here.
+/// Runs the wizard in the terminal until it ends. When the terminal is lost, the process ends here.
 ///
 /// # Errors
 /// The terminal cannot be used, or the system refuses a thread.
@@ -110,7 +110,7 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
         ui: Ui::new(options.theme).with_bell(options.has_bell),
     };
     let end = driver.run(&received);
-    // Its drop would write to the terminal once more, which may be gone.
+    // Dropping it would write to the terminal once more, which may be gone.
     let Driver { screen, .. } = driver;
     std::mem::forget(screen);
     if end == End::Gone || received.signal() == Some(SIGHUP) {
@@ -129,7 +129,7 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
     })
 }
 
-/// Closes the session, touches nothing of the terminal, ends the process.
+/// Closes the session without touching the terminal, and ends the process.
 fn close_without_terminal(engine: &mut Engine, at_end: AtEnd<'_>) -> ! {
     engine.abandon_recording();
     engine.shut_down("the terminal went away (SIGHUP)");
@@ -188,41 +188,41 @@ impl Driver<'_> {
             }
             let timeout = if is_due { early } else { IDLE };
             if self.engine.wait(timeout) {
-                // One event may have brought others.
+                // Handle all events that have arrived before drawing.
                 while !self.engine.has_exited() && self.engine.wait(Duration::ZERO) {}
             }
-            view = self.look(view, &mut is_due);
+            view = self.refresh(view, &mut is_due);
             while let Ok(input) = self.inputs.try_recv() {
                 is_by_key = true;
                 match self.ui.on_input(input, &view) {
-                    Wish::None => {}
-                    Wish::Intend(intent) => {
+                    Command::None => {}
+                    Command::Intent(intent) => {
                         self.engine.intend(intent);
-                        view = self.look(view, &mut is_due);
+                        view = self.refresh(view, &mut is_due);
                     }
-                    Wish::Suspend => {
-                        if self.guard.suspend().is_err() || self.anew().is_err() {
+                    Command::Suspend => {
+                        if self.guard.suspend().is_err() || self.redraw().is_err() {
                             return End::Gone;
                         }
                         is_due = true;
                     }
-                    Wish::Redraw => {
-                        if self.anew().is_err() {
+                    Command::Redraw => {
+                        if self.redraw().is_err() {
                             return End::Gone;
                         }
                         is_due = true;
                     }
-                    Wish::Gone => return End::Gone,
-                    Wish::End => self.engine.shut_down("the keys cannot be read any more"),
+                    Command::TerminalLost => return End::Gone,
+                    Command::Shutdown => self.engine.shut_down("keys can no longer be read"),
                 }
             }
             is_due |= self.ui.take_dirty();
         }
     }
 
-    /// The view as it is now; what changed is to be drawn.
-    fn look(&mut self, before: crate::wizard::ViewModel, is_due: &mut bool) -> crate::wizard::ViewModel {
-        // Nobody reads them here; they must not pile up.
+    /// Returns the current view. If it has changed, a frame is due.
+    fn refresh(&mut self, before: crate::wizard::ViewModel, is_due: &mut bool) -> crate::wizard::ViewModel {
+        // They are not used here and must not pile up.
         self.engine.happenings().for_each(drop);
         let view = self.engine.wizard().view();
         if view == before {
@@ -234,7 +234,7 @@ impl Driver<'_> {
         view
     }
 
-    /// Draws a frame; whether the robot is in it.
+    /// Draws a frame. Returns whether the robot is in it.
     fn draw(&mut self, view: &crate::wizard::ViewModel) -> io::Result<bool> {
         let ui = &self.ui;
         let area = self
@@ -247,8 +247,8 @@ impl Driver<'_> {
         Ok(ui.shows_picture(view, area))
     }
 
-    /// Everything is to be drawn anew, without asking the terminal anything.
-    fn anew(&mut self) -> io::Result<()> {
+    /// Makes the next frame redraw everything, without querying the terminal.
+    fn redraw(&mut self) -> io::Result<()> {
         let size = self.screen.backend().size()?;
         self.screen.resize(Rect::from((Position::ORIGIN, size)))
     }

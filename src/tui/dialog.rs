@@ -1,4 +1,4 @@
-//! What is asked before an intent is carried out: its value, or whether it is meant. Drawn over the content of a screen.
+//! Dialogs: they ask for the value of an intent, or for a confirmation. Drawn over the content of a screen.
 
 pub mod ask;
 mod form;
@@ -9,69 +9,57 @@ use ratatui::layout::Rect;
 
 pub use form::{Build, Form};
 
-use super::form::{ChoiceList, NumberField, Reaction, TextField};
-use super::glyphs::wrapped;
-use super::keymap::{Item, Key};
+use super::form::{ChoiceList, FieldOutcome, NumberField, TextField};
+use super::keymap::{Key, KeyHint};
 use super::paint;
 use super::theme::{Role, Theme};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::session::simulation::{Simulation, Truth};
+use crate::text::wrapped;
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Danger, Intent, IntentInfo};
 
 /// Largest number of poses that can be added at once.
 const MOST_POSES: f64 = 200.0;
 
-/// A question that is open.
+/// An open dialog.
 #[derive(Clone, Debug)]
 pub enum Dialog {
-    /// Is it meant? Lines of explanation.
+    /// Asks for a confirmation.
     Confirm {
-        /// What is done.
         intent: Intent,
-        /// What it means.
+        /// Lines of explanation.
         lines: Vec<String>,
-        /// The focus is on yes.
+        /// Whether the focus is on yes.
         is_yes: bool,
     },
-    /// A text becomes an intent.
-    Text {
-        /// The field.
-        field: TextField,
-        /// What the text is for.
-        intent: fn(String) -> Intent,
-    },
-    /// A number becomes an intent.
-    Number {
-        /// The field.
-        field: NumberField,
-        /// What the number is for.
-        intent: fn(f64) -> Intent,
-    },
-    /// One of several intents.
+    /// Asks for a text.
+    Text { field: TextField, intent: fn(String) -> Intent },
+    /// Asks for a number.
+    Number { field: NumberField, intent: fn(f64) -> Intent },
+    /// Asks for one of several intents.
     Choice {
-        /// The list.
         list: ChoiceList,
-        /// What each choice does.
+        /// Intent of each choice.
         intents: Vec<Intent>,
     },
-    /// Several fields become an intent.
+    /// Asks for several values at once.
     Form(Form),
 }
 
-/// What an open question makes of a key.
+/// State of a dialog after a key.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Answer {
-    /// It stays open.
+pub enum DialogOutcome {
+    /// Still open.
     Open,
-    /// It is closed without anything.
+    /// Closed without an intent.
     Closed,
-    /// It is closed, and this is to be done.
-    Intend(Intent),
+    /// Closed with an intent to send.
+    Submitted(Intent),
 }
 
 impl Dialog {
-    /// The question that an intent on offer needs before it can be done; none: it can be done at once.
+    /// The dialog that an offered intent needs before it is sent; `None` if it needs none.
     pub fn before(info: &IntentInfo, view: &ViewModel) -> Option<Self> {
         let text = |label: &str, value: &str, intent: fn(String) -> Intent| {
             Some(Self::Text { field: TextField::new(label, value).proposed(), intent })
@@ -95,22 +83,22 @@ impl Dialog {
         }
     }
 
-    /// Takes a key.
-    pub fn on_key(&mut self, key: Key) -> Answer {
+    /// Handles a key.
+    pub fn on_key(&mut self, key: Key) -> DialogOutcome {
         let (reaction, intent) = match self {
             Self::Confirm { intent, is_yes, .. } => match key.code {
-                KeyCode::Char('y') => (Reaction::Done, Some(intent.clone())),
-                // Asked to leave twice means it.
+                KeyCode::Char('y') => (FieldOutcome::Submitted, Some(intent.clone())),
+                // A second Ctrl-C confirms.
                 KeyCode::Char('c') if key.has_modifier() && *intent == Intent::Quit => {
-                    (Reaction::Done, Some(intent.clone()))
+                    (FieldOutcome::Submitted, Some(intent.clone()))
                 }
-                KeyCode::Enter if *is_yes => (Reaction::Done, Some(intent.clone())),
-                KeyCode::Enter | KeyCode::Esc | KeyCode::Char('n') => (Reaction::Cancelled, None),
+                KeyCode::Enter if *is_yes => (FieldOutcome::Submitted, Some(intent.clone())),
+                KeyCode::Enter | KeyCode::Esc | KeyCode::Char('n') => (FieldOutcome::Cancelled, None),
                 KeyCode::Tab | KeyCode::BackTab | KeyCode::Left | KeyCode::Right | KeyCode::Up | KeyCode::Down => {
                     *is_yes = !*is_yes;
-                    (Reaction::Changed, None)
+                    (FieldOutcome::Changed, None)
                 }
-                _ => (Reaction::Ignored, None),
+                _ => (FieldOutcome::Ignored, None),
             },
             Self::Text { field, intent } => (field.on_key(key), Some(intent(field.text().trim().to_owned()))),
             Self::Number { field, intent } => (field.on_key(key), field.value().ok().map(*intent)),
@@ -120,13 +108,13 @@ impl Dialog {
             }
         };
         match (reaction, intent) {
-            (Reaction::Done, Some(intent)) => Answer::Intend(intent),
-            (Reaction::Cancelled, _) => Answer::Closed,
-            _ => Answer::Open,
+            (FieldOutcome::Submitted, Some(intent)) => DialogOutcome::Submitted(intent),
+            (FieldOutcome::Cancelled, _) => DialogOutcome::Closed,
+            _ => DialogOutcome::Open,
         }
     }
 
-    /// Takes pasted text.
+    /// Inserts pasted text.
     pub fn paste(&mut self, text: &str) {
         match self {
             Self::Confirm { .. } => {}
@@ -137,46 +125,46 @@ impl Dialog {
         }
     }
 
-    /// Its keys.
-    pub fn items(&self) -> Vec<Item> {
-        let mut items = vec![Item::new("Enter", "take it", 0), Item::new("Esc", "leave it", 1)];
+    /// Keys of the dialog.
+    pub fn key_hints(&self) -> Vec<KeyHint> {
+        let mut items = vec![KeyHint::new("Enter", "accept", 0), KeyHint::new("Esc", "cancel", 1)];
         match self {
             Self::Confirm { .. } => {
-                items = vec![Item::new("y", "yes", 1), Item::new("n", "no", 1), Item::new("Tab", "other", 3)];
+                items = vec![KeyHint::new("y", "yes", 1), KeyHint::new("n", "no", 1), KeyHint::new("Tab", "switch", 3)];
             }
-            Self::Choice { .. } => items.push(Item::new("Up/Down", "choose", 2)),
+            Self::Choice { .. } => items.push(KeyHint::new("Up/Down", "choose", 2)),
             Self::Form(_) => {
-                items.push(Item::new("Tab", "next field", 2));
-                items.push(Item::new("Ctrl-U", "empty the line", 4));
+                items.push(KeyHint::new("Tab", "next field", 2));
+                items.push(KeyHint::new("Ctrl-U", "clear the line", 4));
             }
-            Self::Text { .. } | Self::Number { .. } => items.push(Item::new("Ctrl-U", "empty the line", 4)),
+            Self::Text { .. } | Self::Number { .. } => items.push(KeyHint::new("Ctrl-U", "clear the line", 4)),
         }
         items
     }
 
-    /// Draws it.
+    /// Draws the dialog.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         match self {
-            Self::Confirm { lines, is_yes, .. } => {
-                let columns = usize::from(area.width);
-                let lines: Vec<String> =
-                    lines.iter().flat_map(|line| wrapped(&theme.glyphs.show(line), columns)).collect();
-                let mut row = 0;
-                for line in &lines {
-                    let role = if row == 0 { Role::Title } else { Role::Plain };
-                    paint::text(buf, area, (0, row), line, theme.style(role));
-                    row += 1;
-                }
-                let style = |focus: bool| theme.style(if focus { Role::Focus } else { Role::Plain });
-                let column = paint::text(buf, area, (0, row + 1), "[ no ]", style(!is_yes));
-                paint::text(buf, area, (column + 2, row + 1), "[ yes ]", style(*is_yes));
-            }
+            Self::Confirm { lines, is_yes, .. } => draw_confirmation(lines, *is_yes, theme, area, buf),
             Self::Text { field, .. } => field.draw(theme, area, buf),
             Self::Number { field, .. } => field.draw(theme, area, buf),
             Self::Choice { list, .. } => list.draw(theme, area, buf),
             Self::Form(form) => form.draw(theme, area, buf),
         }
     }
+}
+
+fn draw_confirmation(lines: &[String], is_yes: bool, theme: Theme, area: Rect, buf: &mut Buffer) {
+    let columns = usize::from(area.width);
+    let mut row = 0;
+    for line in lines.iter().flat_map(|line| wrapped(&theme.glyphs.show(line), columns)) {
+        let role = if row == 0 { Role::Title } else { Role::Plain };
+        paint::text(buf, area, (0, row), &line, theme.style(role));
+        row += 1;
+    }
+    let (no, yes) = if is_yes { (Role::Plain, Role::Focus) } else { (Role::Focus, Role::Plain) };
+    let column = paint::text(buf, area, (0, row + 1), "[ no ]", theme.style(no));
+    paint::text(buf, area, (column + 2, row + 1), "[ yes ]", theme.style(yes));
 }
 
 fn choose_profile(view: &ViewModel) -> Option<Dialog> {
@@ -186,14 +174,14 @@ fn choose_profile(view: &ViewModel) -> Option<Dialog> {
     Some(Dialog::Choice { list: ChoiceList::new("Robot", content.profiles.clone(), chosen.unwrap_or(0)), intents })
 }
 
-/// The instruments that need no further question; the paper's hidden truth fits only its own arm.
+/// The instruments that need no further values. The hidden errors of the method paper only fit its own arm.
 fn choose_instrument(view: &ViewModel) -> Dialog {
     let mut choices = Vec::new();
     let simulated = |truth| InstrumentChoice::Simulated(Simulation { truth, ..Simulation::default() });
     if view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper")) {
         choices.push(("simulated: the arm of the method paper, table II hidden".to_owned(), simulated(Truth::Paper)));
     }
-    choices.push(("simulated: an arm with random errors, to rehearse on".to_owned(), simulated(Truth::Drawn)));
+    choices.push(("simulated: an arm with random errors, for rehearsing".to_owned(), simulated(Truth::Drawn)));
     for unit in CoordinateUnit::ALL {
         let label = format!("by hand: coordinates typed or pasted, in {}", unit.sign());
         choices.push((label, InstrumentChoice::Manual { unit }));
@@ -216,15 +204,15 @@ fn confirm(intent: &Intent, info: &IntentInfo, view: &ViewModel) -> Option<Dialo
         Danger::None => return None,
         Danger::DropsData => vec![
             format!("{}?", capitalised(&info.label)),
-            "It will not count any more. It stays in the journal; nothing is deleted.".to_owned(),
+            "It will no longer count. It stays in the journal; nothing is deleted.".to_owned(),
         ],
         Danger::Leaves => match &view.header.folder {
             Some(folder) => vec![
-                "Leave the program?".to_owned(),
-                format!("{} entries are saved. Go on later with:", view.header.saved_entries),
+                "Quit the program?".to_owned(),
+                format!("{} entries are saved. Resume later with:", view.header.saved_entries),
                 format!("trupose resume {folder}"),
             ],
-            None => vec!["Leave the program?".to_owned(), "Nothing has been measured yet; nothing is lost.".to_owned()],
+            None => vec!["Quit the program?".to_owned(), "Nothing has been measured yet; nothing is lost.".to_owned()],
         },
     };
     Some(Dialog::Confirm { intent: intent.clone(), lines, is_yes: false })
@@ -242,12 +230,12 @@ mod tests {
     #[test]
     fn the_answer_to_a_danger_is_no_unless_meant() {
         let dialog = || Dialog::Confirm { intent: Intent::Quit, lines: vec!["Leave?".to_owned()], is_yes: false };
-        assert_eq!(dialog().on_key(Key::plain_code(KeyCode::Enter)), Answer::Closed);
-        assert_eq!(dialog().on_key(Key::char('y')), Answer::Intend(Intent::Quit));
-        assert_eq!(dialog().on_key(Key::ctrl('c')), Answer::Intend(Intent::Quit));
+        assert_eq!(dialog().on_key(Key::plain_code(KeyCode::Enter)), DialogOutcome::Closed);
+        assert_eq!(dialog().on_key(Key::char('y')), DialogOutcome::Submitted(Intent::Quit));
+        assert_eq!(dialog().on_key(Key::ctrl('c')), DialogOutcome::Submitted(Intent::Quit));
         let mut toggled = dialog();
-        assert_eq!(toggled.on_key(Key::plain_code(KeyCode::Tab)), Answer::Open);
-        assert_eq!(toggled.on_key(Key::plain_code(KeyCode::Enter)), Answer::Intend(Intent::Quit));
+        assert_eq!(toggled.on_key(Key::plain_code(KeyCode::Tab)), DialogOutcome::Open);
+        assert_eq!(toggled.on_key(Key::plain_code(KeyCode::Enter)), DialogOutcome::Submitted(Intent::Quit));
     }
 
     #[test]
@@ -256,7 +244,7 @@ mod tests {
         dialog.paste(" warm tool ");
         assert_eq!(
             dialog.on_key(Key::plain_code(KeyCode::Enter)),
-            Answer::Intend(Intent::Note("warm tool".to_owned()))
+            DialogOutcome::Submitted(Intent::Note("warm tool".to_owned()))
         );
     }
 }

@@ -1,5 +1,4 @@
-//! Fields to fill in: a line of text, a number, a choice from a list. They take keys and draw themselves; what the value is
-//! for is their owner's business.
+//! Input fields: a line of text, a number, a choice from a list. They handle keys and draw themselves; their owner uses the value.
 
 mod choice;
 mod number;
@@ -7,17 +6,17 @@ mod text;
 
 pub use choice::ChoiceList;
 pub use number::NumberField;
-pub use text::{Check, TextField};
+pub use text::{TextField, Validator};
 
-/// What a key did to a field.
+/// What a field did with a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reaction {
-    /// The field has no use for it.
+pub enum FieldOutcome {
+    /// Not handled.
     Ignored,
-    /// Something changed.
+    /// The field changed.
     Changed,
-    /// The value is meant.
-    Done,
-    /// The operator does not want it.
+    /// The operator submitted the value.
+    Submitted,
+    /// The operator cancelled.
     Cancelled,
 }

@@ -1,15 +1,15 @@
-//! The skeleton of every screen.
+//! The frame of every screen.
 //!
 //! ```text
 //! trupose · robot                              step 5 of 8: Capture
 //! session demo · saved · 12 samples · 34 min · instrument
 //! ──────────────────────────────────────────────────────────────────
-//! What this step is for.
+//! Purpose of this step.
 //!
 //! content
 //!
 //! measuring  ███████░░░░░  58 %  shot 3 of 5            (if busy)
-//! message, with what to do                              (if any)
+//! message with hints                                    (if any)
 //! ──────────────────────────────────────────────────────────────────
 //! Enter measure   s skip   ? help   q quit
 //! ```
@@ -17,33 +17,34 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::glyphs::{shortened, width, wrapped};
-use super::keymap::Item;
+use super::glyphs::shortened;
+use super::keymap::KeyHint;
 use super::paint;
 use super::theme::{Role, Theme};
+use crate::text::{self, wrapped};
 use crate::wizard::view::{BusyView, Header, ViewModel};
 use crate::wizard::{Notice, Severity};
 
-/// Smallest size that shows everything needed.
+/// Smallest usable size of the terminal.
 pub const SMALLEST: (u16, u16) = (60, 18);
 /// First row of the content.
 const TOP: u16 = 5;
-/// Lines of a message.
+/// Largest number of lines of a message.
 const MOST_NOTICE: usize = 6;
-/// Lines of the footer.
+/// Largest number of lines of the footer.
 const MOST_FOOTER: usize = 2;
-/// Columns of the bar of what is under way.
+/// Columns of the progress bar.
 const BAR: u16 = 20;
 /// Columns between two keys.
 const GAP: usize = 3;
 
-/// Whether a screen fits.
+/// Whether a screen fits into `area`.
 pub const fn fits(area: Rect) -> bool {
     area.width >= SMALLEST.0 && area.height >= SMALLEST.1
 }
 
-/// Where the content goes with these keys in the footer; none: the terminal is too small.
-pub fn room(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect) -> Option<Rect> {
+/// The area of the content, given the keys in the footer; `None` if the terminal is too small.
+pub fn content_area(view: &ViewModel, keys: &[KeyHint], theme: Theme, area: Rect) -> Option<Rect> {
     if !fits(area) {
         return None;
     }
@@ -55,9 +56,9 @@ pub fn room(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect) -> Option
     Some(paint::band(area, TOP, bottom.saturating_sub(TOP)))
 }
 
-/// Draws everything but the content; gives back where that goes. None: the terminal is too small, which is said.
-pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut Buffer) -> Option<Rect> {
-    let Some(content) = room(view, keys, theme, area) else {
+/// Draws everything but the content, and returns the area of the content; `None` if the terminal is too small.
+pub fn draw(view: &ViewModel, keys: &[KeyHint], theme: Theme, area: Rect, buf: &mut Buffer) -> Option<Rect> {
+    let Some(content) = content_area(view, keys, theme, area) else {
         say_too_small(theme, area, buf);
         return None;
     };
@@ -81,7 +82,7 @@ pub fn draw(view: &ViewModel, keys: &[Item], theme: Theme, area: Rect, buf: &mut
     Some(content)
 }
 
-/// Says how large a terminal has to be.
+/// Draws the required size of the terminal.
 pub(super) fn say_too_small(theme: Theme, area: Rect, buf: &mut Buffer) {
     let (columns, rows) = SMALLEST;
     let said = format!("terminal {}x{}, need {columns}x{rows}", area.width, area.height);
@@ -91,8 +92,8 @@ pub(super) fn say_too_small(theme: Theme, area: Rect, buf: &mut Buffer) {
     }
 }
 
-/// Draws the keys below a rule; gives back the row of the rule.
-pub(super) fn footer(keys: &[Item], theme: Theme, area: Rect, buf: &mut Buffer) -> u16 {
+/// Draws the keys below a rule, and returns the row of the rule.
+pub(super) fn footer(keys: &[KeyHint], theme: Theme, area: Rect, buf: &mut Buffer) -> u16 {
     let lines = footer_lines(keys, usize::from(area.width), MOST_FOOTER);
     let top = area.height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
     for (row, line) in (top..).zip(&lines) {
@@ -106,11 +107,11 @@ pub(super) fn footer(keys: &[Item], theme: Theme, area: Rect, buf: &mut Buffer) 
 fn header(header: &Header, theme: Theme, area: Rect, buf: &mut Buffer) {
     let glyphs = theme.glyphs;
     let step = format!("step {} of {}: {}", header.number, header.steps, header.step);
-    let room = usize::from(area.width).saturating_sub(width(&step) + 2);
+    let room = usize::from(area.width).saturating_sub(text::columns(&step) + 2);
     let robot = header.robot.as_deref().unwrap_or("no robot yet");
     let title = shortened(&glyphs.show(&format!("trupose{}{robot}", glyphs.dot())), room, glyphs);
     paint::text(buf, area, (0, 0), &title, theme.style(Role::Title));
-    let column = u16::try_from(usize::from(area.width).saturating_sub(width(&step))).unwrap_or(0);
+    let column = u16::try_from(usize::from(area.width).saturating_sub(text::columns(&step))).unwrap_or(0);
     paint::text(buf, area, (column, 0), &step, theme.style(Role::Title));
 
     let mut parts = vec![match &header.session {
@@ -121,18 +122,18 @@ fn header(header: &Header, theme: Theme, area: Rect, buf: &mut Buffer) {
         parts.push(if header.is_saving { "saving" } else { "saved" }.to_owned());
     }
     if header.samples > 0 {
-        parts.push(format!("{} {}", header.samples, if header.samples == 1 { "sample" } else { "samples" }));
+        parts.push(text::counted(header.samples, "sample"));
     }
     if header.elapsed_min >= 1.0 {
         parts.push(format!("{:.0} min", header.elapsed_min));
     }
-    // The longest last: it may be cut off.
+    // The longest part comes last, because it may be cut off.
     parts.push(header.instrument.clone().unwrap_or_else(|| "no instrument".to_owned()));
     let line = shortened(&glyphs.show(&parts.join(glyphs.dot())), usize::from(area.width), glyphs);
     paint::text(buf, area, (0, 1), &line, theme.style(Role::Dim));
 }
 
-/// A message in lines, with what it is in words.
+/// The lines of a message, starting with its severity in words.
 fn notice_lines(notice: &Notice, theme: Theme, area: Rect) -> Vec<(String, Role)> {
     let (lead, role) = match notice.severity {
         Severity::Info => ("", Role::Plain),
@@ -148,7 +149,7 @@ fn notice_lines(notice: &Notice, theme: Theme, area: Rect) -> Vec<(String, Role)
     let mut lines: Vec<(String, Role)> = lines_of(lead, &notice.what, role);
     let hints: Vec<(String, Role)> =
         notice.hints.iter().flat_map(|hint| -> Vec<(String, Role)> { lines_of("hint: ", hint, Role::Hint) }).collect();
-    // What to do is more use than the end of a long description.
+    // Hints are more useful than the end of a long description.
     let most = MOST_NOTICE.min(usize::from(area.height / 3));
     let kept = hints.len().min(most / 2);
     if lines.len() + kept > most {
@@ -180,9 +181,9 @@ fn busy_line(busy: &BusyView, theme: Theme, area: Rect, buf: &mut Buffer) {
     }
 }
 
-/// The footer in at most `most` lines of `columns`: whole items only, the least important left out.
-pub fn footer_lines(keys: &[Item], columns: usize, most: usize) -> Vec<Vec<Item>> {
-    let mut kept: Vec<Item> = keys.iter().filter(|item| item.is_for_footer()).cloned().collect();
+/// The footer in at most `most` lines of `columns`. Keys that do not fit are left out, the least important first.
+pub fn footer_lines(keys: &[KeyHint], columns: usize, most: usize) -> Vec<Vec<KeyHint>> {
+    let mut kept: Vec<KeyHint> = keys.iter().filter(|item| item.is_for_footer()).cloned().collect();
     loop {
         let lines = laid_out(&kept, columns);
         let is_good = lines.len() <= most && lines.iter().all(|line| line_width(line) <= columns);
@@ -192,14 +193,14 @@ pub fn footer_lines(keys: &[Item], columns: usize, most: usize) -> Vec<Vec<Item>
         if is_good {
             return lines;
         }
-        // What is too wide for any line goes first.
+        // Keys that are too wide for any line are removed first.
         let too_wide = kept.iter().position(|item| item_width(item) > columns);
         kept.remove(too_wide.unwrap_or(least.0));
     }
 }
 
-fn laid_out(items: &[Item], columns: usize) -> Vec<Vec<Item>> {
-    let mut lines: Vec<Vec<Item>> = Vec::new();
+fn laid_out(items: &[KeyHint], columns: usize) -> Vec<Vec<KeyHint>> {
+    let mut lines: Vec<Vec<KeyHint>> = Vec::new();
     for item in items {
         match lines.last_mut() {
             Some(line) if line_width(line) + GAP + item_width(item) <= columns => line.push(item.clone()),
@@ -209,15 +210,15 @@ fn laid_out(items: &[Item], columns: usize) -> Vec<Vec<Item>> {
     lines
 }
 
-fn item_width(item: &Item) -> usize {
-    width(&item.key) + 1 + width(&item.label)
+fn item_width(item: &KeyHint) -> usize {
+    text::columns(&item.key) + 1 + text::columns(&item.label)
 }
 
-fn line_width(line: &[Item]) -> usize {
+fn line_width(line: &[KeyHint]) -> usize {
     line.iter().map(item_width).sum::<usize>() + GAP * line.len().saturating_sub(1)
 }
 
-fn draw_footer_line(line: &[Item], theme: Theme, (area, row): (Rect, u16), buf: &mut Buffer) {
+fn draw_footer_line(line: &[KeyHint], theme: Theme, (area, row): (Rect, u16), buf: &mut Buffer) {
     let mut column = 0;
     for item in line {
         let is_default = item.rank == 0;
@@ -235,19 +236,19 @@ mod tests {
 
     use super::*;
 
-    fn text(lines: &[Vec<Item>]) -> Vec<String> {
-        let one = |item: &Item| format!("{} {}", item.key, item.label);
+    fn text(lines: &[Vec<KeyHint>]) -> Vec<String> {
+        let one = |item: &KeyHint| format!("{} {}", item.key, item.label);
         lines.iter().map(|line| line.iter().map(one).collect::<Vec<_>>().join("   ")).collect()
     }
 
     #[test]
     fn the_footer_wraps_then_drops_the_least_important() {
         let keys = [
-            Item::new("Enter", "measure", 0),
-            Item::new("?", "help", 2),
-            Item::new("q", "quit", 2),
-            Item::new("s", "skip this pose", 5),
-            Item::new("w", "write a note", 6),
+            KeyHint::new("Enter", "measure", 0),
+            KeyHint::new("?", "help", 2),
+            KeyHint::new("q", "quit", 2),
+            KeyHint::new("s", "skip this pose", 5),
+            KeyHint::new("w", "write a note", 6),
         ];
         assert_eq!(
             text(&footer_lines(&keys, 80, 2)),
@@ -268,7 +269,7 @@ mod tests {
             labels in prop::collection::vec(("[a-z]{1,5}", "[a-zµ漢 ]{0,20}", 0_u8..9), 0..20),
             columns in 0_usize..120, most in 0_usize..4,
         ) {
-            let keys: Vec<Item> = labels.into_iter().map(|(key, label, rank)| Item::new(key, label, rank)).collect();
+            let keys: Vec<KeyHint> = labels.into_iter().map(|(key, label, rank)| KeyHint::new(key, label, rank)).collect();
             let lines = footer_lines(&keys, columns, most);
             prop_assert!(lines.len() <= most);
             prop_assert!(lines.iter().all(|line| line_width(line) <= columns));

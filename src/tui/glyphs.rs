@@ -1,10 +1,8 @@
-//! Signs beyond ASCII, each with its ASCII form; and text that is safe to put on a terminal.
+//! Symbols beyond ASCII with their ASCII forms, and text that is safe to print on a terminal.
 
-use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
+use crate::text;
 
-use crate::text::printable;
-
-/// Which characters the terminal can show. Decided once, at the start.
+/// Characters that the terminal can show. Decided once, at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Glyphs {
     /// Everything: braille, blocks, arrows.
@@ -29,59 +27,59 @@ impl Glyphs {
         self.choose("─", "-")
     }
 
-    /// Between two things on one line.
+    /// Separator between two items on one line.
     pub const fn dot(self) -> &'static str {
         self.choose(" · ", " | ")
     }
 
-    /// The choice that has the focus.
+    /// Marks the choice that has the focus.
     pub const fn pointer(self) -> &'static str {
         self.choose("▸ ", "> ")
     }
 
-    /// Something is cut off.
+    /// Marks text that is cut off.
     pub const fn ellipsis(self) -> &'static str {
         self.choose("…", "~")
     }
 
-    /// A part of a bar that is done.
+    /// Completed part of a bar.
     pub const fn bar_done(self) -> &'static str {
         self.choose("█", "#")
     }
 
-    /// A part of a bar that is left.
+    /// Remaining part of a bar.
     pub const fn bar_left(self) -> &'static str {
         self.choose("░", ".")
     }
 
-    /// The pose to go to.
+    /// Marks the pose to go to.
     pub const fn next(self) -> &'static str {
         self.choose("◎", "@")
     }
 
-    /// The reflector.
+    /// Marks the reflector.
     pub const fn reflector(self) -> &'static str {
         self.choose("●", "O")
     }
 
-    /// A point in doubt.
+    /// Marks a point in doubt.
     pub const fn doubt(self) -> &'static str {
         self.choose("‼", "!")
     }
 
-    /// The arrow keys.
+    /// Name of the four arrow keys.
     pub const fn arrows(self) -> &'static str {
         self.choose("←↑↓→", "arrows")
     }
 
-    /// The arrow keys left and right.
+    /// Name of the arrow keys left and right.
     pub const fn sideways(self) -> &'static str {
         self.choose("←→", "Left/Right")
     }
 
-    /// A text that this terminal can show: no control characters; without Unicode, nothing but ASCII.
+    /// A text that this terminal can show: without control characters, and pure ASCII if there is no Unicode.
     pub fn show(self, text: &str) -> String {
-        let clean = printable(text);
+        let clean = text::printable(text);
         match self {
             Self::Unicode | Self::Blocks => clean,
             Self::Ascii => clean.chars().map(ascii).collect(),
@@ -89,7 +87,7 @@ impl Glyphs {
     }
 }
 
-/// What stands for a character on a terminal that has only ASCII.
+/// ASCII replacement of a character.
 fn ascii(c: char) -> String {
     match c {
         ' '..='~' => c.to_string(),
@@ -106,68 +104,9 @@ fn ascii(c: char) -> String {
     }
 }
 
-/// Columns that a text takes.
-pub fn width(text: &str) -> usize {
-    text.width()
-}
-
-/// The beginning of a text that fits into `room` columns, with a sign where something is missing.
-pub fn shortened(text: &str, room: usize, glyphs: Glyphs) -> String {
-    if width(text) <= room {
-        return text.to_owned();
-    }
-    let Some(left) = room.checked_sub(1) else { return String::new() };
-    let mut taken = 0;
-    let begin: String = text
-        .chars()
-        .take_while(|c| {
-            taken += c.width().unwrap_or(0);
-            taken <= left
-        })
-        .collect();
-    begin + glyphs.ellipsis()
-}
-
-/// A text in lines of at most `room` columns, broken at blanks; a word longer than a line is broken where it must be.
-pub fn wrapped(text: &str, room: usize) -> Vec<String> {
-    let mut lines = Vec::new();
-    if room == 0 {
-        return lines;
-    }
-    for paragraph in text.split('\n') {
-        let mut line = String::new();
-        for word in paragraph.split(' ') {
-            let mut word = word.to_owned();
-            if !line.is_empty() && width(&line) + 1 + width(&word) > room {
-                lines.push(std::mem::take(&mut line));
-            }
-            while width(&word) > room {
-                let (head, tail) = broken(&word, room);
-                lines.push(head);
-                word = tail;
-            }
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(&word);
-        }
-        lines.push(line);
-    }
-    lines
-}
-
-/// A word cut at `room` columns; at least one character goes into the head.
-fn broken(word: &str, room: usize) -> (String, String) {
-    let mut taken = 0;
-    let count = word
-        .chars()
-        .take_while(|c| {
-            taken += c.width().unwrap_or(0);
-            taken <= room
-        })
-        .count()
-        .max(1);
-    (word.chars().take(count).collect(), word.chars().skip(count).collect())
+/// The beginning of a text that fits into `columns`, with the ellipsis of these glyphs where something is cut off.
+pub fn shortened(text: &str, columns: usize, glyphs: Glyphs) -> String {
+    text::shortened(text, columns).replace(text::ELLIPSIS, glyphs.ellipsis())
 }
 
 #[cfg(test)]
@@ -175,15 +114,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texts_keep_to_their_room() {
+    fn shortened_texts_keep_to_their_columns() {
         assert_eq!(shortened("reflector", 5, Glyphs::Unicode), "refl…");
         assert_eq!(shortened("reflector", 9, Glyphs::Ascii), "reflector");
         assert_eq!(shortened("reflector", 0, Glyphs::Ascii), "");
         assert_eq!(shortened("漢字漢字", 4, Glyphs::Ascii), "漢~");
-        assert_eq!(wrapped("move the robot", 8), ["move the", "robot"]);
-        assert_eq!(wrapped("abcdefgh ij", 3), ["abc", "def", "gh", "ij"]);
-        assert_eq!(wrapped("a\n\nb", 3), ["a", "", "b"]);
-        assert!(wrapped("a", 0).is_empty());
     }
 
     #[test]

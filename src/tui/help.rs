@@ -1,19 +1,19 @@
-//! The help page: every key of the screen, and why some do nothing now.
+//! The help page: every key of the screen, with the reason if it is blocked.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::glyphs::wrapped;
-use super::keymap::Item;
+use super::keymap::KeyHint;
 use super::paint;
 use super::preview;
 use super::theme::{Role, Theme};
+use crate::text::wrapped;
 
 /// Columns for the names of keys.
 const KEYS: u16 = 11;
 
 /// Lines of the page: key, text, role.
-fn lines(items: &[Item], theme: Theme, columns: usize) -> Vec<(String, String, Role)> {
+fn lines(items: &[KeyHint], theme: Theme, columns: usize) -> Vec<(String, String, Role)> {
     let mut lines = Vec::new();
     for item in items {
         let (text, role) = match &item.blocked {
@@ -25,15 +25,15 @@ fn lines(items: &[Item], theme: Theme, columns: usize) -> Vec<(String, String, R
         lines.extend(wrapped.into_iter().zip(keys).map(|(text, key)| (key, text, role)));
     }
     lines.push((String::new(), String::new(), Role::Plain));
-    lines.push((String::new(), "the picture of the robot".to_owned(), Role::Title));
+    lines.push((String::new(), "robot picture".to_owned(), Role::Title));
     for (key, label) in preview::KEYS {
         lines.push((key.name(theme.glyphs), label.to_owned(), Role::Plain));
     }
     lines
 }
 
-/// Draws the page from line `scroll` on; gives back how far it can be scrolled.
-pub(super) fn draw(items: &[Item], scroll: usize, theme: Theme, area: Rect, buf: &mut Buffer) -> usize {
+/// Draws the page from line `scroll` on. Returns the largest possible scroll.
+pub(super) fn draw(items: &[KeyHint], scroll: usize, theme: Theme, area: Rect, buf: &mut Buffer) -> usize {
     let lines = lines(items, theme, area.width.into());
     let last = lines.len().saturating_sub(area.height.into());
     for (row, (key, text, role)) in (0..area.height).zip(lines.iter().skip(scroll.min(last))) {

@@ -1,7 +1,7 @@
-//! Keys, paste and resizing, read on a thread of their own.
+//! Keys, pasted text and resizing, read by a separate thread.
 //!
-//! Nobody joins that thread: when the terminal goes away, a read never returns. What it reads goes into a bounded channel, then
-//! whoever waits is woken, so that the driver waits on one thing only.
+//! The thread is never joined, because a read of a lost terminal never returns. Inputs go into a bounded channel, and then the
+//! driver is woken, so that it only waits in one place.
 
 use std::io;
 use std::panic;
@@ -13,29 +13,27 @@ use crossterm::event::{self, Event, KeyEventKind, MouseEventKind};
 
 use super::keymap::Key;
 
-/// Inputs that wait; then the terminal's own buffer holds what is typed.
+/// Capacity of the channel. When it is full, the terminal's own buffer holds what is typed.
 const WAITING: usize = 256;
-/// So long the start waits for the thread to listen.
+/// Longest wait for the thread to start listening.
 const LISTENS: Duration = Duration::from_millis(500);
 
-/// Something from the terminal.
+/// An input from the terminal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
-    /// A key.
     Key(Key),
     /// Pasted text.
     Paste(String),
-    /// The wheel: lines, down is positive.
+    /// Lines of the mouse wheel; down is positive.
     Scroll(i16),
-    /// A new size.
     Resize,
-    /// The terminal cannot be read any more.
+    /// The terminal can no longer be read.
     Gone,
-    /// Reading it has failed by a defect: what was sent made no sense to it.
+    /// The parser of the terminal library failed on what the terminal sent.
     Broken,
 }
 
-/// Starts reading; `wake` tells whoever waits that there is something, `false` if nobody does.
+/// Starts reading. `wake` wakes the driver, and returns `false` if it has ended.
 ///
 /// # Errors
 /// The system refuses a thread.
@@ -43,13 +41,13 @@ pub(super) fn start(wake: impl Fn() -> bool + Send + 'static) -> io::Result<Rece
     let (sender, inputs) = sync_channel(WAITING);
     let (ready, listens) = sync_channel(1);
     let work = move || {
-        // The first look has the system tell of new sizes. Nobody may be waiting any more, and `read` says what is wrong.
+        // The first poll subscribes to new sizes. Its errors appear again in `read`, and the receiver may already be gone.
         drop(panic::catch_unwind(|| event::poll(Duration::ZERO)));
-        let _nobody = ready.send(());
+        let _gone = ready.send(());
         read(&sender, &wake);
     };
     thread::Builder::new().name("input".to_owned()).spawn(work)?;
-    // Whoever draws before would not hear of a size that changes right after. A terminal that hangs holds nobody up for long.
+    // A frame drawn before that would miss a new size right after it. A terminal that hangs must not delay the start for long.
     let _late = listens.recv_timeout(LISTENS);
     Ok(inputs)
 }
@@ -72,7 +70,7 @@ fn read(inputs: &SyncSender<Input>, wake: &impl Fn() -> bool) {
     }
 }
 
-/// What an event of the terminal means; movements of the mouse mean nothing.
+/// The input of a terminal event. Movements of the mouse are ignored.
 fn input(event: Event) -> Option<Input> {
     match event {
         Event::Key(key) => (key.kind != KeyEventKind::Release).then(|| Input::Key(Key::from(key))),

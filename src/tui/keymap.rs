@@ -1,4 +1,4 @@
-//! One table from keys to what they do. Handler, footer and help page are all made from it and from what the wizard offers.
+//! The table of keys. Handler, footer and help page are made from it and from the intents that the wizard offers.
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
@@ -6,17 +6,15 @@ use super::glyphs::Glyphs;
 use crate::session::set_up::TargetChoice;
 use crate::wizard::{Intent, IntentInfo};
 
-/// A key with its modifiers; Shift is part of a letter.
+/// A key with its modifiers. Shift is part of a letter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key {
-    /// Which key.
     pub code: KeyCode,
-    /// What was held.
     pub modifiers: KeyModifiers,
 }
 
 impl Key {
-    /// A letter or sign.
+    /// A letter or other character, without modifiers.
     pub const fn char(c: char) -> Self {
         Self::plain_code(KeyCode::Char(c))
     }
@@ -31,12 +29,12 @@ impl Key {
         Self { code, modifiers: KeyModifiers::NONE }
     }
 
-    /// Whether Ctrl, Alt or the like is held.
+    /// Whether Ctrl or Alt is held.
     pub const fn has_modifier(self) -> bool {
         !self.modifiers.is_empty()
     }
 
-    /// As it is written in footer and help.
+    /// The name in footer and help.
     pub fn name(self, glyphs: Glyphs) -> String {
         let name = match self.code {
             KeyCode::Char(' ') => "Space".to_owned(),
@@ -67,57 +65,57 @@ impl From<KeyEvent> for Key {
     }
 }
 
-/// What happens in the terminal only.
+/// An action of the terminal, unknown to the wizard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Local {
-    /// All keys of this screen.
+pub enum LocalAction {
+    /// Show all keys of this screen.
     Help,
-    /// Back to the shell for a while.
+    /// Suspend the program.
     Suspend,
-    /// Draw everything anew.
+    /// Redraw the whole screen.
     Redraw,
-    /// Bell on or off.
-    Bell,
+    /// Turn the bell on or off.
+    ToggleBell,
 }
 
-/// What a key does.
+/// What a key is bound to.
 #[derive(Clone, Copy, Debug)]
-enum Does {
-    /// The sensible next thing, as the wizard says.
+enum Target {
+    /// The default intent of the wizard.
     Default,
-    /// The intent that this accepts, if the wizard offers one.
+    /// The offered intent that the predicate accepts.
     Offer(fn(&Intent) -> bool),
-    /// Something local.
-    Local(Local, &'static str),
+    /// A local action, with its label.
+    Local(LocalAction, &'static str),
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Binding {
     key: Key,
-    does: Does,
-    /// Importance in the footer; the largest goes first when there is no room.
+    target: Target,
+    /// Rank in the footer. The largest rank is dropped first when there is no room.
     rank: u8,
 }
 
-const fn bind(key: Key, rank: u8, does: Does) -> Binding {
-    Binding { key, does, rank }
+const fn bind(key: Key, rank: u8, target: Target) -> Binding {
+    Binding { key, target, rank }
 }
 
 const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
-    bind(Key::char(c), rank, Does::Offer(accepts))
+    bind(Key::char(c), rank, Target::Offer(accepts))
 }
 
-/// Turns the bell on and off.
+/// The key that turns the bell on and off.
 pub const BELL: Key = Key::ctrl('b');
 
-/// The table. Of several with one key the first whose intent is possible is meant.
+/// The table. Of several bindings with the same key, the first one whose intent is possible applies.
 const BINDINGS: [Binding; 42] = [
-    bind(Key::plain_code(KeyCode::Enter), 0, Does::Default),
-    bind(Key::plain_code(KeyCode::Esc), 1, Does::Offer(|intent| matches!(intent, Intent::Cancel))),
-    bind(Key::plain_code(KeyCode::Esc), 4, Does::Offer(|intent| matches!(intent, Intent::Dismiss))),
-    bind(Key::char('?'), 2, Does::Local(Local::Help, "help")),
+    bind(Key::plain_code(KeyCode::Enter), 0, Target::Default),
+    bind(Key::plain_code(KeyCode::Esc), 1, Target::Offer(|intent| matches!(intent, Intent::Cancel))),
+    bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::Dismiss))),
+    bind(Key::char('?'), 2, Target::Local(LocalAction::Help, "help")),
     offer('q', 2, |intent| matches!(intent, Intent::Quit)),
-    bind(Key::ctrl('c'), 9, Does::Offer(|intent| matches!(intent, Intent::Quit))),
+    bind(Key::ctrl('c'), 9, Target::Offer(|intent| matches!(intent, Intent::Quit))),
     offer('n', 3, |intent| matches!(intent, Intent::Next)),
     offer('b', 5, |intent| matches!(intent, Intent::Back)),
     offer('r', 3, |intent| matches!(intent, Intent::Retry)),
@@ -135,7 +133,7 @@ const BINDINGS: [Binding; 42] = [
     offer('r', 5, |intent| matches!(intent, Intent::PlanFromRecording)),
     offer('a', 3, |intent| matches!(intent, Intent::AcceptPlan)),
     offer('m', 3, |intent| matches!(intent, Intent::Measure)),
-    bind(Key::char(' '), 9, Does::Offer(|intent| matches!(intent, Intent::Measure))),
+    bind(Key::char(' '), 9, Target::Offer(|intent| matches!(intent, Intent::Measure))),
     offer('t', 4, |intent| matches!(intent, Intent::TypeReading(_))),
     offer('a', 3, |intent| matches!(intent, Intent::AcceptReading)),
     offer('k', 3, |intent| matches!(intent, Intent::Keep)),
@@ -150,105 +148,108 @@ const BINDINGS: [Binding; 42] = [
     offer('i', 3, |intent| matches!(intent, Intent::Identify)),
     offer('d', 3, |intent| matches!(intent, Intent::Deliver)),
     offer('a', 5, |intent| matches!(intent, Intent::About(_))),
-    bind(Key::plain_code(KeyCode::F(1)), 9, Does::Local(Local::Help, "help")),
-    bind(Key::ctrl('z'), 9, Does::Local(Local::Suspend, "to the shell, back with 'fg'")),
-    bind(Key::ctrl('l'), 9, Does::Local(Local::Redraw, "draw the screen anew")),
-    bind(BELL, 9, Does::Local(Local::Bell, "bell when a reading needs attention, on or off")),
+    bind(Key::plain_code(KeyCode::F(1)), 9, Target::Local(LocalAction::Help, "help")),
+    bind(Key::ctrl('z'), 9, Target::Local(LocalAction::Suspend, "suspend; 'fg' resumes")),
+    bind(Key::ctrl('l'), 9, Target::Local(LocalAction::Redraw, "redraw the screen")),
+    bind(BELL, 9, Target::Local(LocalAction::ToggleBell, "bell when a reading needs attention, on or off")),
 ];
 
-/// Least importance that is still worth a place in the footer.
+/// Largest rank that is shown in the footer.
 const FOOTER: u8 = 8;
 
-/// What a key means now.
+/// What a key does now.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Meaning {
-    /// An intent, possible or not.
+pub enum Action {
+    /// Sends an intent, which may be blocked.
     Offer(Box<IntentInfo>),
-    /// Something local.
-    Local(Local),
+    /// Runs a local action.
+    Local(LocalAction),
 }
 
-/// A key with what it does, for footer and help.
+/// A key and its effect, for footer and help.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Item {
+pub struct KeyHint {
     /// Name of the key.
     pub key: String,
-    /// What it does.
+    /// Effect in a few words.
     pub label: String,
-    /// Why not now.
+    /// Reason why it is not possible now.
     pub blocked: Option<String>,
-    /// Importance; 0 is the default action.
+    /// Rank in the footer; 0 is the default action.
     pub rank: u8,
 }
 
-impl Item {
-    /// A key of a screen of its own.
+impl KeyHint {
+    /// A key that a screen handles itself.
     pub fn new(key: impl Into<String>, label: impl Into<String>, rank: u8) -> Self {
         Self { key: key.into(), label: label.into(), blocked: None, rank }
     }
 
-    /// Whether it belongs into the footer.
+    /// Whether the key is shown in the footer.
     pub const fn is_for_footer(&self) -> bool {
         self.blocked.is_none() && self.rank <= FOOTER
     }
 }
 
-/// What a key means where `offers` can be done.
-pub fn meaning(key: Key, offers: &[IntentInfo]) -> Option<Meaning> {
+/// What a key does, given the offers of the wizard.
+pub fn action(key: Key, offers: &[IntentInfo]) -> Option<Action> {
     let mut blocked = None;
     for binding in BINDINGS.iter().filter(|binding| binding.key == key) {
-        match binding.does {
-            Does::Local(local, _) => return Some(Meaning::Local(local)),
-            Does::Default | Does::Offer(_) => {
-                for info in offers.iter().filter(|info| accepts(binding.does, info)) {
+        match binding.target {
+            Target::Local(local, _) => return Some(Action::Local(local)),
+            Target::Default | Target::Offer(_) => {
+                for info in offers.iter().filter(|info| accepts(binding.target, info)) {
                     if info.is_enabled() {
-                        return Some(Meaning::Offer(Box::new(info.clone())));
+                        return Some(Action::Offer(Box::new(info.clone())));
                     }
-                    blocked.get_or_insert_with(|| Meaning::Offer(Box::new(info.clone())));
+                    blocked.get_or_insert_with(|| Action::Offer(Box::new(info.clone())));
                 }
             }
         }
     }
-    blocked.or_else(|| unmeasured(key, offers))
+    blocked.or_else(|| blocked_measurement(key, offers))
 }
 
-/// Where measuring would be the next thing and cannot be done now, such as while the link is down: the wizard says why. While
-/// something is under way a key waits for nothing.
-fn unmeasured(key: Key, offers: &[IntentInfo]) -> Option<Meaning> {
-    let is_next = BINDINGS.iter().any(|binding| binding.key == key && matches!(binding.does, Does::Default))
-        && !offers.iter().any(|info| info.is_default || info.intent == Intent::Cancel);
-    let is_blocked = |info: &&IntentInfo| matches!(info.intent, Intent::Measure) && !info.is_enabled();
-    offers.iter().filter(|_| is_next).find(is_blocked).map(|info| Meaning::Offer(Box::new(info.clone())))
+/// The blocked measurement, if the default key finds no default intent, such as while the link is down: the wizard then says why
+/// nothing is measured. It does not apply while a request is running.
+fn blocked_measurement(key: Key, offers: &[IntentInfo]) -> Option<Action> {
+    let is_default_key = BINDINGS.iter().any(|binding| binding.key == key && matches!(binding.target, Target::Default));
+    let is_busy = offers.iter().any(|info| info.intent == Intent::Cancel);
+    if !is_default_key || is_busy || offers.iter().any(|info| info.is_default) {
+        return None;
+    }
+    let measure = offers.iter().find(|info| info.intent == Intent::Measure && !info.is_enabled())?;
+    Some(Action::Offer(Box::new(measure.clone())))
 }
 
-fn accepts(does: Does, info: &IntentInfo) -> bool {
-    match does {
-        Does::Default => info.is_default,
-        Does::Offer(accepts) => accepts(&info.intent),
-        Does::Local(..) => false,
+fn accepts(target: Target, info: &IntentInfo) -> bool {
+    match target {
+        Target::Default => info.is_default,
+        Target::Offer(accepts) => accepts(&info.intent),
+        Target::Local(..) => false,
     }
 }
 
-/// All keys that mean something where `offers` can be done, most important first.
-pub fn items(offers: &[IntentInfo], glyphs: Glyphs) -> Vec<Item> {
+/// All keys that have an effect, given the offers of the wizard, most important first.
+pub fn key_hints(offers: &[IntentInfo], glyphs: Glyphs) -> Vec<KeyHint> {
     let mut items = Vec::new();
     for binding in &BINDINGS {
         let key = binding.key.name(glyphs);
-        match binding.does {
-            Does::Local(_, label) => {
-                items.push(Item { key, label: label.to_owned(), blocked: None, rank: binding.rank });
+        match binding.target {
+            Target::Local(_, label) => {
+                items.push(KeyHint { key, label: label.to_owned(), blocked: None, rank: binding.rank });
             }
-            Does::Default | Does::Offer(_) => {
-                for info in offers.iter().filter(|info| accepts(binding.does, info)) {
-                    let is_meant = match meaning(binding.key, offers) {
-                        Some(Meaning::Offer(meant)) => *meant == *info,
+            Target::Default | Target::Offer(_) => {
+                for info in offers.iter().filter(|info| accepts(binding.target, info)) {
+                    let is_chosen = match action(binding.key, offers) {
+                        Some(Action::Offer(chosen)) => *chosen == *info,
                         _ => false,
                     };
-                    if is_meant || !info.is_enabled() {
-                        // Under its own key the default would stand twice in the footer.
+                    if is_chosen || !info.is_enabled() {
+                        // The default action is already in the footer under the default key.
                         let rank = if info.is_default && binding.rank > 0 { FOOTER + 1 } else { binding.rank };
                         let (label, blocked) = (info.label.clone(), info.blocked.clone());
-                        items.push(Item { key: key.clone(), label, blocked, rank });
+                        items.push(KeyHint { key: key.clone(), label, blocked, rank });
                     }
                 }
             }
@@ -267,8 +268,8 @@ mod tests {
     fn enter_is_answered_where_measuring_is_next_and_cannot_be_done() {
         let down = IntentInfo::new(Intent::Measure, "measure").unless(Some("the link is down".to_owned()));
         let enter = Key::plain_code(KeyCode::Enter);
-        let meant = |offers: &[IntentInfo]| match meaning(enter, offers) {
-            Some(Meaning::Offer(info)) => Some(info.intent),
+        let meant = |offers: &[IntentInfo]| match action(enter, offers) {
+            Some(Action::Offer(info)) => Some(info.intent),
             _ => None,
         };
         assert_eq!(meant(std::slice::from_ref(&down)), Some(Intent::Measure));
@@ -281,13 +282,13 @@ mod tests {
     #[test]
     fn the_first_possible_intent_of_a_key_is_meant() {
         let offers = [
-            IntentInfo::new(Intent::Cancel, "cancel planning").unless(Some("it is being cancelled".to_owned())),
+            IntentInfo::new(Intent::Cancel, "cancel planning").unless(Some("already being cancelled".to_owned())),
             IntentInfo::new(Intent::Dismiss, "dismiss the message"),
         ];
-        let meant = meaning(Key::plain_code(KeyCode::Esc), &offers);
-        assert_eq!(meant, Some(Meaning::Offer(Box::new(offers[1].clone()))));
-        assert_eq!(meaning(Key::char('z'), &offers), None);
-        assert_eq!(meaning(Key::char('?'), &offers), Some(Meaning::Local(Local::Help)));
+        let meant = action(Key::plain_code(KeyCode::Esc), &offers);
+        assert_eq!(meant, Some(Action::Offer(Box::new(offers[1].clone()))));
+        assert_eq!(action(Key::char('z'), &offers), None);
+        assert_eq!(action(Key::char('?'), &offers), Some(Action::Local(LocalAction::Help)));
     }
 
     #[test]
@@ -298,11 +299,11 @@ mod tests {
             IntentInfo::new(Intent::Next, "go on").unless(Some("no plan".to_owned())),
             IntentInfo::new(Intent::Quit, "quit"),
         ];
-        let shown = items(&offers, Glyphs::Unicode);
+        let shown = key_hints(&offers, Glyphs::Unicode);
         let text: Vec<String> = shown.iter().map(|item| format!("{} {}", item.key, item.label)).collect();
         assert_eq!(text[0], "Enter measure this plan");
         assert!(text.contains(&"a measure this plan".to_owned()) && text.contains(&"p choose poses".to_owned()));
-        let footer: Vec<&Item> = shown.iter().filter(|item| item.is_for_footer()).collect();
+        let footer: Vec<&KeyHint> = shown.iter().filter(|item| item.is_for_footer()).collect();
         assert_eq!(footer.iter().map(|item| item.key.as_str()).collect::<Vec<_>>(), ["Enter", "?", "q", "p"]);
         assert!(shown.iter().any(|item| item.blocked.as_deref() == Some("no plan")));
     }

@@ -1,7 +1,7 @@
 //! The wizard in plain lines, for terminals that cannot move their cursor, for screen readers and for pipes.
 //!
-//! What there is to see is printed, then a line is read: a number from the list, with a value behind it where one is needed, or
-//! an intent as scripts have it. The next line is read when nothing is under way any more, so that lines can come from a file.
+//! The view is printed, then a line is read: a number from the list, followed by a value if one is needed, or an intent as in
+//! scripts. The next line is read only when the wizard is idle again, so that lines can come from a file.
 
 use std::io::{self, BufRead as _, BufReader, Read, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -11,35 +11,36 @@ use super::glyphs::Glyphs;
 use super::values;
 use super::{AtEnd, Exit, IDLE, LAST_ENTRY};
 use crate::runtime::{Engine, Events, signals};
+use crate::text::counted;
 use crate::wizard::view::ViewModel;
 use crate::wizard::{Intent, IntentInfo, Notice, Severity};
 
-/// Lines that wait; then they wait in the pipe.
+/// Capacity of the channel. Further lines wait in the pipe.
 const WAITING: usize = 64;
-/// Longest line (bytes) that is looked at.
+/// Longest line that is read (bytes).
 const LONGEST: u64 = 64 * 1024;
 
-/// Something from the input.
+/// A line of the input, or its end.
 enum Input {
     Line(String),
-    Over,
+    End,
 }
 
-/// What a line asks for.
+/// The meaning of a line.
 #[derive(Clone, Debug, PartialEq)]
-enum Asked {
-    /// To be shown again, perhaps with everything.
+enum Command {
+    /// Show the view again, with long lists in full if `all`.
     Show { all: bool },
-    /// This is to be done.
-    Intend(Intent),
-    /// It cannot be understood.
-    Unclear(String),
+    /// Send an intent.
+    Intent(Intent),
+    /// The line is invalid for this reason.
+    Invalid(String),
 }
 
-/// Runs the wizard in lines until it ends, or the input does.
+/// Runs the wizard in plain lines until the wizard or the input ends.
 ///
 /// # Errors
-/// The system refuses a thread. Output that cannot be written ends the session in good order, and is no error.
+/// The system refuses a thread. If the output cannot be written, the session is closed cleanly, which is not an error.
 pub fn run(
     mut engine: Engine,
     input: impl Read + Send + 'static,
@@ -49,8 +50,8 @@ pub fn run(
 ) -> io::Result<Exit> {
     let received = signals::watch(engine.sender())?;
     let lines = start(input, engine.sender())?;
-    let mut talk = Talk { engine: &mut engine, out, glyphs };
-    if talk.run(&lines).is_err() {
+    let mut driver = Driver { engine: &mut engine, out, glyphs };
+    if driver.run(&lines).is_err() {
         engine.shut_down("the output cannot be written");
     }
     while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
@@ -65,7 +66,7 @@ pub fn run(
     })
 }
 
-/// Reads on a thread that nobody joins: a read may never return.
+/// Starts the reading thread. It is never joined, because a read may never return.
 fn start(input: impl Read + Send + 'static, events: Events) -> io::Result<Receiver<Input>> {
     let (sender, lines) = sync_channel(WAITING);
     let read = move || {
@@ -73,7 +74,7 @@ fn start(input: impl Read + Send + 'static, events: Events) -> io::Result<Receiv
         loop {
             let mut bytes = Vec::new();
             let count = input.by_ref().take(LONGEST).read_until(b'\n', &mut bytes).unwrap_or(0);
-            let next = if count == 0 { Input::Over } else { Input::Line(String::from_utf8_lossy(&bytes).into_owned()) };
+            let next = if count == 0 { Input::End } else { Input::Line(String::from_utf8_lossy(&bytes).into_owned()) };
             if sender.send(next).is_err() || !events.wake() || count == 0 {
                 break;
             }
@@ -83,13 +84,13 @@ fn start(input: impl Read + Send + 'static, events: Events) -> io::Result<Receiv
     Ok(lines)
 }
 
-struct Talk<'a, W> {
+struct Driver<'a, W> {
     engine: &'a mut Engine,
     out: &'a mut W,
     glyphs: Glyphs,
 }
 
-impl<W: Write> Talk<'_, W> {
+impl<W: Write> Driver<'_, W> {
     fn run(&mut self, lines: &Receiver<Input>) -> io::Result<()> {
         self.settle()?;
         let mut shown = self.engine.wizard().view();
@@ -97,21 +98,10 @@ impl<W: Write> Talk<'_, W> {
         while !self.engine.has_exited() {
             match lines.try_recv() {
                 Ok(Input::Line(line)) => {
-                    let view = self.engine.wizard().view();
-                    match asked(&line, &view.intents) {
-                        Asked::Show { all } => self.show(&view, all)?,
-                        Asked::Unclear(why) => self.say(&why)?,
-                        Asked::Intend(intent) => {
-                            self.engine.intend(intent);
-                            self.settle()?;
-                            if !self.engine.has_exited() {
-                                self.show(&self.engine.wizard().view(), false)?;
-                            }
-                        }
-                    }
+                    self.on_line(&line)?;
                     shown = self.engine.wizard().view();
                 }
-                Ok(Input::Over) | Err(TryRecvError::Disconnected) => self.engine.shut_down("the input ended"),
+                Ok(Input::End) | Err(TryRecvError::Disconnected) => self.engine.shut_down("the input ended"),
                 Err(TryRecvError::Empty) => {
                     self.engine.wait(IDLE);
                     self.settle()?;
@@ -127,7 +117,23 @@ impl<W: Write> Talk<'_, W> {
         self.say(&end)
     }
 
-    /// Waits until nothing is under way; says what is.
+    fn on_line(&mut self, line: &str) -> io::Result<()> {
+        let view = self.engine.wizard().view();
+        match command(line, &view.intents) {
+            Command::Show { all } => self.show(&view, all),
+            Command::Invalid(reason) => self.say(&reason),
+            Command::Intent(intent) => {
+                self.engine.intend(intent);
+                self.settle()?;
+                if self.engine.has_exited() {
+                    return Ok(());
+                }
+                self.show(&self.engine.wizard().view(), false)
+            }
+        }
+    }
+
+    /// Waits until the wizard is idle, and prints what is running.
     fn settle(&mut self) -> io::Result<()> {
         let mut said = None;
         while !self.engine.has_exited() && !self.engine.wizard().is_idle() {
@@ -138,7 +144,7 @@ impl<W: Write> Talk<'_, W> {
             }
             self.engine.wait(IDLE);
         }
-        // Nobody reads them here; they must not pile up.
+        // They are not used here and must not pile up.
         self.engine.happenings().for_each(drop);
         Ok(())
     }
@@ -156,7 +162,7 @@ impl<W: Write> Talk<'_, W> {
     }
 }
 
-/// Everything there is to see, in lines.
+/// The whole view in lines.
 fn page(view: &ViewModel, has_all: bool) -> Vec<String> {
     let header = &view.header;
     let mut lines = vec![String::new(), format!("step {} of {}: {}", header.number, header.steps, header.step)];
@@ -166,7 +172,7 @@ fn page(view: &ViewModel, has_all: bool) -> Vec<String> {
         |session| format!("session {session}, {}", if header.is_saving { "saving" } else { "saved" }),
     ));
     if header.samples > 0 {
-        parts.push(format!("{} {}", header.samples, if header.samples == 1 { "sample" } else { "samples" }));
+        parts.push(counted(header.samples, "sample"));
     }
     parts.extend(header.instrument.clone());
     lines.push(parts.join(", "));
@@ -194,7 +200,7 @@ fn notice(notice: &Notice) -> Vec<String> {
     said.lines().map(str::to_owned).chain(hints).collect()
 }
 
-/// What can be done now, in the order of its numbers.
+/// Intents that are possible now, in the order of their numbers.
 fn offers(intents: &[IntentInfo]) -> impl Iterator<Item = &IntentInfo> {
     intents.iter().filter(|offer| offer.is_enabled())
 }
@@ -203,35 +209,36 @@ fn ron(intent: &Intent) -> String {
     ron::to_string(intent).unwrap_or_else(|_| intent.name().to_owned())
 }
 
-fn asked(line: &str, intents: &[IntentInfo]) -> Asked {
+fn command(line: &str, intents: &[IntentInfo]) -> Command {
     let line = line.trim();
     match line {
-        "" => return Asked::Show { all: false },
-        "all" => return Asked::Show { all: true },
+        "" => return Command::Show { all: false },
+        "all" => return Command::Show { all: true },
         _ => {}
     }
     let (first, value) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
     if let Ok(number) = first.parse::<usize>() {
         let Some(offer) = number.checked_sub(1).and_then(|index| offers(intents).nth(index)) else {
-            return Asked::Unclear(format!("there is no {number} in the list; an empty line shows it again"));
+            return Command::Invalid(format!("there is no {number} in the list; an empty line shows the list again"));
         };
         return match with_value(&offer.intent, value.trim()) {
-            Some(intent) => Asked::Intend(intent),
-            None => {
-                Asked::Unclear(format!("'{value}' does not fit {}; write it out as in the list", offer.intent.name()))
-            }
+            Some(intent) => Command::Intent(intent),
+            None => Command::Invalid(format!(
+                "'{value}' is not a value for {}; write the intent as in the list",
+                offer.intent.name()
+            )),
         };
     }
     match ron::from_str(line) {
-        Ok(intent) => Asked::Intend(intent),
-        Err(error) => Asked::Unclear(format!(
-            "neither a number of the list nor something to do, such as ChooseProfile(\"soochow\"): {}",
+        Ok(intent) => Command::Intent(intent),
+        Err(error) => Command::Invalid(format!(
+            "neither a number from the list nor an intent such as ChooseProfile(\"soochow\"): {}",
             error.code
         )),
     }
 }
 
-/// The intent with what was written behind its number; without that, as it is on offer.
+/// The intent with the value typed after its number, or as offered if there is none.
 fn with_value(intent: &Intent, value: &str) -> Option<Intent> {
     if value.is_empty() {
         return Some(intent.clone());
@@ -260,14 +267,14 @@ mod tests {
             IntentInfo::new(Intent::LoadPlan(String::new()), "load a plan"),
             IntentInfo::new(Intent::AcceptPlan, "measure this plan"),
         ];
-        let said = |line: &str| asked(line, &offers);
-        assert_eq!(said(" 1 my plan.csv\n"), Asked::Intend(Intent::LoadPlan("my plan.csv".to_owned())));
-        assert_eq!(said("2"), Asked::Intend(Intent::AcceptPlan));
-        assert_eq!(said("Next"), Asked::Intend(Intent::Next));
-        assert_eq!(said("Note(\"warm\")"), Asked::Intend(Intent::Note("warm".to_owned())));
-        assert_eq!(said("\r\n"), Asked::Show { all: false });
+        let parsed = |line: &str| command(line, &offers);
+        assert_eq!(parsed(" 1 my plan.csv\n"), Command::Intent(Intent::LoadPlan("my plan.csv".to_owned())));
+        assert_eq!(parsed("2"), Command::Intent(Intent::AcceptPlan));
+        assert_eq!(parsed("Next"), Command::Intent(Intent::Next));
+        assert_eq!(parsed("Note(\"warm\")"), Command::Intent(Intent::Note("warm".to_owned())));
+        assert_eq!(parsed("\r\n"), Command::Show { all: false });
         for wrong in ["0", "3", "2 x", "-1", "measure", "99999999999999999999999", "Note(", "ä"] {
-            assert!(matches!(said(wrong), Asked::Unclear(_)), "{wrong}");
+            assert!(matches!(parsed(wrong), Command::Invalid(_)), "{wrong}");
         }
     }
 }

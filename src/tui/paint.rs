@@ -1,11 +1,11 @@
-//! Putting text into an area, whatever its size: nothing is ever written outside.
+//! Writing text into an area of any size. Nothing is ever written outside it.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use unicode_width::UnicodeWidthChar as _;
 
-/// Writes `text` at a place of `area` (column and row from its corner) and returns the column behind it.
+/// Writes `text` at column and row `at` of `area`, and returns the column after it.
 pub fn text(buf: &mut Buffer, area: Rect, at: (u16, u16), text: &str, style: Style) -> u16 {
     let area = area.intersection(buf.area);
     let (mut column, row) = at;
@@ -33,24 +33,24 @@ pub fn text(buf: &mut Buffer, area: Rect, at: (u16, u16), text: &str, style: Sty
     column
 }
 
-/// A part of `area`: `rows` lines from line `top` on, as far as there are.
+/// Part of `area`: up to `rows` lines from line `top` on.
 pub fn band(area: Rect, top: u16, rows: u16) -> Rect {
     let top = top.min(area.height);
     Rect { x: area.x, y: area.y.saturating_add(top), width: area.width, height: rows.min(area.height - top) }
 }
 
-/// `area` without `margin` columns left and right.
+/// `area` without `margin` columns on the left and right.
 pub const fn inset(area: Rect, margin: u16) -> Rect {
     let margin = if 2 * margin as u32 > area.width as u32 { 0 } else { margin };
     Rect { x: area.x + margin, y: area.y, width: area.width - 2 * margin, height: area.height }
 }
 
-/// Fills a line with a sign.
+/// Fills a line with a symbol.
 pub fn rule(buf: &mut Buffer, area: Rect, row: u16, sign: &str, style: Style) {
     text(buf, area, (0, row), &sign.repeat(usize::from(area.width)), style);
 }
 
-/// What a buffer shows, for snapshots: the characters, then how many cells have which style.
+/// A buffer as text for snapshots: its characters, then the number of cells of each style.
 #[cfg(test)]
 pub(crate) fn snapshot(buf: &Buffer) -> String {
     let mut styles = std::collections::BTreeMap::<String, usize>::new();

@@ -1,11 +1,11 @@
-//! The robot in its cell, drawn with characters.
+//! The picture of the robot in its cell, drawn with characters.
 //!
 //! ```text
 //! Scene (base frame, m) ──► Camera ──► View ──► Raster (dots with depth) ──► cells: braille, half blocks or ASCII
 //! ```
 //!
-//! What is near hides what is far; solids are shaded and outlined, far lines dotted, so that the picture can be read without
-//! colour. Nothing here keeps state but the [`Camera`]; drawing the same scene twice gives the same characters.
+//! Near objects hide far ones. Solids are shaded and outlined, far lines are dotted, so that the picture can be read without
+//! colour. Only the [`Camera`] has state; drawing the same scene twice gives the same characters.
 
 mod camera;
 mod cells;
@@ -18,7 +18,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget;
 
 pub use camera::{Camera, Framing, Projection};
-pub use scene::{Arm, Beam, Body, Checked, ErrorVector, Look, Mark, MarkKind, Scene};
+pub use scene::{ArmStyle, Beam, Body, DrawnArm, ErrorVector, Mark, MarkKind, Scene, VerifiedPoint};
 
 use super::keymap::Key;
 use super::paint;
@@ -26,30 +26,30 @@ use super::theme::{Role, Theme};
 use crate::units::DEGREE;
 use raster::{Material, Raster};
 
-/// One step of the keys.
+/// Step of the arrow keys (rad).
 const ORBIT: f64 = 10.0 * DEGREE;
 const ZOOM: f64 = 1.2;
 const PAN: f64 = 0.08;
 
-/// The keys of the preview with what they do, for footer and help.
+/// The keys of the preview with their effects, for footer and help.
 pub const KEYS: [(Key, &str); 13] = [
     (Key::plain_code(crossterm::event::KeyCode::Left), "turn left"),
     (Key::plain_code(crossterm::event::KeyCode::Right), "turn right"),
     (Key::plain_code(crossterm::event::KeyCode::Up), "look from higher"),
     (Key::plain_code(crossterm::event::KeyCode::Down), "look from lower"),
-    (Key::char('+'), "nearer"),
-    (Key::char('-'), "farther"),
+    (Key::char('+'), "zoom in"),
+    (Key::char('-'), "zoom out"),
     (Key::char('H'), "move the picture left"),
     (Key::char('L'), "move the picture right"),
     (Key::char('K'), "move the picture up"),
     (Key::char('J'), "move the picture down"),
     (Key::char('v'), "view: arm, all, reflector"),
     (Key::char('o'), "perspective or parallel"),
-    (Key::char('0'), "first view"),
+    (Key::char('0'), "reset the view"),
 ];
 
 impl Camera {
-    /// Takes a key of the preview; `false` if it is none.
+    /// Handles a key. Returns `false` if it is not a key of the preview.
     pub fn on_key(&mut self, key: Key) -> bool {
         use crossterm::event::KeyCode as K;
         match key.code {
@@ -87,11 +87,8 @@ impl Camera {
 /// The picture as a widget.
 #[derive(Clone, Copy, Debug)]
 pub struct Preview<'a> {
-    /// What is shown.
     pub scene: &'a Scene,
-    /// From where.
     pub camera: &'a Camera,
-    /// With which characters and colours.
     pub theme: Theme,
 }
 
@@ -123,28 +120,28 @@ impl Widget for Preview<'_> {
 }
 
 impl Preview<'_> {
-    /// What the picture cannot say itself.
+    /// Draws what the picture itself cannot show.
     fn caption(&self, area: Rect, buf: &mut Buffer) {
         let mut said = Vec::new();
         if !self.scene.errors.is_empty() {
-            said.push(format!("errors drawn {:.0} times longer", self.scene.exaggeration));
+            said.push(format!("errors enlarged {:.0} times", self.scene.exaggeration));
         }
-        if self.scene.arms.iter().any(|arm| arm.look == Look::Dashed) {
+        if self.scene.arms.iter().any(|arm| arm.style == ArmStyle::Dashed) {
             said.push("dashed: identified arm".to_owned());
         }
         if self.scene.magnified > 1.0 {
-            said.push(format!("difference {:.0} times larger", self.scene.magnified));
+            said.push(format!("difference enlarged {:.0} times", self.scene.magnified));
         }
         let last = area.height.saturating_sub(1);
         paint::text(buf, area, (0, last), &said.join(", "), self.theme.style(Role::Dim));
     }
 }
 
-/// What a material looks like.
+/// Role of a material.
 const fn role(material: Material) -> Role {
     match material {
         Material::Empty | Material::Nominal => Role::Plain,
-        Material::Floor | Material::KeepOut | Material::Left => Role::Dim,
+        Material::Floor | Material::KeepOut | Material::Open => Role::Dim,
         Material::Tracker => Role::Title,
         Material::Identified => Role::Hint,
         Material::Beam | Material::Error => Role::Warn,

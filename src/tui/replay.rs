@@ -1,4 +1,4 @@
-//! A session looked at again: the fold of its journal up to any entry. Nothing is locked and nothing is written.
+//! Replay of a session: the fold of its journal up to any entry. Nothing is locked and nothing is written.
 
 mod draw;
 
@@ -26,43 +26,43 @@ use crate::session::summary::IdentificationSummary;
 
 /// Entries per second, slowest to fastest.
 const SPEEDS: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 20.0];
-/// Lines that one key passes over.
+/// Lines that PgUp and PgDn scroll.
 const PAGE: usize = 8;
 
-/// What stands below the entry.
+/// The page below the entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Page {
-    /// The entries around it and the robot.
+    /// The neighbouring entries and the robot.
     #[default]
     Robot,
     /// The samples so far.
     Samples,
-    /// The result, once it is there.
+    /// The result, once there is one.
     Result,
 }
 
-/// What is to be done after a key.
+/// A command to the driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum After {
-    /// Nothing changed.
-    Nothing,
-    /// Draw it.
+pub enum ReplayCommand {
+    /// Nothing has changed.
+    None,
+    /// Draw a frame.
     Draw,
-    /// Draw everything anew.
+    /// Redraw the whole screen.
     Redraw,
-    /// Back to the shell for a while.
+    /// Suspend the program.
     Suspend,
-    /// End.
-    Leave,
+    /// Quit the replay.
+    Quit,
 }
 
-/// A journal with a place in it.
+/// A journal and a position in it.
 #[derive(Clone, Debug)]
 pub struct Replay {
     lines: Vec<Line>,
     /// Index of the entry that is shown.
     place: usize,
-    /// The fold up to there.
+    /// The session up to that entry.
     session: Session,
     is_playing: bool,
     speed: usize,
@@ -70,21 +70,21 @@ pub struct Replay {
     scroll: usize,
     camera: Camera,
     theme: Theme,
-    /// The tables of a result as text.
+    /// Formats the tables of a result.
     tables: fn(&IdentificationSummary) -> String,
 }
 
 impl Replay {
-    /// A replay at the first entry; `tables` writes a result.
+    /// A replay at the first entry. `tables` formats a result.
     ///
     /// # Errors
-    /// Entries that do not fit together.
+    /// The entries are inconsistent.
     pub fn new(
         journal: Journal,
         tables: fn(&IdentificationSummary) -> String,
         theme: Theme,
     ) -> Result<Self, FoldError> {
-        // Every place must be good before any is shown.
+        // All entries are checked before any is shown.
         Session::of(&journal)?;
         let mut replay = Self {
             lines: journal.lines,
@@ -111,13 +111,13 @@ impl Replay {
             self.session = Session::default();
         }
         for line in self.lines.iter().take(place + 1).skip(first) {
-            // All of them fit: that was seen at the beginning.
+            // The entries are consistent: `new` has checked them.
             drop(self.session.apply(line));
         }
         self.place = place;
     }
 
-    /// The session as it was after the entry that is shown.
+    /// The session after the shown entry.
     pub const fn session(&self) -> &Session {
         &self.session
     }
@@ -126,26 +126,26 @@ impl Replay {
         self.place + 1 >= self.lines.len()
     }
 
-    /// Time to the next entry; none: it stands still.
+    /// Time to the next entry; `None` while paused or at the end.
     fn pause(&self) -> Option<Duration> {
         let speed = SPEEDS.get(self.speed).copied().unwrap_or(1.0);
         (self.is_playing && !self.is_at_end()).then(|| Duration::from_secs_f64(1.0 / speed))
     }
 
-    /// Goes on by one entry when it is playing.
+    /// Advances by one entry.
     fn tick(&mut self) {
         self.go(self.place + 1);
         self.is_playing &= !self.is_at_end();
     }
 
-    /// Takes a key.
-    pub fn on_key(&mut self, key: Key) -> After {
+    /// Handles a key.
+    pub fn on_key(&mut self, key: Key) -> ReplayCommand {
         match key.code {
-            KeyCode::Char('z') if key.has_modifier() => return After::Suspend,
-            KeyCode::Char('l') if key.has_modifier() => return After::Redraw,
-            KeyCode::Char('c') if key.has_modifier() => return After::Leave,
-            _ if key.has_modifier() => return After::Nothing,
-            KeyCode::Char('q') => return After::Leave,
+            KeyCode::Char('z') if key.has_modifier() => return ReplayCommand::Suspend,
+            KeyCode::Char('l') if key.has_modifier() => return ReplayCommand::Redraw,
+            KeyCode::Char('c') if key.has_modifier() => return ReplayCommand::Quit,
+            _ if key.has_modifier() => return ReplayCommand::None,
+            KeyCode::Char('q') => return ReplayCommand::Quit,
             KeyCode::Left => self.stop_at(self.place.saturating_sub(1)),
             KeyCode::Right => self.stop_at(self.place + 1),
             KeyCode::Home => self.stop_at(0),
@@ -174,7 +174,7 @@ impl Replay {
             KeyCode::Char('Z') => self.camera.zoom(1.0 / 1.2),
             _ => return self.turn(key),
         }
-        After::Draw
+        ReplayCommand::Draw
     }
 
     fn stop_at(&mut self, place: usize) {
@@ -182,22 +182,22 @@ impl Replay {
         self.go(place);
     }
 
-    fn turn(&mut self, key: Key) -> After {
-        if self.camera.on_key(key) { After::Draw } else { After::Nothing }
+    fn turn(&mut self, key: Key) -> ReplayCommand {
+        if self.camera.on_key(key) { ReplayCommand::Draw } else { ReplayCommand::None }
     }
 
-    fn on_input(&mut self, input: &Input) -> After {
+    fn on_input(&mut self, input: &Input) -> ReplayCommand {
         match *input {
             Input::Key(key) => self.on_key(key),
-            Input::Resize => After::Redraw,
+            Input::Resize => ReplayCommand::Redraw,
             Input::Scroll(lines) if lines < 0 => self.on_key(Key::plain_code(KeyCode::PageUp)),
             Input::Scroll(_) => self.on_key(Key::plain_code(KeyCode::PageDown)),
-            Input::Paste(_) => After::Nothing,
-            Input::Gone | Input::Broken => After::Leave,
+            Input::Paste(_) => ReplayCommand::None,
+            Input::Gone | Input::Broken => ReplayCommand::Quit,
         }
     }
 
-    /// The robot where it was at the entry.
+    /// The scene of the shown entry.
     fn scene(&self) -> Option<Scene> {
         let row = match self.lines.get(self.place).map(|line| &line.entry) {
             Some(Entry::Sample(sample)) => self.session.sample(sample.number).map(|sample| sample.row),
@@ -208,12 +208,12 @@ impl Replay {
     }
 }
 
-/// Ends the wait; with no room somebody else has. `false` if nobody waits any more.
+/// Wakes the driver; a full channel means that it is awake already. Returns `false` if the driver has ended.
 fn wake(waker: &SyncSender<()>) -> bool {
     !matches!(waker.try_send(()), Err(TrySendError::Disconnected(())))
 }
 
-/// Shows a session in the terminal until the operator leaves; gives back the signal that ended it, if one did.
+/// Shows a session in the terminal until the operator quits. Returns the signal that ended it, if any.
 ///
 /// # Errors
 /// The terminal cannot be used, or the system refuses a thread.
@@ -233,7 +233,7 @@ pub fn run(mut replay: Replay, options: Options) -> io::Result<Option<i32>> {
     let guard = TerminalGuard::enter(options.has_mouse)?;
     let inputs = input::start(move || wake(&waker))?;
     let mut screen = Terminal::new(CrosstermBackend::new(io::stdout()))?;
-    let mut end = Ok(After::Draw);
+    let mut end = Ok(ReplayCommand::Draw);
     let mut is_due = true;
     while end.is_ok() && signal().is_none() {
         if is_due {
@@ -242,7 +242,7 @@ pub fn run(mut replay: Replay, options: Options) -> io::Result<Option<i32>> {
                     let area = frame.area();
                     replay.draw(area, frame.buffer_mut());
                 })
-                .map(|_| After::Draw);
+                .map(|_| ReplayCommand::Draw);
             is_due = false;
         }
         let after = match inputs.try_recv() {
@@ -250,24 +250,25 @@ pub fn run(mut replay: Replay, options: Options) -> io::Result<Option<i32>> {
             Err(_) => match woken.recv_timeout(replay.pause().map_or(IDLE, |pause| pause.max(FRAME))) {
                 Err(RecvTimeoutError::Timeout) if replay.pause().is_some() => {
                     replay.tick();
-                    After::Draw
+                    ReplayCommand::Draw
                 }
-                _ => After::Nothing,
+                _ => ReplayCommand::None,
             },
         };
-        is_due |= after != After::Nothing;
-        if after == After::Leave {
+        is_due |= after != ReplayCommand::None;
+        if after == ReplayCommand::Quit {
             break;
         }
-        if after == After::Suspend {
-            end = guard.suspend().map(|()| After::Redraw);
+        if after == ReplayCommand::Suspend {
+            end = guard.suspend().map(|()| ReplayCommand::Redraw);
         }
-        if matches!(after, After::Redraw | After::Suspend) && end.is_ok() {
+        if matches!(after, ReplayCommand::Redraw | ReplayCommand::Suspend) && end.is_ok() {
             let size = screen.backend().size();
-            end = size.and_then(|size| screen.resize(Rect::from((Position::ORIGIN, size)))).map(|()| After::Draw);
+            end =
+                size.and_then(|size| screen.resize(Rect::from((Position::ORIGIN, size)))).map(|()| ReplayCommand::Draw);
         }
     }
-    // Its drop would write to the terminal once more, which may be gone.
+    // Dropping it would write to the terminal once more, which may be gone.
     std::mem::forget(screen);
     if end.is_err() || signal() == Some(SIGHUP) {
         guard.abandon();

@@ -1,8 +1,8 @@
-//! The content of a step: what a screen gets, how it draws, and how it takes keys.
+//! The content of a step: how a screen draws and how it handles keys.
 //!
-//! A screen keeps only what is local (focus, scroll). It draws from the [`ViewModel`], and the preview from a [`Scene`] that the
-//! driver makes whenever the view changes. Keys go to an open dialog first, then to the screen, then to the table of
-//! [`keymap`](super::keymap), last to the camera of the preview.
+//! A screen keeps only local state (focus, scroll). It draws from the [`ViewModel`], and the preview from a [`Scene`] that the
+//! driver builds whenever the view changes. Keys go to an open dialog first, then to the screen, then to the table of
+//! [`keymap`](super::keymap), and last to the camera of the preview.
 
 mod capture;
 mod deliver;
@@ -21,39 +21,36 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::dialog::Dialog;
-use super::keymap::{Item, Key};
+use super::keymap::{Key, KeyHint};
 use super::preview::{Camera, Scene};
 use super::theme::Theme;
 use crate::session::set_up::Step;
 use crate::wizard::Intent;
 use crate::wizard::view::ViewModel;
 
-/// What a screen sees.
+/// What a screen draws from.
 #[derive(Clone, Copy, Debug)]
 pub struct ScreenCx<'a> {
-    /// What there is to show.
     pub view: &'a ViewModel,
     /// The robot at the configuration of this step, if there is one.
     pub scene: Option<&'a Scene>,
-    /// From where the preview is seen; kept over all steps.
+    /// Camera of the preview, which is kept over all steps.
     pub camera: &'a Camera,
-    /// How to show it.
     pub theme: Theme,
 }
 
-/// Where the picture of the robot is.
+/// Place of the robot's picture on a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PicturePlace {
-    /// Not shown, or its keys mean something else.
+    /// Not shown, or its keys have another use.
     Nowhere,
-    /// Beside or below something else.
+    /// Beside or below other content.
     Beside,
-    /// It is what the page is for.
+    /// Alone on its page.
     Alone,
 }
 
 impl PicturePlace {
-    /// Alone on its page, or beside something else.
     const fn of(is_alone: bool, is_beside: bool) -> Self {
         match (is_alone, is_beside) {
             (true, _) => Self::Alone,
@@ -63,48 +60,48 @@ impl PicturePlace {
     }
 }
 
-/// What a screen makes of a key.
+/// What a screen did with a key.
 #[derive(Debug)]
-pub enum Reply {
-    /// It has no use for it.
+pub enum ScreenOutcome {
+    /// Not handled.
     Ignored,
-    /// Something local changed.
+    /// Changed local state.
     Changed,
-    /// The operator wants this.
-    Intend(Intent),
-    /// This has to be asked first.
-    Ask(Box<Dialog>),
+    /// Sends an intent.
+    Intent(Intent),
+    /// Opens a dialog.
+    Open(Box<Dialog>),
 }
 
 /// The content of a step.
 pub trait Screen: fmt::Debug {
-    /// Takes note of a new view, for what a screen remembers of earlier ones.
+    /// Observes a new view, for what a screen remembers of earlier ones.
     fn see(&mut self, _view: &ViewModel) {}
 
-    /// Its own keys, for footer and help; they stand for the same keys of the table.
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item>;
+    /// Keys that the screen handles itself, for footer and help. They replace the same keys of the table.
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint>;
 
-    /// Takes a key.
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply;
+    /// Handles a key.
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome;
 
-    /// Takes pasted text.
-    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply;
+    /// Handles pasted text.
+    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome;
 
-    /// Where in `area` the robot is shown, so that its keys have a sense.
+    /// Where in `area` the robot is shown, so that the keys of the picture make sense.
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace;
 
-    /// Draws itself; any size must do.
+    /// Draws the content; must cope with any size.
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer);
 }
 
-/// The screen of a step, as it is when the step is entered.
+/// A new screen for a step.
 pub fn of(step: Step) -> Box<dyn Screen> {
     match step {
         Step::Profile => Box::new(profile::ProfileScreen::default()),
         Step::Instrument => Box::new(instrument::InstrumentScreen::default()),
         Step::Target => Box::new(target::TargetScreen::default()),
-        Step::Plan => Box::new(plan::Plan::default()),
-        Step::Capture => Box::new(capture::Capture::default()),
+        Step::Plan => Box::new(plan::PlanScreen::default()),
+        Step::Capture => Box::new(capture::CaptureScreen::default()),
         Step::Identify => Box::new(identify::IdentifyScreen::default()),
         Step::Verify => Box::new(verify::VerifyScreen::default()),
         Step::Deliver => Box::new(deliver::DeliverScreen::default()),

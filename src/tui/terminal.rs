@@ -1,7 +1,7 @@
-//! The modes of the terminal: entered once, undone exactly, in reverse order, whatever happens.
+//! The modes of the terminal: entered once, and left in reverse order in any case.
 //!
-//! Errors of undoing are ignored: nobody is left to tell, and the terminal may be gone. The modes that are on are known
-//! globally, because the panic hook must undo them without a guard at hand. Nothing here asks the terminal a question.
+//! Errors while leaving are ignored: they could not be shown, and the terminal may be gone. The active modes are global, because the
+//! panic hook must leave them without a guard. Nothing here queries the terminal.
 
 use std::io::{self, Write};
 use std::panic::{self, PanicHookInfo};
@@ -20,11 +20,11 @@ const PASTE: u8 = 1 << 2;
 const MOUSE: u8 = 1 << 3;
 const CURSOR: u8 = 1 << 4;
 
-/// Modes that are on.
+/// Active modes.
 static ENTERED: AtomicU8 = AtomicU8::new(0);
 /// Folder of the session, for the panic hook.
 static FOLDER: Mutex<Option<String>> = Mutex::new(None);
-/// What other threads could not say while the screen was up.
+/// Messages of other threads that could not be printed while the screen was up.
 static REMARKS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Keeps the terminal in the modes of a full screen until it is dropped.
@@ -34,10 +34,10 @@ pub(super) struct TerminalGuard {
 }
 
 impl TerminalGuard {
-    /// Enters the modes; the mouse only when asked for, because it takes the terminal's own selection away.
+    /// Enters the modes. The mouse is optional, because it disables the terminal's own selection.
     ///
     /// # Errors
-    /// The terminal refuses a mode; those entered before are undone.
+    /// The terminal refuses a mode. The modes entered before are left again.
     pub(super) fn enter(has_mouse: bool) -> io::Result<Self> {
         let guard = Self { has_mouse };
         guard.modes_on()?;
@@ -53,7 +53,7 @@ impl TerminalGuard {
     }
 
     fn try_modes_on(&self, out: &mut impl Write) -> io::Result<()> {
-        // A mode counts from before it is asked for: undoing one that never came on does no harm.
+        // A mode is noted before it is entered: leaving one that was never entered does no harm.
         ENTERED.fetch_or(RAW, Ordering::SeqCst);
         enable_raw_mode()?;
         ENTERED.fetch_or(SCREEN | PASTE | CURSOR, Ordering::SeqCst);
@@ -65,8 +65,7 @@ impl TerminalGuard {
         Ok(())
     }
 
-    /// Gives the terminal back to the shell until the process is continued, then takes it again. The screen must be drawn
-    /// anew.
+    /// Returns the terminal to the shell until the process is continued, then enters the modes again. The screen must be redrawn.
     ///
     /// # Errors
     /// The system refuses to stop the process, or the terminal a mode.
@@ -76,7 +75,7 @@ impl TerminalGuard {
         self.modes_on()
     }
 
-    /// Leaves the terminal alone for good: it is gone.
+    /// Gives up the terminal without writing to it, because it is gone.
     pub(super) fn abandon(self) {
         ENTERED.store(0, Ordering::SeqCst);
         drop(self);
@@ -89,11 +88,11 @@ impl Drop for TerminalGuard {
     }
 }
 
-/// Undoes the modes that are on.
+/// Leaves the active modes.
 fn leave() {
     let entered = ENTERED.swap(0, Ordering::SeqCst);
     let mut out = io::stdout();
-    // With the terminal gone there is nothing to give back.
+    // If the terminal is gone, there is nothing to restore.
     drop(write_leave(&mut out, entered));
     if entered & RAW != 0 {
         drop(disable_raw_mode());
@@ -126,20 +125,20 @@ pub(super) fn ring() -> io::Result<()> {
     out.flush()
 }
 
-/// Tells the panic hook where the session is.
+/// Stores the folder of the session for the panic hook.
 pub(super) fn note_folder(folder: Option<&str>) {
     if let Ok(mut held) = FOLDER.lock() {
         *held = folder.map(str::to_owned);
     }
 }
 
-/// What was to be said while the screen was up.
+/// Takes the messages that could not be printed while the screen was up.
 pub(super) fn take_remarks() -> Vec<String> {
     REMARKS.lock().map(|mut remarks| std::mem::take(&mut *remarks)).unwrap_or_default()
 }
 
-/// From now on a panic gives the terminal back first, then says where it happened and how to go on. A panic of another
-/// thread is noted and leaves the screen alone: whoever waits for that thread is told.
+/// Installs a hook that restores the terminal on a panic and then prints where it happened and how to continue. A panic of another
+/// thread is stored and leaves the screen alone: the owner of that thread reports it.
 pub(super) fn install_panic_hook() {
     let owner = thread::current().id();
     panic::set_hook(Box::new(move |info| on_panic(owner, info)));
@@ -158,9 +157,9 @@ fn on_panic(owner: ThreadId, info: &PanicHookInfo<'_>) {
 }
 
 fn panic_text(info: &str, thread: Option<&str>, folder: Option<&str>) -> String {
-    let head = format!("error: a defect of this program, thread '{}': {info}", thread.unwrap_or("unnamed"));
+    let head = format!("error: internal error in thread '{}': {info}", thread.unwrap_or("unnamed"));
     match folder {
-        Some(folder) => format!("{head}\nhint: your session is saved; go on with 'trupose resume {folder}'"),
+        Some(folder) => format!("{head}\nhint: your session is saved; continue with 'trupose resume {folder}'"),
         None => format!("{head}\nhint: nothing was measured yet; start again with 'trupose'"),
     }
 }

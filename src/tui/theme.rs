@@ -1,40 +1,38 @@
-//! What things look like: roles, never colours, are used elsewhere.
+//! The look of the screens. All other modules use roles, never colours.
 //!
-//! Only the 16 colours of the terminal's own palette, so that light and dark terminals both work; without colour the same
-//! roles differ by bold, dim, underlined and reversed. No meaning is carried by colour alone: a word or sign stands with it.
+//! Only the 16 colours of the terminal's own palette are used, so that light and dark terminals both work. Without colour the same
+//! roles differ by bold, dim, underlined and reversed. Colour never carries a meaning alone: a word or symbol goes with it.
 
 use ratatui::style::{Color, Modifier, Style};
 
 use super::glyphs::Glyphs;
 
-/// What a piece of text is.
+/// Role of a piece of text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
     /// Ordinary text.
     #[default]
     Plain,
-    /// Good.
+    /// Good state.
     Ok,
-    /// To be looked at.
+    /// Needs attention.
     Warn,
     /// Stops the procedure.
     Alarm,
-    /// What to do.
+    /// What to do next.
     Hint,
-    /// Secondary.
+    /// Secondary text.
     Dim,
-    /// What the next key acts on.
+    /// The element that the next key acts on.
     Focus,
-    /// Headings.
+    /// Heading.
     Title,
 }
 
-/// How roles and signs are shown. Decided once, from command line and environment.
+/// Styles and glyphs. Decided once, from command line and environment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Theme {
-    /// Whether there are colours.
     pub has_colour: bool,
-    /// Which characters there are.
     pub glyphs: Glyphs,
 }
 
@@ -53,7 +51,7 @@ impl Theme {
             Role::Title => (None, Modifier::BOLD),
         };
         let modifier = match role {
-            // What colour says, an underline says as well.
+            // Without colour the underline marks a hint.
             Role::Hint if !self.has_colour => Modifier::UNDERLINED,
             _ => modifier,
         };

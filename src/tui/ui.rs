@@ -1,14 +1,14 @@
-//! What the terminal shows and does with keys, without a terminal: screen, dialog, help, camera.
+//! The user interface without a terminal: screen, dialog, help and camera.
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::dialog::{Answer, Dialog};
+use super::dialog::{Dialog, DialogOutcome};
 use super::input::Input;
-use super::keymap::{self, Item, Key, Local, Meaning};
+use super::keymap::{self, Action, Key, KeyHint, LocalAction};
 use super::preview::{Camera, Scene};
-use super::screen::{self, PicturePlace, Reply, Screen, ScreenCx};
+use super::screen::{self, PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use super::theme::Theme;
 use super::{frame, help};
 use crate::profile::{Profile, builtin};
@@ -18,48 +18,47 @@ use crate::units::{DEGREE, MILLIMETRE};
 use crate::wizard::Intent;
 use crate::wizard::view::{Content, TargetView, ViewModel};
 
-/// What the driver is to do.
+/// A command to the driver.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Wish {
-    /// Nothing.
+pub enum Command {
     None,
-    /// Tell the wizard.
-    Intend(Intent),
-    /// Back to the shell for a while.
+    /// Send an intent to the wizard.
+    Intent(Intent),
+    /// Suspend the program.
     Suspend,
-    /// Draw everything anew.
+    /// Redraw the whole screen.
     Redraw,
-    /// The terminal is gone.
-    Gone,
-    /// End: no key can be read any more.
-    End,
+    /// Stop, because the terminal is gone.
+    TerminalLost,
+    /// Shut down, because keys can no longer be read.
+    Shutdown,
 }
 
-/// Everything local.
+/// State that exists only in the terminal: screen, dialog, camera.
 #[derive(Debug)]
 pub struct Ui {
     theme: Theme,
     step: Step,
     screen: Box<dyn Screen>,
     dialog: Option<Dialog>,
-    /// Lines scrolled; none: no help.
+    /// Scroll position of the help page; `None` if it is closed.
     help: Option<usize>,
     camera: Camera,
     scene: Option<Scene>,
-    /// Something local changed since it was drawn.
+    /// Whether local state changed since the last frame.
     is_dirty: bool,
     /// Whether the bell rings when something needs attention.
     has_bell: bool,
-    /// What needs attention.
+    /// What needs attention, if anything.
     attention: Option<Attention>,
-    /// The bell is to ring.
+    /// Whether the bell has to ring.
     is_ringing: bool,
 }
 
-/// Something in the capture step that nobody should miss with the back to the screen.
+/// An event of the capture step that an operator who is not looking at the screen should not miss.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Attention {
-    /// The sample of this measurement is in question.
+    /// The sample of this measurement is questioned.
     Finding(u64),
     /// A reading is held back.
     Held(String),
@@ -74,7 +73,7 @@ impl Attention {
 }
 
 impl Ui {
-    /// Before anything is known.
+    /// A new user interface, before the first view.
     pub fn new(theme: Theme) -> Self {
         Self {
             theme,
@@ -91,19 +90,19 @@ impl Ui {
         }
     }
 
-    /// With the bell on or off.
+    /// Turns the bell on or off.
     #[must_use]
     pub const fn with_bell(mut self, has_bell: bool) -> Self {
         self.has_bell = has_bell;
         self
     }
 
-    /// Whether the bell is to ring since it was asked last.
+    /// Returns whether the bell has to ring, and clears the request.
     pub const fn take_bell(&mut self) -> bool {
         std::mem::replace(&mut self.is_ringing, false)
     }
 
-    /// Takes note of a new view. The session gives the preview its numbers and nothing else.
+    /// Takes a new view. The session is only used for the preview.
     pub fn refresh(&mut self, view: &ViewModel, session: &Session) {
         if view.header.step != self.step {
             self.step = view.header.step;
@@ -119,34 +118,34 @@ impl Ui {
         self.is_dirty = true;
     }
 
-    /// Whether something local changed since it was asked last.
+    /// Returns whether local state changed, and clears the flag.
     pub fn take_dirty(&mut self) -> bool {
         std::mem::take(&mut self.is_dirty)
     }
 
-    /// Takes an input.
-    pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Wish {
+    /// Handles an input.
+    pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Command {
         let was_dirty = std::mem::replace(&mut self.is_dirty, true);
-        let wish = self.take_input(input, view);
-        // A key without effect does not take back what one before it has changed.
+        let command = self.take_input(input, view);
+        // A key without effect must not clear the change of an earlier one.
         self.is_dirty |= was_dirty;
-        wish
+        command
     }
 
-    fn take_input(&mut self, input: Input, view: &ViewModel) -> Wish {
+    fn take_input(&mut self, input: Input, view: &ViewModel) -> Command {
         match input {
-            Input::Gone => Wish::Gone,
-            Input::Broken => Wish::End,
-            Input::Resize => Wish::Redraw,
+            Input::Gone => Command::TerminalLost,
+            Input::Broken => Command::Shutdown,
+            Input::Resize => Command::Redraw,
             Input::Key(key) => self.on_key(key, view),
             Input::Paste(text) => {
                 if let Some(dialog) = &mut self.dialog {
                     dialog.paste(&text);
-                    return Wish::None;
+                    return Command::None;
                 }
                 let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
-                let reply = self.screen.on_paste(&text, &cx);
-                self.on_reply(reply).unwrap_or(Wish::None)
+                let outcome = self.screen.on_paste(&text, &cx);
+                self.on_outcome(outcome).unwrap_or(Command::None)
             }
             Input::Scroll(lines) => {
                 let code = if lines < 0 { KeyCode::PageUp } else { KeyCode::PageDown };
@@ -155,20 +154,20 @@ impl Ui {
         }
     }
 
-    fn on_key(&mut self, key: Key, view: &ViewModel) -> Wish {
+    fn on_key(&mut self, key: Key, view: &ViewModel) -> Command {
         if let Some(dialog) = &mut self.dialog {
             if key == Key::ctrl('z') {
-                return Wish::Suspend;
+                return Command::Suspend;
             }
             return match dialog.on_key(key) {
-                Answer::Open => Wish::None,
-                Answer::Closed => {
+                DialogOutcome::Open => Command::None,
+                DialogOutcome::Closed => {
                     self.dialog = None;
-                    Wish::None
+                    Command::None
                 }
-                Answer::Intend(intent) => {
+                DialogOutcome::Submitted(intent) => {
                     self.dialog = None;
-                    Wish::Intend(intent)
+                    Command::Intent(intent)
                 }
             };
         }
@@ -178,66 +177,66 @@ impl Ui {
                 KeyCode::Up | KeyCode::PageUp => *scroll = scroll.saturating_sub(5),
                 _ => self.help = None,
             }
-            return Wish::None;
+            return Command::None;
         }
         let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
-        let reply = self.screen.on_key(key, &cx);
-        if let Some(wish) = self.on_reply(reply) {
-            return wish;
+        let outcome = self.screen.on_key(key, &cx);
+        if let Some(command) = self.on_outcome(outcome) {
+            return command;
         }
-        match keymap::meaning(key, &view.intents) {
-            Some(Meaning::Offer(info)) => {
-                // What cannot be done now is not asked about: the wizard says why.
+        match keymap::action(key, &view.intents) {
+            Some(Action::Offer(info)) => {
+                // A blocked intent needs no dialog: the wizard answers with the reason.
                 self.dialog = Dialog::before(&info, view).filter(|_| info.is_enabled());
-                if self.dialog.is_some() { Wish::None } else { Wish::Intend(info.intent) }
+                if self.dialog.is_some() { Command::None } else { Command::Intent(info.intent) }
             }
-            Some(Meaning::Local(Local::Help)) => {
+            Some(Action::Local(LocalAction::Help)) => {
                 self.help = Some(0);
-                Wish::None
+                Command::None
             }
-            Some(Meaning::Local(Local::Suspend)) => Wish::Suspend,
-            Some(Meaning::Local(Local::Redraw)) => Wish::Redraw,
-            Some(Meaning::Local(Local::Bell)) => {
+            Some(Action::Local(LocalAction::Suspend)) => Command::Suspend,
+            Some(Action::Local(LocalAction::Redraw)) => Command::Redraw,
+            Some(Action::Local(LocalAction::ToggleBell)) => {
                 self.has_bell = !self.has_bell;
-                // It shows what it is like.
+                // Ring once, so that the operator knows the sound.
                 self.is_ringing = self.has_bell;
-                Wish::None
+                Command::None
             }
             None => {
                 self.is_dirty = self.scene.is_some() && self.camera.on_key(key);
-                Wish::None
+                Command::None
             }
         }
     }
 
-    /// What a screen's reply means; none: it had no use for the input.
-    fn on_reply(&mut self, reply: Reply) -> Option<Wish> {
-        match reply {
-            Reply::Ignored => None,
-            Reply::Changed => Some(Wish::None),
-            Reply::Intend(intent) => Some(Wish::Intend(intent)),
-            Reply::Ask(dialog) => {
+    /// The command that follows from a screen's outcome; `None` if it did not handle the input.
+    fn on_outcome(&mut self, outcome: ScreenOutcome) -> Option<Command> {
+        match outcome {
+            ScreenOutcome::Ignored => None,
+            ScreenOutcome::Changed => Some(Command::None),
+            ScreenOutcome::Intent(intent) => Some(Command::Intent(intent)),
+            ScreenOutcome::Open(dialog) => {
                 self.dialog = Some(*dialog);
-                Some(Wish::None)
+                Some(Command::None)
             }
         }
     }
 
-    fn items(&self, cx: &ScreenCx<'_>, area: Rect) -> Vec<Item> {
+    fn key_hints(&self, cx: &ScreenCx<'_>, area: Rect) -> Vec<KeyHint> {
         match (&self.dialog, self.help) {
-            (Some(dialog), _) => dialog.items(),
+            (Some(dialog), _) => dialog.key_hints(),
             (None, Some(_)) => {
-                vec![Item::new("any key", "back", 0), Item::new("Up/Down", "scroll", 1)]
+                vec![KeyHint::new("any key", "back", 0), KeyHint::new("Up/Down", "scroll", 1)]
             }
-            (None, None) => self.page_items(cx, area),
+            (None, None) => self.page_key_hints(cx, area),
         }
     }
 
-    /// Keys of the screen itself.
-    fn page_items(&self, cx: &ScreenCx<'_>, area: Rect) -> Vec<Item> {
-        let own = self.screen.items(cx);
-        let mut items = keymap::items(&cx.view.intents, self.theme.glyphs);
-        // The screen is asked first: its keys hide those of the table.
+    /// Keys of the page, with those of the table.
+    fn page_key_hints(&self, cx: &ScreenCx<'_>, area: Rect) -> Vec<KeyHint> {
+        let own = self.screen.key_hints(cx);
+        let mut items = keymap::key_hints(&cx.view.intents, self.theme.glyphs);
+        // The screen handles keys first, so its keys hide those of the table.
         items.retain(|item| !own.iter().any(|one| one.key == item.key));
         let bell = keymap::BELL.name(self.theme.glyphs);
         for item in items.iter_mut().filter(|item| item.key == bell) {
@@ -254,40 +253,40 @@ impl Ui {
             PicturePlace::Beside => 8,
             PicturePlace::Alone => 3,
         };
-        items.push(Item::new(arrows, "turn the picture", rank));
+        items.push(KeyHint::new(arrows, "turn the picture", rank));
         items.sort_by_key(|item| item.rank);
         items
     }
 
     /// Where in `area` the page with these keys shows the robot.
-    fn picture_place(&self, cx: &ScreenCx<'_>, items: &[Item], area: Rect) -> PicturePlace {
-        let content = frame::room(cx.view, items, self.theme, area);
+    fn picture_place(&self, cx: &ScreenCx<'_>, items: &[KeyHint], area: Rect) -> PicturePlace {
+        let content = frame::content_area(cx.view, items, self.theme, area);
         content.map_or(PicturePlace::Nowhere, |content| self.screen.picture_place(cx, content))
     }
 
-    /// Whether the robot is to be seen in `area`.
+    /// Whether the robot is shown in `area`.
     pub fn shows_picture(&self, view: &ViewModel, area: Rect) -> bool {
         let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
         self.dialog.is_none()
             && self.help.is_none()
-            && self.picture_place(&cx, &self.items(&cx, area), area) != PicturePlace::Nowhere
+            && self.picture_place(&cx, &self.key_hints(&cx, area), area) != PicturePlace::Nowhere
     }
 
-    /// Draws everything; nothing changes by it.
+    /// Draws the whole terminal, without side effects.
     pub fn draw(&self, view: &ViewModel, area: Rect, buf: &mut Buffer) {
         let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
-        let Some(content) = frame::draw(view, &self.items(&cx, area), self.theme, area, buf) else { return };
+        let Some(content) = frame::draw(view, &self.key_hints(&cx, area), self.theme, area, buf) else { return };
         match (&self.dialog, self.help) {
             (Some(dialog), _) => dialog.draw(self.theme, content, buf),
             (None, Some(scroll)) => {
-                help::draw(&self.page_items(&cx, area), scroll, self.theme, content, buf);
+                help::draw(&self.page_key_hints(&cx, area), scroll, self.theme, content, buf);
             }
             (None, None) => self.screen.draw(&cx, content, buf),
         }
     }
 }
 
-/// What the preview shows in this step.
+/// The scene of the preview in this step.
 fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
     match &view.content {
         Content::Profile(content) => {

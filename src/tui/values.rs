@@ -4,10 +4,10 @@ use serde_json::Value;
 
 use crate::wizard::view::{Content, LiveView};
 
-/// Longest list that is written on one line, and entries of longer ones that are shown.
+/// Longest list that is written on one line, and number of entries shown of a longer one.
 const SHORT_LIST: usize = 8;
 
-/// The content in lines, indented; long lists are cut unless everything is asked for.
+/// The content as indented lines. Long lists are cut unless `has_all`.
 pub(super) fn lines(content: &Content, has_all: bool) -> Vec<String> {
     let mut lines = Vec::new();
     if let Ok(Value::Object(steps)) = serde_json::to_value(content) {
@@ -27,12 +27,12 @@ fn collect(depth: usize, value: &Value, has_all: bool, lines: &mut Vec<String>) 
             Value::Null => {}
             Value::Array(values) if values.is_empty() => {}
             Value::Array(values) if values.len() <= SHORT_LIST && !values.iter().any(is_nested) => {
-                lines.push(format!("{indent}{name}: {}", short(value)));
+                lines.push(format!("{indent}{name}: {}", inline(value)));
             }
             Value::Array(values) => {
                 lines.push(format!("{indent}{name}: {}", values.len()));
                 let most = if has_all { values.len() } else { SHORT_LIST };
-                lines.extend(values.iter().take(most).map(|value| format!("{indent}  - {}", short(value))));
+                lines.extend(values.iter().take(most).map(|value| format!("{indent}  - {}", inline(value))));
                 if values.len() > most {
                     lines.push(format!("{indent}  and {} more: type 'all'", values.len() - most));
                 }
@@ -41,7 +41,7 @@ fn collect(depth: usize, value: &Value, has_all: bool, lines: &mut Vec<String>) 
                 lines.push(format!("{indent}{name}:"));
                 collect(depth + 1, value, has_all, lines);
             }
-            value => lines.push(format!("{indent}{name}: {}", short(value))),
+            value => lines.push(format!("{indent}{name}: {}", inline(value))),
         }
     }
 }
@@ -50,8 +50,8 @@ const fn is_nested(value: &Value) -> bool {
     matches!(value, Value::Object(_) | Value::Array(_))
 }
 
-/// A value on a part of a line.
-fn short(value: &Value) -> String {
+/// A value within a line.
+fn inline(value: &Value) -> String {
     match value {
         Value::Null => "-".to_owned(),
         Value::String(text) => text.clone(),
@@ -61,21 +61,21 @@ fn short(value: &Value) -> String {
             Some(value) => format!("{value:.4}"),
             None => number.to_string(),
         },
-        Value::Array(values) => values.iter().map(short).collect::<Vec<_>>().join(", "),
+        Value::Array(values) => values.iter().map(inline).collect::<Vec<_>>().join(", "),
         Value::Object(fields) => {
             let fields = fields.iter().filter(|(_, value)| !value.is_null());
             fields
-                .map(|(name, value)| format!("{} {}", name.replace('_', " "), short(value)))
+                .map(|(name, value)| format!("{} {}", name.replace('_', " "), inline(value)))
                 .collect::<Vec<_>>()
                 .join(", ")
         }
     }
 }
 
-/// A silence shorter than this (s) is not worth a word.
+/// Silence that is not reported yet (s).
 const SILENT: f64 = 2.0;
 
-/// Where the SMR is, in a line, or why nobody knows.
+/// The position of the SMR in a line, or why it is unknown.
 pub(super) fn seen(live: &LiveView) -> String {
     match (live.point_mm, live.silent_s) {
         (Some([x, y, z]), _) => format!("x {x:.3}  y {y:.3}  z {z:.3} mm"),
@@ -85,12 +85,16 @@ pub(super) fn seen(live: &LiveView) -> String {
     }
 }
 
-/// For how long nothing was heard.
+/// How long the instrument has been silent.
 fn silent(seconds: f64) -> String {
-    if seconds < SILENT { "...".to_owned() } else { format!("nothing: the instrument is silent for {seconds:.0} s") }
+    if seconds < SILENT {
+        "...".to_owned()
+    } else {
+        format!("nothing: the instrument has been silent for {seconds:.0} s")
+    }
 }
 
-/// What the instrument sees, in a line.
+/// The live reading in a line.
 pub(super) fn live(live: &LiveView) -> Option<String> {
     if live.down.is_some() {
         return Some("the link is down".to_owned());
@@ -99,11 +103,11 @@ pub(super) fn live(live: &LiveView) -> Option<String> {
         return None;
     }
     if let (None, Some(seconds)) = (live.point_mm, live.silent_s) {
-        return (seconds >= SILENT).then(|| format!("the instrument is silent for {seconds:.0} s"));
+        return (seconds >= SILENT).then(|| format!("the instrument has been silent for {seconds:.0} s"));
     }
     live.point_mm?;
     let mut parts = Vec::new();
-    parts.extend(live.rest_s.map(|seconds| format!("SMR rests {seconds:.1} s")));
+    parts.extend(live.rest_s.map(|seconds| format!("SMR at rest for {seconds:.1} s")));
     parts.extend(live.scatter_mm.map(|scatter| format!("scatter {scatter:.3} mm")));
     parts.extend(live.from_predicted_mm.map(|distance| format!("{distance:.1} mm from predicted")));
     Some(parts.join(", "))
@@ -137,12 +141,16 @@ mod tests {
         for (view, where_it_is, now) in [
             (nothing(), "no SMR", None),
             (silent(1.5), "...", None),
-            (silent(3.2), "nothing: the instrument is silent for 3 s", Some("the instrument is silent for 3 s")),
+            (
+                silent(3.2),
+                "nothing: the instrument has been silent for 3 s",
+                Some("the instrument has been silent for 3 s"),
+            ),
             (blind, "no live view: this instrument shows nothing between measurements", None),
         ] {
             assert_eq!((seen(&view).as_str(), live(&view).as_deref()), (where_it_is, now));
         }
         let rests = LiveView { point_mm: Some([1.0, 2.0, 3.0]), rest_s: Some(4.9), ..nothing() };
-        assert_eq!(live(&rests).as_deref(), Some("SMR rests 4.9 s"));
+        assert_eq!(live(&rests).as_deref(), Some("SMR at rest for 4.9 s"));
     }
 }

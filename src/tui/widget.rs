@@ -1,4 +1,4 @@
-//! Small things that several screens draw: table, bar, chart, large digits, tabs. They keep nothing and draw into their area only.
+//! Widgets of several screens: table, bar, chart, large digits, tabs. They are stateless and draw into their area only.
 
 pub mod bar;
 pub mod chart;

@@ -1,5 +1,4 @@
-//! The forms that screens ask with: coordinates, a known target, a simulated cell, recorded measurements, what the
-//! report is about.
+//! The forms of the screens: coordinates, a known target, a simulated cell, recorded measurements, and the details of the report.
 
 use super::{Dialog, Form};
 use crate::session::filter::Filter;
@@ -7,7 +6,7 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
-use crate::tui::form::{Check, TextField};
+use crate::tui::form::{TextField, Validator};
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Intent, reading};
 
@@ -17,7 +16,7 @@ const TRUTHS: [Truth; 3] = [Truth::Drawn, Truth::Paper, Truth::Nominal];
 /// Layouts of tables.
 const LAYOUTS: &[&str] = &["named", "robodk", "delmia"];
 
-/// The coordinates of a reading, begun with what was typed or pasted; they are checked against the unit as they are typed.
+/// Asks for the coordinates of a reading, starting with the text typed or pasted so far. They are checked while they are typed.
 pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
     let (unit, place) = match &view.content {
         Content::Capture(content) => {
@@ -34,11 +33,11 @@ pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
     };
     let unit = CoordinateUnit::ALL.into_iter().find(|one| Some(one.sign()) == unit).unwrap_or_default();
     let label = format!("Coordinates x y z of the SMR{place} ({})", unit.sign());
-    Dialog::Text { field: TextField::new(label, begun).checked(check_of(unit)), intent: Intent::TypeReading }
+    Dialog::Text { field: TextField::new(label, begun).checked(validator(unit)), intent: Intent::TypeReading }
 }
 
-/// What is wrong with coordinates in a unit.
-fn check_of(unit: CoordinateUnit) -> Check {
+/// The validator of coordinates in a unit.
+fn validator(unit: CoordinateUnit) -> Validator {
     match unit {
         CoordinateUnit::Millimetre => |text| reading::check(text, CoordinateUnit::Millimetre),
         CoordinateUnit::Metre => |text| reading::check(text, CoordinateUnit::Metre),
@@ -47,19 +46,15 @@ fn check_of(unit: CoordinateUnit) -> Check {
     }
 }
 
-/// Where the SMR is known to be.
+/// Asks for known coordinates of the SMR.
 pub fn known_target(nominal_mm: [f64; 3]) -> Dialog {
     let [x, y, z] = nominal_mm.map(|value| format!("{value:.3}"));
     Dialog::Form(
         Form::new("Centre of the SMR in the flange frame", known)
-            .text("x (mm)", &x, "As measured on the flange adapter, for example with a CMM; to the centre of the SMR.")
+            .text("x (mm)", &x, "Measured on the flange adapter, for example with a CMM, to the centre of the SMR.")
             .text("y (mm)", &y, "Along the y axis of the flange as the profile defines it.")
             .text("z (mm)", &z, "Along the flange axis, away from the arm.")
-            .text(
-                "sigma (mm)",
-                "0.1",
-                "How well it is known, one standard deviation per coordinate; 0: exact, it is not identified.",
-            ),
+            .text("sigma (mm)", "0.1", "Standard deviation of each coordinate. 0: exact, so it is not identified."),
     )
 }
 
@@ -73,7 +68,7 @@ fn known(values: &[String]) -> Result<Intent, String> {
     Ok(Intent::ChooseTarget(TargetChoice::Known { xyz_mm, sigma_mm }))
 }
 
-/// An instrument on a wire. What the profile says about it stands there already.
+/// Asks for an instrument on a wire, starting with the link of the profile.
 pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
     let proposed = proposal.cloned().unwrap_or_default();
     Dialog::Form(
@@ -86,14 +81,14 @@ pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
             .text(
                 "options",
                 &proposed.options.unwrap_or_default(),
-                "Empty: the usual ones. For ascii a preset such as xyz or bridge; else as (measure_ms: 2000).",
+                "Empty: defaults. For ascii a preset such as xyz or bridge; otherwise as in (measure_ms: 2000).",
             )
-            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, if the robot's controller reports its joint angles. Empty: it does not.")
+            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, if the robot controller reports its joint angles. Empty: it does not.")
             .pick(
-                "measure by itself",
+                "automatic measuring",
                 &["no", "yes"],
                 usize::from(proposed.is_automatic),
-                "Left/Right. yes: as soon as the SMR rests for 2 s near the predicted place.",
+                "Left/Right. yes: as soon as the SMR has been at rest for 2 s near its predicted position.",
             ),
     )
 }
@@ -102,7 +97,7 @@ fn link(values: &[String]) -> Result<Intent, String> {
     let [address, options, robot, automatic] = values else { return Err("four values are needed".to_owned()) };
     let parsed: WireAddress = address.parse()?;
     if parsed.protocol.is_robot() {
-        return Err(format!("{} is a robot: give it below", parsed.protocol));
+        return Err(format!("{} is a robot: enter it below", parsed.protocol));
     }
     let some = |text: &String| (!text.trim().is_empty()).then(|| text.trim().to_owned());
     let robot = some(robot);
@@ -116,14 +111,14 @@ fn link(values: &[String]) -> Result<Intent, String> {
     Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice)))
 }
 
-/// A cell that exists in the program only.
+/// Asks for a simulated cell.
 pub fn simulated(is_paper: bool) -> Dialog {
     let truth = usize::from(is_paper);
     Dialog::Form(
-        Form::new("Simulated cell, to rehearse on", simulation)
+        Form::new("Simulated cell, for rehearsing", simulation)
             .text("seed", "1", "The same seed gives the same errors and noise again.")
             .pick("hidden errors of the arm", TRUTH_WORDS, truth, "Left/Right. random: drawn by seed; paper: table II of the method paper (only its own arm); nominal: none.")
-            .text("noise (mm)", "", "Standard deviation of a coordinate; empty: as the profile's instrument.")
+            .text("noise (mm)", "", "Standard deviation of a coordinate. Empty: that of the profile's instrument.")
             .text("faults", "", "What goes wrong, separated by commas: wrong-pose@12, outlier@9:3mm, target-bumped@20:5mm, beam-break@7-9. Empty: nothing."),
     )
 }
@@ -148,23 +143,19 @@ fn simulation(values: &[String]) -> Result<Intent, String> {
     })))
 }
 
-/// Tables of earlier days.
+/// Asks for tables of recorded measurements.
 pub fn recorded() -> Dialog {
     let rows = "A condition on the columns, such as: pose % 5 != 0. Empty: all rows.";
     Dialog::Form(
-        Form::new("Recorded measurements, played as if they were captured now", replay)
+        Form::new("Recorded measurements, played back as if they were captured now", replay)
             .text(
                 "table to identify from",
                 "",
                 "Path of a CSV file with joint values and measured points, units in its header.",
             )
-            .text("rows of it", "", rows)
-            .text(
-                "table to verify with",
-                "",
-                "Path; it may be the same file with other rows. Empty: nothing is kept for verification.",
-            )
-            .text("rows of it", "", rows)
+            .text("rows to use", "", rows)
+            .text("table to verify with", "", "Path; it may be the same file with other rows. Empty: no verification.")
+            .text("rows to use", "", rows)
             .pick(
                 "layout",
                 LAYOUTS,
@@ -179,7 +170,7 @@ fn replay(values: &[String]) -> Result<Intent, String> {
         return Err("five values are needed".to_owned());
     };
     if first.is_empty() {
-        return Err("give the table to identify from".to_owned());
+        return Err("enter the table to identify from".to_owned());
     }
     if second.is_empty() && !second_rows.is_empty() {
         return Err("there are rows to verify with, but no table".to_owned());
@@ -199,22 +190,26 @@ fn set(file: &str, rows: &str, layout: &str, kind: PoseKind) -> Result<RecordedS
     Ok(RecordedSet { file: file.to_owned(), kind, rows, layout: layout.to_owned() })
 }
 
-/// What is wrong, without the picture of where.
+/// An error without the lines that point at its position.
 fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-/// What only people know.
+/// Asks for the details of the report that only people know.
 pub fn about(about: &About) -> Dialog {
     Dialog::Form(
-        Form::new("For the report: what only you know. All of it may stay empty.", said)
+        Form::new("For the report: details that only you know. All are optional.", said)
             .text(
                 "serial number",
                 &about.serial,
-                "Of the arm, from its type plate: the result belongs to this one arm.",
+                "Of the arm, from its type plate: the result belongs to this arm only.",
             )
-            .text("operator", &about.operator, "Who measured.")
-            .text("place and conditions", &about.site, "Hall, cell, warm-up, payload: what a later reader must know."),
+            .text("operator", &about.operator, "The person who measured.")
+            .text(
+                "place and conditions",
+                &about.site,
+                "Hall, cell, warm-up, payload: whatever a later reader must know.",
+            ),
     )
 }
 
@@ -224,11 +219,11 @@ fn said(values: &[String]) -> Result<Intent, String> {
     if about.is_usable() {
         Ok(Intent::About(about))
     } else {
-        Err(format!("each text may have up to {} characters", About::LONGEST))
+        Err(format!("at most {} characters each", About::LONGEST))
     }
 }
 
-/// A number; a decimal comma is a point.
+/// Parses a number, with a decimal point or comma.
 fn number(name: &str, text: &str) -> Result<f64, String> {
     let value = text.replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite());
     value.ok_or_else(|| format!("{name}: '{text}' is not a number"))
@@ -273,7 +268,7 @@ mod tests {
         let typed = values(&["emscon:192.168.0.2", " (measure_ms: 2000) ", "rtde:10.0.0.1", "yes"]);
         assert_eq!(link(&typed), Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice))));
         for (texts, part) in [
-            (["192.168.0.2", "", "", "no"], "is no address"),
+            (["192.168.0.2", "", "", "no"], "address"),
             (["rtde:10.0.0.1", "", "", "no"], "is a robot"),
             (["emscon:a", "", "emscon:b", "no"], "is not a robot controller"),
         ] {
@@ -295,10 +290,7 @@ mod tests {
     fn what_the_report_is_about_may_be_empty_but_not_endless() {
         let given = About { serial: "R-17".to_owned(), ..About::default() };
         assert_eq!(said(&values(&["R-17", "", ""])), Ok(Intent::About(given)));
-        assert_eq!(
-            said(&values(&["", "", &"x".repeat(201)])),
-            Err("each text may have up to 200 characters".to_owned())
-        );
+        assert_eq!(said(&values(&["", "", &"x".repeat(201)])), Err("at most 200 characters each".to_owned()));
     }
 
     #[test]

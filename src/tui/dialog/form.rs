@@ -1,11 +1,11 @@
-//! Several fields that together become an intent.
+//! A form: several fields that together make an intent.
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::form::{Reaction, TextField};
-use crate::tui::glyphs::wrapped;
+use crate::text::wrapped;
+use crate::tui::form::{FieldOutcome, TextField};
 use crate::tui::keymap::Key;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
@@ -14,7 +14,7 @@ use crate::wizard::Intent;
 /// Columns of the labels.
 const LABELS: u16 = 24;
 
-/// What the values of the fields mean, or what is wrong with them.
+/// Builds the intent from the values of the fields, or says what is wrong with them.
 pub type Build = fn(&[String]) -> Result<Intent, String>;
 
 /// Several fields, one line each.
@@ -24,11 +24,11 @@ pub struct Form {
     fields: Vec<Field>,
     focus: usize,
     build: Build,
-    /// The values were meant although they are wrong: from then on it is said.
+    /// Whether the operator has tried to submit the form. From then on errors are shown.
     is_tried: bool,
 }
 
-/// A field with a line that explains it.
+/// A field with an explanation.
 #[derive(Clone, Debug)]
 struct Field {
     label: &'static str,
@@ -57,14 +57,14 @@ impl Form {
         Self { title: title.into(), fields: Vec::new(), focus: 0, build, is_tried: false }
     }
 
-    /// With a line of text.
+    /// Adds a line of text.
     #[must_use]
     pub fn text(mut self, label: &'static str, value: &str, about: &'static str) -> Self {
         self.fields.push(Field { label, about, value: Value::Text(TextField::new(label, value)) });
         self
     }
 
-    /// With one of some words.
+    /// Adds a choice of words.
     #[must_use]
     pub fn pick(
         mut self,
@@ -80,42 +80,42 @@ impl Form {
     /// The intent, or what is wrong.
     ///
     /// # Errors
-    /// A field cannot be understood.
+    /// A field is invalid.
     pub fn value(&self) -> Result<Intent, String> {
         let values: Vec<String> = self.fields.iter().map(|field| field.value.text()).collect();
         (self.build)(&values)
     }
 
-    /// Takes a key.
-    pub fn on_key(&mut self, key: Key) -> Reaction {
+    /// Handles a key.
+    pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let count = self.fields.len().max(1);
         match key.code {
             KeyCode::Enter => {
                 self.is_tried = true;
-                return if self.value().is_ok() { Reaction::Done } else { Reaction::Changed };
+                return if self.value().is_ok() { FieldOutcome::Submitted } else { FieldOutcome::Changed };
             }
-            KeyCode::Esc => return Reaction::Cancelled,
+            KeyCode::Esc => return FieldOutcome::Cancelled,
             KeyCode::Tab | KeyCode::Down => self.focus = (self.focus + 1) % count,
             KeyCode::BackTab | KeyCode::Up => self.focus = (self.focus + count - 1) % count,
             _ => {
                 return match self.fields.get_mut(self.focus).map(|field| &mut field.value) {
                     Some(Value::Text(field)) => field.on_key(key),
                     Some(Value::Pick { options, at }) => picked(options.len().max(1), at, key),
-                    None => Reaction::Ignored,
+                    None => FieldOutcome::Ignored,
                 };
             }
         }
-        Reaction::Changed
+        FieldOutcome::Changed
     }
 
-    /// Inserts pasted text into the field in focus.
+    /// Inserts pasted text into the focused field.
     pub fn paste(&mut self, text: &str) {
         if let Some(Value::Text(field)) = self.fields.get_mut(self.focus).map(|field| &mut field.value) {
             field.paste(text);
         }
     }
 
-    /// Draws it: title, fields, what the one in focus is for, what is wrong.
+    /// Draws title, fields, the explanation of the focused field, and the error.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         paint::text(buf, area, (0, 0), &theme.glyphs.show(&self.title), theme.style(Role::Title));
         let mut row = 2;
@@ -162,11 +162,11 @@ impl Form {
     }
 }
 
-fn picked(count: usize, at: &mut usize, key: Key) -> Reaction {
+fn picked(count: usize, at: &mut usize, key: Key) -> FieldOutcome {
     *at = match key.code {
         KeyCode::Right | KeyCode::Char(' ') => (*at + 1) % count,
         KeyCode::Left => (*at + count - 1) % count,
-        _ => return Reaction::Ignored,
+        _ => return FieldOutcome::Ignored,
     };
-    Reaction::Changed
+    FieldOutcome::Changed
 }

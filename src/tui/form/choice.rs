@@ -1,10 +1,10 @@
-//! A choice from a list; typing narrows the list.
+//! A choice from a list. Typing narrows the list.
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{Reaction, TextField};
+use super::{FieldOutcome, TextField};
 use crate::tui::glyphs::shortened;
 use crate::tui::keymap::Key;
 use crate::tui::paint;
@@ -13,23 +13,23 @@ use crate::tui::theme::{Role, Theme};
 /// Rows that PageUp and PageDown pass over.
 const PAGE: usize = 10;
 
-/// A list with one choice.
+/// A list to choose from.
 #[derive(Clone, Debug)]
 pub struct ChoiceList {
     label: String,
     choices: Vec<String>,
     filter: TextField,
-    /// Among those that the filter leaves.
+    /// Position among the choices that match the filter.
     selected: usize,
 }
 
 impl ChoiceList {
-    /// A list with the choice `selected` in focus.
+    /// A list with the focus on the choice `selected`.
     pub fn new(label: impl Into<String>, choices: Vec<String>, selected: usize) -> Self {
         Self { label: label.into(), choices, filter: TextField::new("", ""), selected }
     }
 
-    /// Indices of the choices that contain every word of what was typed, in any case.
+    /// Indices of the choices that contain every typed word, ignoring case.
     pub fn matching(&self) -> Vec<usize> {
         let wanted = self.filter.text().to_lowercase();
         let fits = |choice: &String| {
@@ -39,18 +39,20 @@ impl ChoiceList {
         self.choices.iter().enumerate().filter(|(_, choice)| fits(choice)).map(|(index, _)| index).collect()
     }
 
-    /// Index of the choice in focus, in the whole list.
+    /// Index of the focused choice in the whole list.
     pub fn selected(&self) -> Option<usize> {
         let matching = self.matching();
         matching.get(self.selected).or_else(|| matching.last()).copied()
     }
 
-    /// Takes a key.
-    pub fn on_key(&mut self, key: Key) -> Reaction {
+    /// Handles a key.
+    pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let last = self.matching().len().saturating_sub(1);
         let now = self.selected.min(last);
         self.selected = match key.code {
-            KeyCode::Enter => return if self.selected().is_some() { Reaction::Done } else { Reaction::Changed },
+            KeyCode::Enter => {
+                return if self.selected().is_some() { FieldOutcome::Submitted } else { FieldOutcome::Changed };
+            }
             KeyCode::Up => now.saturating_sub(1),
             KeyCode::Down => (now + 1).min(last),
             KeyCode::PageUp => now.saturating_sub(PAGE),
@@ -66,7 +68,7 @@ impl ChoiceList {
                 return reaction;
             }
         };
-        Reaction::Changed
+        FieldOutcome::Changed
     }
 
     /// Narrows the list by pasted text.
@@ -75,7 +77,7 @@ impl ChoiceList {
         self.selected = 0;
     }
 
-    /// Draws it: label and filter, then as much of the list as there is room for, around the focus.
+    /// Draws label and filter, then as much of the list around the focus as fits.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         let glyphs = theme.glyphs;
         let matching = self.matching();
@@ -101,7 +103,7 @@ impl ChoiceList {
             paint::text(buf, list, (column, row), &shortened(&glyphs.show(choice), room, glyphs), style);
         }
         if matching.is_empty() {
-            paint::text(buf, list, (0, 0), "nothing fits; Backspace widens the search", theme.style(Role::Warn));
+            paint::text(buf, list, (0, 0), "no match; Backspace widens the search", theme.style(Role::Warn));
         }
     }
 }
@@ -126,9 +128,9 @@ mod tests {
         list.on_key(Key::plain_code(KeyCode::Down));
         list.on_key(Key::plain_code(KeyCode::Down));
         assert_eq!(list.selected(), Some(3));
-        assert_eq!(list.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Done);
+        assert_eq!(list.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Submitted);
         list.paste("zzz");
-        assert_eq!((list.selected(), list.on_key(Key::plain_code(KeyCode::Enter))), (None, Reaction::Changed));
+        assert_eq!((list.selected(), list.on_key(Key::plain_code(KeyCode::Enter))), (None, FieldOutcome::Changed));
     }
 
     #[test]

@@ -1,14 +1,14 @@
-//! A number with its unit and range.
+//! A number field with unit and range.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{Reaction, TextField};
+use super::{FieldOutcome, TextField};
 use crate::tui::keymap::Key;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 
-/// A number that must be in a range.
+/// A field for a number in a range.
 #[derive(Clone, Debug)]
 pub struct NumberField {
     field: TextField,
@@ -23,17 +23,17 @@ impl NumberField {
         Self { field: TextField::new(label, &value.to_string()), unit, range, is_whole: false }
     }
 
-    /// Only whole numbers.
+    /// Accepts only whole numbers.
     #[must_use]
     pub const fn whole(mut self) -> Self {
         self.is_whole = true;
         self
     }
 
-    /// The number, or what is wrong with it. A decimal comma is a point.
+    /// The number, with a decimal point or comma, or what is wrong with it.
     ///
     /// # Errors
-    /// It is no number, or not in the range.
+    /// The text is not a number, or not in the range.
     pub fn value(&self) -> Result<f64, String> {
         let text = self.field.text();
         let text = text.trim();
@@ -43,14 +43,14 @@ impl NumberField {
             Ok(value) if self.is_whole && value.fract() != 0.0 => Err(format!("'{text}' is not a whole number")),
             Ok(value) if value >= low && value <= high => Ok(value),
             Ok(value) if value.is_finite() => Err(format!("{value} is not between {low} and {high}{unit}")),
-            _ => Err(format!("'{text}' is not a number; {low} to {high}{unit}")),
+            _ => Err(format!("'{text}' is not a number from {low} to {high}{unit}")),
         }
     }
 
-    /// Takes a key.
-    pub fn on_key(&mut self, key: Key) -> Reaction {
+    /// Handles a key.
+    pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         match self.field.on_key(key) {
-            Reaction::Done if self.value().is_err() => Reaction::Changed,
+            FieldOutcome::Submitted if self.value().is_err() => FieldOutcome::Changed,
             reaction => reaction,
         }
     }
@@ -60,7 +60,7 @@ impl NumberField {
         self.field.paste(text);
     }
 
-    /// Draws it in three lines.
+    /// Draws the field in three lines.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         let label = match self.unit {
             "" => self.field.label().to_owned(),
@@ -85,8 +85,8 @@ mod tests {
         let mut field = NumberField::new("sigma", 0.5, "mm", (0.0, 50.0));
         assert_eq!(field.value(), Ok(0.5));
         field.on_key(Key::char('x'));
-        assert_eq!(field.value(), Err("'0.5x' is not a number; 0 to 50 mm".to_owned()));
-        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Changed);
+        assert_eq!(field.value(), Err("'0.5x' is not a number from 0 to 50 mm".to_owned()));
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Changed);
         field.on_key(Key::ctrl('u'));
         field.paste("1,25");
         assert_eq!(field.value(), Ok(1.25));

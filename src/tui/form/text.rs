@@ -4,8 +4,8 @@ use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::Reaction;
-use crate::tui::glyphs::{width, wrapped};
+use super::FieldOutcome;
+use crate::text::{self, wrapped};
 use crate::tui::keymap::Key;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
@@ -13,23 +13,23 @@ use crate::tui::theme::{Role, Theme};
 /// Longest text, in characters; a paste beyond it is cut.
 const LONGEST: usize = 4096;
 
-/// Says what is wrong with a text.
-pub type Check = fn(&str) -> Result<(), String>;
+/// Checks a text; the error says what is wrong.
+pub type Validator = fn(&str) -> Result<(), String>;
 
 /// A single line of text with a cursor.
 #[derive(Clone, Debug)]
 pub struct TextField {
     label: String,
     characters: Vec<char>,
-    /// Before which character the cursor stands.
+    /// Index of the character at the cursor.
     cursor: usize,
-    /// The text is a proposal: what is typed first takes its place, unless the cursor was moved into it.
+    /// Whether the text is a proposal. Typing replaces a proposal, unless the cursor was moved into it first.
     is_proposal: bool,
-    check: Option<Check>,
+    check: Option<Validator>,
 }
 
 impl TextField {
-    /// A field with a text to begin with, the cursor behind it.
+    /// A field with an initial text and the cursor behind it.
     pub fn new(label: impl Into<String>, text: &str) -> Self {
         let mut field =
             Self { label: label.into(), characters: Vec::new(), cursor: 0, is_proposal: false, check: None };
@@ -37,21 +37,21 @@ impl TextField {
         field
     }
 
-    /// The text to begin with is a proposal, as good as selected: typing takes its place.
+    /// Makes the initial text a proposal, which typing replaces like a selection.
     #[must_use]
     pub const fn proposed(mut self) -> Self {
         self.is_proposal = !self.characters.is_empty();
         self
     }
 
-    /// With a check that runs as it is typed.
+    /// Adds a check that runs while the text is typed.
     #[must_use]
-    pub const fn checked(mut self, check: Check) -> Self {
+    pub const fn checked(mut self, check: Validator) -> Self {
         self.check = Some(check);
         self
     }
 
-    /// What it asks for.
+    /// The label of the field.
     pub fn label(&self) -> &str {
         &self.label
     }
@@ -61,23 +61,22 @@ impl TextField {
         self.characters.iter().collect()
     }
 
-    /// Before which character the cursor stands.
+    /// Index of the character at the cursor.
     pub const fn cursor(&self) -> usize {
         self.cursor
     }
 
-    /// Empties it.
     pub fn clear(&mut self) {
         self.characters.clear();
         self.cursor = 0;
     }
 
-    /// What is wrong with the text.
+    /// What is wrong with the text, if anything.
     pub fn problem(&self) -> Option<String> {
         self.check.and_then(|check| check(self.text().trim()).err())
     }
 
-    /// Inserts pasted text: line breaks and tabs become blanks, other control characters go.
+    /// Inserts pasted text. Line breaks and tabs become blanks, other control characters are removed.
     pub fn paste(&mut self, text: &str) {
         if std::mem::take(&mut self.is_proposal) {
             self.clear();
@@ -91,20 +90,20 @@ impl TextField {
         self.cursor += count;
     }
 
-    /// Takes a key.
-    pub fn on_key(&mut self, key: Key) -> Reaction {
+    /// Handles a key.
+    pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let was_proposal = self.is_proposal;
         let reaction = self.edited(key);
-        // Whoever moves or deletes in it wants to change it.
-        self.is_proposal = was_proposal && reaction == Reaction::Ignored;
+        // An operator who moves or deletes inside a proposal wants to edit it.
+        self.is_proposal = was_proposal && reaction == FieldOutcome::Ignored;
         reaction
     }
 
-    fn edited(&mut self, key: Key) -> Reaction {
+    fn edited(&mut self, key: Key) -> FieldOutcome {
         match (key.code, key.has_modifier()) {
-            (KeyCode::Enter, _) if self.problem().is_none() => return Reaction::Done,
+            (KeyCode::Enter, _) if self.problem().is_none() => return FieldOutcome::Submitted,
             (KeyCode::Enter, _) => {}
-            (KeyCode::Esc, _) => return Reaction::Cancelled,
+            (KeyCode::Esc, _) => return FieldOutcome::Cancelled,
             (KeyCode::Char('a'), true) | (KeyCode::Home, _) => self.cursor = 0,
             (KeyCode::Char('e'), true) | (KeyCode::End, _) => self.cursor = self.characters.len(),
             (KeyCode::Char('u'), true) => {
@@ -123,12 +122,12 @@ impl TextField {
             (KeyCode::Delete, _) if self.cursor < self.characters.len() => {
                 self.characters.remove(self.cursor);
             }
-            _ => return Reaction::Ignored,
+            _ => return FieldOutcome::Ignored,
         }
-        Reaction::Changed
+        FieldOutcome::Changed
     }
 
-    /// Takes the word before the cursor away.
+    /// Deletes the word before the cursor.
     fn delete_word(&mut self) {
         let before = self.characters.get(..self.cursor).unwrap_or_default();
         let blanks = before.iter().rev().take_while(|c| **c == ' ').count();
@@ -138,7 +137,7 @@ impl TextField {
         self.cursor = start;
     }
 
-    /// Draws it: the label, the text with its cursor, what is wrong. Takes three lines or more.
+    /// Draws the label, the text with its cursor, and the error, in three lines or more.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         paint::text(buf, area, (0, 0), &theme.glyphs.show(&self.label), theme.style(Role::Title));
         self.draw_line(theme, paint::band(area, 1, 1), buf);
@@ -150,7 +149,7 @@ impl TextField {
         }
     }
 
-    /// Draws the text alone, so that the cursor is always in view.
+    /// Draws the text alone. The cursor is always in view.
     pub fn draw_line(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         let lead = theme.glyphs.pointer();
         let start = paint::text(buf, area, (0, 0), lead, theme.style(Role::Hint));
@@ -160,7 +159,7 @@ impl TextField {
         }
         let shown = |range: &[char]| theme.glyphs.show(&range.iter().collect::<String>());
         let mut first = 0;
-        while width(&shown(self.characters.get(first..self.cursor).unwrap_or_default())) >= room {
+        while text::columns(&shown(self.characters.get(first..self.cursor).unwrap_or_default())) >= room {
             first += 1;
         }
         let before = shown(self.characters.get(first..self.cursor).unwrap_or_default());
@@ -213,19 +212,19 @@ mod tests {
         typed(&mut field, &[KeyCode::Home, KeyCode::Char('a'), KeyCode::End, KeyCode::Backspace]);
         assert_eq!(field.text(), "aplan.cs");
         let mut field = proposed();
-        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Done);
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Submitted);
         assert_eq!(field.text(), "plan.csv");
     }
 
     #[test]
     fn a_wrong_text_is_not_accepted() {
-        let check: Check = |text| if text.is_empty() { Err("write something".to_owned()) } else { Ok(()) };
+        let check: Validator = |text| if text.is_empty() { Err("write something".to_owned()) } else { Ok(()) };
         let mut field = TextField::new("note", "").checked(check);
-        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Changed);
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Changed);
         assert_eq!(field.problem().as_deref(), Some("write something"));
         typed(&mut field, &[KeyCode::Char('x')]);
-        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), Reaction::Done);
-        assert_eq!(field.on_key(Key::plain_code(KeyCode::Esc)), Reaction::Cancelled);
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Submitted);
+        assert_eq!(field.on_key(Key::plain_code(KeyCode::Esc)), FieldOutcome::Cancelled);
     }
 
     #[test]

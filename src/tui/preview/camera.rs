@@ -1,7 +1,7 @@
-//! Where the scene is looked at from, and how points of the robot base become dots.
+//! The camera: how points in the robot base become dots.
 //!
-//! x of the screen goes to the right, y down; depth is the distance along the view direction (m). Every number that comes in
-//! is made finite and kept in its range, so that nothing that goes out is ever NaN.
+//! On the screen x goes right and y down; depth is the distance along the view direction (m). All inputs are made finite and kept
+//! in their ranges, so that no output is ever NaN.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -9,30 +9,30 @@ use nalgebra::{Point3, Vector3};
 
 use crate::units::DEGREE;
 
-/// Steepest view (rad): straight down would have no upright.
+/// Steepest view (rad). Straight down would leave the upright direction undefined.
 const STEEPEST: f64 = FRAC_PI_2 - DEGREE;
 /// Smallest and largest zoom.
 const ZOOM: (f64, f64) = (0.05, 50.0);
-/// Farthest that the view can be moved aside, in sizes of what is shown.
+/// Largest pan, as a multiple of the height of the picture.
 const FARTHEST_PAN: f64 = 10.0;
-/// Opening of the perspective view (rad), along the height of what is shown.
+/// Opening angle of the perspective view along the height (rad).
 const OPENING: f64 = 30.0 * DEGREE;
-/// Part of the area that is used.
+/// Used part of the area.
 const USED: f64 = 0.88;
-/// Nothing nearer than this is drawn (m).
+/// Nearest depth that is drawn (m).
 const NEAREST: f64 = 1e-3;
 
-/// How depth is shown.
+/// Kind of projection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Projection {
-    /// What is farther is smaller.
+    /// Distant objects are smaller.
     #[default]
     Perspective,
     /// Parallel lines stay parallel.
     Orthographic,
 }
 
-/// What is kept in view.
+/// What the picture frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Framing {
     /// The arm.
@@ -40,20 +40,20 @@ pub enum Framing {
     Arm,
     /// Everything: points and tracker too.
     All,
-    /// The reflector, from near.
+    /// The reflector, close up.
     Reflector,
 }
 
-/// A camera that circles what it looks at.
+/// A camera that orbits the centre of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     yaw: f64,
     pitch: f64,
     zoom: f64,
     pan: (f64, f64),
-    /// How depth is shown.
+    /// Kind of projection.
     pub projection: Projection,
-    /// What is kept in view.
+    /// What the picture frames.
     pub framing: Framing,
 }
 
@@ -71,44 +71,44 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// From this direction: `yaw` about the vertical from the x axis of the base, `pitch` above the horizon (rad).
+    /// A camera in this direction: `yaw` about the vertical from the x axis of the base, `pitch` above the horizon (rad).
     pub fn from_direction(yaw: f64, pitch: f64) -> Self {
         let mut camera = Self { yaw: 0.0, pitch: 0.0, ..Self::default() };
         camera.orbit(yaw, pitch);
         camera
     }
 
-    /// Direction from which it looks: yaw and pitch (rad).
+    /// Direction of the camera: yaw and pitch (rad).
     pub const fn direction(&self) -> (f64, f64) {
         (self.yaw, self.pitch)
     }
 
-    /// Circles by these angles (rad).
+    /// Orbits by these angles (rad).
     pub fn orbit(&mut self, yaw: f64, pitch: f64) {
         let turned = finite(self.yaw + finite(yaw, 0.0), 0.0);
         self.yaw = turned - 2.0 * PI * (turned / (2.0 * PI)).round();
         self.pitch = finite(self.pitch + finite(pitch, 0.0), 0.0).clamp(-STEEPEST, STEEPEST);
     }
 
-    /// Makes everything larger by a factor.
+    /// Enlarges the picture by a factor.
     pub fn zoom(&mut self, factor: f64) {
         if factor > 0.0 {
             self.zoom = finite(self.zoom * factor, 1.0).clamp(ZOOM.0, ZOOM.1);
         }
     }
 
-    /// Moves the picture aside, in parts of its height; right and up are positive.
+    /// Pans the picture by parts of its height; right and up are positive.
     pub fn pan(&mut self, right: f64, up: f64) {
         let moved = |from: f64, by: f64| finite(from + finite(by, 0.0), 0.0).clamp(-FARTHEST_PAN, FARTHEST_PAN);
         self.pan = (moved(self.pan.0, right / self.zoom), moved(self.pan.1, up / self.zoom));
     }
 
-    /// Back to the first view; the kind of projection stays.
+    /// Resets the view, except for the kind of projection.
     pub fn reset(&mut self) {
         *self = Self { projection: self.projection, ..Self::default() };
     }
 
-    /// The view on an area of so many dots that has all of `shown` (points with a radius, m) in it, before zoom and pan.
+    /// The view on an area of `width` × `height` dots that frames `shown` (points with radii, m), before zoom and pan.
     pub fn view(&self, width: usize, height: usize, shown: &[(Point3<f64>, f64)]) -> View {
         let (width, height) = (width.max(1) as f64, height.max(1) as f64);
         let (sin_yaw, cos_yaw) = self.yaw.sin_cos();
@@ -121,7 +121,7 @@ impl Camera {
         let scale = USED * (width / extent_x.max(0.01)).min(height / extent_y.max(0.01));
         let visible = height / scale;
         let depth = (deep / 2.0).max(0.01);
-        // The whole scene lies before the eye.
+        // The whole scene is in front of the eye.
         let distance = (visible.max(extent_x * height / width) / (2.0 * (OPENING / 2.0).tan())).max(1.5 * depth);
         let pan = -right * (self.pan.0 * visible) - up * (self.pan.1 * visible);
         let scale = scale * self.zoom;
@@ -143,7 +143,7 @@ fn finite(value: f64, otherwise: f64) -> f64 {
     if value.is_finite() { value } else { otherwise }
 }
 
-/// Middle of points with radii, and how far they extend along three directions.
+/// Centre of points with radii, and their extents along three directions.
 fn bounds(shown: &[(Point3<f64>, f64)], along: &[Vector3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
     let is_usable = |(point, radius): &&(Point3<f64>, f64)| {
         radius.is_finite() && *radius >= 0.0 && *radius < 1e6 && point.iter().all(|x| x.is_finite() && x.abs() < 1e6)
@@ -166,7 +166,7 @@ fn bounds(shown: &[(Point3<f64>, f64)], along: &[Vector3<f64>; 3]) -> (Point3<f6
     (centre, extents)
 }
 
-/// A camera on an area of dots.
+/// A camera applied to an area of dots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     eye: Point3<f64>,
@@ -178,32 +178,32 @@ pub struct View {
     scale: f64,
     distance: f64,
     projection: Projection,
-    /// Nearest and farthest depth of what is shown.
+    /// Nearest and farthest depth of the scene.
     pub depths: (f64, f64),
 }
 
-/// Where a point is on the screen, in dots, and how far away (m).
+/// Position of a point on the screen (dots), and its depth (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projected {
-    /// To the right.
+    /// Dots to the right.
     pub x: f64,
-    /// Down.
+    /// Dots down.
     pub y: f64,
-    /// Along the view direction.
+    /// Distance along the view direction.
     pub depth: f64,
 }
 
-/// What a dot sees: points `origin + t · direction`, `t` the depth.
+/// The ray of a dot: points `origin + t · direction`, where `t` is the depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts.
+    /// Start of the ray.
     pub origin: Point3<f64>,
-    /// Along it; its part in the view direction is 1.
+    /// Direction, with a component of 1 along the view direction.
     pub direction: Vector3<f64>,
 }
 
 impl View {
-    /// Where a point is; none behind the eye or when it is no point.
+    /// Projects a point; `None` behind the eye or if it is not finite.
     pub fn project(&self, point: &Point3<f64>) -> Option<Projected> {
         let seen = point - self.eye;
         let depth = seen.dot(&self.forward);
@@ -224,7 +224,7 @@ impl View {
         }
     }
 
-    /// What the middle of a dot sees.
+    /// The ray of the centre of a dot.
     pub fn ray(&self, x: usize, y: usize) -> Ray {
         let aside = (x as f64 + 0.5 - self.middle.0) / self.scale;
         let above = (self.middle.1 - y as f64 - 0.5) / self.scale;
@@ -239,12 +239,12 @@ impl View {
         }
     }
 
-    /// A direction of the base as the screen has it: right, up, towards the eye.
+    /// A direction of the base in screen axes: right, up, towards the eye.
     pub fn turned(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         Vector3::new(direction.dot(&self.right), direction.dot(&self.up), -direction.dot(&self.forward))
     }
 
-    /// How far back a depth is in what is shown: 0 in front, 1 at the back.
+    /// Relative depth in the scene: 0 in front, 1 at the back.
     pub fn farness(&self, depth: f64) -> f64 {
         ((depth - self.depths.0) / (self.depths.1 - self.depths.0)).clamp(0.0, 1.0)
     }

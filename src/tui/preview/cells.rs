@@ -1,4 +1,4 @@
-//! The character that stands for 2 × 4 dots: braille, half blocks or ASCII.
+//! Characters for cells of 2 × 4 dots: braille, half blocks or ASCII.
 
 use super::raster::CellDots;
 use crate::tui::glyphs::Glyphs;
@@ -7,10 +7,10 @@ use crate::tui::glyphs::Glyphs;
 const BRAILLE: [u32; 8] = [0x01, 0x08, 0x02, 0x10, 0x04, 0x20, 0x40, 0x80];
 /// Half blocks: none, upper, lower, both.
 const HALVES: [char; 4] = [' ', '▀', '▄', '█'];
-/// Fill of a solid, dark to bright.
+/// Fill of a solid, from dark to bright.
 const RAMP: [char; 6] = ['.', ':', '-', '=', '+', '%'];
 
-/// Shapes of characters; rows from the top, each left and right dot.
+/// Shapes of characters: rows from the top, each with its left and right dot.
 const SHAPES: [(char, [u8; 4]); 27] = [
     ('\'', [0b10, 0b10, 0b00, 0b00]),
     ('\'', [0b01, 0b01, 0b00, 0b00]),
@@ -41,7 +41,7 @@ const SHAPES: [(char, [u8; 4]); 27] = [
     ('#', [0b11, 0b11, 0b11, 0b01]),
 ];
 
-/// The character for a cell; none where nothing is lit.
+/// The character for a cell; `None` if no dot is lit.
 pub(super) fn character(cell: CellDots, glyphs: Glyphs) -> Option<char> {
     match glyphs {
         Glyphs::Unicode => braille(cell.lit),
@@ -62,7 +62,7 @@ fn half_block(lit: u8) -> Option<char> {
     HALVES.get(upper + 2 * lower).copied().filter(|c| *c != ' ')
 }
 
-/// Lines and outlines by their shape, the inside of solids by its brightness.
+/// The character for lines and outlines by shape, for the inside of solids by brightness.
 fn ascii(cell: CellDots) -> Option<char> {
     if cell.lines == 0 {
         let level = cell.tone as usize * RAMP.len() / 121;

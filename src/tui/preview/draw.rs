@@ -1,34 +1,31 @@
-//! Draws a scene into dots, solids first, and says where words and signs go.
+//! Drawing a scene into dots, solids first, and placing its labels.
 
 use nalgebra::{Point3, Vector3};
 
 use super::camera::{Camera, Framing, View};
 use super::raster::{Material, Raster, Solid, Stroke};
-use super::scene::{Arm, Look, MarkKind, Scene};
+use super::scene::{ArmStyle, DrawnArm, MarkKind, Scene};
 use crate::tui::glyphs::Glyphs;
 use crate::tui::theme::Role;
 
-/// What is kept in view around a reflector (m).
+/// Radius around the reflector that is framed (m).
 const AROUND_REFLECTOR: f64 = 0.25;
-/// Most lines of the floor grid on each side of the base.
+/// Largest number of lines of the floor grid on each side of the base.
 const GRID: i32 = 4;
 /// Columns below which words are left out.
 const FEW_COLUMNS: usize = 30;
 
-/// A word or sign over the picture.
+/// A word or symbol over the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Label {
-    /// Cell.
     pub(super) column: usize,
-    /// Cell.
     pub(super) row: usize,
-    /// What it looks like.
     pub(super) role: Role,
-    sign: Sign,
+    symbol: Symbol,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Sign {
+enum Symbol {
     Word(&'static str),
     Next,
     Reflector,
@@ -36,18 +33,18 @@ enum Sign {
 }
 
 impl Label {
-    /// What is written.
+    /// The text of the label.
     pub(super) const fn text(&self, glyphs: Glyphs) -> &'static str {
-        match self.sign {
-            Sign::Word(word) => word,
-            Sign::Next => glyphs.next(),
-            Sign::Reflector => glyphs.reflector(),
-            Sign::Doubt => glyphs.doubt(),
+        match self.symbol {
+            Symbol::Word(word) => word,
+            Symbol::Next => glyphs.next(),
+            Symbol::Reflector => glyphs.reflector(),
+            Symbol::Doubt => glyphs.doubt(),
         }
     }
 }
 
-/// Draws everything.
+/// Draws the scene, and returns its labels.
 pub(super) fn scene(scene: &Scene, camera: &Camera, raster: &mut Raster) -> Vec<Label> {
     let shown = match (camera.framing, scene.reflector()) {
         (Framing::Reflector, Some(reflector)) => vec![(reflector, AROUND_REFLECTOR)],
@@ -57,7 +54,7 @@ pub(super) fn scene(scene: &Scene, camera: &Camera, raster: &mut Raster) -> Vec<
     let view = camera.view(raster.width(), raster.height(), &shown);
     let floor = scene.floor.unwrap_or(f64::NEG_INFINITY);
     let mut part = 1;
-    for arm in scene.arms.iter().filter(|arm| arm.look == Look::Solid) {
+    for arm in scene.arms.iter().filter(|arm| arm.style == ArmStyle::Solid) {
         for body in &arm.bodies {
             let solid = Solid { from: body.from, to: body.to, radius: body.radius, above: floor };
             raster.solid(&view, &solid, Material::Nominal, part);
@@ -76,7 +73,7 @@ pub(super) fn scene(scene: &Scene, camera: &Camera, raster: &mut Raster) -> Vec<
     for space in &scene.keep_out {
         draw_box(&view, &space.min, &space.max, raster);
     }
-    for arm in scene.arms.iter().filter(|arm| arm.look == Look::Dashed) {
+    for arm in scene.arms.iter().filter(|arm| arm.style == ArmStyle::Dashed) {
         draw_dashed(&view, arm, raster);
     }
     if let Some(beam) = &scene.beam {
@@ -85,26 +82,26 @@ pub(super) fn scene(scene: &Scene, camera: &Camera, raster: &mut Raster) -> Vec<
     for error in &scene.errors {
         let tip = error.at + error.error * scene.exaggeration;
         raster.line(&view, &error.at, &tip, Material::Error, Stroke::ByDepth);
-        blot(&view, &tip, Material::Error, raster);
+        draw_spot(&view, &tip, Material::Error, raster);
     }
     for mark in &scene.marks {
         match mark.kind {
-            MarkKind::Left => {
-                // Upright, so that it is no dot of the floor.
+            MarkKind::Open => {
+                // Two dots, to tell it from a dot of the floor.
                 if let Some(seen) = view.project(&mark.at) {
-                    raster.dot(seen.x, seen.y, seen.depth, Material::Left);
-                    raster.dot(seen.x, seen.y + 1.0, seen.depth, Material::Left);
+                    raster.dot(seen.x, seen.y, seen.depth, Material::Open);
+                    raster.dot(seen.x, seen.y + 1.0, seen.depth, Material::Open);
                 }
             }
-            MarkKind::Done => blot(&view, &mark.at, Material::Done, raster),
+            MarkKind::Done => draw_spot(&view, &mark.at, Material::Done, raster),
             MarkKind::Next | MarkKind::Doubt => {}
         }
     }
     labels(scene, &view, raster)
 }
 
-/// 2 × 2 dots.
-fn blot(view: &View, at: &Point3<f64>, material: Material, raster: &mut Raster) {
+/// Draws a spot of 2 × 2 dots.
+fn draw_spot(view: &View, at: &Point3<f64>, material: Material, raster: &mut Raster) {
     if let Some(seen) = view.project(at) {
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
             raster.dot(seen.x + x, seen.y + y, seen.depth, material);
@@ -112,7 +109,7 @@ fn blot(view: &View, at: &Point3<f64>, material: Material, raster: &mut Raster) 
     }
 }
 
-/// A head on three legs.
+/// Draws the tracker as a head on three legs.
 fn draw_tracker(view: &View, tracker: &Point3<f64>, floor: f64, raster: &mut Raster, part: u16) {
     let head = Solid { from: *tracker, to: tracker - Vector3::z() * 0.25, radius: 0.11, above: floor };
     raster.solid(view, &head, Material::Tracker, part);
@@ -125,7 +122,7 @@ fn draw_tracker(view: &View, tracker: &Point3<f64>, floor: f64, raster: &mut Ras
     }
 }
 
-/// Squares of a round size around the base, and the axes x and y.
+/// Draws the floor as squares of a round size around the base, and the axes x and y.
 fn draw_floor(view: &View, height: f64, radius: f64, raster: &mut Raster) {
     let size = [0.1, 0.25, 0.5, 1.0].into_iter().find(|size| size * f64::from(GRID) >= radius).unwrap_or(2.0);
     let lines = (1..GRID).find(|lines| size * f64::from(*lines) >= radius).unwrap_or(GRID);
@@ -163,8 +160,8 @@ fn draw_box(view: &View, min: &Point3<f64>, max: &Point3<f64>, raster: &mut Rast
     }
 }
 
-/// Dashes from joint to joint, a blot on each.
-fn draw_dashed(view: &View, arm: &Arm, raster: &mut Raster) {
+/// Draws dashes from joint to joint, and a spot on each.
+fn draw_dashed(view: &View, arm: &DrawnArm, raster: &mut Raster) {
     let points: Vec<&Point3<f64>> = arm.joints.iter().chain(&arm.reflector).collect();
     for pair in points.windows(2) {
         if let [from, to] = pair {
@@ -172,13 +169,13 @@ fn draw_dashed(view: &View, arm: &Arm, raster: &mut Raster) {
         }
     }
     for point in points {
-        blot(view, point, Material::Identified, raster);
+        draw_spot(view, point, Material::Identified, raster);
     }
 }
 
 fn labels(scene: &Scene, view: &View, raster: &Raster) -> Vec<Label> {
     let mut labels = Vec::new();
-    let mut put = |at: &Point3<f64>, sign: Sign, role: Role, hides: bool| {
+    let mut put = |at: &Point3<f64>, symbol: Symbol, role: Role, hides: bool| {
         let Some(seen) = view.project(at) else { return };
         if hides && raster.is_hidden(seen.x, seen.y, seen.depth) {
             return;
@@ -187,25 +184,25 @@ fn labels(scene: &Scene, view: &View, raster: &Raster) -> Vec<Label> {
         if inside(seen.x, raster.width()) && inside(seen.y, raster.height()) {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the picture")]
             let (column, row) = (seen.x as usize / 2, seen.y as usize / 4);
-            labels.push(Label { column, row, role, sign });
+            labels.push(Label { column, row, role, symbol });
         }
     };
     let axis = axis_length(scene.radius()) * 1.08;
     if let Some(height) = scene.floor {
-        put(&Point3::new(axis, 0.0, height), Sign::Word("x"), Role::Dim, true);
-        put(&Point3::new(0.0, axis, height), Sign::Word("y"), Role::Dim, true);
+        put(&Point3::new(axis, 0.0, height), Symbol::Word("x"), Role::Dim, true);
+        put(&Point3::new(0.0, axis, height), Symbol::Word("y"), Role::Dim, true);
     }
     if let Some(tracker) = scene.tracker.filter(|_| raster.width() >= 2 * FEW_COLUMNS) {
-        put(&(tracker + Vector3::z() * 0.25), Sign::Word("tracker"), Role::Title, true);
+        put(&(tracker + Vector3::z() * 0.25), Symbol::Word("tracker"), Role::Title, true);
     }
     if let Some(reflector) = scene.reflector() {
-        put(&reflector, Sign::Reflector, Role::Title, true);
+        put(&reflector, Symbol::Reflector, Role::Title, true);
     }
     for mark in &scene.marks {
         match mark.kind {
-            MarkKind::Next => put(&mark.at, Sign::Next, Role::Warn, false),
-            MarkKind::Doubt => put(&mark.at, Sign::Doubt, Role::Alarm, false),
-            MarkKind::Left | MarkKind::Done => {}
+            MarkKind::Next => put(&mark.at, Symbol::Next, Role::Warn, false),
+            MarkKind::Doubt => put(&mark.at, Symbol::Doubt, Role::Alarm, false),
+            MarkKind::Open | MarkKind::Done => {}
         }
     }
     labels

@@ -1,7 +1,7 @@
 //! A grid of dots with a depth buffer: capsules, lines and points go in, lit dots come out.
 //!
-//! Solids are filled with a dither of their brightness and outlined where something farther begins; lines are dotted the
-//! wider the farther they are. So depth can be read with one colour, and what is near hides what is far.
+//! Solids are filled with a dither of their brightness and outlined at steps in depth; lines are dotted more widely the farther away
+//! they are. Depth can therefore be read with a single colour, and near objects hide far ones.
 
 use std::ops::Range;
 
@@ -11,14 +11,14 @@ use super::camera::{Ray, View};
 
 /// Largest number of samples of one line, as a multiple of width + height.
 const SAMPLES: usize = 4;
-/// Two surfaces nearer than this touch (m): a crease, not a step.
+/// Difference in depth up to which two surfaces touch (m): a crease, not a step.
 const CREASE: f32 = 0.03;
 /// Order of the dither (Bayer, 4 × 4).
 const DITHER: [u8; 16] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
-/// Where the light comes from, as the screen has it: left, above, in front.
+/// Direction of the light in screen axes: left, above, in front.
 const LIGHT: Vector3<f64> = Vector3::new(-0.45, 0.65, 0.61);
 
-/// What a dot belongs to; the later ones win a cell that several share.
+/// Material of a dot. In a cell with several materials the later one wins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Material {
     /// Nothing.
@@ -36,30 +36,30 @@ pub(super) enum Material {
     Identified,
     /// The beam.
     Beam,
-    /// A planned point that waits.
-    Left,
-    /// A point that is measured.
+    /// A planned point that is not measured yet.
+    Open,
+    /// A measured point.
     Done,
     /// An error vector.
     Error,
 }
 
-/// A dot.
+/// A dot of the raster.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Dot {
     material: Material,
-    /// Which solid; 0 for lines and the empty.
+    /// Number of the solid; 0 for lines and empty dots.
     part: u16,
-    /// Brightness of a solid, 0 … 15; a line is always lit.
+    /// Brightness of a solid, 0 … 15. A line is always lit.
     tone: u8,
 }
 
 /// How a line is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stroke {
-    /// Solid in front, dotted the wider the farther.
+    /// Solid in front, dotted more widely with depth.
     ByDepth,
-    /// Dotted, wider with depth.
+    /// Dotted, more widely with depth.
     Dotted,
     /// Dashes.
     Dashed,
@@ -67,7 +67,7 @@ pub(super) enum Stroke {
     Thick,
 }
 
-/// A solid line with a thickness.
+/// A capsule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Solid {
     /// One end (m).
@@ -76,11 +76,11 @@ pub(super) struct Solid {
     pub(super) to: Point3<f64>,
     /// Distance to the surface (m).
     pub(super) radius: f64,
-    /// Nothing of it below this height is seen (m).
+    /// The part below this height is hidden (m).
     pub(super) above: f64,
 }
 
-/// The dots.
+/// A grid of dots with depths.
 #[derive(Clone, Debug)]
 pub(super) struct Raster {
     width: usize,
@@ -90,7 +90,7 @@ pub(super) struct Raster {
 }
 
 impl Raster {
-    /// Empty, `width` × `height` dots.
+    /// An empty raster of `width` × `height` dots.
     pub(super) fn new(width: usize, height: usize) -> Self {
         let count = width * height;
         Self { width, height, depths: vec![f32::INFINITY; count], dots: vec![Dot::default(); count] }
@@ -111,16 +111,16 @@ impl Raster {
         (x < self.width && y < self.height).then_some(y * self.width + x)
     }
 
-    /// Whether something at this place and depth would be hidden.
+    /// Whether a dot at this position and depth is hidden.
     pub(super) fn is_hidden(&self, x: f64, y: f64, depth: f64) -> bool {
         self.index(x, y).is_some_and(|index| f64::from(self.depths[index]) < depth - f64::from(CREASE))
     }
 
-    /// Lights a dot unless something nearer is there.
+    /// Sets a dot, unless it is hidden.
     pub(super) fn dot(&mut self, x: f64, y: f64, depth: f64, material: Material) {
         let Some(index) = self.index(x, y) else { return };
         let depth = single(depth);
-        // On a surface means in front of it.
+        // A dot on a surface is drawn in front of it.
         if depth <= self.depths[index] + CREASE {
             self.depths[index] = self.depths[index].min(depth);
             self.dots[index] = Dot { material, part: 0, tone: 15 };
@@ -171,7 +171,7 @@ impl Raster {
         }
     }
 
-    /// Draws a solid; `part` tells it from its neighbours.
+    /// Draws a solid. `part` distinguishes it from its neighbours.
     pub(super) fn solid(&mut self, view: &View, solid: &Solid, material: Material, part: u16) {
         let Some(Extent { columns, rows, band }) = self.extent(view, solid) else { return };
         for y in rows {
@@ -200,13 +200,13 @@ impl Raster {
         let mut low = (f64::INFINITY, f64::INFINITY);
         let mut high = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         for end in [&solid.from, &solid.to] {
-            // Partly behind the eye: it may be anywhere.
+            // A solid that is partly behind the eye may be anywhere.
             let Some(seen) = view.project(end) else { return Some(all) };
             let nearest = seen.depth - solid.radius;
             if nearest <= 0.05 {
                 return Some(all);
             }
-            // Wide enough for a sphere seen askew.
+            // Wide enough for a sphere seen at an angle.
             let around = 1.0 + solid.radius * view.scale_at(nearest) * 1.3;
             band = Band { from: band.to, to: (seen.x, seen.y), half: around.max(band.half) };
             low = (low.0.min(seen.x - around), low.1.min(seen.y - around));
@@ -245,7 +245,7 @@ impl Raster {
             || (y + 1 < self.height && differs(index + self.width))
     }
 
-    /// What a cell of 2 × 4 dots shows.
+    /// The content of a cell of 2 × 4 dots.
     pub(super) fn cell(&self, column: usize, row: usize) -> CellDots {
         let mut cell = CellDots::default();
         let mut weights = [(Material::Empty, 0_u32); 8];
@@ -290,13 +290,13 @@ impl Raster {
 /// The dots of a cell: bit 2·row + column.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct CellDots {
-    /// All that are lit.
+    /// All lit dots.
     pub(super) lit: u8,
-    /// Those of lines and outlines.
+    /// Dots of lines and outlines.
     pub(super) lines: u8,
-    /// Sum of the brightness of the rest, 0 … 120.
+    /// Sum of the brightness of the other dots, 0 … 120.
     pub(super) tone: u32,
-    /// What most of it is.
+    /// Prevailing material.
     pub(super) material: Material,
 }
 
@@ -305,11 +305,11 @@ pub(super) struct CellDots {
 struct Extent {
     columns: Range<usize>,
     rows: Range<usize>,
-    /// None: anywhere in there.
+    /// Narrower bound, if there is one.
     band: Option<Band>,
 }
 
-/// All within a distance of a line, in dots.
+/// All dots within a distance of a line.
 #[derive(Clone, Copy, Debug)]
 struct Band {
     from: (f64, f64),
@@ -318,7 +318,7 @@ struct Band {
 }
 
 impl Band {
-    /// Whether the middle of a dot is inside.
+    /// Whether the centre of a dot is inside.
     fn may_cover(&self, x: usize, y: usize) -> bool {
         let (x, y) = (x as f64 + 0.5 - self.from.0, y as f64 + 0.5 - self.from.1);
         let (dx, dy) = (self.to.0 - self.from.0, self.to.1 - self.from.1);
@@ -376,20 +376,20 @@ fn hit(ray: &Ray, solid: &Solid) -> Option<(f64, Vector3<f64>)> {
     Some((depth, normal))
 }
 
-/// The whole part of a number that is not negative.
+/// The integer part of a number that is not negative.
 fn whole(value: f64) -> Option<usize> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be small and not negative")]
     (0.0..1e9).contains(&value).then_some(value as usize)
 }
 
-/// Single precision is enough for depths.
+/// Converts to single precision, which is enough for depths.
 const fn single(value: f64) -> f32 {
     #[expect(clippy::cast_possible_truncation, reason = "less precise, never wrong: the largest become infinite")]
     let single = value as f32;
     single
 }
 
-/// Brightness 0 … 1 as 0 … 15.
+/// Maps a brightness of 0 … 1 to 0 … 15.
 fn tone(brightness: f64) -> u8 {
     whole((brightness * 16.0).clamp(0.0, 15.0)).and_then(|tone| u8::try_from(tone).ok()).unwrap_or(0)
 }

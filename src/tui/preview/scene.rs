@@ -1,4 +1,4 @@
-//! What is in the picture, in the robot base (m). Plain data: no camera, no dots.
+//! The content of the picture in the robot base (m). Plain data without camera or dots.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -11,17 +11,16 @@ use crate::session::state::Session;
 use crate::session::station;
 use crate::units::from_mm;
 
-/// Thickness of an arm whose profile has no bodies, as a part of its length.
+/// Radius of an arm whose profile has no bodies, as a part of its length.
 const SLENDER: f64 = 0.035;
-/// Thickness of an arm that is compared with another, as a part of its reach.
+/// Radius of an arm that is compared with another, as a part of its reach.
 const THIN: f64 = 0.008;
-/// Size of a base without bodies, as a part of the arm's length.
+/// Radius of the base of an arm without bodies, as a part of its length.
 const BASE: f64 = 0.09;
-
-/// Longest error or difference as a part of the arm's reach.
+/// Longest drawn error or difference, as a part of the arm's reach.
 const LONGEST_ERROR: f64 = 0.15;
 
-/// The middle of each range (rad) or (m).
+/// The middle of each joint range (rad, sliding joints m).
 fn rest(profile: &Profile) -> Vec<f64> {
     let middle = |range: &crate::profile::JointRange| {
         range.planning_limits.or(range.limits).map_or(0.0, |(low, high)| f64::midpoint(low, high))
@@ -29,31 +28,27 @@ fn rest(profile: &Profile) -> Vec<f64> {
     profile.joints().iter().map(middle).collect()
 }
 
-/// How an arm is drawn.
+/// Style of a drawn arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
-    /// Solid: the nominal arm.
+pub enum ArmStyle {
+    /// Solid bodies: the nominal arm.
     Solid,
     /// Dashed lines through the joints: the identified arm.
     Dashed,
 }
 
-/// A line with a thickness.
+/// A capsule (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
-    /// One end.
     pub from: Point3<f64>,
-    /// The other end.
     pub to: Point3<f64>,
-    /// Distance to the surface.
     pub radius: f64,
 }
 
-/// An arm at a configuration.
+/// An arm at a configuration, to be drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Arm {
-    /// How it is drawn.
-    pub look: Look,
+pub struct DrawnArm {
+    pub style: ArmStyle,
     /// Castings, from the base to the flange.
     pub bodies: Vec<Body>,
     /// Origins of the link frames, from the base to the flange.
@@ -62,10 +57,10 @@ pub struct Arm {
     pub reflector: Option<Point3<f64>>,
 }
 
-impl Arm {
-    /// The arm of `profile` with the link constants of `chain` at the pendant configuration `q` ((rad) or (m)) with the
-    /// target of number `target`.
-    pub fn new(profile: &Profile, chain: &KinematicChain, q: &[f64], target: usize, look: Look) -> Self {
+impl DrawnArm {
+    /// The arm of `profile` with the link constants of `chain` at the pendant configuration `q` (rad, sliding joints m), with
+    /// the target of index `target`.
+    pub fn new(profile: &Profile, chain: &KinematicChain, q: &[f64], target: usize, style: ArmStyle) -> Self {
         let mut q = q.to_vec();
         q.resize(chain.dof(), 0.0);
         let forward = ForwardKinematics::new(chain);
@@ -74,11 +69,11 @@ impl Arm {
         let bodies = if profile.bodies().is_empty() { slender(&joints) } else { castings(profile, &frames) };
         let reflector =
             profile.targets().get(target).map(|target| forward.point_in_base(&q, &target.position_in_flange));
-        Self { look, bodies, joints, reflector }
+        Self { style, bodies, joints, reflector }
     }
 }
 
-/// The bodies of a profile where they are.
+/// The bodies of a profile at their positions.
 fn castings(profile: &Profile, frames: &[Isometry3<f64>]) -> Vec<Body> {
     let place = |body: &crate::profile::Capsule| {
         let frame = frames.get(body.link)?;
@@ -87,105 +82,105 @@ fn castings(profile: &Profile, frames: &[Isometry3<f64>]) -> Vec<Body> {
     profile.bodies().iter().filter_map(place).collect()
 }
 
+/// The lines from the base through the joints.
+fn links(joints: &[Point3<f64>]) -> impl Iterator<Item = (Point3<f64>, Point3<f64>)> {
+    let starts = std::iter::once(Point3::origin()).chain(joints.iter().copied());
+    starts.zip(joints.iter().copied())
+}
+
 /// Thin bodies along the joints.
 fn thin(joints: &[Point3<f64>]) -> Vec<Body> {
-    let reach = joints.last().map_or(1.0, |last| last.coords.norm());
-    let from = std::iter::once(&Point3::origin()).chain(joints).copied().collect::<Vec<_>>();
-    from.into_iter().zip(joints).map(|(from, to)| Body { from, to: *to, radius: THIN * reach }).collect()
+    let radius = THIN * joints.last().map_or(1.0, |last| last.coords.norm());
+    links(joints).map(|(from, to)| Body { from, to, radius }).collect()
 }
 
-/// Bodies along the joints of an arm that has none.
+/// Bodies along the joints of an arm whose profile has none.
 fn slender(joints: &[Point3<f64>]) -> Vec<Body> {
-    let links =
-        || std::iter::once(&Point3::origin()).chain(joints).copied().zip(joints.iter().copied()).collect::<Vec<_>>();
-    let length: f64 = links().iter().map(|(from, to)| (to - from).norm()).sum();
-    let base = Body { from: Point3::origin(), to: Point3::origin(), radius: BASE * length };
-    let long = links().into_iter().filter(|(from, to)| (to - from).norm() > 1e-6);
-    std::iter::once(base).chain(long.map(|(from, to)| Body { from, to, radius: SLENDER * length })).collect()
+    let length: f64 = links(joints).map(|(from, to)| (to - from).norm()).sum();
+    let mut bodies = vec![Body { from: Point3::origin(), to: Point3::origin(), radius: BASE * length }];
+    let long = links(joints).filter(|(from, to)| (to - from).norm() > 1e-6);
+    bodies.extend(long.map(|(from, to)| Body { from, to, radius: SLENDER * length }));
+    bodies
 }
 
-/// What has become of a point.
+/// State of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarkKind {
-    /// Waits to be measured.
-    Left,
+    /// Not measured yet.
+    Open,
     /// Measured.
     Done,
-    /// The one to go to.
+    /// The next one to measure.
     Next,
-    /// Measured, and in doubt.
+    /// Measured but questioned.
     Doubt,
 }
 
-/// A point.
+/// A point of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
-    /// Where.
     pub at: Point3<f64>,
-    /// What has become of it.
     pub kind: MarkKind,
 }
 
-/// How far a point is from where it should be; drawn longer by the scene's exaggeration.
+/// The error of a point, which is drawn enlarged by the scene's exaggeration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorVector {
-    /// Where it begins.
+    /// Start of the vector.
     pub at: Point3<f64>,
-    /// The error (m), not exaggerated.
+    /// The error itself (m).
     pub error: Vector3<f64>,
 }
 
 /// The beam from tracker to reflector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
-    /// The tracker.
     pub from: Point3<f64>,
-    /// The reflector.
     pub to: Point3<f64>,
 }
 
-/// Everything in the picture.
+/// The content of the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// Arms; the first one is what the camera looks at.
-    pub arms: Vec<Arm>,
+    /// Arms; the camera looks at the first one.
+    pub arms: Vec<DrawnArm>,
     /// Height of the floor.
     pub floor: Option<f64>,
-    /// Boxes to keep out of.
+    /// Boxes that the arm must not enter.
     pub keep_out: Vec<KeepOut>,
-    /// Where the tracker stands.
+    /// Position of the tracker.
     pub tracker: Option<Point3<f64>>,
-    /// What it sees.
+    /// Beam of the tracker.
     pub beam: Option<Beam>,
     /// Planned and measured points.
     pub marks: Vec<Mark>,
     /// Errors of points.
     pub errors: Vec<ErrorVector>,
-    /// Errors are drawn so many times longer than they are.
+    /// Enlargement of the errors.
     pub exaggeration: f64,
-    /// The difference of the second arm from the first is drawn so many times larger than it is; up to 1: as it is.
+    /// Enlargement of the difference between the second arm and the first; up to 1: none.
     pub magnified: f64,
-    /// Verification samples with what they say about both arms.
-    pub checked: Vec<Checked>,
+    /// Verification samples with the errors of both arms.
+    pub verified: Vec<VerifiedPoint>,
 }
 
 /// A verification sample against both arms, in the registration of each.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Checked {
+pub struct VerifiedPoint {
     /// Name of the pose.
     pub pose: String,
-    /// Where the identified arm has the reflector.
+    /// Position of the reflector predicted by the identified arm.
     pub at: Point3<f64>,
-    /// Measured less predicted by the nominal arm (m).
+    /// Measured minus predicted by the nominal arm (m).
     pub nominal: Vector3<f64>,
-    /// Measured less predicted by the identified arm (m).
+    /// Measured minus predicted by the identified arm (m).
     pub identified: Vector3<f64>,
 }
 
 impl Scene {
-    /// The robot of `profile` in its cell at the pendant configuration `q` ((rad) or (m)).
+    /// The robot of `profile` in its cell at the pendant configuration `q` (rad, sliding joints m).
     pub fn of(profile: &Profile, q: &[f64]) -> Self {
-        let arm = Arm::new(profile, profile.chain(), q, 0, Look::Solid);
+        let arm = DrawnArm::new(profile, profile.chain(), q, 0, ArmStyle::Solid);
         let tracker = profile.tracker().position_in_base;
         Self {
             beam: arm.reflector.map(|reflector| Beam { from: tracker, to: reflector }),
@@ -198,12 +193,12 @@ impl Scene {
         }
     }
 
-    /// The robot of `profile` in a configuration in which its shape is seen: the middle of each range, elbow bent.
+    /// The robot of `profile` in the middle of each joint range, where its shape can be seen.
     pub fn at_rest(profile: &Profile) -> Self {
         Self::of(profile, &rest(profile))
     }
 
-    /// The robot of a session at row `row` of its plan, with all points of the plan and what has become of them.
+    /// The robot of a session at row `row` of its plan, with the states of all points of the plan.
     pub fn of_session(session: &Session, row: Option<usize>) -> Option<Self> {
         let profile = &session.robot.as_ref()?.profile;
         let shown = row.and_then(|row| session.rows.get(row));
@@ -214,11 +209,14 @@ impl Scene {
         let forward = ForwardKinematics::new(profile.chain());
         let doubts: Vec<usize> = session.doubts().map(|(sample, _)| sample.row).collect();
         for (index, planned) in session.rows.iter().enumerate().filter(|(_, row)| row.active && !row.skipped) {
-            let kind = match () {
-                () if row == Some(index) => MarkKind::Next,
-                () if doubts.contains(&index) => MarkKind::Doubt,
-                () if session.sample_of_row(index).is_some() => MarkKind::Done,
-                () => MarkKind::Left,
+            let kind = if row == Some(index) {
+                MarkKind::Next
+            } else if doubts.contains(&index) {
+                MarkKind::Doubt
+            } else if session.sample_of_row(index).is_some() {
+                MarkKind::Done
+            } else {
+                MarkKind::Open
             };
             let mut q = planned.planned.configuration.clone();
             q.resize(profile.chain().dof(), 0.0);
@@ -227,7 +225,7 @@ impl Scene {
         Some(scene)
     }
 
-    /// Both arms of a session that is identified; `with_errors`: with what the verification samples say.
+    /// Both arms of an identified session, or if `with_errors` the errors at the verification samples.
     pub fn of_identified(session: &Session, with_errors: bool) -> Option<Self> {
         let profile = session.mounted_profile()?;
         let mut scene = Self::at_rest(&profile);
@@ -244,7 +242,7 @@ impl Scene {
             for (number, point) in result.samples.iter().zip(&result.points) {
                 let Some(sample) = session.sample(*number) else { continue };
                 if session.kind_of(sample) == PoseKind::Verification {
-                    scene.checked.push(Checked {
+                    scene.verified.push(VerifiedPoint {
                         pose: session.pose_of(sample).to_owned(),
                         at: from_xyz_mm(point.at_mm),
                         nominal: from_xyz_mm(point.nominal_mm).coords,
@@ -257,7 +255,7 @@ impl Scene {
         Some(scene)
     }
 
-    /// Puts the tracker where the measured points say that it stands; it stays as planned where they do not.
+    /// Moves the tracker to its registered position. Without a registration it stays as planned.
     fn place_tracker(&mut self, session: &Session) {
         let Some(found) = station::registration(session) else { return };
         let place = Point3::from(found.to_from_from.translation.vector);
@@ -267,15 +265,15 @@ impl Scene {
         }
     }
 
-    /// Shows the errors of the identified or of the nominal arm, each so much longer that the largest is well seen.
+    /// Shows the errors of the identified or of the nominal arm, enlarged so that the largest is clearly visible.
     pub fn show_errors(&mut self, of_identified: bool) {
-        let pick = |one: &Checked| if of_identified { one.identified } else { one.nominal };
-        self.errors = self.checked.iter().map(|one| ErrorVector { at: one.at, error: pick(one) }).collect();
+        let pick = |one: &VerifiedPoint| if of_identified { one.identified } else { one.nominal };
+        self.errors = self.verified.iter().map(|one| ErrorVector { at: one.at, error: pick(one) }).collect();
         let largest = self.errors.iter().map(|vector| vector.error.norm()).fold(0.0, f64::max);
         self.exaggeration = enlargement(largest, LONGEST_ERROR * self.radius());
     }
 
-    /// Moves the second arm away from the first until the difference is seen.
+    /// Enlarges the difference of the second arm from the first until it is visible.
     fn magnify(&mut self) {
         let room = LONGEST_ERROR * self.radius();
         let [nominal, identified] = self.arms.as_mut_slice() else { return };
@@ -292,15 +290,15 @@ impl Scene {
     /// Adds the arm with other link constants, drawn dashed.
     #[must_use]
     pub fn with_identified(mut self, profile: &Profile, identified: &KinematicChain, q: &[f64]) -> Self {
-        self.arms.push(Arm::new(profile, identified, q, 0, Look::Dashed));
+        self.arms.push(DrawnArm::new(profile, identified, q, 0, ArmStyle::Dashed));
         self
     }
 
-    /// The same cell with other points (mm, in the base), all of them to be measured.
+    /// The same cell with other points (mm, in the base), all of them open.
     #[must_use]
     pub fn with_points(mut self, points_mm: impl Iterator<Item = [f64; 3]>) -> Self {
         let at = |point: [f64; 3]| Point3::from(point.map(from_mm));
-        self.marks = points_mm.map(|point| Mark { at: at(point), kind: MarkKind::Left }).collect();
+        self.marks = points_mm.map(|point| Mark { at: at(point), kind: MarkKind::Open }).collect();
         self
     }
 
@@ -316,7 +314,7 @@ impl Scene {
         let floor = self.floor.unwrap_or(f64::NEG_INFINITY);
         bodies
             .flat_map(|body| [(body.from, body.radius), (body.to, body.radius)])
-            // What is below the floor is not seen.
+            // The part below the floor is not visible.
             .map(|(point, radius)| (point, radius.min((point.z - floor).max(0.0))))
             .chain(joints.map(|point| (*point, 0.0)))
             .collect()

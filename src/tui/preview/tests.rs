@@ -22,7 +22,7 @@ fn soochow() -> Scene {
 
 fn with_everything() -> Scene {
     let mut scene = soochow();
-    let kinds = [MarkKind::Left, MarkKind::Done, MarkKind::Next, MarkKind::Doubt];
+    let kinds = [MarkKind::Open, MarkKind::Done, MarkKind::Next, MarkKind::Doubt];
     for (index, kind) in kinds.into_iter().cycle().take(24).enumerate() {
         let (sin, cos) = (index as f64).sin_cos();
         let at = Point3::new(0.9 + 0.4 * cos, 0.8 * sin, 0.5 + 0.04 * index as f64);

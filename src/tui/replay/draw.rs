@@ -1,4 +1,4 @@
-//! What a replay looks like.
+//! Drawing of a replay.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -6,23 +6,25 @@ use ratatui::widgets::Widget as _;
 
 use super::{Page, Replay, SPEEDS};
 use crate::session::plan::PoseKind;
+use crate::session::set_up::Step;
 use crate::session::state::{Sample, SampleState};
-use crate::tui::glyphs::{shortened, width, wrapped};
-use crate::tui::keymap::Item;
+use crate::text::{self, wrapped};
+use crate::tui::glyphs::shortened;
+use crate::tui::keymap::KeyHint;
 use crate::tui::preview::Preview;
 use crate::tui::theme::Role;
 use crate::tui::{frame, paint};
 use crate::units::to_mm;
 
-/// Lines for the entry in words.
+/// Largest number of lines for the entry in words.
 const MOST_WORDS: usize = 4;
-/// Entries before the one that is shown.
+/// Entries listed before the shown one.
 const BEFORE: usize = 3;
-/// Columns that the entries need before the preview gets any.
+/// Least columns of the entries beside the preview.
 const ENTRIES: u16 = 36;
 
 impl Replay {
-    /// Draws it; any size must do.
+    /// Draws the replay at any size.
     pub fn draw(&self, area: Rect, buf: &mut Buffer) {
         let theme = self.theme;
         if !frame::fits(area) {
@@ -32,7 +34,7 @@ impl Replay {
         let area = paint::inset(area, 1);
         self.header(area, buf);
         paint::rule(buf, area, 2, theme.glyphs.rule(), theme.style(Role::Dim));
-        let bottom = frame::footer(&self.items(), theme, area, buf);
+        let bottom = frame::footer(&self.key_hints(), theme, area, buf);
         self.timeline(area, buf);
         let mut row = 4;
         for line in wrapped(&self.words(self.place), area.width.into()).iter().take(MOST_WORDS) {
@@ -52,23 +54,23 @@ impl Replay {
         }
     }
 
-    fn items(&self) -> Vec<Item> {
+    fn key_hints(&self) -> Vec<KeyHint> {
         let next = match self.page {
             Page::Robot => "samples",
             Page::Samples => "result",
             Page::Result => "robot",
         };
         let mut items = vec![
-            Item::new("Space", if self.is_playing { "pause" } else { "play" }, 0),
-            Item::new("Left/Right", "step", 1),
-            Item::new("Home/End", "first, last", 3),
-            Item::new("+/-", "speed", 4),
-            Item::new("Tab", next, 2),
-            Item::new("q", "leave", 1),
+            KeyHint::new("Space", if self.is_playing { "pause" } else { "play" }, 0),
+            KeyHint::new("Left/Right", "step", 1),
+            KeyHint::new("Home/End", "first, last", 3),
+            KeyHint::new("+/-", "speed", 4),
+            KeyHint::new("Tab", next, 2),
+            KeyHint::new("q", "quit", 1),
         ];
         match self.page {
-            Page::Robot => items.push(Item::new("< > Up/Down z v", "turn the picture", 6)),
-            Page::Samples | Page::Result => items.push(Item::new("PgUp/PgDn", "scroll", 5)),
+            Page::Robot => items.push(KeyHint::new("< > Up/Down z v", "turn the picture", 6)),
+            Page::Samples | Page::Result => items.push(KeyHint::new("PgUp/PgDn", "scroll", 5)),
         }
         items
     }
@@ -78,17 +80,17 @@ impl Replay {
         let place = format!("entry {} of {}", self.place + 1, self.lines.len());
         let robot = self.session.robot.as_ref().map_or("no robot yet", |robot| robot.profile.title());
         let title = glyphs.show(&["replay", &self.session.name, robot].join(glyphs.dot()));
-        let room = usize::from(area.width).saturating_sub(width(&place) + 2);
+        let room = usize::from(area.width).saturating_sub(text::columns(&place) + 2);
         paint::text(buf, area, (0, 0), &shortened(&title, room, glyphs), theme.style(Role::Title));
-        let column = u16::try_from(usize::from(area.width).saturating_sub(width(&place))).unwrap_or(0);
+        let column = u16::try_from(usize::from(area.width).saturating_sub(text::columns(&place))).unwrap_or(0);
         paint::text(buf, area, (column, 0), &place, theme.style(Role::Title));
 
         let samples = self.session.counted().count();
         let mut parts = vec![
             self.lines.get(self.place).map_or_else(String::new, |line| format!("{:.0}", line.time)),
-            format!("{samples} {}", if samples == 1 { "sample" } else { "samples" }),
+            text::counted(samples, "sample"),
         ];
-        parts.push(format!("step {} of 8: {}", self.session.step.number(), self.session.step));
+        parts.push(format!("step {} of {}: {}", self.session.step.number(), Step::ALL.len(), self.session.step));
         if self.session.identified.is_some() {
             parts.push(if self.session.is_current() { "identified" } else { "result out of date" }.to_owned());
         }
@@ -100,8 +102,8 @@ impl Replay {
         let (theme, glyphs) = (self.theme, self.theme.glyphs);
         let speed = SPEEDS.get(self.speed).copied().unwrap_or(1.0);
         let state = format!("{} {speed}/s", if self.is_playing { "playing" } else { "paused" });
-        let columns = usize::from(area.width).saturating_sub(width(&state) + 2);
-        // A session of one entry is at its end.
+        let columns = usize::from(area.width).saturating_sub(text::columns(&state) + 2);
+        // A session with a single entry is complete.
         let done = match self.lines.len().saturating_sub(1) {
             0 => columns,
             last => (columns * self.place).div_ceil(last).min(columns),
@@ -156,7 +158,7 @@ impl Replay {
         }
     }
 
-    /// Last line that can be the first one shown.
+    /// Largest scroll position.
     pub(super) fn last_line(&self) -> usize {
         self.page_lines().len().saturating_sub(1)
     }
@@ -180,9 +182,9 @@ impl Replay {
         };
         let state = match sample.state {
             SampleState::Counts => "counts",
-            SampleState::Superseded => "again",
-            SampleState::LeftOut => "left out",
-            SampleState::Undone => "taken back",
+            SampleState::Superseded => "remeasured",
+            SampleState::LeftOut => "excluded",
+            SampleState::Undone => "undone",
         };
         let [x, y, z] = self.session.point_of(sample).coords.map(to_mm).into();
         let pose = self.session.pose_of(sample);

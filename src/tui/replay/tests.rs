@@ -72,7 +72,7 @@ fn drawn(replay: &Replay, width: u16, height: u16) -> String {
     paint::snapshot(&buffer)
 }
 
-fn press(replay: &mut Replay, code: KeyCode) -> After {
+fn press(replay: &mut Replay, code: KeyCode) -> ReplayCommand {
     replay.on_key(Key::plain_code(code))
 }
 
@@ -132,8 +132,8 @@ fn it_plays_to_the_end_and_stops_there() {
     assert!(replay.is_playing);
     press(&mut replay, KeyCode::Right);
     assert_eq!((replay.place, replay.is_playing), (1, false));
-    assert_eq!(press(&mut replay, KeyCode::Char('q')), After::Leave);
-    assert_eq!(replay.on_key(Key::ctrl('z')), After::Suspend);
+    assert_eq!(press(&mut replay, KeyCode::Char('q')), ReplayCommand::Quit);
+    assert_eq!(replay.on_key(Key::ctrl('z')), ReplayCommand::Suspend);
 
     let keys = prop::sample::select(vec![
         KeyCode::Left,

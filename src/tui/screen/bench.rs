@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{Reply, Screen, ScreenCx};
+use super::{Screen, ScreenCx, ScreenOutcome};
 use crate::profile::{Profile, builtin};
 use crate::session::set_up::Step;
 use crate::tui::glyphs::Glyphs;
@@ -44,8 +44,8 @@ pub(crate) fn scene() -> Scene {
 pub(crate) fn drawn(screen: &dyn Screen, view: &ViewModel, theme: Theme, (width, height): (u16, u16)) -> Buffer {
     let (scene, camera) = (scene(), Camera::default());
     let cx = ScreenCx { view, scene: Some(&scene), camera: &camera, theme };
-    let own = screen.items(&cx);
-    let mut items = keymap::items(&view.intents, theme.glyphs);
+    let own = screen.key_hints(&cx);
+    let mut items = keymap::key_hints(&view.intents, theme.glyphs);
     items.retain(|item| !own.iter().any(|own| own.key == item.key));
     items.extend(own);
     items.sort_by_key(|item| item.rank);
@@ -57,12 +57,12 @@ pub(crate) fn drawn(screen: &dyn Screen, view: &ViewModel, theme: Theme, (width,
     buf
 }
 
-pub(crate) fn press(screen: &mut dyn Screen, view: &ViewModel, key: Key) -> Reply {
+pub(crate) fn press(screen: &mut dyn Screen, view: &ViewModel, key: Key) -> ScreenOutcome {
     let (scene, camera) = (scene(), Camera::default());
     screen.on_key(key, &ScreenCx { view, scene: Some(&scene), camera: &camera, theme: themes()[0] })
 }
 
-pub(crate) fn paste(screen: &mut dyn Screen, view: &ViewModel, text: &str) -> Reply {
+pub(crate) fn paste(screen: &mut dyn Screen, view: &ViewModel, text: &str) -> ScreenOutcome {
     let (scene, camera) = (scene(), Camera::default());
     screen.on_paste(text, &ScreenCx { view, scene: Some(&scene), camera: &camera, theme: themes()[0] })
 }

@@ -1,12 +1,12 @@
-//! Capture: where a technician spends two hours. What to do now stands in large digits; everything else is one Tab away.
+//! Screen Capture, where a technician spends two hours. The next configuration is shown in large digits; Tab reaches the rest.
 //!
 //! ```text
-//! Go to       configuration in large digits; or the sample in question with what can be done
-//! Poses       all poses with what became of them; Enter goes to one
-//! Prediction  how good the result would be, and whether the rest is worth its time
-//! Live        what the instrument sees now, over the last seconds
-//! Notes       remarks, and measurements that gave no sample
-//! Picture     the arm, where it is not beside the other views anyway
+//! Go to       configuration in large digits, or the questioned sample with the possible decisions
+//! Poses       all poses with their states; Enter goes to one
+//! Prediction  predicted error of the result, and whether the rest is worth the time
+//! Live        live readings of the last seconds
+//! Notes       notes, drift, and refused measurements
+//! Picture     the arm, if it is not beside the other views anyway
 //! ```
 
 mod go_to;
@@ -21,9 +21,9 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
-use super::{PicturePlace, Reply, Screen, ScreenCx};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::tui::dialog::ask;
-use crate::tui::keymap::{Item, Key};
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::preview::Preview;
 use crate::tui::theme::Role;
@@ -31,15 +31,15 @@ use crate::tui::widget::tabs;
 use crate::wizard::Intent;
 use crate::wizard::view::{CaptureView, Content, ViewModel};
 
-/// Content columns from which on the picture stands beside the views (a terminal of 100).
+/// Content columns from which the picture is beside the views (a terminal of 100).
 const WIDE: u16 = 98;
 /// Columns of the views beside the picture: two joints side by side, and one.
 const VIEWS: [u16; 2] = [72, 46];
-/// Rows that the "go to" view needs besides the joints.
+/// Rows of the "go to" view besides the joints.
 const AROUND_JOINTS: u16 = 7;
 /// Columns between view and picture.
 const GAP: u16 = 2;
-/// Rows that PgUp and PgDn pass over.
+/// Rows that PgUp and PgDn scroll.
 const PAGE: usize = 8;
 
 /// The views.
@@ -62,19 +62,19 @@ impl Tab {
         Self::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
     }
 
-    /// The view so many places on.
+    /// The view `by` places further on.
     fn turned(self, by: usize) -> Self {
         Self::ALL.get((self.index() + by) % Self::ALL.len()).copied().unwrap_or_default()
     }
 }
 
-/// Which view is shown, and where in it.
+/// The shown view and the position in it.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Capture {
+pub(super) struct CaptureScreen {
     tab: Tab,
-    /// Row of the list that has the focus; none: the pose shown.
+    /// Focused row of the list; `None`: the pose shown.
     cursor: Option<usize>,
-    /// Lines of the notes that are scrolled away.
+    /// Scroll position of the notes.
     scroll: usize,
 }
 
@@ -85,24 +85,24 @@ fn content(view: &ViewModel) -> Option<&CaptureView> {
     }
 }
 
-/// Whether coordinates can be typed in now.
+/// Whether coordinates can be typed now.
 fn takes_typing(view: &ViewModel) -> bool {
     view.intents.iter().any(|info| matches!(info.intent, Intent::TypeReading(_)) && info.is_enabled())
 }
 
-/// The question for coordinates, begun with what was typed or pasted.
-fn reading_dialog(cx: &ScreenCx<'_>, begun: &str) -> Reply {
-    Reply::Ask(Box::new(ask::coordinates(cx.view, begun)))
+/// Opens the dialog for coordinates, starting with the text typed or pasted so far.
+fn reading_dialog(cx: &ScreenCx<'_>, begun: &str) -> ScreenOutcome {
+    ScreenOutcome::Open(Box::new(ask::coordinates(cx.view, begun)))
 }
 
-impl Capture {
-    /// The row of the list that has the focus.
+impl CaptureScreen {
+    /// The focused row of the list.
     fn selected(&self, content: &CaptureView) -> usize {
         let shown = || content.rows.iter().position(|row| Some(row.row) == content.row).unwrap_or(0);
         self.cursor.unwrap_or_else(shown).min(content.rows.len().saturating_sub(1))
     }
 
-    fn on_list_key(&mut self, code: KeyCode, content: &CaptureView) -> Reply {
+    fn on_list_key(&mut self, code: KeyCode, content: &CaptureView) -> ScreenOutcome {
         let selected = self.selected(content);
         let last = content.rows.len().saturating_sub(1);
         let to = match code {
@@ -113,18 +113,18 @@ impl Capture {
             KeyCode::Home => 0,
             KeyCode::End => last,
             KeyCode::Enter => {
-                let Some(row) = content.rows.get(selected) else { return Reply::Ignored };
+                let Some(row) = content.rows.get(selected) else { return ScreenOutcome::Ignored };
                 self.tab = Tab::GoTo;
                 self.cursor = None;
-                return Reply::Intend(Intent::GoToPose(row.pose.clone()));
+                return ScreenOutcome::Intent(Intent::GoToPose(row.pose.clone()));
             }
-            _ => return Reply::Ignored,
+            _ => return ScreenOutcome::Ignored,
         };
         self.cursor = Some(to);
-        Reply::Changed
+        ScreenOutcome::Changed
     }
 
-    fn on_notes_key(&mut self, code: KeyCode, content: &CaptureView) -> Reply {
+    fn on_notes_key(&mut self, code: KeyCode, content: &CaptureView) -> ScreenOutcome {
         let last = notes::count(content).saturating_sub(1);
         self.scroll = match code {
             KeyCode::Up => self.scroll.saturating_sub(1),
@@ -133,34 +133,34 @@ impl Capture {
             KeyCode::PageDown => (self.scroll + PAGE).min(last),
             KeyCode::Home => 0,
             KeyCode::End => last,
-            _ => return Reply::Ignored,
+            _ => return ScreenOutcome::Ignored,
         };
-        Reply::Changed
+        ScreenOutcome::Changed
     }
 }
 
-impl Screen for Capture {
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+impl Screen for CaptureScreen {
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
         let next = Tab::NAMES.get(self.tab.turned(1).index()).copied().unwrap_or("other view");
-        let mut items = vec![Item::new("Tab", next.to_lowercase(), 4)];
+        let mut items = vec![KeyHint::new("Tab", next.to_lowercase(), 4)];
         match self.tab {
             Tab::Poses => {
-                items.push(Item::new("Enter", "go to this pose", 0));
-                items.push(Item::new("Up/Down", "choose", 1));
+                items.push(KeyHint::new("Enter", "go to this pose", 0));
+                items.push(KeyHint::new("Up/Down", "choose", 1));
             }
-            Tab::Notes => items.push(Item::new("Up/Down", "scroll", 7)),
+            Tab::Notes => items.push(KeyHint::new("Up/Down", "scroll", 7)),
             Tab::GoTo | Tab::Prediction | Tab::Live | Tab::Picture => {}
         }
         if takes_typing(cx.view) && self.tab != Tab::Picture {
-            items.push(Item::new("0-9, paste", "coordinates", 3));
+            items.push(KeyHint::new("0-9, paste", "coordinates", 3));
         }
         items
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
-        let Some(content) = content(cx.view) else { return Reply::Ignored };
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
+        let Some(content) = content(cx.view) else { return ScreenOutcome::Ignored };
         match key.code {
-            _ if key.has_modifier() => return Reply::Ignored,
+            _ if key.has_modifier() => return ScreenOutcome::Ignored,
             KeyCode::Tab => self.tab = self.tab.turned(1),
             KeyCode::BackTab => self.tab = self.tab.turned(Tab::ALL.len() - 1),
             KeyCode::Char(c @ ('0'..='9' | '-' | '+' | '.' | ','))
@@ -172,18 +172,18 @@ impl Screen for Capture {
                 return match self.tab {
                     Tab::Poses => self.on_list_key(code, content),
                     Tab::Notes => self.on_notes_key(code, content),
-                    Tab::GoTo | Tab::Prediction | Tab::Live | Tab::Picture => Reply::Ignored,
+                    Tab::GoTo | Tab::Prediction | Tab::Live | Tab::Picture => ScreenOutcome::Ignored,
                 };
             }
         }
         self.cursor = None;
-        Reply::Changed
+        ScreenOutcome::Changed
     }
 
-    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply {
+    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome {
         match content(cx.view) {
             Some(_) if takes_typing(cx.view) => reading_dialog(cx, text.trim()),
-            _ => Reply::Ignored,
+            _ => ScreenOutcome::Ignored,
         }
     }
 
@@ -211,14 +211,14 @@ impl Screen for Capture {
                 Preview { scene, camera: cx.camera, theme: cx.theme }.render(picture, buf);
             }
             (None, Some(picture)) => {
-                paint::text(buf, picture, (0, 1), "there is no robot to show", cx.theme.style(Role::Dim));
+                paint::text(buf, picture, (0, 1), "no robot to show", cx.theme.style(Role::Dim));
             }
             (_, None) => {}
         }
     }
 }
 
-/// Where the views go, and the picture beside them.
+/// The area of the views, and of the picture beside them.
 fn parts(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect) -> (Rect, Option<Rect>) {
     if area.width < WIDE || cx.scene.is_none() {
         return (area, None);

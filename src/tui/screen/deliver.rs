@@ -1,22 +1,21 @@
-//! Deliver: what was written where, and what to do with it.
+//! Screen Deliver: which files were written, and what to do with them.
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll};
-use super::{PicturePlace, Reply, Screen, ScreenCx, verify};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome, verify};
 use crate::session::summary::VerdictStatus;
 use crate::tui::dialog::Dialog;
-use crate::tui::keymap::{Item, Key};
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::theme::Role;
 use crate::wizard::Intent;
 use crate::wizard::view::{Content, DeliverView};
 
-/// Rows that it takes to say of each file what is in it.
+/// Rows from which the content of each file is explained.
 const EXPLAINED: u16 = 22;
 
-/// How far it is scrolled.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct DeliverScreen {
     scroll: Scroll,
@@ -29,22 +28,22 @@ const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a DeliverView> {
     }
 }
 
-/// Whether there is nothing left but to leave.
+/// Whether the results are written and only quitting is left.
 fn is_done(cx: &ScreenCx<'_>) -> bool {
     content(cx).is_some_and(|content| !content.files.is_empty() && content.is_current)
         && !cx.view.intents.iter().any(|info| info.is_default)
         && cx.view.busy.is_none()
 }
 
-/// What is in a file.
+/// Content of a file in words.
 fn about(file: &str) -> &'static str {
     match file.rsplit(['/', '\\']).next().unwrap_or(file) {
         "plan.csv" => "the poses that were planned",
-        "measurements.csv" => "everything measured, to be identified again by any program",
-        "calibration.ron" => "the identified arm: the result to apply",
-        "report.json" => "all numbers of this session, for other programs",
-        "report.html" => "all numbers of this session, to read and print",
-        "drift.csv" => "the pose that was measured again and again",
+        "measurements.csv" => "all measurements, as input for any program",
+        "calibration.ron" => "the identified arm, to be applied",
+        "report.json" => "all figures of this session, for other programs",
+        "report.html" => "all figures of this session, to read and print",
+        "drift.csv" => "the repeated measurements of the drift pose",
         "corrected.ron" => "a profile with the identified constants, for this program",
         "corrected.urdf" => "the identified arm for robot software, such as ROS",
         "dh.csv" => "the identified link constants, for a controller or a spreadsheet",
@@ -60,7 +59,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
     if !content.is_current {
         page.marked(
             ("OUT OF DATE: ", Role::Warn),
-            "the samples have changed since: go back and identify again.",
+            "the samples have changed since then: go back and identify again.",
             Role::Plain,
         );
     }
@@ -85,11 +84,11 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             Role::Plain,
         );
         let is_writing = cx.view.busy.is_some();
-        let nothing = "Nothing is written yet. Enter writes the results into:";
-        page.title(if is_writing { "The results are being written into:" } else { nothing });
+        let nothing = "Nothing has been written yet. Enter writes the results to:";
+        page.title(if is_writing { "The results are being written to:" } else { nothing });
         page.paragraph(folder, Role::Plain);
         page.gap();
-        page.paragraph("calibration.ron is the identified arm, corrected.* and dh.csv are the same arm for other programs; report.html is to read and print, report.json has the same numbers; plan.csv and measurements.csv are the data.", Role::Plain);
+        page.paragraph("calibration.ron is the identified arm; corrected.* and dh.csv are the same arm for other programs. report.html is for reading and printing, report.json has the same figures. plan.csv and measurements.csv are the data.", Role::Plain);
     } else {
         page.title("Written");
         for file in &content.files {
@@ -101,6 +100,9 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         for reason in &content.left_out {
             page.marked(("Left out: ", Role::Warn), reason, Role::Plain);
         }
+        if !content.left_out.is_empty() {
+            page.paragraph("'trupose export --help' lists what can be done about it.", Role::Plain);
+        }
         page.title("What to do next");
         let is_accepted = content.verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
         if is_accepted {
@@ -110,7 +112,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             let wait = "do not apply it yet: b goes back to Verify, which says what is missing";
             page.marked(("1 ", Role::Dim), wait, Role::Warn);
         }
-        page.marked(("2 ", Role::Dim), "verify on new points, later or after a collision:", Role::Plain);
+        page.marked(("2 ", Role::Dim), "verify with new points, later or after a collision:", Role::Plain);
         let verify = format!(
             "trupose verify --calibration {} --measurements NEW.csv --refit frame+target",
             path("calibration.ron")
@@ -119,34 +121,34 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         page.marked(("3 ", Role::Dim), "measure more:", Role::Plain);
         page.paragraph(&format!("trupose resume {folder}"), Role::Plain);
     }
-    page.paragraph("Quitting is safe: every measurement is in the journal already.", Role::Ok);
+    page.paragraph("Quitting is safe: every measurement is already in the journal.", Role::Ok);
     page
 }
 
 impl Screen for DeliverScreen {
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
-        let mut items = vec![Scroll::item()];
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
+        let mut items = vec![Scroll::key_hint()];
         if is_done(cx) {
-            items.push(Item::new("Enter", "done: quit", 0));
+            items.push(KeyHint::new("Enter", "done: quit", 0));
         }
         items
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
         if key.code == KeyCode::Enter && is_done(cx) {
-            let mut lines = vec!["Done. Leave the program?".to_owned(), "Everything is saved.".to_owned()];
+            let mut lines = vec!["Done. Quit the program?".to_owned(), "Everything is saved.".to_owned()];
             if let Some(folder) = &cx.view.header.folder {
-                lines.push("Go on later with:".to_owned());
+                lines.push("Resume later with:".to_owned());
                 lines.push(format!("trupose resume {folder}"));
             }
-            return Reply::Ask(Box::new(Dialog::Confirm { intent: Intent::Quit, lines, is_yes: true }));
+            return ScreenOutcome::Open(Box::new(Dialog::Confirm { intent: Intent::Quit, lines, is_yes: true }));
         }
         let lines = page(cx, 78, 0).len();
-        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
     }
 
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
-        Reply::Ignored
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
+        ScreenOutcome::Ignored
     }
 
     fn picture_place(&self, _cx: &ScreenCx<'_>, _area: Rect) -> PicturePlace {

@@ -1,4 +1,4 @@
-//! Identify: what the samples say about the arm. No number here is an accuracy.
+//! Screen Identify: the identified parameters. No number here is an accuracy.
 
 mod pages;
 
@@ -6,16 +6,16 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll, Tabs, picture, split};
-use super::{PicturePlace, Reply, Screen, ScreenCx};
-use crate::tui::keymap::{Item, Key};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
+use crate::tui::keymap::{Key, KeyHint};
 use crate::wizard::view::{Content, IdentifyView};
 
 /// Columns of the text beside the picture.
 const TEXT: u16 = 66;
-/// Where the picture alone is.
+/// Tab with the picture alone.
 const PICTURE: usize = 3;
 
-/// Which page, and how far it is scrolled.
+/// Page and scroll position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct IdentifyScreen {
     tabs: Tabs,
@@ -54,21 +54,21 @@ fn has_result(cx: &ScreenCx<'_>) -> bool {
 }
 
 impl Screen for IdentifyScreen {
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
-        if has_result(cx) { vec![self.tabs.item(), Scroll::item()] } else { Vec::new() }
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
+        if has_result(cx) { vec![self.tabs.key_hint(), Scroll::key_hint()] } else { Vec::new() }
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
         if has_result(cx) && self.tabs.on_key(key) {
             self.scroll = Scroll::default();
-            return Reply::Changed;
+            return ScreenOutcome::Changed;
         }
         let lines = self.page(cx, TEXT).len();
-        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
     }
 
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
-        Reply::Ignored
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
+        ScreenOutcome::Ignored
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {

@@ -1,15 +1,16 @@
-//! Instrument: what measures, as a list of ways with what each means.
+//! Screen Instrument: a menu of the ways to measure.
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::menu::Menu;
-use super::page::{Page, Scroll, counted, picture, split};
-use super::{PicturePlace, Reply, Screen, ScreenCx};
+use super::page::{Page, Scroll, picture, split};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
+use crate::text::counted;
 use crate::tui::dialog::ask;
-use crate::tui::keymap::{Item, Key};
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::theme::Role;
 use crate::tui::values;
 use crate::wizard::Intent;
@@ -17,18 +18,18 @@ use crate::wizard::view::{Content, InstrumentView};
 
 /// Columns of the text beside the picture.
 const TEXT: u16 = 62;
-/// The ways, with what each means.
+/// The menu entries with their explanations.
 const WAYS: [(&str, &str); 6] = [
     ("by hand, in mm", "you read x y z off the instrument and type or paste them"),
-    ("by hand, in m", "the same, the instrument counts in metres"),
-    ("by hand, in inch", "the same, the instrument counts in inches"),
+    ("by hand, in m", "the same, for an instrument that shows metres"),
+    ("by hand, in inch", "the same, for an instrument that shows inches"),
     ("over a wire ...", "a tracker or another instrument on the network or a serial port"),
     ("simulated cell ...", "an arm with hidden errors: rehearse the whole procedure"),
-    ("recorded measurements ...", "tables of earlier days, played as if captured now"),
+    ("recorded measurements ...", "tables of earlier measurements, played back as if captured now"),
 ];
 const UNITS: [CoordinateUnit; 3] = [CoordinateUnit::Millimetre, CoordinateUnit::Metre, CoordinateUnit::Inch];
 
-/// The focus in the list.
+/// The focus in the menu.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct InstrumentScreen {
     menu: Menu,
@@ -42,30 +43,30 @@ const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a InstrumentView> {
     }
 }
 
-/// Why another instrument cannot be chosen.
+/// Whether the instrument can no longer be changed.
 fn is_fixed(cx: &ScreenCx<'_>) -> bool {
     let mut offers = cx.view.intents.iter().filter(|info| matches!(info.intent, Intent::ChooseInstrument(_)));
     offers.all(|info| !info.is_enabled()) && cx.view.busy.is_none()
 }
 
 impl InstrumentScreen {
-    /// Whether Enter chooses instead of going on.
+    /// Whether Enter chooses from the menu instead of continuing.
     fn chooses(&self, cx: &ScreenCx<'_>) -> bool {
         !is_fixed(cx) && content(cx).is_some_and(|content| self.menu.at.is_some() || content.choice.is_none())
     }
 
-    fn choose(&mut self, cx: &ScreenCx<'_>) -> Reply {
+    fn choose(&mut self, cx: &ScreenCx<'_>) -> ScreenOutcome {
         let at = self.menu.at.take().unwrap_or(0);
         match UNITS.get(at) {
-            Some(unit) => Reply::Intend(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
+            Some(unit) => ScreenOutcome::Intent(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
             None if at == UNITS.len() => {
-                Reply::Ask(Box::new(ask::linked(content(cx).and_then(|content| content.link.as_ref()))))
+                ScreenOutcome::Open(Box::new(ask::linked(content(cx).and_then(|content| content.link.as_ref()))))
             }
             None if at == UNITS.len() + 1 => {
                 let is_paper = cx.view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper"));
-                Reply::Ask(Box::new(ask::simulated(is_paper)))
+                ScreenOutcome::Open(Box::new(ask::simulated(is_paper)))
             }
-            None => Reply::Ask(Box::new(ask::recorded())),
+            None => ScreenOutcome::Open(Box::new(ask::recorded())),
         }
     }
 
@@ -76,7 +77,7 @@ impl InstrumentScreen {
         page.gap();
         if is_fixed(cx) {
             page.paragraph(
-                "Something is measured already: points of another instrument cannot be mixed in.",
+                "Points have already been measured: those of another instrument cannot be mixed with them.",
                 Role::Dim,
             );
             return page;
@@ -86,9 +87,9 @@ impl InstrumentScreen {
     }
 }
 
-/// What is chosen, who answers, how well it measures.
+/// The chosen instrument, its identity and its uncertainty.
 fn state(content: &InstrumentView, cx: &ScreenCx<'_>, page: &mut Page) {
-    let robot = "none stated; then sigma is estimated from the residuals";
+    let robot = "none stated; sigma is estimated from the residuals";
     page.pair("profile", content.stated_sigma.as_deref().unwrap_or(robot));
     let Some(choice) = &content.choice else {
         page.pair("chosen", "nothing yet: what measures the SMR?");
@@ -98,7 +99,7 @@ fn state(content: &InstrumentView, cx: &ScreenCx<'_>, page: &mut Page) {
     match (&content.identity, &cx.view.busy) {
         (Some(identity), _) => page.pair_as("answers", identity, Role::Ok),
         (None, Some(_)) => page.pair("answers", "connecting ..."),
-        (None, None) => page.pair_as("answers", "NO ANSWER: press r to try again, or choose another", Role::Warn),
+        (None, None) => page.pair_as("answers", "NO RESPONSE: press r to reconnect, or choose another", Role::Warn),
     }
     if let Some(live) = &cx.view.live {
         if live.down.is_none() {
@@ -114,40 +115,40 @@ fn state(content: &InstrumentView, cx: &ScreenCx<'_>, page: &mut Page) {
 }
 
 impl Screen for InstrumentScreen {
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
         if is_fixed(cx) {
-            return vec![Scroll::item()];
+            return vec![Scroll::key_hint()];
         }
-        let mut items = vec![Item::new("Up/Down", "choose", 2), Scroll::item()];
+        let mut items = vec![KeyHint::new("Up/Down", "choose", 2), Scroll::key_hint()];
         if self.chooses(cx) {
-            items.push(Item::new("Enter", "take this instrument", 0));
+            items.push(KeyHint::new("Enter", "use this instrument", 0));
         }
         items
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
         if key.has_modifier() {
-            return Reply::Ignored;
+            return ScreenOutcome::Ignored;
         }
         let lines = self.page(cx, TEXT).len();
         if !is_fixed(cx) {
             if self.menu.on_key(key, WAYS.len()) {
-                return Reply::Changed;
+                return ScreenOutcome::Changed;
             }
             match key.code {
                 KeyCode::Enter if self.chooses(cx) => return self.choose(cx),
                 KeyCode::Char('c') => {
                     self.menu.at.get_or_insert(0);
-                    return Reply::Changed;
+                    return ScreenOutcome::Changed;
                 }
                 _ => {}
             }
         }
-        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
     }
 
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
-        Reply::Ignored
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
+        ScreenOutcome::Ignored
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {

@@ -1,4 +1,4 @@
-//! A short list of ways to go on, each with a sentence that says when.
+//! A short menu: each entry has a sentence that says when to choose it.
 
 use crossterm::event::KeyCode;
 
@@ -6,14 +6,14 @@ use super::page::Page;
 use crate::tui::keymap::Key;
 use crate::tui::theme::Role;
 
-/// Where the focus is in a menu; `None`: the operator has not moved it.
+/// Position of the focus in a menu; `None` if the operator has not moved it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Menu {
     pub(super) at: Option<usize>,
 }
 
 impl Menu {
-    /// Takes a key in a menu of `count` entries; `false`: it is none for it.
+    /// Handles a key in a menu of `count` entries. Returns `false` if it is not a menu key.
     pub(super) fn on_key(&mut self, key: Key, count: usize) -> bool {
         let now = self.at.unwrap_or(0);
         let last = count.saturating_sub(1);
@@ -25,7 +25,7 @@ impl Menu {
         true
     }
 
-    /// Writes the entries: title, and when to take it below. `has_focus`: Enter takes the one under the cursor.
+    /// Writes the entries, each with its explanation below. If `has_focus`, Enter chooses the focused entry.
     pub(super) fn write(self, page: &mut Page, pointer: &str, entries: &[(&str, &str)], has_focus: bool) {
         for (index, (title, about)) in entries.iter().enumerate() {
             let has_focus = has_focus && index == self.at.unwrap_or(0);

@@ -1,21 +1,22 @@
-//! Lines of text for a screen: made for a width, scrolled, drawn; with tabs where there is more than one page.
+//! Pages of text lines with a fixed width, scrolling and tabs.
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::{shortened, width, wrapped};
-use crate::tui::keymap::{Item, Key};
+use crate::text::{self, wrapped};
+use crate::tui::glyphs::shortened;
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::preview::{Preview, Scene};
 use crate::tui::screen::ScreenCx;
 use crate::tui::theme::{Role, Theme};
 
-/// Rows that one key passes over.
+/// Rows that PgUp and PgDn scroll.
 const PAGE: usize = 8;
 /// Rows that stay in view at the end.
 const KEPT: usize = 4;
-/// Columns that a picture needs to say anything.
+/// Least columns of a useful picture.
 const PICTURE: u16 = 26;
 /// Columns of the names in [`Page::pair`].
 const NAMES: usize = 12;
@@ -26,12 +27,12 @@ pub(super) struct Page {
     theme: Theme,
     columns: usize,
     lines: Vec<Vec<(String, Role)>>,
-    /// First and last line that stay in view, wherever it is scrolled to.
+    /// First and last line that stay in view at any scroll position.
     kept: Option<(usize, usize)>,
 }
 
 impl Page {
-    /// An empty page of so many columns.
+    /// An empty page with this many columns.
     pub(super) const fn new(theme: Theme, columns: u16) -> Self {
         Self { theme, columns: columns as usize, lines: Vec::new(), kept: None }
     }
@@ -51,20 +52,20 @@ impl Page {
         self.columns
     }
 
-    /// An empty line, unless the page begins or there is one.
+    /// Adds an empty line, unless the page is empty or already ends with one.
     pub(super) fn gap(&mut self) {
         if self.lines.last().is_some_and(|line| !line.is_empty()) {
             self.lines.push(Vec::new());
         }
     }
 
-    /// A line of parts; what does not fit is cut off.
+    /// Adds a line of parts. Text that does not fit is cut off.
     pub(super) fn line(&mut self, parts: Vec<(String, Role)>) {
         let mut room = self.columns;
         let mut line = Vec::new();
         for (text, role) in parts {
             let text = shortened(&self.theme.glyphs.show(&text), room, self.theme.glyphs);
-            room -= width(&text).min(room);
+            room -= text::columns(&text).min(room);
             line.push((text, role));
         }
         self.lines.push(line);
@@ -78,7 +79,7 @@ impl Page {
 
     /// A paragraph behind a mark; further lines stand below its text.
     pub(super) fn marked(&mut self, mark: (&str, Role), text: &str, role: Role) {
-        let lead = width(mark.0);
+        let lead = text::columns(mark.0);
         let room = self.columns.saturating_sub(lead).max(1);
         for (index, line) in wrapped(&self.theme.glyphs.show(text), room).into_iter().enumerate() {
             let first = if index == 0 { mark.0.to_owned() } else { " ".repeat(lead) };
@@ -86,26 +87,26 @@ impl Page {
         }
     }
 
-    /// A paragraph.
+    /// Adds a paragraph.
     pub(super) fn paragraph(&mut self, text: &str, role: Role) {
         self.marked(("", role), text, role);
     }
 
-    /// A name with its value, wrapped.
+    /// Adds a name with its value, wrapped.
     pub(super) fn pair(&mut self, name: &str, value: &str) {
         self.pair_as(name, value, Role::Plain);
     }
 
-    /// A name with its value in a role.
+    /// Adds a name with its value in a role.
     pub(super) fn pair_as(&mut self, name: &str, value: &str, role: Role) {
         self.marked((&format!("{name:<NAMES$} "), Role::Dim), value, role);
     }
 
-    /// Draws the lines from `first` on; where some are left out, the last row says so.
+    /// Draws the lines from `first` on. If lines are left below, the last row says so.
     pub(super) fn draw(&self, first: usize, area: Rect, buf: &mut Buffer) {
         let rows = usize::from(area.height);
         let first = if self.len() <= rows { 0 } else { first.min(self.len().saturating_sub(KEPT)) };
-        // The last row may be needed to say that there is more.
+        // The last row may be needed to say that there are more lines.
         let whole = rows.saturating_sub(1).max(1);
         let first = match self.kept.filter(|_| self.len() > rows) {
             Some((from, _)) if from < first => from,
@@ -132,7 +133,7 @@ impl Page {
 pub(super) struct Scroll(pub(super) usize);
 
 impl Scroll {
-    /// Takes a key for a page of so many lines; `false`: it is none for it.
+    /// Handles a key on a page of `lines` lines. Returns `false` if it is not a scroll key.
     pub(super) fn on_key(&mut self, key: Key, lines: usize) -> bool {
         let last = lines.saturating_sub(KEPT);
         self.0 = match key.code {
@@ -145,27 +146,27 @@ impl Scroll {
         true
     }
 
-    /// Its keys.
-    pub(super) fn item() -> Item {
-        Item::new("PgUp/PgDn", "scroll", 6)
+    /// Keys for footer and help.
+    pub(super) fn key_hint() -> KeyHint {
+        KeyHint::new("PgUp/PgDn", "scroll", 6)
     }
 }
 
-/// Pages of one screen.
+/// The pages of a screen, as tabs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tabs {
     titles: &'static [&'static str],
-    /// The one that is shown.
+    /// Index of the page that is shown.
     pub(super) at: usize,
 }
 
 impl Tabs {
-    /// The first page of some.
+    /// Tabs that show the first page.
     pub(super) const fn new(titles: &'static [&'static str]) -> Self {
         Self { titles, at: 0 }
     }
 
-    /// Takes a key; `false`: it is none for it.
+    /// Handles a key. Returns `false` if it is not a tab key.
     pub(super) fn on_key(&mut self, key: Key) -> bool {
         let count = self.titles.len().max(1);
         self.at = match key.code {
@@ -180,12 +181,12 @@ impl Tabs {
         true
     }
 
-    /// Its keys.
-    pub(super) fn item(&self) -> Item {
-        Item::new(format!("Tab or 1-{}", self.titles.len()), "other page", 4)
+    /// Keys for footer and help.
+    pub(super) fn key_hint(&self) -> KeyHint {
+        KeyHint::new(format!("Tab or 1-{}", self.titles.len()), "next page", 4)
     }
 
-    /// Draws the titles in one line and gives back the rest.
+    /// Draws the titles in one line, and returns the remaining area.
     pub(super) fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) -> Rect {
         let mut column = 0;
         for (index, title) in self.titles.iter().enumerate() {
@@ -200,7 +201,7 @@ impl Tabs {
     }
 }
 
-/// `area` in a part for text of `wanted` columns and one for a picture, if both have room.
+/// Splits `area` into text of `wanted` columns and a picture, if there is room for both.
 pub(super) const fn split(area: Rect, wanted: u16, has_picture: bool) -> (Rect, Option<Rect>) {
     let left = wanted + 2;
     if !has_picture || area.width < left.saturating_add(PICTURE) {
@@ -216,7 +217,7 @@ pub(super) fn picture(cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Bu
     Preview { scene, camera: cx.camera, theme: cx.theme }.render(area, buf);
 }
 
-/// A number with fixed decimals; no negative zero, and an exponent above 1e9.
+/// A number with fixed decimals, without a negative zero, and with an exponent above 1e9.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if value.abs() > 1e9 {
         return format!("{value:.3e}");
@@ -226,12 +227,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
-/// Decimals that show two significant digits of an uncertainty, between 1 and 6.
+/// Decimals that show two significant digits of an uncertainty, from 1 to 6.
 pub(super) fn decimals_for(sigma: f64) -> usize {
     (1..=6_u8).find(|&decimals| sigma * 10_f64.powi(i32::from(decimals)) >= 9.95).map_or(6, usize::from)
-}
-
-/// `n sample`, `n samples`.
-pub(super) fn counted(count: usize, one: &str) -> String {
-    if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
 }

@@ -1,10 +1,10 @@
-//! Plan: how many poses, what they would give, and what they would cost.
+//! Screen Plan: the number of poses, their benefit and their cost.
 //!
 //! ```text
-//! Plan       settings, what is proposed or being measured, search or trade-off
+//! Plan       settings, the proposed or accepted plan, search or trade-off
 //! Trade-off  number of poses against predicted error and time
-//! Weak       parameters that the plan tells little about, and warnings
-//! Picture    where the points are
+//! Weak       weakly determined parameters, and warnings
+//! Picture    positions of the points
 //! ```
 
 mod figures;
@@ -18,19 +18,19 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
-use super::{PicturePlace, Reply, Screen, ScreenCx};
-use crate::tui::glyphs::wrapped;
-use crate::tui::keymap::{Item, Key};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
+use crate::text::wrapped;
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::preview::Preview;
 use crate::tui::theme::Role;
 use crate::tui::widget::tabs;
 use crate::wizard::view::{Content, PlanView, ViewModel};
 use crate::wizard::{Intent, PlanSettings};
-use form::Form;
+use form::SettingsForm;
 use search::Search;
 
-/// Content columns from which on the picture stands beside the views (a terminal of 108).
+/// Content columns from which the picture is beside the views (a terminal of 108).
 const WIDE: u16 = 106;
 /// Columns of the views beside the picture.
 const VIEWS: u16 = 78;
@@ -41,11 +41,11 @@ const TOP: u16 = 8;
 /// Columns between two parts.
 const GAP: u16 = 2;
 
-/// What happens here.
+/// Explanation for an operator who has never planned poses.
 const HELP: [&str; 3] = [
-    "1. Configurations are drawn that the robot reaches freely and where the tracker sees the SMR.",
-    "2. Of these the set is chosen that tells most about all parameters; that takes seconds to minutes.",
-    "3. You see what it promises and what it costs, then accept it or change the settings.",
+    "1. Random configurations are drawn that the robot can reach freely and where the tracker sees the SMR.",
+    "2. Of these, the set that determines all parameters best is chosen; that takes seconds to minutes.",
+    "3. You see its predicted error and its measuring time, then accept it or change the settings.",
 ];
 
 /// The views.
@@ -71,13 +71,13 @@ impl Tab {
     }
 }
 
-/// Settings that are not sent yet, and what the search has shown so far.
+/// Settings that are not sent yet, and the results of the search so far.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Plan {
+pub(super) struct PlanScreen {
     tab: Tab,
-    form: Form,
+    form: SettingsForm,
     search: Search,
-    /// Lines scrolled away.
+    /// Scroll position.
     scroll: usize,
 }
 
@@ -88,24 +88,24 @@ fn content(view: &ViewModel) -> Option<&PlanView> {
     }
 }
 
-/// Whether choosing poses is what Enter is for.
+/// Whether Enter chooses poses.
 fn makes_by_default(view: &ViewModel) -> bool {
     view.intents.iter().any(|info| info.is_default && matches!(info.intent, Intent::MakePlan(_)))
 }
 
-/// Why poses cannot be chosen now; none: they can.
+/// Whether poses can be chosen now.
 fn can_make(view: &ViewModel) -> bool {
     view.intents.iter().any(|info| info.is_enabled() && matches!(info.intent, Intent::MakePlan(_)))
 }
 
-impl Plan {
-    fn make(&mut self, settings: PlanSettings) -> Reply {
+impl PlanScreen {
+    fn make(&mut self, settings: PlanSettings) -> ScreenOutcome {
         self.tab = Tab::Plan;
-        Reply::Intend(Intent::MakePlan(settings))
+        ScreenOutcome::Intent(Intent::MakePlan(settings))
     }
 }
 
-impl Screen for Plan {
+impl Screen for PlanScreen {
     fn see(&mut self, view: &ViewModel) {
         if let Some(content) = content(view) {
             self.form.follow(content.settings);
@@ -113,30 +113,30 @@ impl Screen for Plan {
         self.search.see(view.busy.as_ref());
     }
 
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
         let next = Tab::NAMES.get(self.tab.turned(1).index()).copied().unwrap_or("other view");
-        let mut items = vec![Item::new("Tab", next.to_lowercase(), 5)];
+        let mut items = vec![KeyHint::new("Tab", next.to_lowercase(), 5)];
         if !can_make(cx.view) {
             return items;
         }
         if self.form.is_changed() {
-            items.push(Item::new("Enter", "choose poses with these settings", 0));
+            items.push(KeyHint::new("Enter", "choose poses with these settings", 0));
         }
         if self.tab == Tab::Plan {
-            items.push(Item::new("Up/Down", "setting", 4));
-            items.push(Item::new("0-9", "type its value", 4));
-            items.push(Item::new("+/-", "more or fewer poses", 4));
+            items.push(KeyHint::new("Up/Down", "setting", 4));
+            items.push(KeyHint::new("0-9", "type its value", 4));
+            items.push(KeyHint::new("+/-", "more or fewer poses", 4));
         }
         if self.tab == Tab::TradeOff {
-            items.push(Item::new("Up/Down", "number of poses", 3));
+            items.push(KeyHint::new("Up/Down", "number of poses", 3));
         }
-        items.push(Item::new("o", "choose with other seed", 5));
+        items.push(KeyHint::new("o", "choose with another seed", 5));
         items
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
         if key.has_modifier() || content(cx.view).is_none() {
-            return Reply::Ignored;
+            return ScreenOutcome::Ignored;
         }
         let is_free = can_make(cx.view);
         match key.code {
@@ -155,7 +155,7 @@ impl Screen for Plan {
                 return self.make(settings);
             }
             code if self.tab == Tab::Plan && is_free => {
-                return if self.form.on_key(code) { Reply::Changed } else { Reply::Ignored };
+                return if self.form.on_key(code) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored };
             }
             KeyCode::Up | KeyCode::Down if self.tab == Tab::TradeOff && is_free => {
                 let poses = self.form.settings().poses;
@@ -172,20 +172,20 @@ impl Screen for Plan {
                 let most = content(cx.view).map_or(0, weak::count);
                 self.scroll = (self.scroll + 1).min(most.saturating_sub(1));
             }
-            _ => return Reply::Ignored,
+            _ => return ScreenOutcome::Ignored,
         }
         if matches!(key.code, KeyCode::Tab | KeyCode::BackTab) {
             self.scroll = 0;
         }
-        Reply::Changed
+        ScreenOutcome::Changed
     }
 
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
-        Reply::Ignored
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
+        ScreenOutcome::Ignored
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
-        // The arrows are for the settings while there are any to change.
+        // While settings can be changed, the arrows belong to them.
         let is_beside = area.width >= WIDE && !(self.tab == Tab::Plan && can_make(cx.view));
         PicturePlace::of(cx.scene.is_some() && self.tab == Tab::Picture, cx.scene.is_some() && is_beside)
     }
@@ -213,14 +213,14 @@ impl Screen for Plan {
         match (cx.scene, picture) {
             (Some(scene), Some(picture)) => Preview { scene, camera: cx.camera, theme: cx.theme }.render(picture, buf),
             (None, Some(picture)) => {
-                paint::text(buf, picture, (0, 1), "there is no robot to show", cx.theme.style(Role::Dim));
+                paint::text(buf, picture, (0, 1), "no robot to show", cx.theme.style(Role::Dim));
             }
             (_, None) => {}
         }
     }
 }
 
-/// What choosing poses means, for somebody who has never done it.
+/// Draws the explanation.
 fn what_happens(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
     let lines = HELP.iter().flat_map(|line| wrapped(&cx.theme.glyphs.show(line), usize::from(area.width)));
     for (row, line) in (0_u16..area.height).zip(lines) {
@@ -228,7 +228,7 @@ fn what_happens(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
     }
 }
 
-impl Plan {
+impl PlanScreen {
     fn overview(&self, cx: &ScreenCx<'_>, content: &PlanView, area: Rect, buf: &mut Buffer) {
         let settings = Rect { width: SETTINGS.min(area.width), ..paint::band(area, 0, TOP) };
         self.form.draw(cx.theme, settings, buf);

@@ -1,14 +1,14 @@
-//! Profile: a list that typing narrows, and the robot that is looked at.
+//! Screen Profile: a list that typing narrows, and the selected robot.
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, picture, split};
-use super::{PicturePlace, Reply, Screen, ScreenCx};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::tui::dialog::Dialog;
 use crate::tui::form::TextField;
-use crate::tui::keymap::{Item, Key};
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::theme::Role;
 use crate::wizard::Intent;
@@ -22,13 +22,13 @@ const CARD: u16 = 46;
 const PICTURE_ROWS: u16 = 9;
 /// Columns for list, card and picture side by side.
 const ALL: u16 = 106;
-/// The entry behind the shipped profiles.
+/// The entry after the bundled profiles.
 const FILE: &str = "file...";
 
 /// Cursor and search.
 #[derive(Clone, Debug)]
 pub(super) struct ProfileScreen {
-    /// Entry among those that the search leaves; none: the operator has not moved it.
+    /// Position among the entries that match the search; `None` if the operator has not moved it.
     cursor: Option<usize>,
     search: TextField,
     is_typing: bool,
@@ -48,35 +48,35 @@ const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a ProfileView> {
 }
 
 impl ProfileScreen {
-    /// Names that contain every word that was typed, and the entry for a file.
+    /// Names that contain every typed word, and the entry for a file.
     fn entries<'a>(&self, content: &'a ProfileView) -> Vec<&'a str> {
         let wanted = self.search.text().to_lowercase();
         let fits = |name: &&str| wanted.split_whitespace().all(|word| name.to_lowercase().contains(word));
         content.profiles.iter().map(String::as_str).filter(fits).chain([FILE]).collect()
     }
 
-    /// Place of the cursor.
+    /// Position of the cursor.
     fn place(&self, content: &ProfileView) -> usize {
         let entries = self.entries(content);
         let chosen = content.chosen.as_ref().and_then(|card| entries.iter().position(|name| *name == card.name));
         self.cursor.or(chosen).unwrap_or(0).min(entries.len().saturating_sub(1))
     }
 
-    /// Whether the operator looks for another robot.
+    /// Whether the operator is looking for another robot.
     const fn is_browsing(&self) -> bool {
         self.is_typing || self.cursor.is_some()
     }
 
-    /// Whether Enter takes what is under the cursor instead of going on.
+    /// Whether Enter loads the focused entry instead of continuing.
     fn loads(&self, content: &ProfileView) -> bool {
         !content.is_fixed && (self.is_browsing() || content.chosen.is_none())
     }
 
-    fn load(&mut self, content: &ProfileView) -> Reply {
+    fn load(&mut self, content: &ProfileView) -> ScreenOutcome {
         let place = self.place(content);
         let entry = self.entries(content).get(place).copied().unwrap_or(FILE).to_owned();
         *self = Self::default();
-        if entry == FILE { file() } else { Reply::Intend(Intent::ChooseProfile(entry)) }
+        if entry == FILE { file() } else { ScreenOutcome::Intent(Intent::ChooseProfile(entry)) }
     }
 
     fn type_key(&mut self, key: Key) -> bool {
@@ -93,31 +93,31 @@ impl ProfileScreen {
 }
 
 /// Asks for the path of a profile.
-fn file() -> Reply {
+fn file() -> ScreenOutcome {
     let field = TextField::new("Path of the profile (RON)", "");
-    Reply::Ask(Box::new(Dialog::Text { field, intent: Intent::ChooseProfile }))
+    ScreenOutcome::Open(Box::new(Dialog::Text { field, intent: Intent::ChooseProfile }))
 }
 
 impl Screen for ProfileScreen {
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
         let Some(content) = content(cx).filter(|content| !content.is_fixed) else { return Vec::new() };
-        let mut items = vec![Item::new("Up/Down", "choose", 2)];
+        let mut items = vec![KeyHint::new("Up/Down", "choose", 2)];
         if self.loads(content) {
-            items.push(Item::new("Enter", "look at this robot", 0));
+            items.push(KeyHint::new("Enter", "show this robot", 0));
         }
         if self.is_typing {
-            items.push(Item::new("Esc", "all robots", 1));
+            items.push(KeyHint::new("Esc", "all robots", 1));
         } else {
-            items.push(Item::new("c", "search by name", 3));
-            items.push(Item::new("f", "profile from a file", 4));
+            items.push(KeyHint::new("c", "search by name", 3));
+            items.push(KeyHint::new("f", "profile from a file", 4));
         }
         items
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
-        let Some(content) = content(cx) else { return Reply::Ignored };
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
+        let Some(content) = content(cx) else { return ScreenOutcome::Ignored };
         if content.is_fixed || key.has_modifier() {
-            return Reply::Ignored;
+            return ScreenOutcome::Ignored;
         }
         let last = self.entries(content).len().saturating_sub(1);
         let place = self.place(content);
@@ -132,19 +132,19 @@ impl Screen for ProfileScreen {
             _ if self.is_typing && self.type_key(key) => {}
             KeyCode::Char('c' | '/') => self.is_typing = true,
             KeyCode::Char('f') => return file(),
-            _ => return Reply::Ignored,
+            _ => return ScreenOutcome::Ignored,
         }
-        Reply::Changed
+        ScreenOutcome::Changed
     }
 
-    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply {
+    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome {
         if content(cx).is_none_or(|content| content.is_fixed) {
-            return Reply::Ignored;
+            return ScreenOutcome::Ignored;
         }
         self.is_typing = true;
         self.search.paste(text);
         self.cursor = Some(0);
-        Reply::Changed
+        ScreenOutcome::Changed
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
@@ -163,7 +163,7 @@ impl Screen for ProfileScreen {
     }
 }
 
-/// Where everything goes.
+/// Areas of the screen.
 struct Parts {
     list: Rect,
     text: Rect,
@@ -187,7 +187,7 @@ impl ProfileScreen {
     }
 }
 
-/// The list and the rest.
+/// The area of the list, and the rest.
 const fn columns(area: Rect) -> (Rect, Rect) {
     let width = if area.width < LIST { area.width } else { LIST };
     let list = Rect { x: area.x, y: area.y, width, height: area.height };
@@ -219,14 +219,17 @@ impl ProfileScreen {
 
 fn introduction(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
     let mut page = Page::new(cx.theme, area.width);
-    page.paragraph("A profile says how the arm is built, what measures it and which errors are allowed.", Role::Plain);
+    page.paragraph(
+        "A profile describes how the arm is built, what measures it and which errors are allowed.",
+        Role::Plain,
+    );
     page.gap();
-    page.paragraph("Move to your robot, press Enter to look at it, and Enter again to take it.", Role::Plain);
+    page.paragraph("Move to your robot and press Enter to see it. Enter again uses it.", Role::Plain);
     page.gap();
-    page.paragraph("Your robot is not in the list? 'file...' takes a profile that you have written: 'trupose profile show NAME' prints one to begin with.", Role::Dim);
+    page.paragraph("Is your robot not in the list? 'file...' loads a profile that you have written: 'trupose profile show NAME' prints one to start from.", Role::Dim);
     page.gap();
     page.paragraph(
-        "To rehearse without hardware take soochow, the arm of the method paper, then the simulated cell.",
+        "To rehearse without hardware, choose soochow, the arm of the method paper, and then the simulated cell.",
         Role::Dim,
     );
     page.draw(0, area, buf);
@@ -249,10 +252,10 @@ fn card_page(card: &ProfileCard, content: &ProfileView, cx: &ScreenCx<'_>, colum
     page.pair("source", &card.source);
     if content.is_fixed {
         page.gap();
-        page.paragraph("Something is measured already: this session keeps its robot.", Role::Dim);
+        page.paragraph("Points have already been measured: this session keeps its robot.", Role::Dim);
     } else {
         page.gap();
-        page.paragraph("Enter takes this robot; Up/Down: the others.", Role::Hint);
+        page.paragraph("Enter uses this robot; Up/Down shows the others.", Role::Hint);
     }
     page
 }

@@ -1,4 +1,4 @@
-//! Target: four ways to say where the SMR sits; and the circle-point analysis.
+//! Screen Target: four ways to locate the SMR, and the circle-point analysis.
 
 mod circles;
 
@@ -8,10 +8,10 @@ use ratatui::layout::Rect;
 
 use super::menu::Menu;
 use super::page::{Page, Scroll, picture, split};
-use super::{PicturePlace, Reply, Screen, ScreenCx};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::session::set_up::TargetChoice;
 use crate::tui::dialog::ask;
-use crate::tui::keymap::{Item, Key};
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::theme::Role;
 use crate::wizard::Intent;
 use crate::wizard::view::{Content, TargetView};
@@ -20,18 +20,18 @@ use crate::wizard::view::{Content, TargetView};
 const CIRCLES: u16 = 44;
 /// Columns of the text beside the picture.
 const TEXT: u16 = 62;
-/// The ways, with when to take each.
+/// The menu entries, with when to choose each.
 const WAYS: [(&str, &str); 4] = [
-    ("as the profile says", "when the adapter is the one of the profile and nothing was changed"),
-    ("known coordinates ...", "when the adapter was measured, for example with a CMM"),
-    ("left free", "when nobody knows: it is identified together with the arm"),
+    ("as the profile says", "if the adapter is that of the profile and nothing was changed"),
+    ("known coordinates ...", "if the adapter was measured, for example with a CMM"),
+    ("left free", "if unknown: it is identified together with the arm"),
     (
         "circle-point analysis",
-        "turn the last two axes, some points each: finds the SMR and uncovers wrong joint signs and a wrong frame",
+        "turn the last two axes, a few points each: locates the SMR and reveals wrong joint signs and a wrong frame",
     ),
 ];
 
-/// The focus in the list.
+/// The focus in the menu.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TargetScreen {
     menu: Menu,
@@ -45,7 +45,7 @@ const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a TargetView> {
     }
 }
 
-/// Whether the SMR is chosen for good.
+/// Whether the SMR can no longer be changed.
 fn is_fixed(cx: &ScreenCx<'_>) -> bool {
     let mut offers = cx.view.intents.iter().filter(|info| matches!(info.intent, Intent::ChooseTarget(_)));
     offers.all(|info| !info.is_enabled()) && cx.view.busy.is_none()
@@ -60,35 +60,35 @@ fn is_in_circles(cx: &ScreenCx<'_>) -> bool {
     content(cx).and_then(|content| content.circles.as_ref()).is_some_and(|circles| circles.joint.is_some())
 }
 
-/// Whether there is a result of the circles that is not taken.
+/// Whether the circles have a result that is not used yet.
 fn has_new_result(cx: &ScreenCx<'_>) -> bool {
     is_offered(cx, &Intent::UseCircles)
         && content(cx).is_some_and(|content| content.choice.as_ref().is_none_or(|text| !text.contains("from circles")))
 }
 
 impl TargetScreen {
-    /// Whether the list is there.
+    /// Whether the menu is shown.
     fn has_menu(cx: &ScreenCx<'_>) -> bool {
         !is_in_circles(cx) && !is_fixed(cx)
     }
 
-    /// Whether Enter chooses from the list.
+    /// Whether Enter chooses from the menu.
     fn chooses(&self, cx: &ScreenCx<'_>) -> bool {
         let is_open = content(cx).is_some_and(|content| content.choice.is_none());
         Self::has_menu(cx) && (self.menu.at.is_some() || is_open && !has_new_result(cx))
     }
 
-    fn choose(&mut self, cx: &ScreenCx<'_>) -> Reply {
+    fn choose(&mut self, cx: &ScreenCx<'_>) -> ScreenOutcome {
         match self.menu.at.take().unwrap_or(0) {
-            0 => Reply::Intend(Intent::ChooseTarget(TargetChoice::Profile)),
+            0 => ScreenOutcome::Intent(Intent::ChooseTarget(TargetChoice::Profile)),
             1 => known(cx),
             2 => cx
                 .view
                 .intents
                 .iter()
                 .find(|info| matches!(info.intent, Intent::ChooseTarget(TargetChoice::Free { .. })))
-                .map_or(Reply::Ignored, |info| Reply::Intend(info.intent.clone())),
-            _ => Reply::Intend(Intent::StartCircles),
+                .map_or(ScreenOutcome::Ignored, |info| ScreenOutcome::Intent(info.intent.clone())),
+            _ => ScreenOutcome::Intent(Intent::StartCircles),
         }
     }
 
@@ -113,7 +113,7 @@ impl TargetScreen {
         }
         page.gap();
         if !Self::has_menu(cx) {
-            page.paragraph("Samples are measured with this SMR: another mounting is another session.", Role::Dim);
+            page.paragraph("Samples were measured with this SMR: a different mounting needs a new session.", Role::Dim);
             return page;
         }
         self.menu.write(&mut page, cx.theme.glyphs.pointer(), &WAYS, self.chooses(cx));
@@ -126,49 +126,50 @@ fn columns(cx: &ScreenCx<'_>) -> u16 {
     if is_in_circles(cx) { CIRCLES } else { TEXT }
 }
 
-/// Asks for coordinates, the profile's to begin with.
-fn known(cx: &ScreenCx<'_>) -> Reply {
-    content(cx).map_or(Reply::Ignored, |content| Reply::Ask(Box::new(ask::known_target(content.nominal_mm))))
+/// Asks for coordinates, starting with those of the profile.
+fn known(cx: &ScreenCx<'_>) -> ScreenOutcome {
+    content(cx)
+        .map_or(ScreenOutcome::Ignored, |content| ScreenOutcome::Open(Box::new(ask::known_target(content.nominal_mm))))
 }
 
 impl Screen for TargetScreen {
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
-        let mut items = vec![Scroll::item()];
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
+        let mut items = vec![Scroll::key_hint()];
         if Self::has_menu(cx) {
-            items.push(Item::new("Up/Down", "choose", 2));
-            items.push(Item::new("k", "known coordinates", 4));
+            items.push(KeyHint::new("Up/Down", "choose", 2));
+            items.push(KeyHint::new("k", "known coordinates", 4));
         }
         if self.chooses(cx) {
-            items.push(Item::new("Enter", "take this way", 0));
+            items.push(KeyHint::new("Enter", "choose this", 0));
         } else if has_new_result(cx) {
-            items.push(Item::new("Enter", "take the result of the circles", 0));
+            items.push(KeyHint::new("Enter", "use the result of the circles", 0));
         }
         items
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
         if key.has_modifier() {
-            return Reply::Ignored;
+            return ScreenOutcome::Ignored;
         }
         if Self::has_menu(cx) && self.menu.on_key(key, WAYS.len()) {
-            return Reply::Changed;
+            return ScreenOutcome::Changed;
         }
         match key.code {
             KeyCode::Enter if self.chooses(cx) => return self.choose(cx),
-            KeyCode::Enter if has_new_result(cx) => return Reply::Intend(Intent::UseCircles),
+            KeyCode::Enter if has_new_result(cx) => return ScreenOutcome::Intent(Intent::UseCircles),
             KeyCode::Char('k') if Self::has_menu(cx) => return known(cx),
             _ => {}
         }
         let lines = self.page(cx, TEXT).len();
-        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
     }
 
-    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> Reply {
-        // Coordinates from the instrument's program.
+    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome {
+        // Coordinates copied from the instrument's software.
         if is_in_circles(cx) && is_offered(cx, &Intent::TypeReading(String::new())) {
-            return Reply::Intend(Intent::TypeReading(text.trim().to_owned()));
+            return ScreenOutcome::Intent(Intent::TypeReading(text.trim().to_owned()));
         }
-        Reply::Ignored
+        ScreenOutcome::Ignored
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {

@@ -19,8 +19,8 @@ use crate::session::summary::{
 };
 use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
-use crate::tui::preview::Checked;
-use crate::tui::ui::{Ui, Wish};
+use crate::tui::preview::VerifiedPoint;
+use crate::tui::ui::{Command, Ui};
 use crate::wizard::view::purpose;
 use crate::wizard::view::{
     CircleView, CirclesResult, CirclesView, Content, DeliverView, IdentifyView, InstrumentView, JointShown,
@@ -65,7 +65,7 @@ fn profile(has_card: bool) -> ViewModel {
             warnings: vec!["no bodies for link 3: \u{1b}[31m".to_owned()],
         });
         content.session = "soochow-20260105-0800".to_owned();
-        view.intents = vec![IntentInfo::new(Intent::Next, "take this robot").default_action()];
+        view.intents = vec![IntentInfo::new(Intent::Next, "use this robot").default_action()];
     }
     view
 }
@@ -81,9 +81,9 @@ fn instrument(choice: Option<&str>, identity: Option<&str>) -> ViewModel {
     let proposal = InstrumentChoice::Manual { unit: CoordinateUnit::Millimetre };
     let wait = identity.is_none().then(|| "the instrument does not answer yet".to_owned());
     let offers = vec![
-        IntentInfo::new(Intent::Next, "measure with this").unless(wait).default_action(),
+        IntentInfo::new(Intent::Next, "use this instrument").unless(wait).default_action(),
         IntentInfo::new(Intent::ChooseInstrument(proposal), "choose an instrument"),
-        IntentInfo::new(Intent::Retry, "connect again").unless(identity.map(|_| "it answers".to_owned())),
+        IntentInfo::new(Intent::Retry, "reconnect").unless(identity.map(|_| "it answers".to_owned())),
     ];
     view(Step::Instrument, content, offers)
 }
@@ -101,7 +101,7 @@ fn target(choice: Option<&str>, circles: Option<CirclesView>) -> ViewModel {
         IntentInfo::new(Intent::ChooseTarget(TargetChoice::Profile), "as the profile says").default_action(),
         IntentInfo::new(Intent::ChooseTarget(TargetChoice::Free { sigma_mm: 50.0 }), "leave it free"),
         IntentInfo::new(Intent::StartCircles, "find it by circles"),
-        IntentInfo::new(Intent::UseCircles, "take the result of the circles").unless(unusable),
+        IntentInfo::new(Intent::UseCircles, "use the result of the circles").unless(unusable),
     ];
     view(Step::Target, content, offers)
 }
@@ -307,7 +307,7 @@ fn identify(summary: Option<IdentificationSummary>, is_current: bool) -> ViewMod
         summary: summary.map(Box::new),
         is_usable: has_result,
     });
-    let next = IntentInfo::new(Intent::Next, "go on to verify");
+    let next = IntentInfo::new(Intent::Next, "continue to Verify");
     let offers = vec![IntentInfo::new(Intent::Identify, "identify the arm").default_action(), next];
     view(Step::Identify, content, offers)
 }
@@ -323,7 +323,7 @@ fn verify(verdict: Option<Verdict>) -> ViewModel {
         verdict: verdict.map(Box::new),
         warnings: if is_good { Vec::new() } else { vec![warning(true)] },
     });
-    view(Step::Verify, content, vec![IntentInfo::new(Intent::Next, "go on to deliver").default_action()])
+    view(Step::Verify, content, vec![IntentInfo::new(Intent::Next, "continue to Deliver").default_action()])
 }
 
 fn deliver(files: &[&str]) -> ViewModel {
@@ -347,7 +347,7 @@ fn checked() -> Scene {
         let (sin, cos) = f64::from(n).sin_cos();
         let error = Vector3::new(sin, cos, 0.5) * (1.0 + 0.05 * f64::from(n));
         let at = Point3::new(0.9 + 0.3 * cos, 0.6 * sin, 0.5 + 0.04 * f64::from(n));
-        scene.checked.push(Checked {
+        scene.verified.push(VerifiedPoint {
             pose: format!("{}", n + 57),
             at,
             nominal: error * 0.01,
@@ -377,7 +377,7 @@ fn drawn(view: &ViewModel, scene: Option<&Scene>, keys: &[Key], theme: Theme, (w
             assert!(is_inside || buffer[(x, y)].symbol() == " ", "drawn outside at {x}, {y}");
         }
     }
-    screen.items(&cx);
+    screen.key_hints(&cx);
     buffer
 }
 
@@ -480,10 +480,10 @@ fn the_delivery() {
 }
 
 /// What the last of some keys is worth.
-fn pressed(view: &ViewModel, keys: &[KeyCode]) -> Wish {
+fn pressed(view: &ViewModel, keys: &[KeyCode]) -> Command {
     let mut ui = Ui::new(theme(false));
     ui.refresh(view, &Session::default());
-    let mut wish = Wish::None;
+    let mut wish = Command::None;
     for code in keys {
         wish = ui.on_input(crate::tui::input::Input::Key(Key::plain_code(*code)), view);
     }
@@ -493,7 +493,8 @@ fn pressed(view: &ViewModel, keys: &[KeyCode]) -> Wish {
 #[test]
 fn keys_become_intents() {
     use KeyCode::{Char, Down, Enter, Esc, Up};
-    let is = |view: &ViewModel, keys: &[KeyCode], intent: Intent| assert_eq!(pressed(view, keys), Wish::Intend(intent));
+    let is =
+        |view: &ViewModel, keys: &[KeyCode], intent: Intent| assert_eq!(pressed(view, keys), Command::Intent(intent));
     let robot = |name: &str| Intent::ChooseProfile(name.to_owned());
     is(&profile(false), &[Down, Down, Up, Enter], robot("abb_irb1600_6_145"));
     is(&profile(true), &[Enter], Intent::Next);
@@ -507,7 +508,7 @@ fn keys_become_intents() {
     is(&instrument(Some("x"), None), &[Char('r')], Intent::Retry);
     let simulated = pressed(&instrument(None, None), &[Down, Down, Down, Down, Enter, Enter]);
     assert!(
-        matches!(simulated, Wish::Intend(Intent::ChooseInstrument(InstrumentChoice::Simulated(_)))),
+        matches!(simulated, Command::Intent(Intent::ChooseInstrument(InstrumentChoice::Simulated(_)))),
         "{simulated:?}"
     );
     is(&target(None, None), &[Enter], Intent::ChooseTarget(TargetChoice::Profile));

@@ -1,4 +1,4 @@
-//! Verify: how accurate the arm is, on verification samples only; the verdict first.
+//! Screen Verify: the accuracy of the arm, from verification samples only. The verdict comes first.
 
 mod pages;
 mod poses;
@@ -10,8 +10,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::{Page, Scroll, Tabs, picture, split};
-use super::{PicturePlace, Reply, Screen, ScreenCx};
-use crate::tui::keymap::{Item, Key};
+use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
+use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::preview::Scene;
 use crate::tui::theme::Role;
@@ -19,10 +19,10 @@ use crate::wizard::view::{Content, VerifyView};
 
 /// Columns of the text beside the picture.
 const TEXT: u16 = 66;
-/// Where the picture alone is.
+/// Tab with the picture alone.
 const PICTURE: usize = 3;
 
-/// Which page, how far it is scrolled, whose errors the picture shows.
+/// Page, scroll position, and whose errors the picture shows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct VerifyScreen {
     tabs: Tabs,
@@ -56,13 +56,13 @@ impl VerifyScreen {
         page
     }
 
-    /// The picture with whose errors it shows.
+    /// Draws the picture and whose errors it shows.
     fn picture(self, cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Buffer) {
         let mut shown = scene.clone();
         shown.show_errors(!self.is_nominal);
         let (whose, other) =
             if self.is_nominal { ("BEFORE: nominal", "identified") } else { ("AFTER: identified", "nominal") };
-        let said = if shown.checked.is_empty() {
+        let said = if shown.verified.is_empty() {
             "no verification samples to draw".to_owned()
         } else {
             format!("{whose} arm's errors (m: {other})")
@@ -73,29 +73,29 @@ impl VerifyScreen {
 }
 
 impl Screen for VerifyScreen {
-    fn items(&self, cx: &ScreenCx<'_>) -> Vec<Item> {
-        let mut items = vec![self.tabs.item(), Scroll::item()];
-        if cx.scene.is_some_and(|scene| !scene.checked.is_empty()) {
-            items.push(Item::new("m", "errors before/after", 5));
+    fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
+        let mut items = vec![self.tabs.key_hint(), Scroll::key_hint()];
+        if cx.scene.is_some_and(|scene| !scene.verified.is_empty()) {
+            items.push(KeyHint::new("m", "errors before/after", 5));
         }
         items
     }
 
-    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> Reply {
+    fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
         if self.tabs.on_key(key) {
             self.scroll = Scroll::default();
-            return Reply::Changed;
+            return ScreenOutcome::Changed;
         }
         if key == Key::plain_code(KeyCode::Char('m')) {
             self.is_nominal = !self.is_nominal;
-            return Reply::Changed;
+            return ScreenOutcome::Changed;
         }
         let lines = self.page(cx, TEXT).len();
-        if self.scroll.on_key(key, lines) { Reply::Changed } else { Reply::Ignored }
+        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
     }
 
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> Reply {
-        Reply::Ignored
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
+        ScreenOutcome::Ignored
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {

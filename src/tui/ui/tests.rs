@@ -131,15 +131,15 @@ fn keys_become_intents() {
     ui.refresh(&view, &Session::default());
     let mut press = |key: Key| ui.on_input(Input::Key(key), &view);
     // Nothing to take yet: the wizard says why.
-    assert_eq!(press(Key::char('n')), Wish::Intend(Intent::Next));
-    assert_eq!(press(Key::char('c')), Wish::None);
+    assert_eq!(press(Key::char('n')), Command::Intent(Intent::Next));
+    assert_eq!(press(Key::char('c')), Command::None);
     for c in "ur10e".chars() {
-        assert_eq!(press(Key::char(c)), Wish::None);
+        assert_eq!(press(Key::char(c)), Command::None);
     }
-    assert_eq!(press(Key::plain_code(KeyCode::Enter)), Wish::Intend(Intent::ChooseProfile("ur10e".to_owned())));
-    assert_eq!(press(Key::ctrl('c')), Wish::None);
-    assert_eq!(press(Key::ctrl('c')), Wish::Intend(Intent::Quit));
-    assert_eq!(press(Key::ctrl('z')), Wish::Suspend);
+    assert_eq!(press(Key::plain_code(KeyCode::Enter)), Command::Intent(Intent::ChooseProfile("ur10e".to_owned())));
+    assert_eq!(press(Key::ctrl('c')), Command::None);
+    assert_eq!(press(Key::ctrl('c')), Command::Intent(Intent::Quit));
+    assert_eq!(press(Key::ctrl('z')), Command::Suspend);
 }
 
 #[test]
@@ -179,7 +179,7 @@ impl Walk {
     fn press(&mut self, key: Key) {
         let view = self.engine.wizard().view();
         self.ui.refresh(&view, self.engine.wizard().session());
-        if let Wish::Intend(intent) = self.ui.on_input(Input::Key(key), &view) {
+        if let Command::Intent(intent) = self.ui.on_input(Input::Key(key), &view) {
             self.engine.intend(intent);
         }
         while !self.engine.wizard().is_idle() {
@@ -193,7 +193,7 @@ impl Walk {
     }
 
     fn every_possible_intent_has_a_key(&self, view: &ViewModel) {
-        let shown = keymap::items(&view.intents, Glyphs::Unicode);
+        let shown = keymap::key_hints(&view.intents, Glyphs::Unicode);
         for offer in view.intents.iter().filter(|offer| offer.is_enabled()) {
             let has_key = shown.iter().any(|item| item.label == offer.label && item.blocked.is_none());
             assert!(has_key, "{offer:?} in the step {}", self.ui.step);

@@ -1,35 +1,36 @@
-//! A line over numbers, in braille, half blocks or ASCII.
+//! A line chart, in braille, half blocks or ASCII.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::{Glyphs, width};
+use crate::text;
+use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 
-/// Dots of a character.
+/// Dots per character.
 const DOTS: (usize, usize) = (2, 4);
-/// Least plotting area that still tells anything.
+/// Smallest useful plotting area.
 const LEAST: (u16, u16) = (6, 2);
 
-/// A line through points.
+/// A line chart.
 #[derive(Clone, Copy, Debug)]
 pub struct Chart<'a> {
-    /// The points, by growing x.
+    /// The points, in ascending order of x.
     pub points: &'a [(f64, f64)],
-    /// A level that is reached at best, drawn dotted.
+    /// The best possible level, drawn dotted.
     pub level: Option<f64>,
-    /// The point at this x is marked.
+    /// The x at which the line is marked.
     pub mark: Option<f64>,
-    /// What is upward, with its unit.
+    /// Title of the y axis, with its unit.
     pub y_title: &'a str,
-    /// What is to the right, with its unit.
+    /// Title of the x axis, with its unit.
     pub x_title: &'a str,
-    /// Digits behind the point of what is upward.
+    /// Decimals of the y axis.
     pub digits: usize,
 }
 
-/// Numbers onto dots.
+/// Maps numbers to dots.
 #[derive(Clone, Copy, Debug)]
 struct Scale {
     x: (f64, f64),
@@ -43,7 +44,7 @@ impl Scale {
     }
 }
 
-/// The dot of a value of a range.
+/// The dot of a value within a range.
 fn place(value: f64, (low, high): (f64, f64), dots: usize) -> usize {
     let last = dots.saturating_sub(1);
     let part = if high > low { (value - low) / (high - low) } else { 0.0 };
@@ -52,13 +53,13 @@ fn place(value: f64, (low, high): (f64, f64), dots: usize) -> usize {
     dot.min(last)
 }
 
-/// Smallest and largest.
+/// Smallest and largest value.
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
 impl Chart<'_> {
-    /// Draws it: title, line with the numbers of its axes.
+    /// Draws the title, and the line with its axes.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         let points: Vec<(f64, f64)> =
             self.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
@@ -67,7 +68,7 @@ impl Chart<'_> {
         let y = range(points.iter().map(|point| point.1).chain(level));
         let label = |value: f64| format!("{value:.*}", self.digits);
         let labels = [label(y.1), label(y.0)];
-        let left = labels.iter().map(|label| width(label)).max().unwrap_or(0) + 1;
+        let left = labels.iter().map(|label| text::columns(label)).max().unwrap_or(0) + 1;
         let left = u16::try_from(left).unwrap_or(u16::MAX);
         let plot = paint::band(area, 1, area.height.saturating_sub(2));
         let plot = Rect { x: plot.x.saturating_add(left), width: plot.width.saturating_sub(left), ..plot };
@@ -76,7 +77,8 @@ impl Chart<'_> {
         }
         let dim = theme.style(Role::Dim);
         paint::text(buf, area, (0, 0), &theme.glyphs.show(self.y_title), dim);
-        let right = |label: &str| u16::try_from(usize::from(left - 1).saturating_sub(width(label))).unwrap_or(0);
+        let right =
+            |label: &str| u16::try_from(usize::from(left - 1).saturating_sub(text::columns(label))).unwrap_or(0);
         paint::text(buf, area, (right(&labels[0]), 1), &labels[0], dim);
         paint::text(buf, area, (right(&labels[1]), plot.height), &labels[1], dim);
         self.x_axis(theme, x, (area, left), buf);
@@ -86,7 +88,7 @@ impl Chart<'_> {
         let mut cells = vec![0_u8; columns * rows];
         if let Some(level) = level {
             let (_, down) = scale.at(x.0, level);
-            (0..scale.dots.0).step_by(4).for_each(|across| light(&mut cells, columns, (across, down)));
+            (0..scale.dots.0).step_by(4).for_each(|across| set_dot(&mut cells, columns, (across, down)));
         }
         draw_line(&points, &scale, columns, &mut cells);
         paint_cells(&cells, theme, plot, buf);
@@ -104,10 +106,10 @@ impl Chart<'_> {
         let dim = theme.style(Role::Dim);
         let column = paint::text(buf, area, (left, row), &format!("{:.0}", x.0), dim);
         let last = format!("{:.0}", x.1);
-        let end = usize::from(area.width).saturating_sub(width(&last));
+        let end = usize::from(area.width).saturating_sub(text::columns(&last));
         let title = theme.glyphs.show(self.x_title);
-        let middle = (usize::from(left) + usize::from(area.width)).saturating_sub(width(&title)) / 2;
-        if middle > usize::from(column) && middle + width(&title) < end {
+        let middle = (usize::from(left) + usize::from(area.width)).saturating_sub(text::columns(&title)) / 2;
+        if middle > usize::from(column) && middle + text::columns(&title) < end {
             paint::text(buf, area, (u16::try_from(middle).unwrap_or(0), row), &title, dim);
         }
         if x.1 > x.0 {
@@ -116,7 +118,7 @@ impl Chart<'_> {
     }
 }
 
-/// The point of the line at `x`; beyond its ends the end.
+/// The point of the line at `x`, clamped to its ends.
 fn on_line(points: &[(f64, f64)], x: f64) -> Option<(f64, f64)> {
     let (first, last) = (points.first()?, points.last()?);
     let x = if x.is_finite() { x.clamp(first.0, last.0.max(first.0)) } else { last.0 };
@@ -127,8 +129,8 @@ fn on_line(points: &[(f64, f64)], x: f64) -> Option<(f64, f64)> {
     }
 }
 
-/// Lights a dot.
-fn light(cells: &mut [u8], columns: usize, (across, down): (usize, usize)) {
+/// Sets a dot.
+fn set_dot(cells: &mut [u8], columns: usize, (across, down): (usize, usize)) {
     let bit = (down % DOTS.1) * DOTS.0 + across % DOTS.0;
     if let Some(cell) = cells.get_mut(down / DOTS.1 * columns + across / DOTS.0) {
         *cell |= 1 << bit;
@@ -138,14 +140,14 @@ fn light(cells: &mut [u8], columns: usize, (across, down): (usize, usize)) {
 fn draw_line(points: &[(f64, f64)], scale: &Scale, columns: usize, cells: &mut [u8]) {
     let dots: Vec<(usize, usize)> = points.iter().map(|(x, y)| scale.at(*x, *y)).collect();
     for dot in &dots {
-        light(cells, columns, *dot);
+        set_dot(cells, columns, *dot);
     }
     for pair in dots.windows(2) {
         let [from, to] = pair else { continue };
         let steps = from.0.abs_diff(to.0).max(from.1.abs_diff(to.1)).max(1);
         let between = |a: usize, b: usize, step: usize| (a * (steps - step) + b * step + steps / 2) / steps;
         for step in 0..=steps {
-            light(cells, columns, (between(from.0, to.0, step), between(from.1, to.1, step)));
+            set_dot(cells, columns, (between(from.0, to.0, step), between(from.1, to.1, step)));
         }
     }
 }
@@ -161,7 +163,7 @@ fn paint_cells(cells: &[u8], theme: Theme, plot: Rect, buf: &mut Buffer) {
     }
 }
 
-/// The character for lit dots; bit 2·row + column.
+/// The character for a pattern of dots; bit 2·row + column.
 fn character(lit: u8, glyphs: Glyphs) -> Option<char> {
     /// Braille dot of each place (Unicode chapter 21.1).
     const BRAILLE: [u32; 8] = [0x01, 0x08, 0x02, 0x10, 0x04, 0x20, 0x40, 0x80];

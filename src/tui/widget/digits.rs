@@ -1,4 +1,4 @@
-//! Numbers that can be read from two metres: three lines high.
+//! Large numbers, three lines high, that can be read from two metres.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -7,7 +7,7 @@ use ratatui::style::Style;
 use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
 
-/// Lines that they take.
+/// Lines of a number.
 pub const HEIGHT: u16 = 3;
 
 /// Half blocks: five dots high, three wide.
@@ -52,7 +52,7 @@ fn shape(c: char, glyphs: Glyphs) -> [&'static str; 3] {
     }
 }
 
-/// Columns that a number takes.
+/// Columns of a number.
 pub fn columns(text: &str) -> u16 {
     let wide: usize = text.chars().map(|c| if c == '.' { 2 } else { 4 }).sum();
     u16::try_from(wide.saturating_sub(1)).unwrap_or(u16::MAX)

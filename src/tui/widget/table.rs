@@ -1,23 +1,24 @@
-//! A table: titles, rows, one of them with the focus.
+//! A table with titles and an optional focused row.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::{shortened, width};
+use crate::text;
+use crate::tui::glyphs::shortened;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 
 /// Columns between two columns of the table.
 const GAP: u16 = 2;
 
-/// A column.
+/// A column of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Column<'a> {
     /// Its title, with the unit.
     pub title: &'a str,
-    /// Columns of the terminal that it takes.
+    /// Width in columns of the terminal.
     pub width: u16,
-    /// Numbers stand to the right.
+    /// Whether the cells are right-aligned.
     pub is_right: bool,
 }
 
@@ -36,18 +37,18 @@ impl<'a> Column<'a> {
 /// A table.
 #[derive(Clone, Copy, Debug)]
 pub struct Table<'a> {
-    /// Its columns.
+    /// Columns from left to right.
     pub columns: &'a [Column<'a>],
-    /// Its rows; each may be shorter than the columns.
+    /// Rows with their roles. A row may have fewer cells than there are columns.
     pub rows: &'a [(Role, Vec<String>)],
-    /// The row with the focus: always in view.
+    /// The focused row, which is always in view.
     pub selected: Option<usize>,
-    /// First row that is shown where none has the focus.
+    /// First row shown if none has the focus.
     pub first: usize,
 }
 
 impl Table<'_> {
-    /// Draws titles and as many rows as there is room for.
+    /// Draws the titles and as many rows as fit.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         let titles: Vec<&str> = self.columns.iter().map(|column| column.title).collect();
         self.line(theme, &titles, Role::Title, false, paint::band(area, 0, 1), buf);
@@ -66,7 +67,7 @@ impl Table<'_> {
         let below = self.rows.len().saturating_sub(first + room);
         if below > 0 && room > 0 {
             let said = format!(" {below} more below ");
-            let column = usize::from(body.width).saturating_sub(width(&said));
+            let column = usize::from(body.width).saturating_sub(text::columns(&said));
             let at = (u16::try_from(column).unwrap_or(0), body.height - 1);
             paint::text(buf, body, at, &said, theme.style(Role::Dim));
         }
@@ -81,7 +82,7 @@ impl Table<'_> {
         for (place, cell) in self.columns.iter().zip(cells) {
             let room = usize::from(place.width);
             let text = shortened(&glyphs.show(cell), room, glyphs);
-            let missing = " ".repeat(room.saturating_sub(width(&text)));
+            let missing = " ".repeat(room.saturating_sub(text::columns(&text)));
             let text = if place.is_right { missing + &text } else { text + &missing };
             paint::text(buf, area, (column, 0), &text, style);
             column = column.saturating_add(place.width + GAP);

@@ -1,4 +1,4 @@
-//! What to do now: go to a configuration, decide about a sample, or go on.
+//! The next action: go to a configuration, decide about a sample, or continue.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -6,7 +6,8 @@ use ratatui::layout::Rect;
 use super::joints;
 use super::prediction::in_short;
 use crate::session::journal::FindingCause;
-use crate::tui::glyphs::{shortened, width, wrapped};
+use crate::text::{self, counted, wrapped};
+use crate::tui::glyphs::shortened;
 use crate::tui::keymap;
 use crate::tui::paint;
 use crate::tui::screen::ScreenCx;
@@ -15,16 +16,16 @@ use crate::tui::values;
 use crate::wizard::Intent;
 use crate::wizard::view::{CaptureView, FindingView, PairView};
 
-/// Columns of the names of keys in a list of what can be done.
+/// Columns of the names of keys in the list of decisions.
 const KEYS: usize = 12;
-/// Lines from which on nothing needs to be left out.
+/// Lines from which nothing needs to be left out.
 const TALL: u16 = 26;
-/// Lines of a message before it is cut off.
+/// Largest number of lines of a message.
 const MESSAGE: usize = 4;
-/// Distances that are shown at most.
+/// Largest number of distances shown.
 const PAIRS: u16 = 5;
 
-/// Draws it.
+/// Draws the view.
 pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
     let theme = cx.theme;
     let room = usize::from(area.width);
@@ -34,7 +35,7 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, role)));
     lines.extend(joined(&count(content, is_tall), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
     lines.extend(panel(cx, content, room));
-    // While something is in question, that and the configuration are what matters.
+    // While a sample is questioned, only that and the configuration matter.
     let status = if content.finding.is_some() && !is_tall { Vec::new() } else { status(cx, content, is_tall) };
     let status: Vec<(String, Role)> = status
         .into_iter()
@@ -44,7 +45,7 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
             parts.into_iter().map(move |part| (part, role))
         })
         .collect();
-    // The joints are what matters, but never so large that what is to be decided has no room.
+    // The joints matter most, but must leave room for the decision.
     let kept = if is_tall { height(status.len()) } else { u16::from(!status.is_empty()) };
     let pairs = content.finding.as_ref().map_or(&[][..], |finding| &finding.worst);
     let small = joints::layout(&content.joints, area.width, 0).rows;
@@ -70,14 +71,14 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     }
 }
 
-/// Parts on one line, the last ones left out where there is no room; or on as many lines as they need.
+/// Joins parts on one line and leaves out the last ones if there is no room; if `is_tall`, on as many lines as needed.
 fn joined(parts: &[String], theme: Theme, room: usize, is_tall: bool) -> Vec<String> {
     let glyphs = theme.glyphs;
     let mut lines: Vec<String> = Vec::new();
     for part in parts {
         let part = glyphs.show(part);
         match lines.last_mut() {
-            Some(line) if width(line) + width(glyphs.dot()) + width(&part) <= room => {
+            Some(line) if text::columns(line) + text::columns(glyphs.dot()) + text::columns(&part) <= room => {
                 line.push_str(glyphs.dot());
                 line.push_str(&part);
             }
@@ -92,30 +93,30 @@ fn height(lines: usize) -> u16 {
     u16::try_from(lines).unwrap_or(u16::MAX)
 }
 
-/// The likely cause of a finding, in a few words.
+/// The cause of a finding in words.
 const fn in_words(cause: FindingCause) -> &'static str {
     match cause {
-        FindingCause::Unit => "another unit",
+        FindingCause::Unit => "wrong unit",
         FindingCause::JointSign => "a joint turns the other way",
-        FindingCause::MistypedJoint => "one joint stood elsewhere",
+        FindingCause::MistypedJoint => "one joint value is wrong",
         FindingCause::WrongPose => "taken at another pose",
         FindingCause::StayedAtPrevious => "the robot had not moved",
-        FindingCause::SwappedRows => "exchanged with another pose",
+        FindingCause::SwappedRows => "swapped with another pose",
         FindingCause::TargetMoved => "the SMR has moved",
         FindingCause::InstrumentMoved => "the tracker has moved",
-        FindingCause::NotAtRest => "the robot still moved",
+        FindingCause::NotAtRest => "the robot was still moving",
         FindingCause::Drift => "it has drifted",
         FindingCause::Unexplained => "its reading does not fit",
     }
 }
 
-/// Where to go, and through which poses.
+/// The pose to go to, and the poses on the way.
 fn heading(content: &CaptureView) -> Vec<String> {
     if let Some(finding) = &content.finding {
         let cause = in_words(finding.cause);
-        return vec![format!("Pose {} is in question: {cause}", finding.pose), "decide before going on".to_owned()];
+        return vec![format!("Pose {} is in question: {cause}", finding.pose), "decide before continuing".to_owned()];
     }
-    let Some(pose) = &content.pose else { return vec!["All poses of the plan are measured.".to_owned()] };
+    let Some(pose) = &content.pose else { return vec!["All poses of the plan have been measured.".to_owned()] };
     let mut parts = vec![format!("Go to pose {pose}")];
     parts.extend(content.kind.map(|kind| kind.name().to_owned()));
     if !content.on_the_way.is_empty() {
@@ -135,21 +136,21 @@ fn count(content: &CaptureView, is_tall: bool) -> Vec<String> {
     if content.open > 0 {
         parts.extend(content.minutes_left.map(|minutes| format!("about {:.0} min left", minutes.ceil())));
     }
-    // Where there is room it is a line of its own.
+    // If there is room, it has a separate line.
     if let Some(drift) = content.drift.last().filter(|_| !is_tall) {
         parts.push(format!("drift {:.3} mm", drift.moved_mm));
     }
     parts
 }
 
-/// The distances that fit least, as a table.
+/// The distances that fit worst, as a table.
 fn table(content: &CaptureView, most: usize) -> Vec<(String, Role)> {
     let Some(finding) = &content.finding else { return Vec::new() };
     let row = |pair: &PairView| {
         let again = if pair.is_drift { " (again)" } else { "" };
         let word = if pair.difference_mm < 0.0 { "too short" } else { "too long" };
         format!(
-            // Blanks between all columns: what does not fit moves the rest.
+            // Blanks between all columns: a value that does not fit moves the rest.
             "  {:<15} {:>10.3} {:>10.3} {:>8.3} {word:<9} {:>6.3}",
             format!("pose {}{again}", pair.pose),
             pair.measured_mm,
@@ -164,7 +165,7 @@ fn table(content: &CaptureView, most: usize) -> Vec<(String, Role)> {
     std::iter::once((head, Role::Dim)).chain(rows).collect()
 }
 
-/// What has to be decided, with the keys for it.
+/// The decision to make, with its keys.
 fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, Role)> {
     let theme = cx.theme;
     let mut lines = Vec::new();
@@ -176,14 +177,14 @@ fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, 
         lines.extend(choice(cx, "measure again at rest", |intent| {
             matches!(intent, Intent::Measure | Intent::TypeReading(_))
         }));
-        lines.extend(choice(cx, "take it as it is", |intent| *intent == Intent::AcceptReading));
+        lines.extend(choice(cx, "accept it as it is", |intent| *intent == Intent::AcceptReading));
         lines.extend(choice(cx, "skip this pose", |intent| *intent == Intent::Skip));
     } else if content.pose.is_none() {
         if let Some(reason) = &content.too_few {
             lines.push((theme.glyphs.show(reason), Role::Warn));
         }
-        lines.extend(choice(cx, "go on: identify the arm", |intent| *intent == Intent::Next));
-        lines.extend(choice(cx, "add the poses that tell most", |intent| matches!(intent, Intent::SuggestPoses(_))));
+        lines.extend(choice(cx, "continue: identify the arm", |intent| *intent == Intent::Next));
+        lines.extend(choice(cx, "add the most useful poses", |intent| matches!(intent, Intent::SuggestPoses(_))));
     }
     lines
 }
@@ -191,17 +192,17 @@ fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, 
 fn question(cx: &ScreenCx<'_>, finding: &FindingView, room: usize) -> Vec<(String, Role)> {
     let mut lines = message(cx, &finding.message, room);
     if finding.has_remedy {
-        lines.extend(choice(cx, "correct it as proposed", |intent| *intent == Intent::ApplyRemedy));
+        lines.extend(choice(cx, "apply the proposed correction", |intent| *intent == Intent::ApplyRemedy));
     }
     lines.extend(choice(cx, "measure this pose again", |intent| {
         matches!(intent, Intent::MeasureAgain | Intent::TypeReading(_))
     }));
     lines.extend(choice(cx, "keep it: it counts as it is", |intent| *intent == Intent::Keep));
-    lines.extend(choice(cx, "leave it out; it stays in the journal", |intent| *intent == Intent::LeaveOut));
+    lines.extend(choice(cx, "exclude it; it stays in the journal", |intent| *intent == Intent::LeaveOut));
     lines
 }
 
-/// A message, unless it stands in the line of messages anyway.
+/// A message, unless it is already shown as the notice.
 fn message(cx: &ScreenCx<'_>, text: &str, room: usize) -> Vec<(String, Role)> {
     if cx.view.notice.as_ref().is_some_and(|notice| notice.what == text) {
         return Vec::new();
@@ -210,11 +211,11 @@ fn message(cx: &ScreenCx<'_>, text: &str, room: usize) -> Vec<(String, Role)> {
     lines.into_iter().take(MESSAGE).map(|line| (line, Role::Plain)).collect()
 }
 
-/// What can be done, with its keys; none where it cannot be done now.
+/// A decision with its keys; `None` if it is not possible now.
 fn choice(cx: &ScreenCx<'_>, label: &str, accepts: impl Fn(&Intent) -> bool) -> Option<(String, Role)> {
     let glyphs = cx.theme.glyphs;
     let info = cx.view.intents.iter().find(|info| info.is_enabled() && accepts(&info.intent))?;
-    let items = keymap::items(&cx.view.intents, glyphs);
+    let items = keymap::key_hints(&cx.view.intents, glyphs);
     let keys: Vec<&str> = items
         .iter()
         .filter(|item| item.blocked.is_none() && item.label == info.label)
@@ -224,7 +225,7 @@ fn choice(cx: &ScreenCx<'_>, label: &str, accepts: impl Fn(&Intent) -> bool) -> 
     (!keys.is_empty()).then(|| (format!("  {:<KEYS$} {label}", keys.join(" or ")), Role::Plain))
 }
 
-/// Last reading, prediction and drift in a line each.
+/// Last reading, prediction and drift, one line each.
 fn status(cx: &ScreenCx<'_>, content: &CaptureView, is_tall: bool) -> Vec<(String, Role)> {
     let mut lines = Vec::new();
     if let Some(live) = &cx.view.live {
@@ -242,12 +243,9 @@ fn status(cx: &ScreenCx<'_>, content: &CaptureView, is_tall: bool) -> Vec<(Strin
         lines.push((in_short(prediction, content.open), role));
     }
     if let Some(drift) = content.drift.last().filter(|_| is_tall) {
-        let checked = match content.drift.len() {
-            1 => "once".to_owned(),
-            count => format!("{count} times"),
-        };
+        let checks = counted(content.drift.len(), "check");
         let text = format!(
-            "drift: pose {} has moved {:.3} mm since it was measured first (checked {checked})",
+            "drift: pose {} has moved {:.3} mm since its first measurement ({checks})",
             drift.pose, drift.moved_mm
         );
         lines.push((text, Role::Plain));

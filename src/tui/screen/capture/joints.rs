@@ -1,22 +1,23 @@
-//! The configuration to go to, as large as there is room.
+//! The configuration to go to, as large as possible.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::{Glyphs, shortened, width};
+use crate::text;
+use crate::tui::glyphs::{Glyphs, shortened};
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::digits;
 use crate::wizard::view::JointShown;
 
-/// Columns of the name of a joint at least, and at most.
+/// Least and largest number of columns of a joint name.
 const NAME: (usize, usize) = (4, 10);
-/// Columns around a name: sign before, gap behind.
+/// Columns around a name: pointer before, gap after.
 const AROUND_NAME: u16 = 3;
 /// Columns of a line with a joint.
 const LINE: u16 = 36;
 
-/// How the joints are shown.
+/// Layout of the joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Layout {
     is_large: bool,
@@ -25,17 +26,17 @@ pub(super) struct Layout {
     pitch: u16,
     /// Columns of name and unit.
     label: u16,
-    /// Lines in all.
+    /// Total number of lines.
     pub(super) rows: u16,
 }
 
-/// Columns that names and units of `joints` take.
+/// Columns of names and units of `joints`.
 fn label(joints: &[JointShown]) -> u16 {
-    let widest = joints.iter().map(|joint| width(&joint.name)).max().unwrap_or(0).clamp(NAME.0, NAME.1);
+    let widest = joints.iter().map(|joint| text::columns(&joint.name)).max().unwrap_or(0).clamp(NAME.0, NAME.1);
     u16::try_from(widest).unwrap_or(0) + AROUND_NAME
 }
 
-/// The largest way to show `joints` in `columns` × `rows`.
+/// The largest layout of `joints` that fits into `columns` × `rows`.
 pub(super) fn layout(joints: &[JointShown], columns: u16, rows: u16) -> Layout {
     let count = u16::try_from(joints.len()).unwrap_or(u16::MAX);
     let label = label(joints);
@@ -58,7 +59,7 @@ pub(super) fn layout(joints: &[JointShown], columns: u16, rows: u16) -> Layout {
 }
 
 fn number(joint: &JointShown) -> String {
-    // Without a minus before a zero.
+    // No minus before a zero.
     let text = format!("{:.3}", joint.value);
     if text.trim_start_matches('-').bytes().all(|byte| matches!(byte, b'0' | b'.')) {
         return text.trim_start_matches('-').to_owned();
@@ -66,7 +67,7 @@ fn number(joint: &JointShown) -> String {
     text
 }
 
-/// Draws the joints column by column, as a pendant lists them.
+/// Draws the joints column by column, like a pendant.
 pub(super) fn draw(joints: &[JointShown], layout: Layout, theme: Theme, area: Rect, buf: &mut Buffer) {
     let per_column = u16::try_from(joints.len()).unwrap_or(u16::MAX).div_ceil(layout.columns).max(1);
     let columns = if layout.is_large { area.width / layout.columns } else { LINE.min(area.width) };
@@ -99,7 +100,7 @@ fn draw_large(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mu
         paint::text(buf, cell, (column, 2), "most", theme.style(Role::Hint));
     }
     let text = number(joint);
-    // Right-aligned, so that the points stand below each other; at most as far right as the widest angle needs.
+    // Right-aligned, so that the decimal points line up, but no farther right than the widest angle needs.
     let right = cell.width.saturating_sub(1).min(label + digits::columns("-360.000").max(digits::columns(&text)));
     let start = right.saturating_sub(digits::columns(&text));
     let place = Rect { x: cell.x + start, width: cell.width - start, ..cell };
@@ -113,7 +114,7 @@ fn draw_line(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut
     let role = if joint.moves_most { Role::Focus } else { Role::Title };
     paint::text(buf, cell, (column, 0), &name, theme.style(role));
     let text = number(joint);
-    let start = usize::from(label) + 10_usize.saturating_sub(width(&text));
+    let start = usize::from(label) + 10_usize.saturating_sub(text::columns(&text));
     let column = paint::text(buf, cell, (u16::try_from(start).unwrap_or(0), 0), &text, theme.style(Role::Title));
     let column = paint::text(buf, cell, (column + 1, 0), &glyphs.show(&joint.unit), theme.style(Role::Dim));
     if joint.moves_most {

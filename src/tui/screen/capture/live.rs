@@ -1,9 +1,9 @@
-//! What the instrument sees now: the SMR over the last seconds, and whether it and the robot are where they should be.
+//! Live readings: the SMR over the last seconds, and whether it and the robot are where they should be.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::wrapped;
+use crate::text::wrapped;
 use crate::tui::paint;
 use crate::tui::screen::ScreenCx;
 use crate::tui::theme::Role;
@@ -11,10 +11,10 @@ use crate::tui::values;
 use crate::tui::widget::Chart;
 use crate::wizard::view::{CaptureView, LiveView};
 
-/// Rows of the picture of the last seconds at most.
+/// Largest number of rows of the chart.
 const CHART: u16 = 12;
 
-/// Draws it.
+/// Draws the view.
 pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
     let theme = cx.theme;
     let Some(live) = &cx.view.live else {
@@ -46,10 +46,10 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
 
 fn lines(live: &LiveView, content: &CaptureView) -> Vec<(String, Role)> {
     if let Some(down) = &live.down {
-        // What was seen before would be taken for what is.
+        // Older readings would be mistaken for current ones.
         return vec![
             (format!("The link is down: {down}"), Role::Warn),
-            ("It is tried again by itself. Nothing is measured meanwhile.".to_owned(), Role::Plain),
+            ("It is reconnected automatically. Nothing is measured meanwhile.".to_owned(), Role::Plain),
         ];
     }
     let mut lines = vec![match live.point_mm {
@@ -65,7 +65,7 @@ fn lines(live: &LiveView, content: &CaptureView) -> Vec<(String, Role)> {
         lines.push((format!("robot: joint {name} is {difference:.3} {unit} from pose {pose}"), Role::Plain));
     }
     lines.extend(live.is_still.map(|is_still| {
-        if is_still { ("robot: at rest".to_owned(), Role::Ok) } else { ("robot: moves".to_owned(), Role::Warn) }
+        if is_still { ("robot: at rest".to_owned(), Role::Ok) } else { ("robot: moving".to_owned(), Role::Warn) }
     }));
     lines
 }

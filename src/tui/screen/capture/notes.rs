@@ -1,20 +1,20 @@
-//! Remarks, drift, and measurements that gave no sample.
+//! Notes, drift, and refused measurements.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::wrapped;
+use crate::text::wrapped;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::wizard::view::CaptureView;
 
-/// How many entries there are to scroll over.
+/// Number of lines to scroll over.
 pub(super) fn count(content: &CaptureView) -> usize {
     lines(content).len()
 }
 
 fn lines(content: &CaptureView) -> Vec<(Role, String)> {
-    let mut lines = vec![(Role::Title, "Notes (w writes one to the pose shown)".to_owned())];
+    let mut lines = vec![(Role::Title, "Notes (w adds one to the pose shown)".to_owned())];
     lines.extend(content.notes.iter().rev().map(|(pose, text)| {
         let pose = pose.as_ref().map_or_else(|| "no pose".to_owned(), |pose| format!("pose {pose}"));
         (Role::Plain, format!("- {pose}: {text}"))
@@ -22,7 +22,7 @@ fn lines(content: &CaptureView) -> Vec<(Role, String)> {
     if content.notes.is_empty() {
         lines.push((Role::Dim, "- none".to_owned()));
     }
-    lines.push((Role::Title, "Drift: how far a repeated pose has moved".to_owned()));
+    lines.push((Role::Title, "Drift: movement of a repeated pose".to_owned()));
     lines.extend(content.drift.iter().rev().map(|drift| {
         let (pose, measurement, moved) = (&drift.pose, drift.measurement, drift.moved_mm);
         (Role::Plain, format!("- pose {pose}, measurement {measurement}: {moved:.3} mm"))
@@ -30,7 +30,7 @@ fn lines(content: &CaptureView) -> Vec<(Role, String)> {
     if content.drift.is_empty() {
         lines.push((Role::Dim, "- not repeated yet".to_owned()));
     }
-    lines.push((Role::Title, "Measurements that gave no sample".to_owned()));
+    lines.push((Role::Title, "Refused measurements".to_owned()));
     lines.extend(content.refused.iter().rev().map(|(pose, reason)| (Role::Plain, format!("- pose {pose}: {reason}"))));
     if content.refused.is_empty() {
         lines.push((Role::Dim, "- none".to_owned()));
@@ -38,7 +38,7 @@ fn lines(content: &CaptureView) -> Vec<(Role, String)> {
     lines
 }
 
-/// Draws them, the newest of each first.
+/// Draws the lines, the newest of each kind first.
 pub(super) fn draw(theme: Theme, content: &CaptureView, scroll: usize, area: Rect, buf: &mut Buffer) {
     let room = usize::from(area.width);
     let mut row = 0;

@@ -1,4 +1,4 @@
-//! All poses with what has become of them.
+//! All poses with their states.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -29,7 +29,7 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, selected: usize, area: R
                 RowState::Open if is_shown => (Role::Title, format!("{} next", theme.glyphs.next())),
                 RowState::Open => (Role::Plain, "open".to_owned()),
                 RowState::Skipped => (Role::Dim, "skipped".to_owned()),
-                RowState::LeftOut => (Role::Warn, "left out".to_owned()),
+                RowState::LeftOut => (Role::Warn, "excluded".to_owned()),
             };
             (role, vec![row.pose.clone(), row.kind.name().to_owned(), word])
         })

@@ -1,24 +1,24 @@
-//! How good a calibration from the samples so far would be.
+//! The error predicted for a calibration from the samples so far.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::wrapped;
+use crate::text::{counted, wrapped};
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::Chart;
 use crate::wizard::view::{CaptureView, PredictionView};
 
-/// What the number is and what it is not.
+/// Meaning of the predicted error.
 const MEANING: &str = "RMS position error that the noise of the instrument alone would leave in the identified arm. \
-    What no kinematic model can express comes on top; only Verify measures the real error.";
+    Errors that no kinematic model can express are added to it; only Verify measures the real error.";
 
-/// An error with its unit: mm where the profile knows its instrument, else multiples of its σ.
+/// An error with its unit: mm if the profile states an instrument, otherwise multiples of σ.
 fn error(sigma: f64, mm: Option<f64>) -> String {
     mm.map_or_else(|| format!("{sigma:.3} sigma"), |mm| format!("{mm:.4} mm"))
 }
 
-/// Whether the rest is worth its time.
+/// Whether the rest is worth the time.
 fn verdict(prediction: &PredictionView) -> &'static str {
     if prediction.is_enough { "enough (rest gains < 5 %)" } else { "not enough yet" }
 }
@@ -27,7 +27,7 @@ fn verdict(prediction: &PredictionView) -> &'static str {
 pub(super) fn in_short(prediction: &PredictionView, open: usize) -> String {
     let now = error(prediction.now_sigma, prediction.now_mm);
     if open == 0 {
-        // Whether more of them would be worth it is another question than the rest of this plan.
+        // Nothing is left of the plan, so there is nothing to say about the rest.
         return format!("predicted error {now} with all poses of the plan");
     }
     let all = prediction.with_all_sigma.map(|sigma| error(sigma, prediction.with_all_mm));
@@ -35,7 +35,7 @@ pub(super) fn in_short(prediction: &PredictionView, open: usize) -> String {
     format!("predicted error {now}{all}: {}", verdict(prediction))
 }
 
-/// Draws the curve with what it means.
+/// Draws the curve and its meaning.
 pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Buffer) {
     let room = usize::from(area.width);
     let mut lines: Vec<(String, Role)> = Vec::new();
@@ -46,17 +46,17 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
         return;
     };
     let now = error(prediction.now_sigma, prediction.now_mm);
-    lines.push((format!("now, {} identification poses: {now}", content.identification), Role::Title));
+    lines.push((format!("now, {}: {now}", counted(content.identification, "identification pose")), Role::Title));
     if let Some(sigma) = prediction.with_all_sigma.filter(|_| content.open > 0) {
         lines.push((format!("with all poses of the plan: {}", error(sigma, prediction.with_all_mm)), Role::Plain));
     }
     let role = if prediction.is_enough { Role::Ok } else { Role::Hint };
-    let said = if content.open == 0 { "all poses of the plan are measured" } else { verdict(prediction) };
+    let said = if content.open == 0 { "all poses of the plan have been measured" } else { verdict(prediction) };
     lines.push((said.to_owned(), role));
     lines.push((MEANING.to_owned(), Role::Dim));
     let used = text(theme, &lines, room, area, buf);
 
-    // mm where they are known: both are multiples of σ.
+    // In mm if known; both are multiples of σ.
     let mm = prediction.now_mm.map(|mm| mm / prediction.now_sigma).filter(|mm| mm.is_finite());
     let factor = mm.unwrap_or(1.0);
     let points: Vec<(f64, f64)> =
@@ -72,7 +72,7 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
     chart.draw(theme, paint::band(area, used + 1, area.height), buf);
 }
 
-/// Draws lines, wrapped; gives back how many they are.
+/// Draws wrapped lines, and returns their number.
 fn text(theme: Theme, lines: &[(String, Role)], room: usize, area: Rect, buf: &mut Buffer) -> u16 {
     let mut row = 0;
     for (line, role) in lines {

@@ -4,7 +4,7 @@ use super::*;
 use crate::session::journal::FindingCause;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
-use crate::tui::dialog::Answer;
+use crate::tui::dialog::DialogOutcome;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
     DriftView, FindingView, JointShown, LivePoint, LiveView, PairView, PredictionView, RowState, RowView, SampleView,
@@ -88,17 +88,17 @@ fn offers(content: &CaptureView) -> Vec<IntentInfo> {
     vec![
         measure.default_action(),
         if manual { type_in.default_action() } else { type_in },
-        IntentInfo::new(Intent::AcceptReading, "take the reading as it is").unless(no(content.held.is_none())),
+        IntentInfo::new(Intent::AcceptReading, "accept the reading").unless(no(content.held.is_none())),
         IntentInfo::new(Intent::MeasureAgain, "measure again").unless(no(!asked || manual)).default_action(),
         IntentInfo::new(Intent::Keep, "keep the sample").unless(no(!asked)),
-        IntentInfo::new(Intent::LeaveOut, "leave the sample out").unless(no(!asked)),
-        IntentInfo::new(Intent::ApplyRemedy, "correct it as proposed").unless(no(!asked)),
+        IntentInfo::new(Intent::LeaveOut, "exclude this sample").unless(no(!asked)),
+        IntentInfo::new(Intent::ApplyRemedy, "apply the correction").unless(no(!asked)),
         IntentInfo::new(Intent::Skip, "skip this pose").unless(no(none || asked)),
-        IntentInfo::new(Intent::Undo, "take the last sample back"),
-        IntentInfo::new(Intent::GoToPose(String::new()), "show another pose"),
+        IntentInfo::new(Intent::Undo, "undo the last sample"),
+        IntentInfo::new(Intent::GoToPose(String::new()), "go to another pose"),
         IntentInfo::new(Intent::Note(String::new()), "write a note"),
-        IntentInfo::new(Intent::SuggestPoses(5), "add the next best poses"),
-        IntentInfo::new(Intent::Next, "go on to identify").unless(no(!none)).default_action(),
+        IntentInfo::new(Intent::SuggestPoses(5), "add more poses"),
+        IntentInfo::new(Intent::Next, "continue to Identify").unless(no(!none)).default_action(),
         IntentInfo::new(Intent::Quit, "quit"),
     ]
 }
@@ -166,8 +166,8 @@ fn manual() -> ViewModel {
     of(CaptureView { typed_unit: Some("in".to_owned()), ..normal() })
 }
 
-fn on(tab: Tab) -> Capture {
-    Capture { tab, ..Capture::default() }
+fn on(tab: Tab) -> CaptureScreen {
+    CaptureScreen { tab, ..CaptureScreen::default() }
 }
 
 #[test]
@@ -255,16 +255,16 @@ fn distances_that_are_far_off_stay_apart() {
 fn digits_and_paste_open_the_question_for_coordinates() {
     let view = manual();
     let mut screen = on(Tab::GoTo);
-    let Reply::Ask(mut dialog) = press(&mut screen, &view, Key::char('1')) else { panic!("no question") };
+    let ScreenOutcome::Open(mut dialog) = press(&mut screen, &view, Key::char('1')) else { panic!("no question") };
     dialog.paste("0.5 20 30");
     let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
-    assert_eq!(answer, Answer::Intend(Intent::TypeReading("10.5 20 30".to_owned())));
-    let Reply::Ask(mut dialog) = paste(&mut screen, &view, " 1.5\t2\t3\n") else { panic!("no question") };
+    assert_eq!(answer, DialogOutcome::Submitted(Intent::TypeReading("10.5 20 30".to_owned())));
+    let ScreenOutcome::Open(mut dialog) = paste(&mut screen, &view, " 1.5\t2\t3\n") else { panic!("no question") };
     let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
-    assert_eq!(answer, Answer::Intend(Intent::TypeReading("1.5 2 3".to_owned())));
+    assert_eq!(answer, DialogOutcome::Submitted(Intent::TypeReading("1.5 2 3".to_owned())));
     // An instrument that measures by itself takes no numbers.
-    assert!(matches!(press(&mut screen, &of(normal()), Key::char('1')), Reply::Ignored));
-    assert!(matches!(paste(&mut screen, &of(normal()), "1 2 3"), Reply::Ignored));
+    assert!(matches!(press(&mut screen, &of(normal()), Key::char('1')), ScreenOutcome::Ignored));
+    assert!(matches!(paste(&mut screen, &of(normal()), "1 2 3"), ScreenOutcome::Ignored));
 }
 
 #[test]
@@ -272,7 +272,7 @@ fn coordinates_are_checked_as_they_are_typed() {
     // In inch, as the instrument of this session counts.
     let view = manual();
     let mut screen = on(Tab::GoTo);
-    let Reply::Ask(mut dialog) = press(&mut screen, &view, Key::char('1')) else { panic!("no question") };
+    let ScreenOutcome::Open(mut dialog) = press(&mut screen, &view, Key::char('1')) else { panic!("no question") };
     let drawn = |dialog: &crate::tui::dialog::Dialog| {
         let mut buf = Buffer::empty(Rect::new(0, 0, 78, 10));
         dialog.draw(themes()[1], buf.area, &mut buf);
@@ -285,14 +285,14 @@ fn coordinates_are_checked_as_they_are_typed() {
     ] {
         dialog.paste(text);
         assert!(drawn(&dialog).contains(reason), "{}", drawn(&dialog));
-        assert_eq!(dialog.on_key(Key::plain_code(KeyCode::Enter)), Answer::Open);
+        assert_eq!(dialog.on_key(Key::plain_code(KeyCode::Enter)), DialogOutcome::Open);
     }
     for _ in 0..6 {
         dialog.on_key(Key::plain_code(KeyCode::Backspace));
     }
     assert!(!drawn(&dialog).contains("not"), "{}", drawn(&dialog));
     let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
-    assert_eq!(answer, Answer::Intend(Intent::TypeReading("10.5 20 30".to_owned())));
+    assert_eq!(answer, DialogOutcome::Submitted(Intent::TypeReading("10.5 20 30".to_owned())));
     // The key of the table asks the same.
     let offer = view.intents.iter().find(|info| matches!(info.intent, Intent::TypeReading(_))).unwrap();
     let asked = crate::tui::dialog::Dialog::before(offer, &view).unwrap();
@@ -303,20 +303,20 @@ fn coordinates_are_checked_as_they_are_typed() {
 fn a_pose_is_chosen_from_the_list() {
     let view = of(normal());
     let mut screen = on(Tab::GoTo);
-    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Enter)), Reply::Ignored));
-    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Tab)), Reply::Changed));
+    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Enter)), ScreenOutcome::Ignored));
+    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Tab)), ScreenOutcome::Changed));
     for _ in 0..2 {
         press(&mut screen, &view, Key::plain_code(KeyCode::Down));
     }
     match press(&mut screen, &view, Key::plain_code(KeyCode::Enter)) {
-        Reply::Intend(intent) => assert_eq!(intent, Intent::GoToPose("17".to_owned())),
+        ScreenOutcome::Intent(intent) => assert_eq!(intent, Intent::GoToPose("17".to_owned())),
         reply => panic!("{reply:?}"),
     }
     assert_eq!(screen.tab, Tab::GoTo);
     press(&mut screen, &view, Key::plain_code(KeyCode::BackTab));
     assert_eq!(screen.tab, Tab::Picture);
     // There the arrows turn the picture.
-    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Up)), Reply::Ignored));
+    assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Up)), ScreenOutcome::Ignored));
 }
 
 proptest! {

@@ -1,15 +1,16 @@
-//! The pages of the identification.
+//! Pages of the identification.
 
 use crate::identification::{SigmaSource, TerminationReason};
 use crate::session::summary::{IdentificationSummary, ParameterSummary};
-use crate::tui::screen::page::{Page, counted, decimals_for, fixed};
+use crate::text::counted;
+use crate::tui::screen::page::{Page, decimals_for, fixed};
 use crate::tui::theme::Role;
 use crate::wizard::view::IdentifyView;
 
-/// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
+/// Standard deviation, as a share of the expected deviation, above which a parameter is only weakly determined.
 const WEAK: f64 = 0.5;
 
-/// Nothing is identified yet.
+/// The page before the identification.
 pub(super) fn before(content: &IdentifyView, is_busy: bool, page: &mut Page) {
     page.pair("samples", &format!("{} to identify from", counted(content.samples, "pose")));
     page.gap();
@@ -21,32 +22,33 @@ pub(super) fn before(content: &IdentifyView, is_busy: bool, page: &mut Page) {
     );
     page.marked(
         ("- ", Role::Dim),
-        "where the tracker stands, and the SMR as it was chosen in the step Target",
+        "the position of the tracker, and of the SMR as chosen in the step Target",
         Role::Plain,
     );
     page.gap();
     page.paragraph(
-        "Samples that contradict all others are found, named and left out. The verification poses are not used here.",
+        "Samples that contradict all others are detected, reported and excluded. The verification poses are not used here.",
         Role::Plain,
     );
     page.gap();
-    let text = if is_busy { "This takes some seconds. Esc stops it." } else { "Enter begins; it takes some seconds." };
+    let text =
+        if is_busy { "This takes a few seconds. Esc cancels." } else { "Enter starts it; it takes a few seconds." };
     page.paragraph(text, Role::Hint);
 }
 
-/// Warnings first, then what the result rests on.
+/// The warnings, then the basis of the result.
 pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, page: &mut Page) {
     if !content.is_current {
         page.marked(
             ("OUT OF DATE: ", Role::Warn),
-            "the samples have changed since; press i to identify again.",
+            "the samples have changed since then; press i to identify again.",
             Role::Plain,
         );
     }
     if !content.is_usable {
         page.marked(
             ("NOT USABLE: ", Role::Alarm),
-            "there is no solution that could be applied; see the warnings.",
+            "there is no solution that can be applied; see the warnings.",
             Role::Plain,
         );
     }
@@ -84,13 +86,13 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
     let source = match summary.sigma.source {
         SigmaSource::Readings => "given with the readings",
         SigmaSource::Option => "given on the command line",
-        SigmaSource::Instrument => "of the profile's instrument",
+        SigmaSource::Instrument => "from the profile's instrument",
         SigmaSource::Residuals => "estimated from the residuals",
-        SigmaSource::Assumed => "ASSUMED, for want of data to estimate it",
+        SigmaSource::Assumed => "ASSUMED, too few data to estimate it",
     };
     page.pair("sigma", &format!("{} mm per coordinate, {source}", fixed(summary.sigma.used_mm, 4)));
     if let Some(said) = summary.sigma.from_residuals_mm.filter(|_| summary.sigma.source != SigmaSource::Residuals) {
-        page.pair("", &format!("{} mm is what the residuals say", fixed(said, 4)));
+        page.pair("", &format!("{} mm from the residuals", fixed(said, 4)));
     }
     let ended = match summary.termination {
         TerminationReason::Converged => "converged",
@@ -101,12 +103,12 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
     page.pair("solver", &format!("{ended} after {}", counted(summary.iterations.len(), "step")));
     page.gap();
     page.paragraph(
-        "How accurate the arm is now: in the next step, on poses that the identification never saw.",
+        "The next step shows how accurate the arm is, at poses that the identification did not use.",
         Role::Dim,
     );
 }
 
-/// How well a parameter is found.
+/// How well a parameter is determined.
 fn found(parameter: &ParameterSummary) -> &'static str {
     if !parameter.identifiable {
         "only combined"
@@ -117,7 +119,7 @@ fn found(parameter: &ParameterSummary) -> &'static str {
     }
 }
 
-/// Every parameter.
+/// The table of parameters.
 pub(super) fn parameters(summary: &IdentificationSummary, page: &mut Page) {
     let head =
         format!("{:<10}{:>4}{:>12}{:>12}{:>11}  {}", "parameter", "unit", "nominal", "deviation", "sigma", "found");
@@ -141,10 +143,10 @@ pub(super) fn parameters(summary: &IdentificationSummary, page: &mut Page) {
         page.line(vec![(line, Role::Plain), (found.to_owned(), role)]);
     }
     page.gap();
-    page.paragraph("deviation: identified less nominal. sigma: standard deviation of it. weakly: sigma above half of what was expected before measuring. only combined: see page 3.", Role::Dim);
+    page.paragraph("deviation: identified minus nominal. sigma: its standard deviation. weakly: sigma above half of the deviation expected before measuring. only combined: see page 3.", Role::Dim);
 }
 
-/// Rejected samples, and what the data cannot tell.
+/// Rejected samples, and what the data cannot determine.
 pub(super) fn limits(summary: &IdentificationSummary, page: &mut Page) {
     page.title(&format!("Rejected samples: {} of {}", summary.rejected.len(), summary.samples));
     for rejected in &summary.rejected {
@@ -155,15 +157,15 @@ pub(super) fn limits(summary: &IdentificationSummary, page: &mut Page) {
             Role::Plain,
         );
     }
-    page.title("What these samples cannot tell");
+    page.title("What these samples cannot determine");
     if summary.blind_groups.is_empty() {
-        page.paragraph("nothing: every parameter is found on its own", Role::Plain);
+        page.paragraph("nothing: every parameter is determined individually", Role::Plain);
     }
     for group in &summary.blind_groups {
         page.marked(("- ", Role::Dim), &group.description, Role::Plain);
     }
     if !summary.correlations.is_empty() {
-        page.title("Strongly correlated (not told apart well)");
+        page.title("Strongly correlated (hard to separate)");
         for pair in &summary.correlations {
             let [first, second] = &pair.parameters;
             page.line(vec![(format!("- {first} and {second}: {:+.2}", pair.correlation), Role::Plain)]);

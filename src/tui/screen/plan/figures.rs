@@ -1,10 +1,11 @@
-//! What is proposed or being measured, in numbers.
+//! Figures of the proposed or accepted plan.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use crate::session::plan_summary::PlanSummary;
-use crate::tui::glyphs::{shortened, wrapped};
+use crate::text::wrapped;
+use crate::tui::glyphs::shortened;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::wizard::view::{PlanFigures, PlanView};
@@ -13,14 +14,14 @@ use crate::wizard::view::{PlanFigures, PlanView};
 const NAMES: usize = 16;
 /// Columns of the comparison with random sets.
 const COMPARED: u16 = 42;
-/// Columns of the names where there is little room.
+/// Columns of the names in the narrow form.
 const SHORT_NAMES: usize = 9;
-/// Said where there is no plan.
-const NO_PLAN: &str = "No plan yet. Enter chooses poses with the settings beside; l takes the poses of a file.";
-/// Said while one is made.
-const SEARCHING: &str = "Choosing poses. Esc stops; nothing is measured before you accept.";
+/// Text if there is no plan.
+const NO_PLAN: &str = "No plan yet. Enter chooses poses with these settings; l loads poses from a file.";
+/// Text while poses are being chosen.
+const SEARCHING: &str = "Choosing poses. Esc cancels; nothing is measured before you accept.";
 
-/// Hours and minutes, as a shift is planned.
+/// A duration in minutes, or in hours and minutes.
 pub(super) fn time(minutes: f64) -> String {
     if !minutes.is_finite() || minutes < 100.0 {
         return format!("{minutes:.0} min");
@@ -28,7 +29,7 @@ pub(super) fn time(minutes: f64) -> String {
     format!("{:.0} h {:02.0} min", (minutes.round() / 60.0).floor(), minutes.round() % 60.0)
 }
 
-/// Draws the proposal, else the plan that is being measured, else what to do.
+/// Draws the proposal, else the plan being measured, else a hint.
 pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: Rect, buf: &mut Buffer) {
     let mut lines = match (&content.proposal, &content.accepted) {
         (Some(figures), _) => {
@@ -84,7 +85,7 @@ fn numbers(figures: &PlanFigures, summary: Option<&PlanSummary>, is_narrow: bool
     lines
 }
 
-/// The figures in few columns.
+/// The figures in the narrow form.
 fn in_short(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, String)> {
     let line = |name: &str, value: &str| (Role::Plain, format!("{name:<SHORT_NAMES$} {value}"));
     let mut lines = vec![line("poses", &format!("{} + {}", figures.identification, figures.verification))];
@@ -103,10 +104,10 @@ fn in_short(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, 
     lines
 }
 
-/// The figures beside those of random sets of the same size: the median one and the best one.
+/// The figures compared with random sets of the same size, the median and the best one.
 fn compared(figures: &PlanFigures, summary: &PlanSummary, condition: f64, sigma: f64) -> Vec<(Role, String)> {
     let random = &summary.random;
-    // σ to mm, where the instrument is known.
+    // σ to mm, if the instrument is known.
     let mm = summary.predicted_rms_mm.map(|mm| mm / sigma).filter(|mm| mm.is_finite());
     let (factor, unit) = mm.map_or((1.0, "sigma"), |mm| (mm, "mm"));
     let row = |name: &str, [plan, median, best]: [String; 3]| format!("{name:<NAMES$}{plan:>7}{median:>7}{best:>12}");
@@ -124,7 +125,7 @@ fn compared(figures: &PlanFigures, summary: &PlanSummary, condition: f64, sigma:
     lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
     let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
     if weak + warnings > 0 {
-        lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: see Tab")));
+        lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: press Tab")));
     }
     lines
 }

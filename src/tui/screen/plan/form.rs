@@ -4,16 +4,16 @@ use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::tui::glyphs::width;
+use crate::text;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::wizard::PlanSettings;
 
-/// Poses that '+' and '-' make a difference of.
+/// Step of '+' and '-' in poses.
 const MORE: usize = 4;
-/// Column behind the numbers.
+/// Column after the numbers.
 const NUMBERS: usize = 30;
-/// Digits that can be typed.
+/// Largest number of digits.
 const MOST_DIGITS: usize = 9;
 
 /// A setting.
@@ -32,28 +32,28 @@ const FIELDS: [Field; 5] = [
     Field { label: "poses between drift checks", range: (0, 500), step: 5 },
 ];
 
-/// What each setting means.
+/// Explanation of each setting.
 const MEANING: [&str; 5] = [
-    "the arm is identified from them",
-    "only to check the result with",
+    "used to identify the arm",
+    "used only to check the result",
     "random poses to choose from",
-    "other seed, other candidates",
+    "another seed, other candidates",
     "0: no pose is repeated",
 ];
 
-/// The settings as they are being edited.
+/// The settings being edited.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Form {
-    /// As the wizard has them.
+pub(super) struct SettingsForm {
+    /// The settings of the wizard.
     given: PlanSettings,
     edited: PlanSettings,
     focus: usize,
-    /// Digits typed into the setting with the focus.
+    /// Digits typed into the focused setting.
     typed: Option<String>,
 }
 
-impl Form {
-    /// Takes the wizard's settings where they are new.
+impl SettingsForm {
+    /// Takes over the wizard's settings if they have changed.
     pub(super) fn follow(&mut self, settings: PlanSettings) {
         if settings != self.given {
             self.given = settings;
@@ -62,7 +62,7 @@ impl Form {
         }
     }
 
-    /// The settings with what is being typed.
+    /// The settings, including the digits being typed.
     pub(super) fn settings(&self) -> PlanSettings {
         let mut form = self.clone();
         form.commit();
@@ -74,13 +74,13 @@ impl Form {
         self.settings() != self.given
     }
 
-    /// The settings with the seed after this one.
+    /// The settings with the next seed.
     pub(super) fn with_other_seed(&self) -> PlanSettings {
         let settings = self.settings();
         PlanSettings { seed: settings.seed.wrapping_add(1) % 1_000_000_000, ..settings }
     }
 
-    /// So many identification poses.
+    /// Sets the number of identification poses.
     pub(super) fn set_poses(&mut self, poses: usize) {
         self.commit();
         self.set(0, poses);
@@ -108,14 +108,14 @@ impl Form {
         }
     }
 
-    /// What is typed counts, kept in its range.
+    /// Applies the typed digits, clamped to the range.
     fn commit(&mut self) {
         if let Some(value) = self.typed.take().and_then(|typed| typed.parse().ok()) {
             self.set(self.focus, value);
         }
     }
 
-    /// Takes a key; whether it is one.
+    /// Handles a key. Returns `false` if it is not a key of the form.
     pub(super) fn on_key(&mut self, code: KeyCode) -> bool {
         let step = FIELDS.get(self.focus).map_or(1, |field| field.step);
         match code {
@@ -149,7 +149,7 @@ impl Form {
         true
     }
 
-    /// What is wrong with what is typed.
+    /// The allowed range, if the typed number is outside it.
     fn problem(&self) -> Option<String> {
         let typed = self.typed.as_ref()?;
         let (low, high) = FIELDS.get(self.focus)?.range;
@@ -157,9 +157,9 @@ impl Form {
         (!is_good).then(|| format!("{low} to {high}"))
     }
 
-    /// Draws title, settings, and what the one with the focus means.
+    /// Draws title, settings, and the explanation of the focused one.
     pub(super) fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
-        let title = if self.is_changed() { "Settings (changed, Enter chooses)" } else { "Settings" };
+        let title = if self.is_changed() { "Settings (changed; Enter applies)" } else { "Settings" };
         paint::text(buf, area, (0, 0), title, theme.style(Role::Title));
         for (row, (index, field)) in (1_u16..).zip(FIELDS.iter().enumerate()) {
             let has_focus = index == self.focus;
@@ -168,7 +168,7 @@ impl Form {
             paint::text(buf, area, (column, row), field.label, theme.style(Role::Plain));
             let typed = self.typed.as_ref().filter(|_| has_focus);
             let value = typed.map_or_else(|| self.value(index).to_string(), |typed| format!("{typed}_"));
-            let start = u16::try_from(NUMBERS.saturating_sub(width(&value)) + 3).unwrap_or(0);
+            let start = u16::try_from(NUMBERS.saturating_sub(text::columns(&value)) + 3).unwrap_or(0);
             let role = if has_focus { Role::Focus } else { Role::Title };
             paint::text(buf, area, (start, row), &value, theme.style(role));
         }

@@ -1,4 +1,4 @@
-//! The search for poses while it runs.
+//! The running search for poses.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -8,10 +8,10 @@ use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::Chart;
 use crate::wizard::view::BusyView;
 
-/// Values that are kept; more would not be seen.
+/// Largest number of values kept. More would not be visible.
 const MOST: usize = 2000;
 
-/// What the search has shown so far.
+/// Results of the search so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
     is_running: bool,
@@ -21,7 +21,7 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// Takes note of what is under way.
+    /// Observes the running request.
     pub(super) fn see(&mut self, busy: Option<&BusyView>) {
         let Some(busy) = busy else {
             self.is_running = false;
@@ -44,12 +44,12 @@ impl Search {
         }
     }
 
-    /// Whether something is under way.
+    /// Whether a request is running.
     pub(super) const fn is_running(&self) -> bool {
         self.is_running
     }
 
-    /// Draws how the condition number falls.
+    /// Draws the condition number over the search.
     pub(super) fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         let best = self.conditions.iter().map(|point| point.1).min_by(f64::total_cmp);
         let text = match (best, self.best_error) {
@@ -64,8 +64,8 @@ impl Search {
             points: &self.conditions,
             level: None,
             mark: self.conditions.last().map(|point| point.0),
-            y_title: "condition number: the smaller, the better all parameters are seen",
-            x_title: "pose sets looked at",
+            y_title: "condition number (smaller is better)",
+            x_title: "pose sets examined",
             digits: 1,
         };
         if self.conditions.len() > 1 {

@@ -101,12 +101,12 @@ fn of(content: PlanView) -> ViewModel {
     let (has_proposal, has_plan) = (content.proposal.is_some(), content.accepted.is_some());
     let accept = IntentInfo::new(Intent::AcceptPlan, "measure this plan").unless(no(!has_proposal));
     let make = IntentInfo::new(Intent::MakePlan(content.settings), "choose poses");
-    let next = IntentInfo::new(Intent::Next, "go on to measuring").unless(no(!has_plan));
+    let next = IntentInfo::new(Intent::Next, "continue to Capture").unless(no(!has_plan));
     let intents = vec![
         accept.default_action(),
         if has_proposal || has_plan { make } else { make.default_action() },
-        IntentInfo::new(Intent::LoadPlan("plan.csv".to_owned()), "take the poses of a file"),
-        IntentInfo::new(Intent::PlanFromRecording, "take the recorded poses").unless(no(true)),
+        IntentInfo::new(Intent::LoadPlan("plan.csv".to_owned()), "load poses from a file"),
+        IntentInfo::new(Intent::PlanFromRecording, "use the recorded poses").unless(no(true)),
         if has_proposal { next } else { next.default_action() },
         IntentInfo::new(Intent::Quit, "quit"),
     ];
@@ -128,7 +128,7 @@ pub(in crate::tui::screen) fn empty() -> ViewModel {
 pub(in crate::tui::screen) fn searching(condition: f64) -> ViewModel {
     let mut view = of(nothing());
     for info in &mut view.intents {
-        info.blocked = Some("planning is under way".to_owned());
+        info.blocked = Some("planning is still running".to_owned());
     }
     view.intents.push(IntentInfo::new(Intent::Cancel, "stop planning"));
     view.busy = Some(BusyView {
@@ -142,14 +142,14 @@ pub(in crate::tui::screen) fn searching(condition: f64) -> ViewModel {
 }
 
 /// A screen that has seen a view.
-fn seen(view: &ViewModel) -> Plan {
-    let mut plan = Plan::default();
+fn seen(view: &ViewModel) -> PlanScreen {
+    let mut plan = PlanScreen::default();
     plan.see(view);
     plan
 }
 
-fn has_searched() -> (Plan, ViewModel) {
-    let mut plan = Plan::default();
+fn has_searched() -> (PlanScreen, ViewModel) {
+    let mut plan = PlanScreen::default();
     for n in 1..40 {
         plan.see(&searching(60.0 + 100.0 / f64::from(n)));
     }
@@ -172,14 +172,14 @@ fn other_views() {
     let [unicode, _] = themes();
     let view = proposal();
     for (name, tab) in [("trade_off", Tab::TradeOff), ("weak", Tab::Weak)] {
-        insta::assert_snapshot!(name, shown(&drawn(&Plan { tab, ..seen(&view) }, &view, unicode, (80, 24))));
+        insta::assert_snapshot!(name, shown(&drawn(&PlanScreen { tab, ..seen(&view) }, &view, unicode, (80, 24))));
     }
     insta::assert_snapshot!("large", shown(&drawn(&seen(&view), &view, unicode, (120, 40))));
 }
 
-fn made(reply: &Reply) -> Option<PlanSettings> {
+fn made(reply: &ScreenOutcome) -> Option<PlanSettings> {
     match reply {
-        Reply::Intend(Intent::MakePlan(settings)) => Some(*settings),
+        ScreenOutcome::Intent(Intent::MakePlan(settings)) => Some(*settings),
         _ => None,
     }
 }
@@ -192,7 +192,7 @@ fn settings_become_a_plan() {
     assert_eq!(made(&press(&mut plan, &view, enter)), Some(PlanSettings::default()));
     // Typing replaces, + gives more, Down goes to the next.
     for key in ['2', '4', '+'] {
-        assert!(matches!(press(&mut plan, &view, Key::char(key)), Reply::Changed));
+        assert!(matches!(press(&mut plan, &view, Key::char(key)), ScreenOutcome::Changed));
     }
     press(&mut plan, &view, Key::plain_code(KeyCode::Down));
     press(&mut plan, &view, Key::char('5'));
@@ -208,12 +208,12 @@ fn enter_accepts_only_what_is_shown() {
     let mut plan = seen(&view);
     let enter = Key::plain_code(KeyCode::Enter);
     // Nothing changed: the table's default, which accepts.
-    assert!(matches!(press(&mut plan, &view, enter), Reply::Ignored));
+    assert!(matches!(press(&mut plan, &view, enter), ScreenOutcome::Ignored));
     press(&mut plan, &view, Key::char('-'));
     assert_eq!(made(&press(&mut plan, &view, enter)).map(|settings| settings.poses), Some(52));
     // While a search runs there is nothing to choose.
     let (mut plan, view) = has_searched();
-    assert!(matches!(press(&mut plan, &view, enter), Reply::Ignored));
+    assert!(matches!(press(&mut plan, &view, enter), ScreenOutcome::Ignored));
 }
 
 #[test]
@@ -240,7 +240,7 @@ proptest! {
             2 => (seen(&accepted()), accepted()),
             _ => has_searched(),
         };
-        let plan = Plan { tab: Tab::ALL[tab], ..plan };
+        let plan = PlanScreen { tab: Tab::ALL[tab], ..plan };
         prop_assert!(!leaks(&plan, &view, themes()[usize::from(ascii)], Rect::new(x, y, width, height)));
     }
 }

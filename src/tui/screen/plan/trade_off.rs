@@ -1,11 +1,11 @@
-//! Number of poses against predicted error and time.
+//! Trade-off of the number of poses against predicted error and time.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::figures::time;
 use crate::session::plan_summary::TradeOffSummary;
-use crate::tui::glyphs::width;
+use crate::text;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::{Chart, Column, Table};
@@ -13,10 +13,10 @@ use crate::wizard::view::PlanView;
 
 /// Columns of the table.
 const TABLE: u16 = 40;
-/// Said where there is nothing to draw.
-const NOTHING: &str = "The trade-off is known when poses have been chosen (Enter or p).";
+/// Text if there is nothing to draw.
+const NOTHING: &str = "The trade-off is known once poses have been chosen (Enter or p).";
 
-/// The number of poses of the option after `poses`, or before.
+/// The number of poses of the next larger or smaller option.
 pub(super) fn next(content: &PlanView, poses: usize, is_more: bool) -> Option<usize> {
     let mut numbers = options(content).iter().map(|option| option.poses);
     if is_more { numbers.find(|number| *number > poses) } else { numbers.rfind(|number| *number < poses) }
@@ -26,7 +26,7 @@ fn options(content: &PlanView) -> &[TradeOffSummary] {
     content.summary.as_deref().map_or(&[], |summary| &summary.trade_off)
 }
 
-/// Points in mm where the instrument is known, else in σ; with the unit.
+/// The points, and whether they are in mm (if the instrument is known) instead of σ.
 fn points(options: &[TradeOffSummary]) -> (Vec<(f64, f64)>, bool) {
     let has_mm = options.iter().all(|option| option.predicted_rms_mm.is_some());
     let error =
@@ -60,13 +60,13 @@ fn in_words(option: &TradeOffSummary) -> String {
     format!("{} poses: {error}{cost}", option.poses)
 }
 
-/// Draws the line with the present number of poses marked, and its neighbours in words.
+/// Draws the curve with the current number of poses marked, and its neighbours in words.
 pub(super) fn draw_in_short(theme: Theme, content: &PlanView, poses: usize, area: Rect, buf: &mut Buffer) {
     let options = options(content);
     let Some(index) = nearest(options, poses) else { return };
     let room = usize::from(area.width);
     let exact = options.get(index).is_some_and(|option| option.poses == poses);
-    // The next larger one is what one asks about; the next smaller one where there is room.
+    // The next larger option is of most interest; the next smaller one follows if there is room.
     let above = options.iter().find(|option| option.poses > poses);
     let below = options.iter().rfind(|option| option.poses < poses);
     let here = options.get(index).filter(|_| exact);
@@ -74,7 +74,7 @@ pub(super) fn draw_in_short(theme: Theme, content: &PlanView, poses: usize, area
     for option in [above, below].into_iter().flatten() {
         let dot = if line.is_empty() { "" } else { theme.glyphs.dot() };
         let longer = format!("{line}{dot}{}", in_words(option));
-        if width(&longer) <= room {
+        if text::columns(&longer) <= room {
             line = longer;
         }
     }
@@ -82,7 +82,7 @@ pub(super) fn draw_in_short(theme: Theme, content: &PlanView, poses: usize, area
     chart(theme, options, poses, paint::band(area, 1, area.height), buf);
 }
 
-/// Draws table and line.
+/// Draws table and curve.
 pub(super) fn draw(theme: Theme, content: &PlanView, poses: usize, area: Rect, buf: &mut Buffer) {
     let options = options(content);
     if options.is_empty() {

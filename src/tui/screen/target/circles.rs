@@ -1,14 +1,17 @@
-//! The circle-point analysis: where to go, and what the circles say.
+//! The circle-point analysis: the configuration to go to, and the result.
 
 use crate::tui::screen::page::{Page, fixed};
 use crate::tui::theme::Role;
 use crate::wizard::view::CirclesView;
 
-/// The point that is to be measured now.
+/// The next point to measure.
 pub(super) fn to_measure(circles: &CirclesView, page: &mut Page) {
     let joint = circles.joint.as_deref().unwrap_or("?");
     page.line(vec![(format!("circle of {joint}: point {} of {}", circles.measured + 1, circles.of), Role::Title)]);
-    page.paragraph(&format!("Go to this configuration; only {joint} turns on its circle. Then measure."), Role::Plain);
+    page.paragraph(
+        &format!("Go to this configuration, then measure. Only {joint} turns along its circle."),
+        Role::Plain,
+    );
     page.gap();
     for shown in &circles.joints {
         let (role, remark) = if shown.moves_most { (Role::Title, "  <- turns") } else { (Role::Plain, "") };
@@ -16,19 +19,19 @@ pub(super) fn to_measure(circles: &CirclesView, page: &mut Page) {
         page.line(vec![(value, role), (remark.to_owned(), Role::Hint)]);
     }
     page.gap();
-    page.paragraph("Circles measured so far stay when you go back.", Role::Dim);
+    page.paragraph("Points measured so far are kept when you go back.", Role::Dim);
 }
 
-/// What the circles say.
+/// The result of the circles.
 pub(super) fn result(circles: &CirclesView, page: &mut Page) {
     page.title(&format!("Circles, {} points", circles.measured));
     if let Some(problem) = &circles.problem {
         page.marked(("NO RESULT: ", Role::Warn), problem, Role::Warn);
-        page.paragraph("d measures the circles anew.", Role::Plain);
+        page.paragraph("d restarts the circles.", Role::Plain);
         return;
     }
     if circles.fits.is_empty() {
-        page.paragraph("They are not complete; c goes on with them.", Role::Plain);
+        page.paragraph("They are not complete; c continues them.", Role::Plain);
         return;
     }
     let head =
@@ -46,13 +49,13 @@ pub(super) fn result(circles: &CirclesView, page: &mut Page) {
         );
         page.line(vec![(line, Role::Plain)]);
     }
-    page.paragraph("lengths in mm, arc in degree; off: RMS distance of the points from their circle", Role::Dim);
+    page.paragraph("lengths in mm, arc in degrees; off: RMS distance of the points from their circle", Role::Dim);
     if let Some(result) = &circles.result {
         let [x, y, z] = result.xyz_mm.map(|value| fixed(value, 3));
         let [sx, sy, sz] = result.sigma_mm.map(|value| fixed(value, 4));
         page.pair("SMR", &format!("({x}, {y}, {z}) mm in the flange"));
         page.pair("sigma", &format!("({sx}, {sy}, {sz}) mm"));
         page.pair("off", &format!("{} mm RMS over both circles", fixed(result.residual_rms_mm, 4)));
-        page.paragraph("u takes this result, d measures the circles anew.", Role::Hint);
+        page.paragraph("u uses this result, d restarts the circles.", Role::Hint);
     }
 }

@@ -11,7 +11,7 @@ fn busy(mut view: ViewModel, what: &'static str, progress: Option<&str>) -> View
     view.busy =
         Some(BusyView { what, progress: progress.map(str::to_owned), part: None, figures: None, is_cancelled: false });
     for info in &mut view.intents {
-        info.blocked.get_or_insert_with(|| format!("{what} is under way"));
+        info.blocked.get_or_insert_with(|| format!("{what} is still running"));
     }
     view.intents.insert(0, IntentInfo::new(Intent::Cancel, format!("cancel {what}")));
     view

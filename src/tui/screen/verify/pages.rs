@@ -1,21 +1,22 @@
 //! Verdict and tables of the verification.
 
 use crate::session::summary::{ModelSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationSummary};
-use crate::tui::screen::page::{Page, counted, fixed};
+use crate::text::counted;
+use crate::tui::screen::page::{Page, fixed};
 use crate::tui::theme::Role;
 use crate::wizard::view::VerifyView;
 
-/// A joint is only named if it explains this share of what is left …
+/// Least share of the square error that a joint must explain to be reported.
 const WORTH_NAMING: f64 = 0.1;
-/// … and this over the number of samples: about four standard deviations of what chance explains.
+/// Least share times number of samples, about four standard deviations of what chance explains.
 const CHANCE: f64 = 4.0;
 
-/// Verdict, limits, warnings, tables.
+/// Verdict, limits, warnings and tables.
 pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
     if !content.is_current {
         page.marked(
             ("OUT OF DATE: ", Role::Warn),
-            "the samples have changed since: go back and identify again.",
+            "the samples have changed since then: go back and identify again.",
             Role::Plain,
         );
     }
@@ -35,10 +36,10 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
     }
 }
 
-/// How a reason begins that is a warning, called by its code.
+/// Beginning of a reason that refers to a warning by its code.
 const BY_CODE: &str = "see the warning '";
 
-/// The verdict in words; `place` says where the warnings can be read, as their codes are shown nowhere.
+/// The verdict in words. `place` says where the warnings can be read, because their codes are shown nowhere.
 pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut Page) {
     let (mark, role) = match verdict.status {
         VerdictStatus::Accepted => ("ACCEPTED: ", Role::Ok),
@@ -49,8 +50,8 @@ pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut 
     let mut reasons: Vec<String> =
         verdict.reasons.iter().filter(|reason| !reason.starts_with(BY_CODE)).cloned().collect();
     if by_code > 0 {
-        let stand = if by_code == 1 { "stands" } else { "stand" };
-        reasons.push(format!("{} {stand} against it, {place}", counted(by_code, "warning")));
+        let verb = if by_code == 1 { "rules" } else { "rule" };
+        reasons.push(format!("{} {verb} it out, {place}", counted(by_code, "warning")));
     }
     page.marked((mark, role), &reasons.join("; "), Role::Plain);
 }
@@ -69,14 +70,15 @@ fn limits(verdict: &Verdict, page: &mut Page) {
     }
 }
 
-/// Picks one kind of error of a model.
+/// Selects one kind of error of a model.
 type Pick = fn(&ModelSummary) -> Option<StatisticsSummary>;
 
-/// Before and after: tables III and IV of the method paper.
+/// Errors before and after, as in tables III and IV of the method paper.
 fn tables(verification: &VerificationSummary, page: &mut Page) {
     let VerificationSummary { samples, basis, independent, nominal, identified, .. } = verification;
     page.gap();
-    let which = if *independent { "the identification never saw" } else { "the identification SAW, in part or all" };
+    let which =
+        if *independent { "the identification did not use" } else { "the identification DID USE, in part or all" };
     page.paragraph(&format!("Errors at {samples} poses that {which}: {basis}."), Role::Plain);
     let names = names(page);
     page.line(vec![(format!("{:<names$}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
@@ -104,7 +106,7 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.paragraph("before: nominal model; after: identified model. Distance errors need no frame.", Role::Dim);
 }
 
-/// Columns of the names of the errors; the numbers come first where there is little room.
+/// Columns of the names of the errors. Where there is little room, the numbers take precedence.
 fn names(page: &Page) -> usize {
     page.columns().saturating_sub(29).clamp(26, 32)
 }
@@ -122,14 +124,14 @@ fn row(page: &mut Page, name: &str, before: f64, after: f64) {
     page.line(vec![(line, Role::Plain), (format!("{better:>9}"), role)]);
 }
 
-/// Mean error over each joint's range.
+/// Mean error over the range of each joint.
 pub(super) fn joints(content: &VerifyView, page: &mut Page) {
     let joints = content.verification.as_ref().map_or(&[][..], |verification| &verification.residual_by_joint);
     if joints.iter().all(|joint| joint.bins.is_empty()) {
-        page.paragraph("There are no verification samples to tell.", Role::Plain);
+        page.paragraph("There are no verification samples.", Role::Plain);
         return;
     }
-    page.paragraph("Mean error of the identified arm (mm) over fifths of each joint's range. A pattern means an error that the model does not have, such as a bent gear or a soft link.", Role::Plain);
+    page.paragraph("Mean error of the identified arm (mm) over fifths of each joint's range. A pattern indicates an error that is not in the model, such as an eccentric gear or a flexible link.", Role::Plain);
     page.gap();
     page.line(vec![(
         format!(
@@ -160,5 +162,5 @@ pub(super) fn joints(content: &VerifyView, page: &mut Page) {
         page.line(vec![(format!("{:<6}{range:<18}{bins}", joint.joint), Role::Plain), (format!("{share:>7}"), role)]);
     }
     page.gap();
-    page.paragraph("share: how much of the square error follows the joint, where chance does not explain it. A dash in a fifth: no verification pose there.", Role::Dim);
+    page.paragraph("share: part of the square error that depends on the joint, if chance does not explain it. A dash in a fifth: no verification pose there.", Role::Dim);
 }

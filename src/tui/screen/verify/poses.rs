@@ -1,4 +1,4 @@
-//! The identified arm's error at each verification pose: how often which size, then pose by pose.
+//! Errors of the identified arm at the verification poses: a histogram, then pose by pose.
 
 use crate::session::summary::LimitedQuantity;
 use crate::tui::glyphs::Glyphs;
@@ -8,15 +8,15 @@ use crate::tui::theme::Role;
 use crate::units::to_mm;
 use crate::wizard::view::VerifyView;
 
-/// Classes of the histogram, at most.
+/// Largest number of classes of the histogram.
 const CLASSES: f64 = 6.0;
 /// Columns beside the bars.
 const LABELS: usize = 30;
 
-/// Histogram and bars.
+/// Writes the histogram and the bars.
 pub(super) fn poses(content: &VerifyView, scene: Option<&Scene>, glyphs: Glyphs, page: &mut Page) {
     let mut errors: Vec<(&str, f64, f64)> = scene
-        .map_or(&[][..], |scene| &scene.checked)
+        .map_or(&[][..], |scene| &scene.verified)
         .iter()
         .map(|one| (one.pose.as_str(), to_mm(one.nominal.norm()), to_mm(one.identified.norm())))
         .collect();
@@ -47,7 +47,7 @@ pub(super) fn poses(content: &VerifyView, scene: Option<&Scene>, glyphs: Glyphs,
 }
 
 fn histogram(errors: &[(&str, f64, f64)], largest: f64, room: usize, glyphs: Glyphs, page: &mut Page) {
-    page.title(&format!("How large the error of the identified arm is, {} poses", errors.len()));
+    page.title(&format!("Errors of the identified arm, {} poses", errors.len()));
     let step = round_step(largest / CLASSES);
     let decimals = (1..=6_u8).find(|&n| step * 10_f64.powi(i32::from(n)) > 0.999).map_or(6, usize::from);
     let within = |low: f64| errors.iter().filter(|(.., error)| *error >= low && *error < low + step).count();
@@ -64,14 +64,14 @@ fn histogram(errors: &[(&str, f64, f64)], largest: f64, room: usize, glyphs: Gly
     }
 }
 
-/// A part of `room`; something is never nothing.
+/// Columns for a share of `room`; a positive share gets at least one.
 fn part(share: f64, room: usize) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number of columns")]
     let columns = (share * room as f64).round().clamp(0.0, room as f64) as usize;
     if share > 0.0 { columns.max(1) } else { 0 }
 }
 
-/// 1, 2 or 5 times a power of ten, at least `step`.
+/// The smallest 1, 2 or 5 times a power of ten that is not below `step`.
 fn round_step(step: f64) -> f64 {
     let power = 10_f64.powf(step.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|factor| factor * power).find(|round| *round >= step).unwrap_or(10.0 * power)
