@@ -241,7 +241,7 @@ fn the_messages_of_the_technician_are_those_of_the_program() {
     let mut source = String::new();
     sources(&root().join("src"), &mut source);
     let document = fs::read_to_string(root().join("docs/technician.md")).unwrap();
-    let (_, table) = document.split_once("| it says |").unwrap();
+    let (_, table) = document.split_once("| message |").unwrap();
     let messages: Vec<&str> =
         table.lines().skip(2).map_while(|line| line.strip_prefix("| ")?.split(" | ").next()).collect();
     assert!(messages.len() > 20, "{messages:?}");

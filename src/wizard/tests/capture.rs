@@ -213,7 +213,7 @@ fn undo_takes_back_one_sample_after_the_other() {
     assert_eq!(bench.wizard.session().measurements, 4, "numbers are never used twice");
     bench.does(Intent::Undo);
     bench.does(Intent::Undo);
-    assert_eq!(blocked(&bench.wizard, "Undo"), "nothing is measured yet");
+    assert_eq!(blocked(&bench.wizard, "Undo"), "nothing has been measured yet");
 }
 
 #[test]
@@ -268,7 +268,7 @@ fn the_next_best_poses_go_on_after_the_last_name() {
     assert_eq!((request.included.len(), request.numbered_after), (12, 18));
     bench.settle(effects);
     let Entry::PlanExtended(plan) = bench.last_entry() else { panic!() };
-    assert_eq!(plan.origin, "2 next best poses");
+    assert_eq!(plan.origin, "2 suggested poses");
     let names: Vec<&str> = plan.rows.iter().map(|row| row.pose.as_str()).collect();
     assert_eq!(names, ["19", "20"], "the robot is not sent home in between");
     let view = bench.capture();

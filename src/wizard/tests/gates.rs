@@ -31,7 +31,7 @@ fn what_is_no_measurement_is_refused_and_noted() {
         (Point3::new(1.0, f64::INFINITY, 1.0), "the reading is not a number"),
         (Point3::origin(), "the reading is 0, 0, 0: the instrument has no target"),
         (Point3::new(2000.0, 0.0, 0.0), "the reading is 2000 m away: no instrument measures that far"),
-        (previous, "identical to the previous reading to the last digit: the instrument has not measured again"),
+        (previous, "identical to the previous reading to the last digit: the instrument did not take a new measurement"),
     ];
     for (number, (point, reason)) in (2..).zip(cases) {
         let effects = measure(&mut bench, |reading| reading.point = point);
@@ -311,7 +311,7 @@ fn while_the_link_is_down_nothing_is_measured_and_nothing_waits_to_be() {
     bench.wizard.update(look(Some("the connection is lost: closed")));
     assert!(bench.intend(Intent::Measure).is_empty());
     let told = bench.told();
-    assert_eq!(told, "not now: the link is down: the connection is lost: closed; it is being connected again");
+    assert_eq!(told, "not now: the link is down: the connection is lost: closed; reconnecting");
     // It comes back: what was asked for before is not done now.
     assert!(bench.wizard.update(look(None)).is_empty());
     assert!(bench.wizard.is_idle());

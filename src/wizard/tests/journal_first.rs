@@ -98,7 +98,7 @@ fn a_full_disk_stops_everything_but_trying_again_and_leaving() {
     assert!(bench.failed(id).is_empty());
     let notice = bench.wizard.notice().unwrap();
     assert_eq!((notice.severity, notice.what.as_str()), (Severity::Stop, "could not save: no space left"));
-    assert_eq!(notice.hints[0], "3 samples are already saved; nothing of that is lost");
+    assert_eq!(notice.hints[0], "3 samples are already saved; nothing has been lost");
     assert!(bench.wizard.view().is_stopped());
     assert_eq!(offers(&bench.wizard), ["Retry*", "Quit"]);
     assert_eq!(*bench.wizard.session(), session);

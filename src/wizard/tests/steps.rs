@@ -57,7 +57,7 @@ fn names_that_cannot_be_a_folder_are_refused() {
         bench.does(Intent::NameSession(text(name)));
         let notice = bench.wizard.notice().unwrap();
         assert_eq!(notice.severity, Severity::Error, "{name}");
-        assert!(notice.what.contains("cannot be the name"), "{}", notice.what);
+        assert!(notice.what.contains("is not a valid session name"), "{}", notice.what);
     }
     let Content::Profile(view) = bench.wizard.view().content else { panic!() };
     assert_eq!(view.session, "soochow-20260301-0915");

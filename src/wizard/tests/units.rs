@@ -51,7 +51,7 @@ fn one_reading_in_inches_is_corrected_and_no_other() {
     let mut bench = one_in_inches();
     let effects = corrects(&mut bench);
     assert_eq!(texts(&effects), ["append 19 corrected: coordinates of measurement 9 times 25.4"]);
-    assert_eq!(bench.told(), "coordinates of measurement 9 count 25.4 times; what was noted stays in the journal");
+    assert_eq!(bench.told(), "coordinates of measurement 9 are multiplied by 25.4; the original values stay in the journal");
     bench.measure(usize::MAX);
     assert_eq!((cause(&bench), bench.capture().measured), (None, MEASURED));
     assert!(all_are_right(bench.wizard.session()));
@@ -65,7 +65,7 @@ fn undo_takes_the_correction_back_that_the_sample_led_to() {
     let effects = bench.intend(Intent::Undo);
     assert_eq!(texts(&effects), ["append 20 the correction in line 19 is taken back | 21 measurement 9: taken back"]);
     bench.settle(effects);
-    assert!(bench.told().contains("taken back"), "{}", bench.told());
+    assert!(bench.told().contains("is undone with it"), "{}", bench.told());
     let session = bench.wizard.session();
     assert_eq!((session.corrections.len(), session.counted().count(), session.correction_of(9)), (0, 8, 1.0));
     assert_eq!((bench.capture().pose.as_deref(), cause(&bench)), (Some("9"), None));
@@ -102,7 +102,7 @@ fn an_instrument_that_stays_in_the_other_unit_is_asked_about_once() {
     assert!(told[0].contains("times 25.4, in the unit of the one before"), "the journal says so: {told:?}");
     assert_eq!(cause(&bench), None);
     assert_eq!(bench.wizard.notice().unwrap().severity, Severity::Attention);
-    assert_eq!(bench.told(), "pose 10: still in the wrong unit; its coordinates count 25.4 times");
+    assert_eq!(bench.told(), "pose 10: still in the wrong unit; its coordinates are multiplied by 25.4");
     // Across the pose that is measured again for drift.
     while bench.capture().measured < 16 {
         inches(&mut bench);
