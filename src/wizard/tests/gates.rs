@@ -31,7 +31,10 @@ fn what_is_no_measurement_is_refused_and_noted() {
         (Point3::new(1.0, f64::INFINITY, 1.0), "the reading is not a number"),
         (Point3::origin(), "the reading is 0, 0, 0: the instrument has no target"),
         (Point3::new(2000.0, 0.0, 0.0), "the reading is 2000 m away: no instrument measures that far"),
-        (previous, "identical to the previous reading to the last digit: the instrument did not take a new measurement"),
+        (
+            previous,
+            "identical to the previous reading to the last digit: the instrument did not take a new measurement",
+        ),
     ];
     for (number, (point, reason)) in (2..).zip(cases) {
         let effects = measure(&mut bench, |reading| reading.point = point);

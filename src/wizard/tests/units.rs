@@ -51,7 +51,10 @@ fn one_reading_in_inches_is_corrected_and_no_other() {
     let mut bench = one_in_inches();
     let effects = corrects(&mut bench);
     assert_eq!(texts(&effects), ["append 19 corrected: coordinates of measurement 9 times 25.4"]);
-    assert_eq!(bench.told(), "coordinates of measurement 9 are multiplied by 25.4; the original values stay in the journal");
+    assert_eq!(
+        bench.told(),
+        "coordinates of measurement 9 are multiplied by 25.4; the original values stay in the journal"
+    );
     bench.measure(usize::MAX);
     assert_eq!((cause(&bench), bench.capture().measured), (None, MEASURED));
     assert!(all_are_right(bench.wizard.session()));
