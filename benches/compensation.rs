@@ -35,7 +35,7 @@ fn seconds(work: impl FnOnce()) -> f64 {
 /// Joint targets within the planning limits, every parameter off by what is expected of it.
 fn measure(name: &str) {
     let profile = Profile::parse(builtin(name).unwrap(), name).unwrap().0;
-    let free = profile.free_parameters(Level::Geometric);
+    let free = profile.parameters(Level::default());
     let deviations =
         free.iter().zip([1.0, -1.0].into_iter().cycle()).map(|(free, sign)| (free.id, sign * free.expected));
     let arm = |chain| ToolArm { chain, flange_from_tool: Isometry3::identity() };

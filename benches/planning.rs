@@ -8,9 +8,9 @@ mod paper_case;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use paper_case::{paper_chain, paper_parameters, paper_target, random_configurations, seeded};
-use trupose::kinematics::{Arm, FreeParameter, Place};
+use trupose::kinematics::{Arm, FreeParameter, ParameterUnit, Place};
 use trupose::planning::{DesignBound, Information, Objective, Score, Search, SearchSettings, Yardstick, trade_off};
-use trupose::units::{DEGREE, MILLIMETRE, Quantity};
+use trupose::units::{DEGREE, MILLIMETRE};
 
 fn main() {
     divan::main();
@@ -24,9 +24,9 @@ fn places(count: usize, seed: u64) -> Vec<Place> {
 fn information(candidates: &[Place]) -> Information {
     let model = Arm { chain: paper_chain(), targets: vec![paper_target()] };
     let expected = |parameter: FreeParameter| FreeParameter {
-        expected: match parameter.id.quantity() {
-            Quantity::Length => MILLIMETRE,
-            Quantity::Angle => 0.1 * DEGREE,
+        expected: match parameter.id.unit() {
+            ParameterUnit::Millimetre => MILLIMETRE,
+            ParameterUnit::Degree => 0.1 * DEGREE,
         },
         ..parameter
     };

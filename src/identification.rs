@@ -38,7 +38,6 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, DVector, Point3};
 
 pub use error::IdentificationError;
-pub(crate) use observability::raw_unit;
 pub use observability::{BlindGroup, Observability};
 pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint};

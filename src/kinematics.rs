@@ -20,7 +20,7 @@ pub use arm::{Arm, Place, PreparedArm};
 pub use chain::{Convention, Joint, JointType, KinematicChain, Link};
 pub use forward::ForwardKinematics;
 pub use jacobian::{ConfigurationJacobian, IdentificationJacobian};
-pub use parameters::{Axis, FreeParameter, LinkParameter, ParameterId};
+pub use parameters::{Axis, FreeParameter, LinkParameter, ParameterId, ParameterUnit};
 
 /// Misuse of a chain: a geometry that cannot be built.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -58,5 +58,11 @@ pub enum KinematicsError {
     UnknownParameter {
         /// Name of the parameter.
         parameter: String,
+    },
+    /// A text that is not the name of a parameter.
+    #[error("'{name}' is not a parameter; names read like 'a2', 'theta3' or 'target1.x'")]
+    ParameterName {
+        /// The text.
+        name: String,
     },
 }

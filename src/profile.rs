@@ -28,7 +28,7 @@ pub use text::{check_text, list_text, show_text};
 
 use wire::LinkSettings;
 
-use crate::kinematics::{Arm, Axis, FreeParameter, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{Arm, FreeParameter, KinematicChain, LinkParameter, ParameterId};
 use crate::text::{names_of_option, written_as_text};
 
 /// Angle below which neighbouring axes count as parallel (rad): 1°, far above any assembly error and far below any design angle.
@@ -228,28 +228,29 @@ impl Profile {
         changed
     }
 
-    /// The parameters to identify, in the order of equation (19) of the method paper: α, a, d, θ joint by joint, then the
-    /// β's, then the coordinates of targets that are not taken as exact.
-    pub fn free_parameters(&self, level: Level) -> Vec<FreeParameter> {
-        let constants = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
-        let links = (0..self.chain.dof())
-            .flat_map(|joint| constants.map(|parameter| ParameterId::Link { joint, parameter }))
-            .chain(self.beta_joints.iter().map(|&joint| ParameterId::Link { joint, parameter: LinkParameter::Beta }))
-            .filter(|id| match level {
-                Level::Offsets => id.is_joint_offset(&self.chain),
-                Level::Geometric => true,
-            });
-        let targets = self
-            .targets
-            .iter()
-            .enumerate()
-            .filter(|(_, target)| target.is_free())
-            .flat_map(|(target, _)| Axis::ALL.map(|axis| ParameterId::Target { target, axis }));
-        links
-            .chain(targets)
-            .filter(|id| !self.fixed_parameters.contains(id))
-            .map(|id| FreeParameter { id, expected: self.expected_deviations.of(id, &self.chain, &self.targets) })
-            .collect()
+    /// The parameters that a level identifies, in the order of equation (19) of the method paper: α, a, d, θ joint by joint,
+    /// then the β's, then the coordinates of targets that are not taken as exact. Fixed parameters are left out.
+    pub fn parameters(&self, level: Level) -> Vec<FreeParameter> {
+        let joints = || self.chain.joints().iter().enumerate();
+        let mut ids: Vec<ParameterId> = match level {
+            Level::Offsets => joints()
+                .map(|(index, joint)| ParameterId::Link {
+                    joint: index,
+                    parameter: LinkParameter::joint_offset(joint.joint_type),
+                })
+                .collect(),
+            Level::Geometric => {
+                let constants = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
+                let links = joints().flat_map(|(joint, _)| constants.map(|parameter| (joint, parameter)));
+                let betas = self.beta_joints.iter().map(|joint| (*joint, LinkParameter::Beta));
+                links.chain(betas).map(|(joint, parameter)| ParameterId::Link { joint, parameter }).collect()
+            }
+        };
+        let free_targets = self.targets.iter().enumerate().filter(|(_, target)| target.is_free());
+        ids.extend(free_targets.flat_map(|(target, _)| ParameterId::of_target(target)));
+        ids.retain(|id| !self.fixed_parameters.contains(id));
+        let free = |id| FreeParameter { id, expected: self.expected_deviations.of(id, &self.chain, &self.targets) };
+        ids.into_iter().map(free).collect()
     }
 }
 

@@ -92,7 +92,7 @@ fn compensated_targets_bring_the_error_down_to_the_identified_level() {
 fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
     for name in builtin_names() {
         let profile = profile(name);
-        let free = profile.free_parameters(Level::Geometric);
+        let free = profile.parameters(Level::Geometric);
         let deviations =
             free.iter().zip([0.5, -0.5].into_iter().cycle()).map(|(free, half)| (free.id, half * free.expected));
         let arms = [profile.chain().clone(), profile.arm().with(deviations).unwrap().chain];
@@ -131,7 +131,7 @@ fn every_shipped_arm_is_compensated_and_the_rest_is_named() {
 #[test]
 fn limits_singularities_and_reach_are_told_apart() {
     let ur = profile("ur5");
-    let deviations = ur.free_parameters(Level::Geometric).into_iter().map(|free| (free.id, free.expected));
+    let deviations = ur.parameters(Level::Geometric).into_iter().map(|free| (free.id, free.expected));
     let arms = [ur.chain().clone(), ur.arm().with(deviations).unwrap().chain].map(|chain| with_tool(&chain, None));
     let limits: Vec<_> = ur.joints().iter().map(|range| range.limits).collect();
     let solve = |limits: &[Option<(f64, f64)>], goal: &Goal| {
@@ -530,7 +530,7 @@ fn closed_loop_in_the_cell(robot: &str, truth: Truth) -> [f64; 3] {
         let command: Vec<f64> = cells[2..8].iter().map(|cell| from_deg(cell.parse().unwrap())).collect();
         meant.push(point(nominal.chain(), &nominal.targets()[0].position_in_flange, q));
         naive.push(point(&hidden.arm.chain, &hidden.arm.targets[0], q));
-        predicted.push(point(&identified.identified, &identified.targets[0].position_in_flange, q));
+        predicted.push(point(&identified.identified.chain, &identified.identified.targets[0], q));
         real.push(point(&hidden.arm.chain, &hidden.arm.targets[0], q));
         compensated.push(point(&hidden.arm.chain, &hidden.arm.targets[0], &command));
     }

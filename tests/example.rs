@@ -144,7 +144,7 @@ fn the_finished_session_is_what_its_script_makes() {
     compare(&report(&made), &report(&committed), "report");
     let calibration = |folder: &Path| {
         let calibration = Calibration::parse(&text(folder, "calibration.ron")).unwrap();
-        calibration.parameters.into_iter().map(|parameter| (parameter.name, parameter.deviation, parameter.sigma))
+        calibration.parameters.into_iter().map(|parameter| (parameter.id, parameter.deviation, parameter.sigma))
     };
     for (made, committed) in calibration(&made).zip(calibration(&committed)) {
         assert_eq!(made.0, committed.0);

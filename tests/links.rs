@@ -75,7 +75,7 @@ fn rehearsed(wires: &str) -> Ended {
 /// Largest difference of the deviations in a unit.
 fn difference(one: &Calibration, other: &Calibration, unit: &str) -> f64 {
     let pairs = one.parameters.iter().zip(&other.parameters);
-    let of_unit = pairs.filter(|(one, _)| one.unit == unit);
+    let of_unit = pairs.filter(|(one, _)| one.unit.name() == unit);
     of_unit.map(|(one, other)| (one.deviation - other.deviation).abs()).fold(0.0, f64::max)
 }
 

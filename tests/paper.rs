@@ -47,10 +47,10 @@ fn table_two_comes_back_entry_by_entry() {
         let found = run(&case, &Settings { weighting, ..paper_settings(100) });
         assert_eq!(found.termination, TerminationReason::Converged);
         for (estimate, truth) in found.estimates.iter().zip(&paper_deviations()) {
-            let quantity = estimate.id.quantity();
-            let (deviation, truth) = (quantity.to_edge(estimate.deviation), quantity.to_edge(*truth));
+            let unit = estimate.id.unit();
+            let (deviation, truth) = (unit.to_edge(estimate.deviation), unit.to_edge(*truth));
             // Half a unit of the last printed digit (four decimals).
-            assert!((deviation - truth).abs() < 5e-5, "{} {deviation} {truth} {}", estimate.id, quantity.unit());
+            assert!((deviation - truth).abs() < 5e-5, "{} {deviation} {truth} {}", estimate.id, unit);
         }
     }
 }

@@ -251,16 +251,16 @@ fn the_page_shows_the_numbers_of_the_journal() {
     assert_eq!(row(&shown, "identified (after), mean absolute value"), axes(after.mean));
 
     for parameter in &summary.parameters {
-        let cells = row(&shown, &parameter.name);
-        assert_eq!(cells[1], parameter.unit, "{}", parameter.name);
-        let shown = |cell: &str| cell.parse::<f64>().unwrap_or_else(|_| panic!("{}: {cell}", parameter.name));
+        let cells = row(&shown, &parameter.id.to_string());
+        assert_eq!(cells[1], parameter.unit.name(), "{}", parameter.id);
+        let shown = |cell: &str| cell.parse::<f64>().unwrap_or_else(|_| panic!("{}: {cell}", parameter.id));
         let half = |cell: &str| 0.5001 * 0.1_f64.powi(i32::try_from(cell.len() - cell.find('.').unwrap() - 1).unwrap());
         let values =
             [parameter.nominal, parameter.deviation, parameter.sigma.unwrap(), parameter.nominal + parameter.deviation];
         for (cell, value) in cells[2..6].iter().zip(values) {
-            assert!((shown(cell) - value).abs() <= half(cell), "{}: {cell} and {value}", parameter.name);
+            assert!((shown(cell) - value).abs() <= half(cell), "{}: {cell} and {value}", parameter.id);
         }
-        assert!(cells[6].starts_with("only combined") != parameter.identifiable, "{}: {cells:?}", parameter.name);
+        assert!(cells[6].starts_with("only combined") != parameter.identifiable, "{}: {cells:?}", parameter.id);
     }
     for check in &summary.verdict.checks {
         let value = format!(" | {:.4} | {:.4} | ", check.value_mm.unwrap(), check.limit_mm);
@@ -401,9 +401,8 @@ fn names_of_others_stay_text() {
             }
         }
         let result = session.identified.as_deref_mut().unwrap();
-        for parameter in &mut result.summary.parameters {
-            name.clone_into(&mut parameter.name);
-            name.clone_into(&mut parameter.unit);
+        for group in &mut result.summary.blind_groups {
+            name.clone_into(&mut group.description);
         }
         name.clone_into(&mut result.summary.provenance.program);
         result.summary.verdict.reasons = vec![name.to_owned()];

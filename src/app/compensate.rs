@@ -11,10 +11,9 @@ use super::{Console, export};
 use crate::cli::compensate::CompensateArgs;
 use crate::compensation::{Compensated, Compensator, Goal, Settings, Status, ToolArm};
 use crate::error::{ExitStatus, Failure};
-use crate::kinematics::{Joint, KinematicChain};
+use crate::kinematics::{Arm, Joint};
 use crate::model::{CalibratedArm, from_roll_pitch_yaw};
 use crate::procedure::joint_types;
-use crate::profile::Target;
 use crate::session::targets::{TargetGoal, decimal, quoted, read_bytes};
 use crate::store;
 use crate::text::printable;
@@ -35,11 +34,8 @@ pub(super) fn run<O: Write, E: Write>(
             .hint("write to another file: what is corrected already must not be corrected again"));
     }
     let arm = export::calibrated_arm(&args.calibration, console)?;
-    for effect in &arm.other_effects {
-        console.remark(&format!("note: compensated for geometry only; identified, but not in it: {effect}"));
-    }
     if !args.position_only && args.target.is_none() && !arm.untold.is_empty() {
-        let names: Vec<&str> = arm.targets.iter().map(|target| target.name.as_str()).collect();
+        let names: Vec<&str> = arm.profile.targets().iter().map(|target| target.name.as_str()).collect();
         console.remark(&format!(
             "note: the measured points tell these constants only combined with others (standard deviations): {}. As uncertain are \
              orientations, and points of the tool away from the target that was measured; '--target {}' compensates that point",
@@ -73,7 +69,7 @@ fn table<O: Write, E: Write>(
     let limits: Vec<_> = arm.profile.joints().iter().map(|range| range.limits).collect();
     let settings = Settings { position_only: args.position_only, ..Settings::default() };
     let compensator = Compensator::new(&nominal, &identified, &limits, settings);
-    let joints = arm.identified.joints();
+    let joints = arm.identified.chain.joints();
     let mut lines = vec![header(joints)];
     let mut failed = 0;
     let mut orientation_left = 0;
@@ -106,27 +102,24 @@ fn table<O: Write, E: Write>(
 
 /// Both arms with the point that counts: the flange, or a target where each of them has it.
 fn tool_arms(arm: &CalibratedArm, target: Option<&str>) -> Result<(ToolArm, ToolArm), Failure> {
-    let place = match target {
+    let index = match target {
         None => None,
         Some(name) => {
-            let known = arm.profile.targets().iter().zip(&arm.targets).find(|(target, _)| target.name == name);
+            let known = arm.profile.targets().iter().position(|target| target.name == name);
             Some(known.ok_or_else(|| {
-                let names: Vec<&str> = arm.targets.iter().map(|target| target.name.as_str()).collect();
+                let names: Vec<&str> = arm.profile.targets().iter().map(|target| target.name.as_str()).collect();
                 Failure::new(ExitStatus::Usage, format!("the profile has no target '{}'", printable(name)))
                     .hint(format!("targets: {}", names.join(", ")))
             })?)
         }
     };
-    let tool = |target: Option<&Target>| {
-        target.map_or_else(Isometry3::identity, |target| {
-            Isometry3::from(Translation3::from(target.position_in_flange.coords))
-        })
+    let with_tool = |arm: &Arm| {
+        let point = index.and_then(|index| arm.targets.get(index));
+        let flange_from_tool =
+            point.map_or_else(Isometry3::identity, |point| Isometry3::from(Translation3::from(point.coords)));
+        ToolArm { chain: arm.chain.clone(), flange_from_tool }
     };
-    let with = |chain: &KinematicChain, target| ToolArm { chain: chain.clone(), flange_from_tool: tool(target) };
-    Ok((
-        with(arm.profile.chain(), place.map(|(nominal, _)| nominal)),
-        with(&arm.identified, place.map(|(_, identified)| identified)),
-    ))
+    Ok((with_tool(&arm.profile.arm()), with_tool(&arm.identified)))
 }
 
 fn goal(goal: &TargetGoal) -> Goal {

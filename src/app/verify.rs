@@ -1,8 +1,9 @@
 //! `trupose verify`: a calibration on other data.
 
+use std::error::Error;
 use std::io::Write;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 
 use super::identify::exit_status;
 use super::{Console, advice, load, to_json};
@@ -18,7 +19,8 @@ use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
 use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
-use crate::units::{MICROMETRE, MILLIMETRE, from_mm, to_mm};
+use crate::text;
+use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
 /// Prior standard deviation of a remounted target (m).
 const NEW_MOUNTING: f64 = 50.0 * MILLIMETRE;
@@ -33,7 +35,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
             .hint("a calibration is written by 'trupose identify --out DIR'")
     })?;
     let loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
-    let profile = &calibration.mounted.map_or_else(|| loaded.profile.clone(), |mounted| mounted.on(&loaded.profile));
+    let profile = &calibration.mounted_on(&loaded.profile);
     let measured = load::measurements(&args.measurements, args.layout, profile, InputRole::Verification)?;
     let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;
     let (rows, _) = load::split(&measured.table, filter.as_ref())?;
@@ -109,9 +111,9 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
 
 /// Looks for mistakes in the whole table, as `identify` does.
 fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) -> Result<Option<Warning>, Failure> {
-    let mut parameters = profile.free_parameters(Level::Geometric);
+    let mut parameters = profile.parameters(Level::default());
     if args.refit == Refit::FrameAndTarget {
-        parameters.retain(|parameter| matches!(parameter.id, ParameterId::Link { .. }));
+        parameters.retain(|parameter| parameter.id.target().is_none());
         parameters.extend(remounted_targets(profile, samples));
     }
     let observations = Observations::default();
@@ -172,31 +174,11 @@ struct Models {
 
 impl Models {
     fn new(calibration: &Calibration, profile: &Profile, file: &str) -> Result<Self, Failure> {
-        let known: Vec<ParameterId> = profile.free_parameters(Level::Geometric).iter().map(|p| p.id).collect();
-        let mut deviations = Vec::new();
-        for parameter in &calibration.parameters {
-            let id = known.iter().copied().find(|id| id.to_string() == parameter.name).ok_or_else(|| {
-                Failure::new(
-                    ExitStatus::Usage,
-                    format!("'{file}': its profile has no free parameter '{}'", parameter.name),
-                )
-            })?;
-            let deviation = id.quantity().from_edge(parameter.deviation);
-            deviations.push((id, deviation));
-        }
-        let identified =
-            profile.arm().with(deviations).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-        let targets = calibration
-            .nominal_targets_mm
-            .iter()
-            .map(|&(x, y, z)| Point3::new(from_mm(x), from_mm(y), from_mm(z)))
-            .collect::<Vec<_>>();
-        if targets.len() != identified.targets.len() {
-            return Err(Failure::new(ExitStatus::Usage, format!("'{file}': the targets do not match its profile")));
-        }
+        let unusable =
+            |error: &dyn Error| Failure::new(ExitStatus::Usage, format!("'{file}': {}", text::causes(error)));
         Ok(Self {
-            nominal: Arm { chain: profile.chain().clone(), targets },
-            identified,
+            nominal: calibration.nominal(profile).map_err(|error| unusable(&error))?,
+            identified: calibration.identified(profile).map_err(|error| unusable(&error))?,
             nominal_station: calibration.nominal_base_from_station.as_ref().map(Into::into),
             station: calibration.base_from_station.as_ref().map(Into::into),
         })
@@ -234,9 +216,7 @@ impl Models {
 fn remounted_targets(profile: &Profile, samples: &[PointSample]) -> Vec<FreeParameter> {
     (0..profile.targets().len())
         .filter(|target| samples.iter().any(|sample| sample.at.target == *target))
-        .flat_map(|target| {
-            crate::kinematics::Axis::ALL
-                .map(|axis| FreeParameter { id: ParameterId::Target { target, axis }, expected: NEW_MOUNTING })
-        })
+        .flat_map(ParameterId::of_target)
+        .map(|id| FreeParameter { id, expected: NEW_MOUNTING })
         .collect()
 }

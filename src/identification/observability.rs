@@ -11,7 +11,7 @@ use super::linearise::{Evaluation, Weights, point_residuals, project};
 use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
 use crate::kinematics::ParameterId;
-use crate::units::{MILLIMETRE, Quantity};
+use crate::text;
 
 /// A ratio of neighbouring singular values below this is no gap: the rank would be a guess.
 const CLEAR_GAP: f64 = 1e3;
@@ -83,7 +83,7 @@ impl Observability {
             }
             _ => DMatrix::zeros(n, 0),
         };
-        let raw: Vec<f64> = problem.parameters.iter().map(|parameter| raw_unit(parameter.id)).collect();
+        let raw: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.id.unit().of_the_paper()).collect();
         // Without points there are no pair rows: the rows themselves are the identification matrix.
         let gram = pair_gram.unwrap_or_else(|| rows.normal_equations().gram);
         let condition = |scale: &[f64]| rank.and_then(|rank| condition_number(&gram, scale, rank));
@@ -102,14 +102,6 @@ impl Observability {
     /// Whether the parameter at `index` can be found on its own.
     pub fn is_identifiable(&self, index: usize) -> bool {
         self.rank.is_some() && self.blind.row(index).norm_squared() < BLIND_SHARE
-    }
-}
-
-/// The unit of the paper: mm for lengths, rad for angles.
-pub(crate) const fn raw_unit(id: ParameterId) -> f64 {
-    match id.quantity() {
-        Quantity::Length => MILLIMETRE,
-        Quantity::Angle => 1.0,
     }
 }
 
@@ -214,7 +206,7 @@ fn describe_group(problem: &Problem<'_>, projector: &DMatrix<f64>, scale: &[f64]
     let eigen = SymmetricEigen::new(block);
     let blind = eigen.eigenvalues.iter().filter(|&&value| value > 0.5).count().max(1);
     let names: Vec<String> = parameters.iter().map(ToString::to_string).collect();
-    let listed = join_names(&names);
+    let listed = text::listed(&names);
     let description = if let [only] = parameters.as_slice() {
         lone_parameter(*only, &names[0])
     } else if blind == 1 {
@@ -223,7 +215,7 @@ fn describe_group(problem: &Problem<'_>, projector: &DMatrix<f64>, scale: &[f64]
         let factors: Vec<f64> = members
             .iter()
             .zip(direction.iter())
-            .map(|(&index, value)| problem.parameters[index].id.quantity().to_edge(value * scale[index]))
+            .map(|(&index, value)| problem.parameters[index].id.unit().to_edge(value * scale[index]))
             .collect();
         one_direction(&parameters, &names, &listed, &factors)
     } else if members.len() == blind + 1 {
@@ -232,7 +224,7 @@ fn describe_group(problem: &Problem<'_>, projector: &DMatrix<f64>, scale: &[f64]
         let weights: Vec<f64> = members
             .iter()
             .zip(direction.iter())
-            .map(|(&index, value)| problem.parameters[index].id.quantity().from_edge(value / scale[index]))
+            .map(|(&index, value)| problem.parameters[index].id.unit().from_edge(value / scale[index]))
             .collect();
         one_combination(&names, &listed, &weights)
     } else {
@@ -247,12 +239,12 @@ fn lone_parameter(id: ParameterId, name: &str) -> String {
         ParameterId::Link { joint: 0, .. } => {
             format!("{name}: cannot be found from distances, it only moves the robot's base frame")
         }
-        _ => format!("{name}: has no effect on these measurements"),
+        ParameterId::Link { .. } | ParameterId::Target { .. } => format!("{name}: has no effect on these measurements"),
     }
 }
 
 fn one_direction(parameters: &[ParameterId], names: &[String], listed: &str, factors: &[f64]) -> String {
-    let same_unit = parameters.windows(2).all(|pair| pair[0].quantity() == pair[1].quantity());
+    let same_unit = parameters.windows(2).all(|pair| pair[0].unit() == pair[1].unit());
     let equal = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs();
     if let ([first, second], true) = (factors, same_unit) {
         if equal(*first, -second) {
@@ -267,7 +259,7 @@ fn one_direction(parameters: &[ParameterId], names: &[String], listed: &str, fac
         .iter()
         .zip(names)
         .zip(parameters)
-        .map(|((factor, name), id)| format!("{:+.3} {} of {name}", factor / largest, id.quantity().unit()))
+        .map(|((factor, name), id)| format!("{:+.3} {} of {name}", factor / largest, id.unit()))
         .collect();
     format!("{listed}: cannot be told apart along the change {}", terms.join(", "))
 }
@@ -285,15 +277,6 @@ fn one_combination(names: &[String], listed: &str, weights: &[f64]) -> String {
 /// The value of largest size, with its sign.
 fn signed_largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0_f64, |largest, value| if value.abs() > largest.abs() { *value } else { largest })
-}
-
-/// `a`, `a and b`, `a, b and c`.
-fn join_names(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [only] => only.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 #[cfg(test)]
@@ -315,12 +298,5 @@ mod tests {
         let (rank, gap) = rank_by_gap(&fading, 1e-16);
         assert_eq!(rank, None);
         assert!((gap - 10.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn names_are_joined_as_in_a_sentence() {
-        let names = ["a1", "d2", "d3"].map(str::to_owned);
-        let joined = [join_names(&names[..1]), join_names(&names[..2]), join_names(&names)];
-        assert_eq!(joined, ["a1", "a1 and d2", "a1, d2 and d3"]);
     }
 }

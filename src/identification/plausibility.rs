@@ -12,7 +12,7 @@ use super::problem::{Observations, PointSample, Problem};
 use super::robust::gross_trust;
 use super::{Estimator, Identification, IdentificationError, Observability, Settings, SigmaSource, identify};
 use crate::geometry::principal_spread;
-use crate::kinematics::{FreeParameter, JointType, ParameterId, Place};
+use crate::kinematics::{FreeParameter, JointType, Place};
 use crate::units::{DEGREE, INCH, MILLIMETRE, to_deg, to_mm};
 
 /// Nominal residuals beyond this many expected ones are not explained by a robot with its expected deviations.
@@ -147,7 +147,7 @@ fn expected_residual(problem: &Problem<'_>) -> f64 {
     let weights = Weights::uniform(problem, 1.0);
     let residuals = point_residuals(problem, &evaluation.points, &weights);
     let gram = project(problem, evaluation, &residuals, &weights, &weights).normal_equations().gram;
-    let of_links = problem.parameters.iter().enumerate().filter(|(_, p)| matches!(p.id, ParameterId::Link { .. }));
+    let of_links = problem.parameters.iter().enumerate().filter(|(_, p)| p.id.target().is_none());
     let variance: f64 = of_links.map(|(index, p)| gram[(index, index)] * p.expected * p.expected).sum();
     (variance / problem.observations.points.len().max(1) as f64).sqrt()
 }
@@ -160,7 +160,7 @@ struct Trial<'a, 'p> {
 
 impl<'a, 'p> Trial<'a, 'p> {
     fn new(problem: &'a Problem<'p>) -> Self {
-        let is_target = |p: &&FreeParameter| matches!(p.id, ParameterId::Target { .. });
+        let is_target = |p: &&FreeParameter| p.id.target().is_some();
         Self { problem, target_parameters: problem.parameters.iter().filter(is_target).copied().collect() }
     }
 

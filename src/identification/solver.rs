@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::linearise::length_rows;
 use super::linearise::{Evaluation, NormalEquations, PointResiduals, Weights, point_residuals, project};
-use super::observability::{Observability, raw_unit};
+use super::observability::Observability;
 use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
 use super::{IdentificationError, Iteration, Prior, TerminationReason, Weighting};
@@ -61,7 +61,7 @@ impl Basis {
                     return Err(IdentificationError::RankUnclear { gap: observability.gap });
                 }
                 // Blind directions in rad and mm, orthonormal; their complement is the row space of the raw A.
-                let unit = |index: usize| raw_unit(problem.parameters[index].id);
+                let unit = |index: usize| problem.parameters[index].id.unit().of_the_paper();
                 let blind = DMatrix::from_fn(n, observability.blind.ncols(), |i, j| {
                     observability.blind[(i, j)] * problem.parameters[i].expected / unit(i)
                 });

@@ -1,9 +1,14 @@
-//! Names of the kinematic parameters.
+//! The kinematic parameters: their names, their units and what they mean.
 
 use std::fmt;
+use std::str::FromStr;
 
-use super::{Convention, JointType, KinematicChain, Link};
-use crate::units::Quantity;
+use super::{Convention, JointType, KinematicChain, KinematicsError, Link};
+use crate::text::{self, names, written_as_text};
+use crate::units::{DEGREE, MILLIMETRE, Quantity};
+
+/// A wrong name in a message is cut at this many columns.
+const LONGEST_NAME: usize = 40;
 
 /// One of the five constants of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -37,6 +42,17 @@ impl LinkParameter {
         match joint_type {
             JointType::Revolute => Self::Theta,
             JointType::Prismatic => Self::D,
+        }
+    }
+
+    /// What it is, in words for people.
+    const fn meaning(self) -> &'static str {
+        match self {
+            Self::Alpha => "twist about x",
+            Self::A => "length along x",
+            Self::D => "offset along z",
+            Self::Theta => "angle about z",
+            Self::Beta => "turn about y",
         }
     }
 
@@ -85,6 +101,8 @@ impl Axis {
 }
 
 /// A parameter that identification may change. Joints and targets count from 0 inside and from 1 in the printed name.
+///
+/// The name is the same wherever a parameter is written: in files, tables and messages. Reading it back gives the parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ParameterId {
     /// A constant of the link driven by joint `joint`.
@@ -104,23 +122,124 @@ pub enum ParameterId {
 }
 
 impl ParameterId {
-    /// Length or angle.
-    pub const fn quantity(self) -> Quantity {
+    /// All parameters of an arm with this number of joints and targets.
+    pub fn all(joints: usize, targets: usize) -> impl Iterator<Item = Self> {
+        (0..joints).flat_map(Self::of_joint).chain((0..targets).flat_map(Self::of_target))
+    }
+
+    /// The parameters of one joint with its link.
+    fn of_joint(joint: usize) -> impl Iterator<Item = Self> {
+        LinkParameter::ALL.into_iter().map(move |parameter| Self::Link { joint, parameter })
+    }
+
+    /// The parameters of one target.
+    pub fn of_target(target: usize) -> impl Iterator<Item = Self> {
+        Axis::ALL.into_iter().map(move |axis| Self::Target { target, axis })
+    }
+
+    /// The unit that people read it in.
+    pub const fn unit(self) -> ParameterUnit {
         match self {
-            Self::Link { parameter, .. } => parameter.quantity(),
-            Self::Target { .. } => Quantity::Length,
+            Self::Link { parameter, .. } => match parameter.quantity() {
+                Quantity::Length => ParameterUnit::Millimetre,
+                Quantity::Angle => ParameterUnit::Degree,
+            },
+            Self::Target { .. } => ParameterUnit::Millimetre,
         }
     }
 
-    /// Whether this is the joint offset of its joint: what level-1 calibration identifies.
-    pub fn is_joint_offset(self, chain: &KinematicChain) -> bool {
+    /// Index of the joint whose link it shapes; `None` for what sits on the flange.
+    pub const fn joint(self) -> Option<usize> {
         match self {
-            Self::Link { joint, parameter } => chain
-                .joints()
-                .get(joint)
-                .is_some_and(|joint| parameter == LinkParameter::joint_offset(joint.joint_type)),
-            Self::Target { .. } => false,
+            Self::Link { joint, .. } => Some(joint),
+            Self::Target { .. } => None,
         }
+    }
+
+    /// Index of the target that it places; `None` for what belongs to the arm itself.
+    pub const fn target(self) -> Option<usize> {
+        match self {
+            Self::Link { .. } => None,
+            Self::Target { target, .. } => Some(target),
+        }
+    }
+
+    /// What it is, in words for people: `J3: twist about x`.
+    pub fn meaning(self, chain: &KinematicChain) -> String {
+        match self {
+            Self::Link { joint, parameter } => {
+                let what = parameter.meaning();
+                match chain.joints().get(joint) {
+                    Some(joint) => format!("{}: {what}", joint.name),
+                    None => format!("link {}: {what}", joint + 1),
+                }
+            }
+            Self::Target { target, axis } => format!("SMR {} on the flange, {}", target + 1, axis.name()),
+        }
+    }
+}
+
+/// `alpha1`, `d2`, `beta2`, `target1.x`.
+impl fmt::Display for ParameterId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = match self {
+            Self::Link { joint, parameter } => format!("{}{}", parameter.name(), joint + 1),
+            Self::Target { target, axis } => format!("target{}.{}", target + 1, axis.name()),
+        };
+        f.pad(&name)
+    }
+}
+
+impl FromStr for ParameterId {
+    type Err = KinematicsError;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        let number: String = name.chars().filter(char::is_ascii_digit).collect();
+        let index = number.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let mut candidates = index.into_iter().flat_map(|index| Self::of_joint(index).chain(Self::of_target(index)));
+        candidates.find(|id| id.to_string() == name).ok_or_else(|| KinematicsError::ParameterName {
+            name: text::shortened(&text::printable(name), LONGEST_NAME),
+        })
+    }
+}
+
+/// The unit that people read a parameter in. Inside, lengths are in metres and angles in radians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ParameterUnit {
+    /// Of a length.
+    Millimetre,
+    /// Of an angle.
+    Degree,
+}
+
+names!(ParameterUnit { Millimetre = "mm", Degree = "deg", });
+written_as_text!(ParameterId, ParameterUnit);
+
+impl ParameterUnit {
+    /// One of it in the unit of the inside ((m) or (rad)).
+    pub const fn size(self) -> f64 {
+        match self {
+            Self::Millimetre => MILLIMETRE,
+            Self::Degree => DEGREE,
+        }
+    }
+
+    /// The unit that the method paper has for it: mm or rad, in that of the inside. Condition numbers without scaling are in it.
+    pub const fn of_the_paper(self) -> f64 {
+        match self {
+            Self::Millimetre => MILLIMETRE,
+            Self::Degree => 1.0,
+        }
+    }
+
+    /// A value of the inside in this unit.
+    pub const fn to_edge(self, value: f64) -> f64 {
+        value / self.size()
+    }
+
+    /// The value of the inside of a number in this unit.
+    pub const fn from_edge(self, value: f64) -> f64 {
+        value * self.size()
     }
 }
 
@@ -131,16 +250,6 @@ pub struct FreeParameter {
     pub id: ParameterId,
     /// Expected deviation from nominal, one standard deviation (m) or (rad); positive.
     pub expected: f64,
-}
-
-/// `alpha1`, `d2`, `beta2`, `target1.x`.
-impl fmt::Display for ParameterId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Link { joint, parameter } => write!(f, "{}{}", parameter.name(), joint + 1),
-            Self::Target { target, axis } => write!(f, "target{}.{}", target + 1, axis.name()),
-        }
-    }
 }
 
 impl Link {
@@ -194,6 +303,45 @@ impl KinematicChain {
         match self.convention() {
             Convention::Standard => first,
             Convention::Modified => first + 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_read_back() {
+        let ids: Vec<ParameterId> = ParameterId::all(12, 11).collect();
+        assert_eq!(ids.len(), 12 * 5 + 11 * 3);
+        for id in ids {
+            assert_eq!(id.to_string().parse(), Ok(id));
+            assert_eq!(ron::from_str::<ParameterId>(&ron::to_string(&id).unwrap()), Ok(id));
+            assert_eq!(id.joint().is_some(), id.target().is_none());
+        }
+        for wrong in
+            ["", "a", "a0", "a02", "+2", "a+2", "a2 ", "A2", "gamma1", "target1", "target0.x", "target1.w", "1a"]
+        {
+            assert!(wrong.parse::<ParameterId>().is_err(), "{wrong}");
+        }
+        let long = "x".repeat(1000).parse::<ParameterId>().unwrap_err().to_string();
+        assert!(long.len() < 150, "{long}");
+    }
+
+    #[test]
+    fn units_have_the_size_that_they_say() {
+        for unit in ParameterUnit::ALL {
+            assert_eq!(ron::from_str(&ron::to_string(unit).unwrap()), Ok(*unit));
+            assert!((unit.to_edge(unit.from_edge(3.0)) - 3.0).abs() < 1e-15);
+        }
+        assert!("um".parse::<ParameterUnit>().is_err());
+        for id in ParameterId::all(1, 1) {
+            let expected = match id {
+                ParameterId::Link { parameter, .. } => parameter.quantity().unit(),
+                ParameterId::Target { .. } => "mm",
+            };
+            assert_eq!(id.unit().name(), expected);
         }
     }
 }

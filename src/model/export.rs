@@ -9,11 +9,11 @@ use super::tables::{read_csv, read_json, read_ur, write_csv, write_json, write_u
 use super::transforms::{is_coupled, link_values, motion, number, roll_pitch_yaw};
 use super::urdf::Urdf;
 use super::{ModelError, urdf_write};
-use crate::kinematics::{Axis, ForwardKinematics, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{Arm, ForwardKinematics, JointType, KinematicChain, ParameterId};
 use crate::profile::{Profile, Target};
 use crate::session::calibration::Calibration;
 use crate::session::summary::{SIMULATED, VerdictStatus};
-use crate::units::{from_mm, to_deg, to_mm};
+use crate::units::{to_deg, to_mm};
 
 /// A format of a model. The comments on the values are the help of `--format`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
@@ -54,11 +54,7 @@ pub struct CalibratedArm {
     /// The robot as its maker says, with the targets as they were mounted.
     pub profile: Profile,
     /// The identified arm.
-    pub identified: KinematicChain,
-    /// The targets where they were identified.
-    pub targets: Vec<Target>,
-    /// Names of identified effects that are no link constants and no targets: no format here can carry them.
-    pub other_effects: Vec<String>,
+    pub identified: Arm,
     /// Where the result comes from and how it was judged, a few lines.
     pub about: Vec<String>,
     /// What speaks against applying it: it was not accepted, or nothing was measured.
@@ -74,23 +70,10 @@ impl CalibratedArm {
     /// # Errors
     /// The calibration has a parameter that this robot does not have.
     pub fn new(calibration: &Calibration, profile: &Profile) -> Result<Self, ModelError> {
-        let profile = calibration.mounted.map_or_else(|| profile.clone(), |mounted| mounted.on(profile));
-        let identified = calibration.identified_chain(&profile).ok_or_else(|| {
-            ModelError::Unsuitable("the calibration has a parameter that its profile does not have".to_owned())
-        })?;
-        let mut targets = profile.targets().to_vec();
-        let mut other_effects = Vec::new();
-        for parameter in &calibration.parameters {
-            match parameter_id(&parameter.name) {
-                Some(ParameterId::Target { target, axis }) => {
-                    if let Some(target) = targets.get_mut(target) {
-                        target.position_in_flange[axis.index()] += from_mm(parameter.deviation);
-                    }
-                }
-                Some(ParameterId::Link { .. }) => {}
-                None => other_effects.push(parameter.name.clone()),
-            }
-        }
+        let profile = calibration.mounted_on(profile);
+        let identified = calibration
+            .identified(&profile)
+            .map_err(|error| ModelError::Unsuitable(format!("the calibration does not fit its profile: {error}")))?;
         let provenance = &calibration.provenance;
         let cautions = cautions(calibration);
         let mut about = vec![
@@ -100,7 +83,13 @@ impl CalibratedArm {
         ];
         about.extend(cautions.iter().map(|caution| format!("WARNING: {caution}")));
         let untold = untold(calibration, profile.chain().dof());
-        Ok(Self { profile, identified, targets, other_effects, about, cautions, untold })
+        Ok(Self { profile, identified, about, cautions, untold })
+    }
+
+    /// The targets where they were identified.
+    pub fn targets(&self) -> Vec<Target> {
+        let identified = self.profile.targets().iter().zip(&self.identified.targets);
+        identified.map(|(target, place)| Target { position_in_flange: *place, ..target.clone() }).collect()
     }
 
     fn limits(&self) -> Vec<Option<(f64, f64)>> {
@@ -128,29 +117,15 @@ fn cautions(calibration: &Calibration) -> Vec<String> {
 
 /// Constants of the last of `joints` links that the data tell only combined with others.
 fn untold(calibration: &Calibration, joints: usize) -> Vec<String> {
-    let of_last_link =
-        |name: &str| matches!(parameter_id(name), Some(ParameterId::Link { joint, .. }) if joint + 1 == joints);
+    let is_of_last_link = |id: ParameterId| id.joint().is_some_and(|joint| joint + 1 == joints);
     let parameters = calibration.parameters.iter();
     parameters
-        .filter(|parameter| !parameter.identifiable && of_last_link(&parameter.name))
+        .filter(|parameter| !parameter.identifiable && is_of_last_link(parameter.id))
         .filter_map(|parameter| {
             let sigma = parameter.sigma.filter(|sigma| *sigma > 0.0)?;
-            Some(format!("{} ({:.2} {})", parameter.name, sigma, parameter.unit))
+            Some(format!("{} ({:.2} {})", parameter.id, sigma, parameter.unit))
         })
         .collect()
-}
-
-/// The parameter of a printed name.
-fn parameter_id(name: &str) -> Option<ParameterId> {
-    if let Some((target, _)) = name.strip_prefix("target").and_then(|rest| rest.split_once('.')) {
-        let target = target.parse::<usize>().ok()?.checked_sub(1)?;
-        let id = |axis| ParameterId::Target { target, axis };
-        return Axis::ALL.map(id).into_iter().find(|id| id.to_string() == name);
-    }
-    let digits = name.trim_start_matches(|c: char| c.is_ascii_alphabetic());
-    let joint = digits.parse::<usize>().ok()?.checked_sub(1)?;
-    let id = |parameter| ParameterId::Link { joint, parameter };
-    LinkParameter::ALL.map(id).into_iter().find(|id| id.to_string() == name)
 }
 
 /// A URDF that is to take the identified geometry.
@@ -189,7 +164,7 @@ pub struct Export {
 /// # Errors
 /// The arm does not fit the format, or the text does not agree with it to 1 µm and 1 µrad at 1,000 random configurations.
 pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) -> Result<Export, ModelError> {
-    let (identified, limits) = (&arm.identified, arm.limits());
+    let (identified, limits) = (&arm.identified.chain, arm.limits());
     let proven = |chain: &KinematicChain| {
         let written = ForwardKinematics::new(chain);
         prove(identified, &limits, proof::EXPORT, |q| written.base_from_flange(q))
@@ -209,7 +184,7 @@ pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) 
             (text, agreement)
         }
         Format::Json => {
-            let text = write_json(arm.profile.name(), &arm.about, arm.profile.chain(), identified, &arm.targets)?;
+            let text = write_json(arm.profile.name(), &arm.about, arm.profile.chain(), identified, &arm.targets())?;
             let agreement = proven(&read_json(&text)?)?;
             (text, agreement)
         }
@@ -218,10 +193,6 @@ pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) 
     };
     if !format.has_targets() {
         remarks.push("the place of the target on the flange is not part of this format".to_owned());
-    }
-    if !arm.other_effects.is_empty() {
-        let names = arm.other_effects.join(", ");
-        remarks.push(format!("this format has geometry only; identified, but not in it: {names}"));
     }
     Ok(Export { text, agreement, remarks })
 }
@@ -239,7 +210,7 @@ fn corrected_profile(arm: &CalibratedArm) -> String {
         title: &format!("{}, corrected", profile.title()),
         source: &format!("identified; nominal: {}", profile.source()),
     };
-    complete(&heading, profile, &arm.identified, &arm.targets)
+    complete(&heading, profile, &arm.identified.chain, &arm.targets())
 }
 
 fn ur_kinematics(
@@ -247,7 +218,7 @@ fn ur_kinematics(
     options: &ExportOptions<'_>,
     remarks: &mut Vec<String>,
 ) -> Result<(String, Agreement), ModelError> {
-    let written = write_ur(&arm.about, &arm.identified)?;
+    let written = write_ur(&arm.about, &arm.identified.chain)?;
     let rest = written.flange_in_wrist_3;
     let offset = offset_text(&rest);
     let is_small =
@@ -259,7 +230,7 @@ fn ur_kinematics(
         remarks.push(format!("the tool must take what the file cannot say: in front of every tool {offset}"));
     }
     let origins = read_ur(&written.text)?;
-    let agreement = prove(&arm.identified, &arm.limits(), proof::EXPORT, |q| {
+    let agreement = prove(&arm.identified.chain, &arm.limits(), proof::EXPORT, |q| {
         let joints =
             origins.iter().zip(q).map(|(origin, q)| origin * motion(JointType::Revolute, &Vector3::z_axis(), *q));
         joints.fold(Isometry3::identity(), |pose, joint| pose * joint) * rest
@@ -285,7 +256,7 @@ fn urdf(
     options: &ExportOptions<'_>,
     remarks: &mut Vec<String>,
 ) -> Result<(String, Agreement), ModelError> {
-    let (nominal, identified, limits) = (arm.profile.chain(), &arm.identified, arm.limits());
+    let (nominal, identified, limits) = (arm.profile.chain(), &arm.identified.chain, arm.limits());
     let coupled: Vec<&str> =
         identified.joints().iter().filter(|joint| is_coupled(joint)).map(|joint| joint.name.as_str()).collect();
     let mut comments = arm.about.clone();

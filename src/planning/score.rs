@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::information::Information;
 use super::pairs::pair_gram;
 use super::{PlanningError, check_set};
-use crate::identification::raw_unit;
 use crate::kinematics::FreeParameter;
 use crate::units::MILLIMETRE;
 
@@ -175,7 +174,7 @@ fn raw_basis(information: &Information) -> DMatrix<f64> {
     let parameters = information.parameters();
     let factors = DVector::from_iterator(
         parameters.len(),
-        parameters.iter().map(|parameter| raw_unit(parameter.id) / parameter.expected.powi(2)),
+        parameters.iter().map(|parameter| parameter.id.unit().of_the_paper() / parameter.expected.powi(2)),
     );
     // `basis` is S V: A·U = (A S V)(VᵀS⁻¹U) because A S vanishes outside V.
     DMatrix::from_diagonal(&factors) * information.basis()

@@ -131,7 +131,7 @@ pub fn identify(
     let file = identification.file.as_deref();
     let mut warnings = identification.warnings.clone();
     warnings.extend(checks::limit_warning(profile, file, identification.configurations()));
-    let expected = request.settings.parameters_of(Level::Geometric, profile);
+    let expected = request.settings.parameters_of(Level::default(), profile);
     let expected = Problem { parameters: &expected, ..problem };
     let compared = checks::check_plausibility(&expected, "")?;
     warnings.extend(compared.warning);

@@ -10,7 +10,7 @@ use history::History;
 
 use super::cell::cell;
 use super::{ProcedureError, joint_types};
-use crate::kinematics::{Arm, FreeParameter, JointType, ParameterId, Place};
+use crate::kinematics::{Arm, FreeParameter, JointType, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
@@ -126,11 +126,8 @@ impl<'a> Planner<'a> {
         let cell = cell(profile, limits.clone(), request.region, request.filters)?;
         let filter = CandidateFilter::new(profile.chain(), &cell, request.clearance)?;
         // The poses are for the first target: coordinates of others cannot be seen with it.
-        let is_seen = |parameter: &FreeParameter| match parameter.id {
-            ParameterId::Target { target, .. } => target == 0,
-            ParameterId::Link { .. } => true,
-        };
-        let mut parameters = profile.free_parameters(request.level);
+        let is_seen = |parameter: &FreeParameter| parameter.id.target().is_none_or(|target| target == 0);
+        let mut parameters = profile.parameters(request.level);
         parameters.retain(is_seen);
         if let Some(expected) = request.expected_deviation {
             expected.replace_in(&mut parameters);

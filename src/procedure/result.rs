@@ -106,13 +106,13 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
         .iter()
         .filter(|estimate| estimate.deviation.abs() > RAN_AWAY * estimate.expected)
         .map(|estimate| {
-            let quantity = estimate.id.quantity();
+            let unit = estimate.id.unit();
             format!(
                 "{} by {}{} {} ({} times the expected deviation)",
                 estimate.id,
                 if estimate.deviation > 0.0 { "+" } else { "" },
-                number(quantity.to_edge(estimate.deviation), 3),
-                quantity.unit(),
+                number(unit.to_edge(estimate.deviation), 3),
+                unit,
                 number(estimate.deviation.abs() / estimate.expected, 0)
             )
         })

@@ -1,7 +1,7 @@
 //! How to identify, as the operator asks for it, and what that means to the solver.
 
 use crate::identification::{Estimator, Prior, Settings, SigmaSource, Weighting};
-use crate::kinematics::{FreeParameter, ParameterId};
+use crate::kinematics::FreeParameter;
 use crate::profile::{ExpectedDeviation, Level, Profile};
 use crate::session::summary::{IdentificationSettings, VerificationMode};
 use crate::units::{to_deg, to_mm};
@@ -70,7 +70,7 @@ impl EstimationSettings {
 
     /// The free parameters of a level with the expected deviations that are asked for.
     pub(crate) fn parameters_of(&self, level: Level, profile: &Profile) -> Vec<FreeParameter> {
-        let mut parameters = profile.free_parameters(level);
+        let mut parameters = profile.parameters(level);
         if let Some(expected) = self.expected_deviation {
             expected.replace_in(&mut parameters);
         }
@@ -96,5 +96,5 @@ impl EstimationSettings {
 
 /// The target coordinates among `parameters`.
 pub(crate) fn target_parameters(parameters: &[FreeParameter]) -> Vec<FreeParameter> {
-    parameters.iter().filter(|parameter| matches!(parameter.id, ParameterId::Target { .. })).copied().collect()
+    parameters.iter().filter(|parameter| parameter.id.target().is_some()).copied().collect()
 }

@@ -57,14 +57,14 @@ fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSum
         .estimates
         .iter()
         .map(|estimate| {
-            let quantity = estimate.id.quantity();
+            let unit = estimate.id.unit();
             ParameterSummary {
-                name: estimate.id.to_string(),
-                unit: quantity.unit().to_owned(),
-                nominal: quantity.to_edge(estimate.nominal),
-                deviation: quantity.to_edge(estimate.deviation),
-                sigma: (estimate.identifiable || prior == Prior::Expected).then(|| quantity.to_edge(estimate.sigma)),
-                expected: quantity.to_edge(estimate.expected),
+                id: estimate.id,
+                unit,
+                nominal: unit.to_edge(estimate.nominal),
+                deviation: unit.to_edge(estimate.deviation),
+                sigma: (estimate.identifiable || prior == Prior::Expected).then(|| unit.to_edge(estimate.sigma)),
+                expected: unit.to_edge(estimate.expected),
                 identifiable: estimate.identifiable,
             }
         })
@@ -74,8 +74,7 @@ fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSum
 /// Deviations of all parameters after a step of the solver, in the units of the parameters and rounded to 1 nm and 1 ndeg.
 fn deviations(found: &Identification, step: usize) -> Vec<f64> {
     let Some(path) = found.path.get(step) else { return Vec::new() };
-    let edge =
-        |(estimate, value): (&Estimate, &f64)| (estimate.id.quantity().to_edge(*value) * 1e9).round() / 1e9 + 0.0;
+    let edge = |(estimate, value): (&Estimate, &f64)| (estimate.id.unit().to_edge(*value) * 1e9).round() / 1e9 + 0.0;
     found.estimates.iter().zip(path.iter()).map(edge).collect()
 }
 
@@ -85,10 +84,7 @@ fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
         for (j, second) in found.estimates.iter().enumerate().skip(i + 1) {
             let correlation = found.correlation(i, j);
             if first.identifiable && second.identifiable && correlation.abs() > STRONG_CORRELATION {
-                strong.push(CorrelationSummary {
-                    parameters: [first.id.to_string(), second.id.to_string()],
-                    correlation,
-                });
+                strong.push(CorrelationSummary { parameters: [first.id, second.id], correlation });
             }
         }
     }
@@ -140,7 +136,7 @@ impl Finished<'_> {
             blind_groups: groups
                 .iter()
                 .map(|group| BlindGroupSummary {
-                    parameters: group.parameters.iter().map(ToString::to_string).collect(),
+                    parameters: group.parameters.clone(),
                     blind: group.blind,
                     description: group.description.clone(),
                 })

@@ -69,11 +69,16 @@ pub struct ExpectedDeviation {
 impl ExpectedDeviation {
     /// Replaces the expected deviations of the link constants among `parameters`; targets keep theirs.
     pub fn replace_in(self, parameters: &mut [FreeParameter]) {
-        for parameter in parameters.iter_mut().filter(|parameter| matches!(parameter.id, ParameterId::Link { .. })) {
-            parameter.expected = match parameter.id.quantity() {
-                Quantity::Length => self.length,
-                Quantity::Angle => self.angle,
-            };
+        for free in parameters {
+            match free.id {
+                ParameterId::Link { parameter, .. } => {
+                    free.expected = match parameter.quantity() {
+                        Quantity::Length => self.length,
+                        Quantity::Angle => self.angle,
+                    };
+                }
+                ParameterId::Target { .. } => {}
+            }
         }
     }
 }

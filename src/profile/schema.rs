@@ -93,9 +93,9 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let keep_out = cell::keep_out(&top, findings);
     let known = joints.as_ref().map(|joints| joints.shapes.as_slice());
     let bodies = cell::bodies(&top, known.map(<[_]>::len), findings);
-    let names = known.map(|joints| parameters::Names::new(joints, targets.as_deref().unwrap_or_default()));
-    let fixed_parameters = parameters::fixed(&top, names.as_ref(), findings);
-    let expected_deviations = parameters::expected_deviations(&top, names.as_ref(), findings);
+    let parameters = known.map(|joints| parameters::Known::new(joints, targets.as_deref().unwrap_or_default()));
+    let fixed_parameters = parameters::fixed(&top, parameters.as_ref(), findings);
+    let expected_deviations = parameters::expected_deviations(&top, parameters.as_ref(), findings);
 
     // From here on everything is needed; what is missing was reported above.
     let decoded = joints?;

@@ -144,7 +144,7 @@ fn target_lines(profile: &Profile) -> Vec<String> {
 }
 
 fn parameter_lines(profile: &Profile) -> Vec<String> {
-    let count = |level| profile.free_parameters(level).len();
+    let count = |level| profile.parameters(level).len();
     let fixed_names: Vec<String> = profile.fixed_parameters().iter().map(ToString::to_string).collect();
     let mut lines = vec![format!(
         "free parameters: {} geometric, {} offsets only (target coordinates included)",

@@ -230,7 +230,7 @@ fn parameter_table(parameters: &[ParameterSummary]) -> String {
             &mut text,
             &format!(
                 "{:<11}{:>4}{:>12}{:>12}{:>12}{:>10}  {found}",
-                parameter.name,
+                parameter.id,
                 parameter.unit,
                 fixed(parameter.nominal, 4),
                 fixed(parameter.deviation, decimals),

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::summary::{IdentificationSettings, ParameterSummary, Provenance, SigmaSummary, Verdict, Warning};
-use crate::kinematics::{Arm, KinematicChain, ParameterId};
-use crate::profile::{Level, Profile, Target};
+use crate::kinematics::{Arm, KinematicsError, ParameterId, ParameterUnit};
+use crate::profile::{Profile, Target};
 use crate::units::{from_mm, to_mm};
 
 /// Version of the layout.
@@ -187,28 +187,36 @@ pub enum CalibrationError {
     /// A number that is not finite.
     #[error("parameter '{parameter}' has a number that is not finite")]
     NotFinite {
-        /// Name of the parameter.
-        parameter: String,
+        /// Which parameter.
+        parameter: ParameterId,
     },
     /// A unit that a parameter cannot have.
-    #[error("parameter '{parameter}' has the unit '{unit}'; it must be 'mm' or 'deg', as its name says")]
+    #[error("parameter '{parameter}' has the unit '{unit}'; it must be '{}'", parameter.unit())]
     Unit {
-        /// Name of the parameter.
-        parameter: String,
+        /// Which parameter.
+        parameter: ParameterId,
         /// Unit found.
-        unit: String,
+        unit: ParameterUnit,
     },
     /// A standard or expected deviation that is not a positive number.
     #[error("parameter '{parameter}' has a standard or expected deviation that is negative or not finite")]
     Sigma {
-        /// Name of the parameter.
-        parameter: String,
+        /// Which parameter.
+        parameter: ParameterId,
     },
     /// A pose whose numbers are not finite, or whose quaternion is not of length 1.
     #[error("'{field}' is not a pose: its numbers must be finite and its quaternion of length 1")]
     Pose {
         /// Name of the field.
         field: &'static str,
+    },
+    /// Nominal coordinates of another number of targets than the robot has.
+    #[error("it has the nominal coordinates of {found} targets; its robot has {expected}")]
+    Targets {
+        /// Number of targets in the file.
+        found: usize,
+        /// Number of targets of the robot.
+        expected: usize,
     },
     /// Target coordinates that are not finite.
     #[error("the nominal coordinates of target {target} are not finite")]
@@ -219,32 +227,44 @@ pub enum CalibrationError {
 }
 
 impl Calibration {
-    /// The identified arm of the robot whose nominal `profile` this is.
-    ///
-    /// `None`: a parameter that this robot does not have.
-    pub fn identified_chain(&self, profile: &Profile) -> Option<KinematicChain> {
-        let deviations: Vec<f64> = self.parameters.iter().map(|parameter| parameter.deviation).collect();
-        self.arm_with(profile, &deviations).map(|arm| arm.chain)
+    /// The robot of `profile` with its first target as it was mounted for this calibration.
+    pub fn mounted_on(&self, profile: &Profile) -> Profile {
+        self.mounted.map_or_else(|| profile.clone(), |mounted| mounted.on(profile))
     }
 
-    /// The robot of `profile` with other deviations than the identified ones: its arm and the targets in its flange (m).
-    /// `deviations` are in the order and units of [`Self::parameters`] (mm, deg).
+    /// The nominal arm with the targets that its own fit placed.
     ///
-    /// `None`: a parameter that this robot does not have.
-    pub fn arm_with(&self, profile: &Profile, deviations: &[f64]) -> Option<Arm> {
-        // A target that was left free only here has coordinates among the parameters.
-        let mounted = self.mounted.map_or_else(|| profile.clone(), |mounted| mounted.on(profile));
-        let known = mounted.free_parameters(Level::Geometric);
-        let deviations: Vec<(ParameterId, f64)> = self
-            .parameters
-            .iter()
-            .zip(deviations)
-            .map(|(parameter, deviation)| {
-                let id = known.iter().map(|free| free.id).find(|id| id.to_string() == parameter.name)?;
-                Some((id, id.quantity().from_edge(*deviation)))
-            })
-            .collect::<Option<_>>()?;
-        mounted.arm().with(deviations).ok()
+    /// # Errors
+    /// Another number of targets than the robot of `profile` has.
+    pub fn nominal(&self, profile: &Profile) -> Result<Arm, CalibrationError> {
+        let point = |&(x, y, z): &(f64, f64, f64)| Point3::new(from_mm(x), from_mm(y), from_mm(z));
+        let targets: Vec<Point3<f64>> = self.nominal_targets_mm.iter().map(point).collect();
+        if targets.len() != profile.targets().len() {
+            return Err(CalibrationError::Targets { found: targets.len(), expected: profile.targets().len() });
+        }
+        Ok(Arm { chain: profile.chain().clone(), targets })
+    }
+
+    /// The identified arm of the robot of `profile`.
+    ///
+    /// # Errors
+    /// A parameter that this robot does not have.
+    pub fn identified(&self, profile: &Profile) -> Result<Arm, KinematicsError> {
+        self.identified_with(profile, self.parameters.iter().map(|parameter| parameter.deviation))
+    }
+
+    /// The arm with other deviations than the identified ones, in the order and the units of [`Self::parameters`].
+    ///
+    /// # Errors
+    /// A parameter that this robot does not have.
+    pub fn identified_with(
+        &self,
+        profile: &Profile,
+        deviations: impl IntoIterator<Item = f64>,
+    ) -> Result<Arm, KinematicsError> {
+        let inside =
+            |(parameter, deviation): (&ParameterSummary, f64)| (parameter.id, parameter.unit.from_edge(deviation));
+        self.mounted_on(profile).arm().with(self.parameters.iter().zip(deviations).map(inside))
     }
 
     /// The text of the file.
@@ -263,15 +283,17 @@ impl Calibration {
     /// # Errors
     /// Not a calibration, of a newer schema, or with numbers that are not finite.
     pub fn parse(text: &str) -> Result<Self, CalibrationError> {
+        // A newer file may have parameters and fields that are unknown here: its version comes first.
+        if let Ok(Heading { schema, provenance }) = ron::from_str(text)
+            && schema > SCHEMA
+        {
+            return Err(CalibrationError::Schema { found: schema, program: provenance.program });
+        }
         let calibration: Self = ron::from_str(text).map_err(|error| CalibrationError::Syntax {
             line: error.span.start.line,
             column: error.span.start.col,
             message: error.code.to_string(),
         })?;
-        if calibration.schema > SCHEMA {
-            let program = calibration.provenance.program.clone();
-            return Err(CalibrationError::Schema { found: calibration.schema, program });
-        }
         for parameter in &calibration.parameters {
             check_parameter(parameter)?;
         }
@@ -296,19 +318,25 @@ impl Calibration {
     }
 }
 
-/// Finite numbers, a unit that exists, and deviations that can be standard deviations.
+/// What every version of the file begins with.
+#[derive(Deserialize)]
+struct Heading {
+    schema: u32,
+    provenance: Provenance,
+}
+
+/// Finite numbers, the unit of the parameter, and deviations that can be standard deviations.
 fn check_parameter(parameter: &ParameterSummary) -> Result<(), CalibrationError> {
-    let name = || parameter.name.clone();
+    let ParameterSummary { id, unit, .. } = *parameter;
     if !(parameter.nominal.is_finite() && parameter.deviation.is_finite()) {
-        return Err(CalibrationError::NotFinite { parameter: name() });
+        return Err(CalibrationError::NotFinite { parameter: id });
     }
-    let is_angle = ["alpha", "beta", "theta"].iter().any(|angle| parameter.name.starts_with(angle));
-    if parameter.unit != if is_angle { "deg" } else { "mm" } {
-        return Err(CalibrationError::Unit { parameter: name(), unit: parameter.unit.clone() });
+    if unit != id.unit() {
+        return Err(CalibrationError::Unit { parameter: id, unit });
     }
     let usable = |value: f64| value.is_finite() && value >= 0.0;
     if !(parameter.sigma.is_none_or(usable) && usable(parameter.expected)) {
-        return Err(CalibrationError::Sigma { parameter: name() });
+        return Err(CalibrationError::Sigma { parameter: id });
     }
     Ok(())
 }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::advice::Advice;
 use super::measurements::Layout;
 use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Weighting};
+use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::Level;
 use crate::text::{names, names_of_option, written_as_text};
 
@@ -128,10 +129,11 @@ pub struct SigmaSummary {
 /// One identified parameter. Numbers are in `unit`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterSummary {
-    /// Name, such as `a2` or `target1.x`.
-    pub name: String,
-    /// `mm` or `deg`.
-    pub unit: String,
+    /// Which one; in files its name, such as `a2` or `target1.x`.
+    #[serde(rename = "name")]
+    pub id: ParameterId,
+    /// Unit of the numbers.
+    pub unit: ParameterUnit,
     pub nominal: f64,
     /// Identified − nominal.
     pub deviation: f64,
@@ -146,7 +148,7 @@ pub struct ParameterSummary {
 /// Two parameters that the data tie together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CorrelationSummary {
-    pub parameters: [String; 2],
+    pub parameters: [ParameterId; 2],
     /// Correlation, −1 … 1.
     pub correlation: f64,
 }
@@ -154,7 +156,7 @@ pub struct CorrelationSummary {
 /// Parameters of which only combinations can be found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlindGroupSummary {
-    pub parameters: Vec<String>,
+    pub parameters: Vec<ParameterId>,
     /// Number of directions that the data do not see.
     pub blind: usize,
     pub description: String,

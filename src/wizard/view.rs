@@ -171,7 +171,7 @@ impl ProfileCard {
             title: profile.title().to_owned(),
             source: profile.source().to_owned(),
             joints: profile.chain().joints().iter().map(|joint| joint.name.clone()).collect(),
-            free_parameters: profile.free_parameters(Level::Geometric).len(),
+            free_parameters: profile.parameters(Level::default()).len(),
             instrument: profile.instrument().map(|instrument| instrument.name.clone()),
             target_mm: profile.targets().first().map(|target| {
                 let point = target.position_in_flange;

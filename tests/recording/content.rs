@@ -69,7 +69,7 @@ pub(super) fn compare_with_journal(folder: &Path) {
     assert_eq!(results.len(), session.runs_in(&journal));
     let Some(last) = results.last() else { return };
     let calibration = last.calibration.as_ref().unwrap();
-    let chain = calibration.identified_chain(&profile).unwrap();
+    let chain = calibration.identified(&profile).unwrap().chain;
     compare_frames(&path, &session, "/world/identified/frames", "identified", &chain);
     for (run, result) in (1..).zip(&results) {
         let samples = || result.samples.iter().zip(&result.points);

@@ -32,7 +32,7 @@ impl Robot {
         Self {
             name,
             arm: profile.arm(),
-            parameters: profile.free_parameters(Level::Geometric),
+            parameters: profile.parameters(Level::default()),
             ranges: profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect(),
         }
     }

@@ -6,10 +6,10 @@
 use nalgebra::DVector;
 use trupose::identification::verification::ModelErrors;
 use trupose::identification::{Estimator, Observations, PointSample, Prior, Problem, Settings, SigmaSource, identify};
-use trupose::kinematics::{Arm, FreeParameter, Place};
+use trupose::kinematics::{Arm, FreeParameter, ParameterUnit, Place};
 use trupose::planning::{Chosen, Information, Search, SearchSettings};
 use trupose::search::plan_in_parallel;
-use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE, Quantity};
+use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
 
 use super::paper_case::{measure, normal, paper_chain, paper_parameters, paper_target, random_configurations, seeded};
 
@@ -35,9 +35,9 @@ impl Reference {
         let model = Arm { chain: paper_chain(), targets: vec![paper_target()] };
         let mut parameters = paper_parameters();
         for parameter in &mut parameters {
-            parameter.expected = match parameter.id.quantity() {
-                Quantity::Length => MILLIMETRE,
-                Quantity::Angle => 0.1 * DEGREE,
+            parameter.expected = match parameter.id.unit() {
+                ParameterUnit::Millimetre => MILLIMETRE,
+                ParameterUnit::Degree => 0.1 * DEGREE,
             };
         }
         let candidates = places(random_configurations(candidates, &mut seeded(1)));

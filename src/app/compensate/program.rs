@@ -31,7 +31,7 @@ pub(super) fn run<O: Write, E: Write>(
     let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
     let settings = Settings { position_only: args.position_only, ..Settings::default() };
     let compensator = Compensator::new(&nominal, &identified, &limits, settings);
-    let joints = arm.identified.joints();
+    let joints = arm.identified.chain.joints();
     let mut commands = Vec::with_capacity(scan.targets.len());
     let (mut replaced, mut position_only, mut unreached) = (0, 0, 0);
     let mut notes: Vec<(usize, String)> = Vec::new();

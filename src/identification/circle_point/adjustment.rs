@@ -6,7 +6,7 @@ use nalgebra::{
 
 use super::{CircleFit, CirclePointError, CircleSeries, TargetLocation};
 use crate::kinematics::{
-    Arm, Axis, ForwardKinematics, FreeParameter, IdentificationJacobian, KinematicChain, ParameterId, Place,
+    Arm, ForwardKinematics, FreeParameter, IdentificationJacobian, KinematicChain, ParameterId, Place,
 };
 
 /// Unknowns: translation, rotation, target.
@@ -41,8 +41,7 @@ struct PointRows {
 impl Adjustment {
     /// All points; `links` are the parameters to differentiate by.
     fn rows(&self, links: &[ParameterId]) -> Vec<PointRows> {
-        let target = Axis::ALL.map(|axis| ParameterId::Target { target: 0, axis });
-        let parameters: Vec<ParameterId> = target.iter().chain(links).copied().collect();
+        let parameters: Vec<ParameterId> = ParameterId::of_target(0).chain(links.iter().copied()).collect();
         let n = parameters.len();
         let mut jacobian = IdentificationJacobian::new(&parameters);
         let turn = *self.tracker_from_base.rotation.to_rotation_matrix().matrix();
@@ -136,7 +135,7 @@ fn summarise(
     let first_moving = fit.arm.chain.dof().saturating_sub(2);
     let (links, sizes): (Vec<ParameterId>, Vec<f64>) = expected
         .iter()
-        .filter(|free| matches!(free.id, ParameterId::Link { joint, .. } if joint >= first_moving))
+        .filter(|free| free.id.joint().is_some_and(|joint| joint >= first_moving))
         .map(|free| (free.id, free.expected))
         .unzip();
     let rows = fit.rows(&links);

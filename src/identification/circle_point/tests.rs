@@ -151,7 +151,7 @@ impl Case {
     }
 
     fn expected(&self) -> Vec<FreeParameter> {
-        self.profile.free_parameters(Level::Geometric)
+        self.profile.parameters(Level::default())
     }
 
     fn locate(

@@ -7,7 +7,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::register;
-use crate::kinematics::{Arm, Axis, ForwardKinematics, FreeParameter, IdentificationJacobian, ParameterId, Place};
+use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, IdentificationJacobian, ParameterId, Place};
 
 /// Steps of a fit at most: from the nominal arm it takes four or five.
 const STEPS: usize = 12;
@@ -28,7 +28,7 @@ pub(super) struct Nominal<'a> {
 
 impl<'a> Nominal<'a> {
     pub(super) fn new(arm: &'a Arm, parameters: &'a [FreeParameter]) -> Self {
-        let axes = (0..arm.targets.len()).flat_map(|target| Axis::ALL.map(|axis| ParameterId::Target { target, axis }));
+        let axes = (0..arm.targets.len()).flat_map(ParameterId::of_target);
         let ids = parameters.iter().map(|parameter| parameter.id).chain(axes).collect();
         Self { arm, parameters, ids }
     }

@@ -30,7 +30,7 @@ impl Session {
     fn new(seed: u64) -> Self {
         let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap();
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-        let parameters = profile.free_parameters(Level::Geometric);
+        let parameters = profile.parameters(Level::default());
         let draw = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
         let deviations: Vec<_> =
             parameters.iter().map(|parameter| (parameter.id, parameter.expected * draw(rng))).collect();

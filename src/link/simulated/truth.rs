@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::random::{Random, Use};
-use crate::kinematics::{Arm, Convention, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{Arm, Convention, FreeParameter, JointType, KinematicChain, LinkParameter, ParameterId};
 use crate::link::LinkError;
 use crate::profile::{Level, Profile};
 use crate::session::simulation::Truth;
@@ -57,12 +57,12 @@ pub(super) fn deviations(profile: &Profile, truth: Truth, seed: u64) -> Result<V
         Truth::Nominal => Ok(Vec::new()),
         Truth::Drawn => {
             let mut random = Random::new(seed, Use::Arm);
-            let spread = |id, expected: f64| match id {
-                ParameterId::Target { .. } => expected.min(TARGET_SPREAD),
-                ParameterId::Link { .. } => expected,
+            let spread = |free: &FreeParameter| match free.id.target() {
+                Some(_) => free.expected.min(TARGET_SPREAD),
+                None => free.expected,
             };
-            let free = profile.free_parameters(Level::Geometric);
-            Ok(free.iter().map(|free| (free.id, spread(free.id, free.expected) * random.normal())).collect())
+            let free = profile.parameters(Level::default());
+            Ok(free.iter().map(|free| (free.id, spread(free) * random.normal())).collect())
         }
         Truth::Paper => {
             is_paper_arm(profile.chain())

@@ -82,12 +82,12 @@ fn weak_parameters(score: &Score, sigma: f64) -> Vec<WeakParameterSummary> {
         .weak(sigma)
         .filter(|weak| weak.identifiable)
         .map(|weak| {
-            let quantity = weak.parameter.id.quantity();
+            let unit = weak.parameter.id.unit();
             WeakParameterSummary {
                 name: weak.parameter.id.to_string(),
-                unit: quantity.unit().to_owned(),
-                predicted_sigma: quantity.to_edge(weak.deviation_per_sigma * sigma),
-                expected: quantity.to_edge(weak.parameter.expected),
+                unit: unit.name().to_owned(),
+                predicted_sigma: unit.to_edge(weak.deviation_per_sigma * sigma),
+                expected: unit.to_edge(weak.parameter.expected),
             }
         })
         .collect()

@@ -5,30 +5,30 @@ use super::super::diagnostic::{Findings, Span};
 use super::super::syntax::{Node, shortened};
 use super::super::{ExpectedDeviations, Target};
 use super::joint::JointShape;
-use crate::kinematics::{Axis, LinkParameter, ParameterId};
-use crate::units::{MILLIMETRE, MILLIRADIAN, Quantity};
+use crate::kinematics::{LinkParameter, ParameterId, ParameterUnit};
+use crate::units::{MILLIMETRE, MILLIRADIAN};
 
-/// The parameters that an arm has, by printed name.
-pub(super) struct Names {
-    known: Vec<(String, ParameterId)>,
+/// The parameters that an arm has.
+pub(super) struct Known {
+    ids: Vec<ParameterId>,
 }
 
-impl Names {
+impl Known {
     pub(super) fn new(joints: &[JointShape], targets: &[Target]) -> Self {
-        let links = joints.iter().enumerate().flat_map(|(joint, shape)| {
-            LinkParameter::ALL
-                .into_iter()
-                .filter(|parameter| shape.has_beta || *parameter != LinkParameter::Beta)
-                .map(move |parameter| ParameterId::Link { joint, parameter })
-        });
-        let targets = (0..targets.len()).flat_map(|target| Axis::ALL.map(|axis| ParameterId::Target { target, axis }));
-        Self { known: links.chain(targets).map(|id| (id.to_string(), id)).collect() }
+        let is_known = |id: &ParameterId| match *id {
+            ParameterId::Link { joint, parameter: LinkParameter::Beta } => {
+                joints.get(joint).is_some_and(|joint| joint.has_beta)
+            }
+            ParameterId::Link { .. } | ParameterId::Target { .. } => true,
+        };
+        Self { ids: ParameterId::all(joints.len(), targets.len()).filter(is_known).collect() }
     }
 
     fn find(&self, name: &str, span: Span, findings: &mut Findings<'_>) -> Option<ParameterId> {
-        let id = self.known.iter().find(|(known, _)| known == name).map(|(_, id)| *id);
+        let id = name.parse().ok().filter(|id| self.ids.contains(id));
         if id.is_none() {
-            let names: Vec<&str> = self.known.iter().map(|(name, _)| name.as_str()).collect();
+            let names: Vec<String> = self.ids.iter().map(ToString::to_string).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
             let suggestion = nearest(name, &names).map_or_else(String::new, |near| format!("did you mean '{near}'? "));
             let hint = format!("{suggestion}allowed: {}", names.join(", "));
             findings.error(span, format!("the arm has no parameter '{}'", shortened(name)), hint);
@@ -37,11 +37,11 @@ impl Names {
     }
 }
 
-/// `fixed: ["d2", …]`. Without names (unreadable joints) nothing can be said.
-pub(super) fn fixed(top: &Fields<'_>, names: Option<&Names>, findings: &mut Findings<'_>) -> Option<Vec<ParameterId>> {
+/// `fixed: ["d2", …]`. Without known parameters (unreadable joints) nothing can be said.
+pub(super) fn fixed(top: &Fields<'_>, known: Option<&Known>, findings: &mut Findings<'_>) -> Option<Vec<ParameterId>> {
     let Some(ast) = top.get("fixed") else { return Some(Vec::new()) };
     let items = list(ast, "parameter names", findings)?;
-    let names = names?;
+    let known = known?;
     let mut ids = Vec::new();
     let mut good = true;
     for item in items {
@@ -51,7 +51,7 @@ pub(super) fn fixed(top: &Fields<'_>, names: Option<&Names>, findings: &mut Find
             good = false;
             continue;
         };
-        match names.find(name, item.span, findings) {
+        match known.find(name, item.span, findings) {
             Some(id) => ids.push(id),
             None => good = false,
         }
@@ -63,7 +63,7 @@ pub(super) fn fixed(top: &Fields<'_>, names: Option<&Names>, findings: &mut Find
 
 pub(super) fn expected_deviations(
     top: &Fields<'_>,
-    names: Option<&Names>,
+    known: Option<&Known>,
     findings: &mut Findings<'_>,
 ) -> Option<ExpectedDeviations> {
     const FIELDS: &[&str] =
@@ -87,26 +87,26 @@ pub(super) fn expected_deviations(
         }
     }
     let own = [
-        ("parameters_mm", Quantity::Length, MILLIMETRE, "parameters_mrad"),
-        ("parameters_mrad", Quantity::Angle, MILLIRADIAN, "parameters_mm"),
+        ("parameters_mm", ParameterUnit::Millimetre, MILLIMETRE, "parameters_mrad"),
+        ("parameters_mrad", ParameterUnit::Degree, MILLIRADIAN, "parameters_mm"),
     ];
-    for (field, quantity, unit, other) in own {
+    for (field, unit, size, other) in own {
         let Some(entries) = inside.get(field).map(|ast| number_map(ast, findings)) else { continue };
-        let (Some(entries), Some(names)) = (entries, names) else {
+        let (Some(entries), Some(known)) = (entries, known) else {
             good = false;
             continue;
         };
         for (name, span, value) in entries {
-            let id = names.find(name, span, findings);
+            let id = known.find(name, span, findings);
             let value = positive(value, findings);
             match (id, value) {
-                (Some(id), _) if id.quantity() != quantity => {
+                (Some(id), _) if id.unit() != unit => {
                     let hint = format!("move it to '{other}'");
                     findings.error(span, format!("'{name}' does not belong in '{field}'"), hint);
                     good = false;
                 }
                 (Some(id), Some(value)) => {
-                    expected.overrides.insert(id, value * unit);
+                    expected.overrides.insert(id, value * size);
                 }
                 _ => good = false,
             }

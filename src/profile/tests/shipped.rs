@@ -100,28 +100,26 @@ fn distance(one: (&Point3<f64>, &Point3<f64>), other: (&Point3<f64>, &Point3<f64
 #[test]
 fn the_papers_robot_has_the_papers_25_parameters() {
     let profile = shipped("soochow");
-    let free = profile.free_parameters(Level::Geometric);
+    let free = profile.parameters(Level::Geometric);
     assert_eq!(free.len(), 25);
     assert_eq!(free[24].id, ParameterId::Link { joint: 1, parameter: LinkParameter::Beta });
     let names: Vec<String> = free.iter().take(5).map(|parameter| parameter.id.to_string()).collect();
     assert_eq!(names, ["alpha1", "a1", "d1", "theta1", "alpha2"]);
     let expected: Vec<f64> = free.iter().take(4).map(|parameter| parameter.expected).collect();
     assert_eq!(expected, [2e-3, 1e-3, 1e-3, 10e-3]);
-    assert_eq!(profile.free_parameters(Level::Offsets).len(), 6);
+    assert_eq!(profile.parameters(Level::Offsets).len(), 6);
 }
 
 #[test]
 fn free_targets_come_last_and_prismatic_offsets_are_lengths() {
     let scara = shipped("epson_ls3_b401s");
-    let names: Vec<String> = scara.free_parameters(Level::Offsets).iter().map(|free| free.id.to_string()).collect();
+    let names: Vec<String> = scara.parameters(Level::Offsets).iter().map(|free| free.id.to_string()).collect();
     assert_eq!(names, ["theta1", "theta2", "d3", "theta4", "target1.x", "target1.y", "target1.z"]);
-    let free = scara.free_parameters(Level::Geometric);
+    let free = scara.parameters(Level::Geometric);
     assert_eq!(free.len(), 4 * 4 + 2 + 3);
     assert_eq!(free.last().map(|free| free.expected), Some(0.05));
     let panda = shipped("franka_panda");
-    assert!(
-        panda.free_parameters(Level::Offsets).iter().take(7).all(|free| free.expected.to_bits() == 5e-3_f64.to_bits())
-    );
+    assert!(panda.parameters(Level::Offsets).iter().take(7).all(|free| free.expected.to_bits() == 5e-3_f64.to_bits()));
 }
 
 #[test]

@@ -78,7 +78,7 @@ fn targets_expected_deviations_and_fixed_parameters() {
     let [one, two] = profile.targets() else { panic!("two targets") };
     assert!(one.is_free() && near(one.uncertainty, 0.05) && !two.is_free());
     assert_eq!((one.axis_in_flange, two.axis_in_flange), (Vector3::y_axis(), Vector3::z_axis()));
-    let free = profile.free_parameters(Level::Geometric);
+    let free = profile.parameters(Level::Geometric);
     let names: Vec<String> = free.iter().map(|free| free.id.to_string()).collect();
     assert_eq!(names.join(" "), "alpha1 a1 alpha2 a2 d2 theta2 alpha3 a3 d3 theta3 beta2 target1.x target1.y");
     let of = |name: &str| free.iter().find(|free| free.id.to_string() == name).unwrap().expected;
@@ -95,7 +95,7 @@ fn targets_expected_deviations_and_fixed_parameters() {
     ] {
         assert!(near(of(name), expected), "{name}: {}", of(name));
     }
-    let offsets: Vec<ParameterId> = profile.free_parameters(Level::Offsets).iter().map(|free| free.id).collect();
+    let offsets: Vec<ParameterId> = profile.parameters(Level::Offsets).iter().map(|free| free.id).collect();
     assert_eq!(offsets[0], ParameterId::Link { joint: 1, parameter: LinkParameter::Theta });
     assert_eq!(offsets[1], ParameterId::Link { joint: 2, parameter: LinkParameter::D });
     assert_eq!(offsets.len(), 4);
@@ -129,7 +129,7 @@ fn what_is_left_out_has_the_documented_default() {
     assert_eq!((profile.floor(), profile.instrument(), profile.bodies().len()), (None, None, 0));
     assert_eq!(profile.targets().len(), 1);
     assert!(profile.targets()[0].is_free());
-    assert_eq!(profile.free_parameters(Level::Geometric).len(), 4 + 3);
+    assert_eq!(profile.parameters(Level::Geometric).len(), 4 + 3);
     let joint = profile.joints()[0];
     assert_eq!((joint.limits, joint.planning_limits, joint.max_speed), (None, None, None));
 }

@@ -114,7 +114,7 @@ fn markdown(session: &Session, identified: &IdentifiedText, time: Timestamp) -> 
         let note = if parameter.identifiable { "" } else { "only with others" };
         line(format!(
             "| {bar} | {} | {:.3} | {:+.4} | {sigma} | {} | {note} |",
-            parameter.name, parameter.nominal, parameter.deviation, parameter.unit
+            parameter.id, parameter.nominal, parameter.deviation, parameter.unit
         ));
     }
     if !summary.blind_groups.is_empty() {

@@ -128,10 +128,11 @@ fn scale(profile: &Profile, lengths: impl Iterator<Item = f64>) -> f64 {
 
 /// How much the deviations of the arm are enlarged so that the difference is seen.
 fn arm_scale(profile: &Profile, calibration: &Calibration, judged: &[Judged<'_>]) -> f64 {
-    let Some(chain) = calibration.identified_chain(profile) else { return 1.0 };
+    let Ok(arm) = calibration.identified(profile) else { return 1.0 };
     let target = Point3::origin();
     let difference = |one: &Judged<'_>| {
-        let (nominal, found) = (Posture::new(profile.chain(), &target, &one.q), Posture::new(&chain, &target, &one.q));
+        let (nominal, found) =
+            (Posture::new(profile.chain(), &target, &one.q), Posture::new(&arm.chain, &target, &one.q));
         (found.reflector - nominal.reflector).norm()
     };
     enlargement(judged.iter().map(difference).fold(0.0, f64::max), SHOWN * reach(profile))
@@ -175,10 +176,8 @@ fn arrow_style(color: Color) -> Arrows3D {
 
 /// The identified arm at every pose, as it is and enlarged.
 fn arms(canvas: &mut Canvas, session: &Session, profile: &Profile, calibration: &Calibration, enlarged: f64) {
-    let deviations: Vec<f64> = calibration.parameters.iter().map(|parameter| parameter.deviation).collect();
-    let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * enlarged).collect();
-    let (Some(arm), Some(bent)) = (calibration.arm_with(profile, &deviations), calibration.arm_with(profile, &larger))
-    else {
+    let larger = calibration.parameters.iter().map(|parameter| parameter.deviation * enlarged);
+    let (Ok(arm), Ok(bent)) = (calibration.identified(profile), calibration.identified_with(profile, larger)) else {
         return;
     };
     cell::enlarged_style(canvas, profile);
@@ -380,12 +379,12 @@ fn solver(
                 canvas.draw(moment, names::COST_AND_STEP, &Scalars::new([cost, largest]));
             }
         }
-        let larger: Vec<f64> = deviations.iter().map(|deviation| deviation * scales.arm).collect();
-        let Some(bent) = calibration.arm_with(profile, &larger) else { continue };
+        let larger = deviations.iter().map(|deviation| deviation * scales.arm);
+        let Ok(bent) = calibration.identified_with(profile, larger) else { continue };
         if let Some(target) = bent.targets.first() {
             cell::enlarged(canvas, profile, &Posture::new(&bent.chain, target, &middle), moment);
         }
-        let Some(arm) = calibration.arm_with(profile, deviations) else { continue };
+        let Ok(arm) = calibration.identified_with(profile, deviations.iter().copied()) else { continue };
         let predicted: Vec<Point3<f64>> = judged
             .iter()
             .filter_map(|one| {

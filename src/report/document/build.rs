@@ -10,7 +10,6 @@ use super::{
     ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
 };
 use crate::kinematics::ForwardKinematics;
-use crate::profile::Profile;
 use crate::report::text::found;
 use crate::session::journal::{instrument_text, target_text};
 use crate::session::plan::PoseKind;
@@ -171,29 +170,8 @@ fn counts(session: &Session) -> Counts {
 }
 
 fn note(parameter: &ParameterSummary, session: &Session) -> ParameterNote {
-    let profile = session.robot.as_ref().map(|robot| &robot.profile);
-    ParameterNote { name: parameter.name.clone(), meaning: meaning(&parameter.name, profile), found: found(parameter) }
-}
-
-/// What a parameter is, from its name: `alpha3` is the twist of link 3.
-fn meaning(name: &str, profile: Option<&Profile>) -> String {
-    let (target, axis) = name.strip_prefix("target").and_then(|rest| rest.split_once('.')).unwrap_or_default();
-    if !target.is_empty() {
-        return format!("SMR {target} on the flange, {axis}");
-    }
-    let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
-    let number = name.strip_prefix(letters).unwrap_or_default();
-    let what = match letters {
-        "alpha" => "twist about x",
-        "a" => "length along x",
-        "d" => "offset along z",
-        "theta" => "angle about z",
-        "beta" => "turn about y",
-        _ => return String::new(),
-    };
-    let joint = number.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
-    let joint = joint.zip(profile).and_then(|(index, profile)| profile.chain().joints().get(index));
-    joint.map_or_else(|| format!("link {number}: {what}"), |joint| format!("{}: {what}", joint.name))
+    let meaning = session.robot.as_ref().map(|robot| parameter.id.meaning(robot.profile.chain())).unwrap_or_default();
+    ParameterNote { name: parameter.id.to_string(), meaning, found: found(parameter) }
 }
 
 fn points(session: &Session) -> Vec<PointPart> {

@@ -1,6 +1,7 @@
 //! The parameters with their uncertainty, and what the data cannot tell.
 
 use super::markup::{Column, aligned, escape, list, number, paragraph, table};
+use crate::kinematics::ParameterId;
 use crate::report::document::{Document, Found};
 use crate::report::tables::decimals_for;
 use crate::session::summary::{IdentificationSummary, ParameterSummary};
@@ -42,7 +43,7 @@ fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> Stri
         .map(|(index, parameter)| {
             let digits = decimals(parameter);
             let note = document.report.parameter_notes.get(index);
-            let group = group_of(document, &parameter.name).map_or_else(String::new, |group| format!(" ({group})"));
+            let group = group_of(document, parameter.id).map_or_else(String::new, |group| format!(" ({group})"));
             let found = note.map_or("", |note| note.found.words());
             let found = if note.is_some_and(|note| note.found == Found::Yes) {
                 found.to_owned()
@@ -50,9 +51,9 @@ fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> Stri
                 format!("<i>{found}</i>{group}")
             };
             vec![
-                escape(&parameter.name),
+                escape(&parameter.id.to_string()),
                 note.map_or_else(String::new, |note| escape(&note.meaning)),
-                escape(&parameter.unit),
+                escape(parameter.unit.name()),
                 aligned(Some(parameter.nominal), PLAIN, most),
                 aligned(Some(parameter.deviation), digits, most),
                 aligned(parameter.sigma, digits, most),
@@ -65,9 +66,9 @@ fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> Stri
 }
 
 /// Number of the group of which a parameter is only known together with others, from 1.
-fn group_of(document: &Document, name: &str) -> Option<usize> {
+fn group_of(document: &Document, id: ParameterId) -> Option<usize> {
     let groups = &document.result.as_ref()?.blind_groups;
-    groups.iter().position(|group| group.parameters.iter().any(|parameter| parameter == name)).map(|index| index + 1)
+    groups.iter().position(|group| group.parameters.iter().any(|parameter| *parameter == id)).map(|index| index + 1)
 }
 
 fn blind(result: &IdentificationSummary) -> String {
@@ -90,7 +91,12 @@ fn blind(result: &IdentificationSummary) -> String {
             .map(|pair| {
                 let [one, other] = &pair.parameters;
                 let sign = if pair.correlation > 0.0 { "+" } else { "" };
-                format!("{} and {}: {sign}{}", escape(one), escape(other), number(pair.correlation, 2))
+                format!(
+                    "{} and {}: {sign}{}",
+                    escape(&one.to_string()),
+                    escape(&other.to_string()),
+                    number(pair.correlation, 2)
+                )
             })
             .collect();
         html.push_str(&list(&pairs));

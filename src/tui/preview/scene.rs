@@ -231,7 +231,8 @@ impl Scene {
         let mut scene = Self::at_rest(&profile);
         scene.place_tracker(session);
         let Some(result) = session.identified.as_deref() else { return Some(scene) };
-        let chain = result.calibration.as_ref().and_then(|calibration| calibration.identified_chain(&profile));
+        let calibration = result.calibration.as_ref();
+        let chain = calibration.and_then(|calibration| calibration.identified(&profile).ok()).map(|arm| arm.chain);
         if let (Some(chain), false) = (&chain, with_errors) {
             // Castings would hide the other arm.
             scene.arms.iter_mut().for_each(|arm| arm.bodies = thin(&arm.joints));

@@ -8,6 +8,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Weighting};
+use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::{Level, Profile, builtin};
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, TargetChoice};
 use crate::session::state::Session;
@@ -150,17 +151,13 @@ fn circles(is_complete: bool) -> CirclesView {
     }
 }
 
-fn parameter(name: &str, unit: &str, deviation: f64, sigma: Option<f64>, identifiable: bool) -> ParameterSummary {
-    let expected = if unit == "mm" { 1.0 } else { 0.114 };
-    ParameterSummary {
-        name: name.to_owned(),
-        unit: unit.to_owned(),
-        nominal: 170.0,
-        deviation,
-        sigma,
-        expected,
-        identifiable,
-    }
+fn parameter(name: &str, deviation: f64, sigma: Option<f64>, identifiable: bool) -> ParameterSummary {
+    let id: ParameterId = name.parse().unwrap();
+    let expected = match id.unit() {
+        ParameterUnit::Millimetre => 1.0,
+        ParameterUnit::Degree => 0.114,
+    };
+    ParameterSummary { id, unit: id.unit(), nominal: 170.0, deviation, sigma, expected, identifiable }
 }
 
 fn verdict(status: VerdictStatus) -> Verdict {
@@ -270,14 +267,14 @@ fn summary(is_good: bool) -> IdentificationSummary {
         parameters: (1..=6)
             .flat_map(|n| {
                 [
-                    parameter(&format!("a{n}"), "mm", -0.388_43, Some(0.0013), true),
-                    parameter(&format!("d{n}"), "mm", 0.1, Some(0.7), true),
-                    parameter(&format!("theta{n}"), "deg", -0.051_72, None, false),
+                    parameter(&format!("a{n}"), -0.388_43, Some(0.0013), true),
+                    parameter(&format!("d{n}"), 0.1, Some(0.7), true),
+                    parameter(&format!("theta{n}"), -0.051_72, None, false),
                 ]
             })
             .collect(),
         blind_groups: vec![BlindGroupSummary {
-            parameters: vec!["d1".to_owned()],
+            parameters: vec!["d1".parse().unwrap()],
             blind: 1,
             description: "d1: cannot be found from distances, it only moves the robot's base frame".to_owned(),
         }],

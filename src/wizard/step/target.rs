@@ -135,7 +135,7 @@ fn locate(session: &Session) -> Option<Result<TargetLocation, CirclePointError>>
         &first.series(),
         &second.series(),
         sigma,
-        &profile.free_parameters(Level::Geometric),
+        &profile.parameters(Level::default()),
     ))
 }
 

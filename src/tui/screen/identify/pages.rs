@@ -130,7 +130,7 @@ pub(super) fn parameters(summary: &IdentificationSummary, page: &mut Page) {
         let found = found(parameter);
         let line = format!(
             "{:<10}{:>4}{:>12}{:>12}{sigma:>11}  ",
-            parameter.name,
+            parameter.id,
             parameter.unit,
             fixed(parameter.nominal, 4),
             fixed(parameter.deviation, decimals),
