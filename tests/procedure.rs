@@ -98,7 +98,7 @@ fn an_identification_can_be_cancelled_at_any_step() {
     })
     .unwrap_err();
     assert_eq!(steps, 1);
-    assert_eq!(failure.to_string(), "error: the identification was cancelled");
+    assert_eq!(failure.to_string(), "the identification was cancelled");
 }
 
 /// A small plan without verification.
