@@ -83,7 +83,7 @@ fn take_a_pose(bencher: Bencher<'_, '_>) {
     let place = places(lines)[0];
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = Recorder::start(folder.path(), lines[..place].to_vec(), None, |_event| ()).unwrap();
-    bencher.bench_local(|| recorder.take(&lines[place..=place]).unwrap());
+    bencher.bench_local(|| recorder.add(&lines[place..=place]).unwrap());
 }
 
 /// A recording made from its journal.

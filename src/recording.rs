@@ -1,9 +1,9 @@
-//! The recording of a session: every pose, error and arm for a 3D viewer. The only module that knows the viewer's library.
+//! Recordings of sessions for a 3D viewer: every pose, error and arm. The only module that knows the viewer's library.
 //!
-//! A recording is a function of the journal and never the truth: `renderer` turns journal lines into rows, and the whole file is
-//! made of them and replaced at once ([`rebuild`]). While a session is measured a thread ([`Recorder`]) does that every few
-//! seconds and at the end; a file that is lost, or that a crash left behind the journal, is made again. It carries the text of
-//! the journal as well, so a recording that was sent by mail can be replayed in a terminal ([`read`]).
+//! A recording is a function of the journal: `renderer` turns journal lines into rows, `rrd` encodes them, and [`rebuild`] replaces
+//! the whole file. While a session is measured, a thread ([`Recorder`]) does that every few seconds and at the end. A recording
+//! that is lost or lacks the last lines can be made again at any time. It carries the text of the journal as well, so a recording
+//! that was sent by mail can be replayed in a terminal ([`read`]).
 //!
 //! Positions and transforms in a recording are 32-bit floats, as the viewer wants them: exact to 0.25 µm at 3 m. Numbers that
 //! are plotted, and the journal's text, are exact.
@@ -13,7 +13,6 @@ mod canvas;
 mod file;
 mod identity;
 mod latin;
-mod layout;
 mod live;
 mod names;
 mod posture;
@@ -21,6 +20,7 @@ mod read;
 mod recorder;
 mod renderer;
 mod rrd;
+mod style;
 
 use std::path::{Path, PathBuf};
 
@@ -34,49 +34,41 @@ pub use recorder::{Recorder, RecordingEvent};
 use crate::session::journal::JournalError;
 use crate::store::StoreError;
 
-/// Why a recording cannot be written or read. The session itself is never affected.
+/// A recording cannot be written or read. The session itself is never affected.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecordingError {
     /// A file cannot be read or written.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The rest of the disk is left for the session.
-    #[error("less than {} MiB are free on the disk, and they are left for the session", reserve >> 20)]
+    /// Too little of the disk is free; the rest is left to the session.
+    #[error("less than {} MiB are free on the disk, and they are left to the session", reserve >> 20)]
     NoRoom {
-        /// Bytes that are left free.
+        /// Free bytes that are left to the session.
         reserve: u64,
     },
-    /// The library refuses.
+    /// The library has failed.
     #[error("{what}: {message}")]
     Library {
-        /// What was tried.
         what: &'static str,
-        /// Message of the library.
         message: String,
     },
     /// The file is not a recording of this program.
     #[error("'{}' is no recording of trupose: {message}", path.display())]
     Foreign {
-        /// Path of the file.
         path: PathBuf,
-        /// What is odd.
         message: String,
     },
     /// The journal in a recording is damaged.
     #[error("the journal in '{}'", path.display())]
     Journal {
-        /// Path of the recording.
         path: PathBuf,
-        /// What is wrong.
         source: JournalError,
     },
     /// The port of the live view cannot be used.
     #[error("the live view cannot listen on 127.0.0.1:{port}: {message}")]
     Port {
-        /// Number of the port.
         port: u16,
-        /// Message of the system.
         message: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Turns the wizard's effects into work on named threads, and answers into events.
+//! Turns the wizard's effects into work on named threads, and their answers into events.
 //!
 //! ```text
 //!  driver (script, tui) ── Intent ──► Engine: Wizard::update ── Effect ──► store thread   (journal, files)
@@ -6,8 +6,8 @@
 //!                                        └────── Event ◄───────────┴─────► job threads    (plan, identify, read)
 //! ```
 //!
-//! All channels are bounded. A progress report that nobody has room for is dropped; an answer never is. Every request can be
-//! cancelled: its flag is asked by whoever works on it. A panic on a job thread is an answer that says so.
+//! The channels of events and commands are bounded. A progress report that finds a full channel is dropped; an answer never is.
+//! Every request can be cancelled: the thread that works on it polls its flag. A panic on a job thread becomes a failed answer.
 
 mod clock;
 mod engine;
@@ -18,5 +18,5 @@ pub mod signals;
 mod store_thread;
 
 pub use clock::Clock;
-pub use engine::{Deed, Engine, Happening, Options};
+pub use engine::{CompletedIntent, Engine, Options, Output};
 pub use events::Events;

@@ -39,7 +39,7 @@ use ratatui::Terminal;
 use ratatui::backend::{Backend as _, CrosstermBackend};
 use ratatui::layout::{Position, Rect};
 
-use crate::runtime::{Deed, Engine, signals};
+use crate::runtime::{CompletedIntent, Engine, signals};
 use input::Input;
 use terminal::TerminalGuard;
 use theme::Theme;
@@ -84,8 +84,8 @@ pub struct Exit {
     pub remarks: Vec<String>,
 }
 
-/// What is done with the operator's deeds before the program ends, however it ends.
-pub type AtEnd<'a> = &'a mut dyn FnMut(&[Deed]);
+/// Called with the completed intents before the program ends, however it ends.
+pub type AtEnd<'a> = &'a mut dyn FnMut(&[CompletedIntent]);
 
 /// Runs the wizard in the terminal until it ends. When the terminal is lost, the process ends here.
 ///
@@ -118,7 +118,7 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
         close_without_terminal(&mut engine, at_end);
     }
     drop(guard);
-    at_end(engine.deeds());
+    at_end(engine.completed_intents());
     let remarks = engine.end_recording().into_iter().chain(terminal::take_remarks()).collect();
     let wizard = engine.wizard();
     Ok(Exit {
@@ -135,7 +135,7 @@ fn close_without_terminal(engine: &mut Engine, at_end: AtEnd<'_>) -> ! {
     engine.shut_down("the terminal went away (SIGHUP)");
     while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
     engine.release();
-    at_end(engine.deeds());
+    at_end(engine.completed_intents());
     #[expect(clippy::exit, reason = "unwinding would write to a terminal that is gone, and abort")]
     std::process::exit(128 + SIGHUP)
 }
@@ -156,7 +156,7 @@ struct Driver<'a> {
 }
 
 impl Driver<'_> {
-    fn run(&mut self, received: &signals::Received) -> End {
+    fn run(&mut self, received: &signals::SignalWatch) -> End {
         let mut view = self.engine.wizard().view();
         self.ui.refresh(&view, self.engine.wizard().session());
         let mut drawn: Option<Instant> = None;
@@ -223,7 +223,7 @@ impl Driver<'_> {
     /// Returns the current view. If it has changed, a frame is due.
     fn refresh(&mut self, before: crate::wizard::ViewModel, is_due: &mut bool) -> crate::wizard::ViewModel {
         // They are not used here and must not pile up.
-        self.engine.happenings().for_each(drop);
+        self.engine.outputs().for_each(drop);
         let view = self.engine.wizard().view();
         if view == before {
             return before;

@@ -96,7 +96,7 @@ fn a_session_is_replayed_without_a_terminal_and_not_changed() {
 
     for (arguments, code, message) in [
         (&["--print", "--entry", "0"][..], 2, "the session has no entry 0"),
-        (&["--csv", "--entry", "1"], 2, "has no robot there"),
+        (&["--csv", "--entry", "1"], 2, "has no robot at that entry"),
         (&[], 2, "needs a terminal"),
     ] {
         let output = replay(arguments);

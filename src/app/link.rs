@@ -44,7 +44,7 @@ pub(super) fn raw_log(path: Option<&Path>) -> Result<Option<RawLog>, Failure> {
 fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let ended = Arc::new(AtomicBool::new(false));
     let signalled = Arc::clone(&ended);
-    signals::each(move |_signal| signalled.store(true, Ordering::Relaxed))
+    signals::on_signal(move |_signal| signalled.store(true, Ordering::Relaxed))
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     let keep_going = || !ended.load(Ordering::Relaxed);
     let usage = |message: String| Failure::new(ExitStatus::Usage, message);

@@ -33,7 +33,7 @@ pub(super) fn run<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let RecordCommand::Rebuild { folder } = command;
-    // Held, so that no program records into the folder meanwhile.
+    // The folder is held so that no other program records into it meanwhile.
     let (_held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
     let Written { path, bytes } = recording::rebuild(folder, &journal.lines).map_err(|error| failure(&error))?;
     let samples = journal.lines.iter().filter(|line| matches!(line.entry, Entry::Sample(_))).count();
@@ -50,18 +50,18 @@ pub(super) fn run<O: Write, E: Write>(
     Ok(ExitStatus::Accepted)
 }
 
-/// What an error of a recording means to the operator.
+/// Returns the failure for an error of a recording.
 pub(super) fn failure(error: &RecordingError) -> Failure {
     Failure::from_error(ExitStatus::Store, error)
 }
 
-/// Refuses to write a recording over something else, such as the measurements.
+/// Refuses to overwrite a file that is not a recording, such as the measurements.
 pub(super) fn check_target(path: &Path) -> Result<(), Failure> {
     let size = std::fs::metadata(path).map_or(0, |found| if found.is_file() { found.len() } else { 0 });
     if size == 0 || recording::is_recording(path) {
         return Ok(());
     }
-    let message = format!("'{}' is there already and is no recording", path.display());
+    let message = format!("'{}' already exists and is not a recording", path.display());
     Err(Failure::new(ExitStatus::Usage, message).hint("give '--record' another file"))
 }
 
@@ -76,7 +76,7 @@ pub(super) fn identification(
     recording::write(path, &lines, false).map_err(|error| failure(&error))
 }
 
-/// What an identification from tables would be as a session: for its report.
+/// Returns an identification from tables as a session, for its report.
 pub(super) fn identification_session(
     folder: &Path,
     source: &str,
@@ -86,7 +86,7 @@ pub(super) fn identification_session(
     session(identification_lines(folder, source, request, identified))
 }
 
-/// What an identification without coordinates would be as a session: for its report.
+/// Returns an identification without coordinates as a session, for its report.
 pub(super) fn bare_session(
     folder: &Path,
     source: &str,
@@ -184,7 +184,7 @@ pub(super) fn plan(
     recording::write(path, &lines.lines, true).map_err(|error| failure(&error))
 }
 
-/// Journal lines of what was not a session.
+/// Journal lines of a calculation without a session.
 struct Lines {
     time: Timestamp,
     lines: Vec<Line>,

@@ -1,4 +1,4 @@
-//! `trupose replay DIR`: a session entry by entry, without holding or changing it.
+//! `trupose replay DIR|FILE.rrd`: shows a session entry by entry, without holding or changing it.
 
 use std::io::Write;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
         None => None,
         Some(entry) => {
             Some(usize::try_from(entry).ok().filter(|entry| (1..=count).contains(entry)).ok_or_else(|| {
-                Failure::new(ExitStatus::Usage, format!("the session has no entry {entry}: they are 1 to {count}"))
+                Failure::new(ExitStatus::Usage, format!("the session has no entry {entry}: its entries are 1 to {count}"))
             })?)
         }
     };
@@ -38,7 +38,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
             console.print(&entries_and_points(&journal, &session))?;
         } else {
             let robot = session.robot.as_ref().ok_or_else(|| {
-                Failure::new(ExitStatus::Usage, format!("session '{}' has no robot there", args.folder.display()))
+                Failure::new(ExitStatus::Usage, format!("session '{}' has no robot at that entry", args.folder.display()))
             })?;
             console.print(&export::measurements_csv(&session, robot))?;
         }
@@ -58,7 +58,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
     })
 }
 
-/// The journal of a session's folder, or the one that a recording carries.
+/// Reads the journal of a session's folder, or the one that a recording carries.
 fn journal(path: &Path) -> Result<Journal, Failure> {
     if !path.is_file() {
         return read_journal(path).map_err(|error| session_failure(&error));
@@ -66,7 +66,7 @@ fn journal(path: &Path) -> Result<Journal, Failure> {
     recording::read(path).map_err(|error| record::failure(&error))
 }
 
-/// The entries, then the points that were measured, with what they say about both arms once these are known.
+/// Lists the entries, then the measured points with the errors of both arms once these are known.
 fn entries_and_points(journal: &Journal, session: &Session) -> String {
     let entries = journal.lines.iter();
     let mut lines: Vec<String> =

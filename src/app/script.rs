@@ -158,7 +158,7 @@ fn play<O: Write, E: Write>(
         let engine = options(script, args)
             .and_then(|options| open(Path::new(folder), options))
             .map_err(|failure| failure.message)?;
-        received.follow(engine.sender());
+        received.redirect(engine.sender());
         Ok(engine)
     };
     let mut runner = Runner::new(engine, transcript, &reopen);

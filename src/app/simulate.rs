@@ -83,7 +83,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     let (sender, orders) = channel();
     let signalled = sender.clone();
     // Nobody listens any more once this ends.
-    signals::each(move |_signal| drop(signalled.send(Order::End)))
+    signals::on_signal(move |_signal| drop(signalled.send(Order::End)))
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     read_lines(sender)?;
     let (mut seen, mut quiet) = (0, 0);

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::{Console, link, script};
 use crate::cli::{ColorArg, ScriptArgs, TerminalArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
-use crate::runtime::{Clock, Deed, Engine, Options};
+use crate::runtime::{Clock, CompletedIntent, Engine, Options};
 use crate::script::{Script, ScriptStep};
 use crate::store;
 use crate::tui;
@@ -105,7 +105,7 @@ fn play<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let mut recorded = Ok(());
-    let mut at_end = |deeds: &[Deed]| recorded = record.map_or(Ok(()), |file| write_script(file, deeds));
+    let mut at_end = |completed: &[CompletedIntent]| recorded = record.map_or(Ok(()), |file| write_script(file, completed));
     let exit = match surface {
         Surface::Screen(options) => tui::run(engine, options, &mut at_end),
         Surface::Lines(glyphs) => tui::lines::run(engine, stdin(), &mut console.out, glyphs, &mut at_end),
@@ -131,12 +131,12 @@ fn play<O: Write, E: Write>(
 }
 
 /// Writes what was done as a script.
-fn write_script(file: &Path, deeds: &[Deed]) -> Result<(), Failure> {
-    let step = |deed: &Deed| match &deed.failure {
-        None => ScriptStep::Do(deed.intent.clone()),
-        Some(message) => ScriptStep::Fails(deed.intent.clone(), message.clone()),
+fn write_script(file: &Path, completed: &[CompletedIntent]) -> Result<(), Failure> {
+    let step = |done: &CompletedIntent| match &done.failure {
+        None => ScriptStep::Do(done.intent.clone()),
+        Some(message) => ScriptStep::Fails(done.intent.clone(), message.clone()),
     };
-    let steps = deeds.iter().map(step).collect();
+    let steps = completed.iter().map(step).collect();
     let script = Script { title: "recorded in the terminal".to_owned(), clock: None, steps };
     let text = script.to_text().map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     store::replace(file, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))

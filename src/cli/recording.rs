@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-/// Port of the live view: the one that viewers expect.
+/// Default port of the live view: the one that viewers expect.
 const DEFAULT_PORT: &str = "9876";
 
-/// What is recorded while a session is worked on.
+/// Options of the recording while a session is measured.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct RecordingArgs {
     /// Show the recording while it grows: viewers connect to this port of this machine [default port: 9876]
@@ -18,15 +18,15 @@ pub struct RecordingArgs {
     pub no_recording: bool,
 }
 
-/// `--record` of a command without a session.
+/// The option `--record` of a command without a session.
 #[derive(Args, Clone, Debug, Default)]
 pub struct RecordArgs {
-    /// Write a recording of it for the 3D viewer
+    /// Write a recording of the result for the 3D viewer
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
 }
 
-/// What to do with recordings.
+/// Commands for recordings.
 #[derive(Debug, Subcommand)]
 pub enum RecordCommand {
     /// Make the recording of a session again from its journal

@@ -1,7 +1,7 @@
 //! The layout that a viewer opens with.
 //!
-//! The library's layout builder lacks cameras, legends and trails, and draws its ids at random. So the entities of a layout are
-//! written here: containers and views, each at a path that contains its id, and what belongs to a view below its path.
+//! The library's layout builder has no cameras, legends or trails, and random ids. So this module writes the entities of a layout
+//! itself: containers and views at paths that contain their ids, and the properties of a view below its path.
 
 use nalgebra::{Point3, Vector3};
 use rerun::blueprint::components::{
@@ -16,33 +16,31 @@ use rerun::{AsComponents, Color, TimeCell, TimePoint};
 
 use super::canvas::Row;
 use super::posture::Posture;
-use super::{layout, names};
+use super::{names, style};
 use crate::profile::Profile;
 
-/// What there is to see of a recording.
+/// What the layout depends on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contents {
-    /// What it is looked at for.
     pub(super) purpose: Purpose,
-    /// Temperatures were measured.
     pub(super) has_temperatures: bool,
 }
 
-/// What a recording is looked at for.
+/// The purpose of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// A session that is measured: the poses, and what the measurement says about itself.
+    /// A session that is being measured: the poses and the course of the measurement.
     Capture,
     /// A session with a result: errors of both arms at the poses.
     Result,
-    /// A plan: the search first.
+    /// A plan: the search for its poses.
     Plan,
 }
 
 /// Background of the picture.
-const BACKGROUND: Color = layout::rgb(24, 28, 33);
+const BACKGROUND: Color = style::rgb(24, 28, 33);
 
-/// The layout for the cell of `profile`.
+/// Returns the rows of the layout for the cell of `profile`.
 pub(super) fn rows(profile: &Profile, contents: Contents) -> Vec<Row> {
     let mut layout = Builder::default();
     let picture = picture(profile, &mut layout);
@@ -52,7 +50,7 @@ pub(super) fn rows(profile: &Profile, contents: Contents) -> Vec<Row> {
         Purpose::Plan => (planning(&mut layout), names::PLAN_ITERATION),
     };
     layout.shared(ContainerKind::Horizontal, &[1.45, 1.0], &[picture, right]);
-    // The last container that was made holds all others.
+    // The container that was made last holds all others.
     let root = RootContainer(datatypes::Uuid { bytes: u128::from(layout.items).to_be_bytes() });
     let viewport = ViewportBlueprint::new().with_root_container(root).with_auto_layout(false).with_auto_views(false);
     layout.put("viewport", &viewport);
@@ -68,11 +66,11 @@ pub(super) fn rows(profile: &Profile, contents: Contents) -> Vec<Row> {
     layout.rows
 }
 
-/// Collects the entities of a layout. What is made has a path; containers list the paths of what they hold.
+/// Collects the entities of a layout. Every view and container has a path; a container lists the paths of its contents.
 #[derive(Debug, Default)]
 struct Builder {
     rows: Vec<Row>,
-    /// Containers and views so far: their ids are numbers.
+    /// Number of containers and views so far, from which their ids are made.
     items: u64,
 }
 
@@ -82,7 +80,7 @@ impl Builder {
         self.rows.push(Row::new(path, time, what));
     }
 
-    /// The path of a new container or view.
+    /// Returns the path of a new container or view.
     fn path(&mut self, kind: &str) -> String {
         self.items += 1;
         format!("/{kind}/00000000-0000-0000-0000-{:012x}", self.items)
@@ -96,7 +94,7 @@ impl Builder {
         path
     }
 
-    /// A view of one entity with everything below it.
+    /// Adds a view of one entity and everything below it.
     fn entity(&mut self, class: &str, name: &str, entity: &str) -> String {
         self.view(class, name, entity, &["$origin/**"])
     }
@@ -107,12 +105,12 @@ impl Builder {
         path
     }
 
-    /// Tabs or a stack with a name.
+    /// Adds tabs or a column with a name.
     fn named(&mut self, kind: ContainerKind, name: &str, contents: &[String]) -> String {
         self.container(&ContainerBlueprint::new(kind).with_display_name(name), contents)
     }
 
-    /// A row or a stack whose parts take these shares of it.
+    /// Adds a row or a column that is divided in these shares.
     fn shared(&mut self, kind: ContainerKind, shares: &[f32], contents: &[String]) -> String {
         let container = ContainerBlueprint::new(kind);
         let shares = shares.iter().copied();
@@ -124,7 +122,7 @@ impl Builder {
     }
 }
 
-/// Beside the picture while there is no result: nothing that would be empty.
+/// Adds the right half while there is no result, without views that would be empty.
 fn capturing(has_temperatures: bool, layout: &mut Builder) -> String {
     let plots = [capture(has_temperatures, layout), search(layout)];
     let plots = layout.named(ContainerKind::Tabs, "Measurement", &plots);
@@ -134,7 +132,7 @@ fn capturing(has_temperatures: bool, layout: &mut Builder) -> String {
     layout.shared(ContainerKind::Vertical, &[1.0, 0.7, 1.3], &[plots, log, texts])
 }
 
-/// Beside the picture when there is a result.
+/// Adds the right half once there is a result.
 fn result(has_temperatures: bool, layout: &mut Builder) -> String {
     let [positions, distances] = errors(layout);
     let plots = [positions, distances, capture(has_temperatures, layout), solver(layout), search(layout)];
@@ -150,7 +148,7 @@ fn result(has_temperatures: bool, layout: &mut Builder) -> String {
     layout.shared(ContainerKind::Vertical, &[1.1, 0.8, 1.1], &[plots, bars, texts])
 }
 
-/// Beside the picture of a plan.
+/// Adds the right half of a plan.
 fn planning(layout: &mut Builder) -> String {
     let search = search(layout);
     let texts = [guide(layout), report(layout), log(layout)];
@@ -170,14 +168,14 @@ fn log(layout: &mut Builder) -> String {
     layout.entity("TextLog", "Log", names::LOG)
 }
 
-/// The 3D view.
+/// Adds the 3D view.
 fn picture(profile: &Profile, layout: &mut Builder) -> String {
     let path = layout.entity("3D", "Cell", names::WORLD);
     let (eye, target) = camera(profile);
     let controls = EyeControls3D::new()
         .with_kind(Eye3DKind::Orbital)
-        .with_position(layout::at(&eye))
-        .with_look_target(layout::at(&target))
+        .with_position(style::at(&eye))
+        .with_look_target(style::at(&target))
         .with_eye_up([0.0, 0.0, 1.0]);
     layout.put(&format!("{path}/EyeControls3D"), &controls);
     layout.put(&format!("{path}/LineGrid3D"), &LineGrid3D::new().with_visible(false));
@@ -191,7 +189,7 @@ fn picture(profile: &Profile, layout: &mut Builder) -> String {
     path
 }
 
-/// All rows up to the time cursor.
+/// Returns the range of all rows up to the time cursor.
 fn trail() -> VisibleTimeRanges {
     VisibleTimeRanges::new([names::POSE, names::TIME].map(|timeline| datatypes::VisibleTimeRange {
         timeline: timeline.into(),
@@ -202,12 +200,13 @@ fn trail() -> VisibleTimeRanges {
     }))
 }
 
-/// Postures that tell how much room an arm takes.
+/// Number of postures from which the extent of an arm is estimated.
 const POSTURES: u32 = 64;
-/// Every joint goes through its range in steps of a power of this part of it: no two postures are alike.
+/// Each joint goes through its range in steps of a power of this fraction, so that no two postures are alike.
 const STEP: f64 = 0.8567;
 
-/// Where the camera stands and what it looks at: across the line from robot to tracker, as near as all of the arm's room allows.
+/// Returns the position of the camera and the point that it looks at: across the line from robot to tracker, and as near as the
+/// extent of the arm allows.
 fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
     let postures = (1..=POSTURES).flat_map(|number| {
         let q: Vec<f64> = (1..)
@@ -232,21 +231,21 @@ fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
     let distance = towards.norm();
     let towards = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
     let aside = Vector3::new(towards.y, -towards.x, 0.0);
-    // A tracker far away is not worth an arm of a few pixels.
+    // Showing a tracker that is far away would leave only a few pixels for the arm.
     let behind = (distance - radius).clamp(0.0, 0.8 * radius);
     let target = centre + towards * (0.5 * behind) - Vector3::z() * (0.1 * radius);
     let from = (aside * 0.8 - towards * 0.75 + Vector3::z() * 0.45).normalize();
     (target + from * (2.0 * radius + 0.7 * behind), target)
 }
 
-/// Plots of the errors of positions and of distances at the poses.
+/// Adds plots of the errors of positions and of distances at the poses.
 fn errors(layout: &mut Builder) -> [String; 2] {
     let plots = [
         ("position", "Position error", "Position errors"),
         ("distance", "Mean distance error to all others", "Distance errors"),
     ];
     plots.map(|(quantity, title, name)| {
-        // Each arm has a plot of its own: beside the nominal errors the identified ones would not be seen.
+        // Each arm has its own plot: beside the nominal errors the identified ones would be invisible.
         let arms = ["nominal", "identified"].map(|arm| {
             let contents = format!("+ /{}/**", names::all_errors(quantity, arm));
             let plot = series(&format!("{title}, {arm} arm (mm)"), &[&contents], layout);
@@ -257,7 +256,7 @@ fn errors(layout: &mut Builder) -> [String; 2] {
     })
 }
 
-/// Plots of the solver.
+/// Adds plots of the solver.
 fn solver(layout: &mut Builder) -> String {
     let plots = [
         series("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"], layout),
@@ -266,7 +265,7 @@ fn solver(layout: &mut Builder) -> String {
     layout.named(ContainerKind::Vertical, "Solver", &plots)
 }
 
-/// Plots of the search for poses.
+/// Adds plots of the search for poses.
 fn search(layout: &mut Builder) -> String {
     let others = ["+ /search/observability_o1_mm", "+ /search/predicted_error_sigma"];
     let plots = [
@@ -276,7 +275,7 @@ fn search(layout: &mut Builder) -> String {
     layout.named(ContainerKind::Vertical, "Search", &plots)
 }
 
-/// Plots of the capture. Nothing that would be empty: many instruments report no temperature.
+/// Adds plots of the capture. Many instruments report no temperature: then there is no plot of it.
 fn capture(has_temperatures: bool, layout: &mut Builder) -> String {
     let lengths = ["+ /capture/predicted_error_mm", "+ /capture/scatter_mm", "+ /capture/drift_mm"];
     let mut plots = vec![series("Predicted error of a calibration so far, scatter, drift (mm)", &lengths, layout)];

@@ -1,4 +1,4 @@
-//! Rows of a recording, collected until they are written or shown.
+//! The rows of a recording, collected until they are written or shown.
 
 use jiff::Timestamp;
 use rerun::external::re_log_types::EntityPath;
@@ -6,7 +6,7 @@ use rerun::{AsComponents, SerializedComponentBatch, TimeCell, TimePoint};
 
 use super::names;
 
-/// When something is shown.
+/// A place on the timelines.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Moment {
     /// Number of the measurement.
@@ -17,22 +17,21 @@ pub(super) struct Moment {
     pub(super) plan_iteration: Option<i64>,
     /// Step of the solver.
     pub(super) solver_iteration: Option<i64>,
-    /// Clock time.
     pub(super) time: Option<Timestamp>,
 }
 
 impl Moment {
-    /// At a sweep of the pose search.
+    /// Returns the moment of a sweep of the pose search.
     pub(super) fn search(step: usize) -> Self {
         Self { plan_iteration: Some(index(step)), ..Self::default() }
     }
 
-    /// At a step of the solver.
+    /// Returns the moment of a step of the solver.
     pub(super) fn solver(step: usize) -> Self {
         Self { solver_iteration: Some(index(step)), ..Self::default() }
     }
 
-    /// At a pose, without a clock time.
+    /// Returns the moment of a pose, without a clock time.
     pub(super) fn pose(number: u64) -> Self {
         Self { pose: Some(i64::try_from(number).unwrap_or(i64::MAX)), ..Self::default() }
     }
@@ -57,21 +56,21 @@ impl Moment {
     }
 }
 
-/// An index of a timeline.
+/// Returns an index of a timeline.
 fn index(value: usize) -> i64 {
     i64::try_from(value).unwrap_or(i64::MAX)
 }
 
-/// Nanoseconds since 1970.
+/// Returns the nanoseconds since 1970.
 pub(super) fn nanoseconds(time: Timestamp) -> i64 {
     i64::try_from(time.as_nanosecond()).unwrap_or(i64::MAX)
 }
 
-/// What an entity shows from a time on, or always.
+/// The values of an entity from a time on, or for all times.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub(super) entity: EntityPath,
-    /// Empty: always.
+    /// Empty for all times: the library calls that static.
     pub(super) time: TimePoint,
     pub(super) components: Vec<SerializedComponentBatch>,
 }
@@ -85,28 +84,27 @@ impl Row {
 /// The layout that a viewer opens with.
 #[derive(Debug)]
 pub(super) struct Layout {
-    /// Number of the journal line that asked for it.
+    /// Number of the journal line that led to it.
     pub(super) line: u64,
     pub(super) rows: Vec<Row>,
 }
 
-/// Collects what is drawn.
+/// Collects rows.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
-    /// Rows in the order in which they were drawn.
     pub(super) rows: Vec<Row>,
-    /// The last layout.
+    /// The latest layout.
     pub(super) layout: Option<Layout>,
 }
 
 impl Canvas {
-    /// Shows something from `moment` on.
+    /// Draws something that is visible from `moment` on.
     pub(super) fn draw(&mut self, moment: Moment, path: &str, what: &dyn AsComponents) {
         self.rows.push(Row::new(path, moment.time_point(), what));
     }
 
-    /// Shows something always, in place of what was always shown there.
-    pub(super) fn fix(&mut self, path: &str, what: &dyn AsComponents) {
+    /// Draws something that is visible at all times, and replaces what was drawn like that before.
+    pub(super) fn draw_static(&mut self, path: &str, what: &dyn AsComponents) {
         self.rows.push(Row::new(path, TimePoint::default(), what));
     }
 }

@@ -1,4 +1,4 @@
-//! The file of a recording: written whole, and replaced only when the new one is on disk.
+//! Files of recordings. They are written whole, and replaced only when the new one is on disk.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,23 +11,21 @@ use crate::store;
 /// Name of the recording in a session's folder.
 pub const FILE_NAME: &str = "recording.rrd";
 
-/// Earlier versions wrote recordings in parts, `recording.part-001.rrd` and so on, and joined them through a temporary file:
-/// how the names of such files begin and end.
+/// Prefix and suffix of files that earlier versions left: parts of a recording, and the temporary file through which they were
+/// joined.
 const OLD_PARTS: [(&str, &str); 2] = [("recording.part-", ".rrd"), (".recording-", ".tmp")];
 
-/// A recording that was written.
+/// The outcome of [`rebuild`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// Path of the file.
     pub path: PathBuf,
-    /// Size of the file.
     pub bytes: usize,
 }
 
 /// Makes the recording in `folder` again from the lines of its journal.
 ///
 /// # Errors
-/// It cannot be written; the old one stays as it was.
+/// The file cannot be written; the old one stays as it was.
 pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<Written, RecordingError> {
     let path = folder.join(FILE_NAME);
     let bytes = rrd::encode(lines, Purpose::Capture)?;
@@ -35,7 +33,7 @@ pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<Written, RecordingError>
     Ok(Written { path, bytes: bytes.len() })
 }
 
-/// Writes a recording of these lines to `path`. `of_plan`: it opens on the search for the poses.
+/// Writes a recording of these lines to `path`. With `of_plan` it opens on the search for the poses.
 ///
 /// # Errors
 /// There are no lines, or the file cannot be written.

@@ -1,4 +1,4 @@
-//! Which recording lines belong to.
+//! The identity of a recording.
 
 use jiff::Timestamp;
 use rerun::external::re_log_types::{StoreId, StoreKind};
@@ -16,7 +16,7 @@ pub(super) struct Identity {
 }
 
 impl Identity {
-    /// From the first line of a journal.
+    /// Derives the identity from the first line of a journal.
     pub(super) fn of(first: &Line) -> Self {
         let name = match &first.entry {
             Entry::Opened { name, .. } => name.as_str(),
@@ -26,18 +26,18 @@ impl Identity {
         Self { id, name: latin::plain(name), start: first.time }
     }
 
-    /// Builds streams of this recording. Its properties are rows like all others.
+    /// Returns a builder of streams of this recording. Its properties are rows like all others, so the stream sends none.
     #[cfg(feature = "live")]
     pub(super) fn stream_builder(&self) -> rerun::RecordingStreamBuilder {
         rerun::RecordingStreamBuilder::from_store_id(&self.recording()).send_properties(false)
     }
 
-    /// Id of the recording.
+    /// Returns the id of the recording.
     pub(super) fn recording(&self) -> StoreId {
         StoreId::new(StoreKind::Recording, names::APPLICATION, self.id.clone())
     }
 
-    /// Id of the layout that line number `line` asked for.
+    /// Returns the id of the layout that line number `line` led to.
     pub(super) fn layout(&self, line: u64) -> StoreId {
         StoreId::new(StoreKind::Blueprint, names::APPLICATION, format!("{}-{line}", self.id))
     }

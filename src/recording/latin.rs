@@ -1,6 +1,6 @@
-//! Texts that every viewer can draw.
+//! Texts in the letters that every viewer can draw.
 
-/// A text in plain Latin letters: some viewers cannot draw others.
+/// Returns a text in plain Latin letters; some viewers cannot draw others.
 pub(super) fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for c in text.chars() {
@@ -17,7 +17,7 @@ pub(super) fn plain(text: &str) -> String {
             '…' => plain.push_str("..."),
             '²' => plain.push_str("^2"),
             '\u{2019}' => plain.push('\''),
-            // Latin letters with marks are drawn everywhere.
+            // Every viewer draws Latin letters with diacritics.
             '\n' | ' '..='~' | 'À'..='ÿ' => plain.push(c),
             _ => plain.push('?'),
         }

@@ -13,14 +13,14 @@ use super::renderer::Renderer;
 use super::rrd::{Ids, layout_messages};
 use crate::session::journal::Line;
 
-/// A port on this machine on which viewers may look at the recording while it grows.
+/// A port on this machine on which viewers can watch the recording grow.
 #[derive(Clone, Copy, Debug)]
 pub struct Live {
     port: u16,
 }
 
 impl Live {
-    /// Makes sure that the port is free.
+    /// Reserves nothing, but makes sure that the port is free now. Port 0 picks a free one.
     ///
     /// # Errors
     /// It is taken, or this program was built without the live view.
@@ -35,22 +35,22 @@ impl Live {
         Ok(Self { port })
     }
 
-    /// The port.
+    /// Returns the port.
     pub const fn port(&self) -> u16 {
         self.port
     }
 
-    /// What a viewer connects to.
+    /// Returns the address for viewers.
     pub fn url(&self) -> String {
         format!("rerun+http://127.0.0.1:{}/proxy", self.port)
     }
 
-    /// A stream to viewers, whether they connect early or late. The server's own limit of 1 GiB is a hundred times a long session.
+    /// Starts a stream to viewers, early or late ones. The server's memory limit of 1 GiB is a hundred times a long session.
     #[cfg(feature = "live")]
     fn stream(self, identity: &Identity) -> Result<RecordingStream, RecordingError> {
         use rerun::external::re_grpc_server::ServerOptions;
 
-        // The environment does not decide whether there is a stream.
+        // Without `enabled`, an environment variable could switch the stream off.
         identity
             .stream_builder()
             .enabled(true)
@@ -68,7 +68,7 @@ fn not_built_in(port: u16) -> RecordingError {
     RecordingError::Port { port, message: "this program was built without the live view".to_owned() }
 }
 
-/// The recording as connected viewers see it.
+/// Streams the recording to connected viewers.
 #[derive(Debug)]
 pub(super) struct LiveView {
     stream: RecordingStream,
@@ -77,7 +77,7 @@ pub(super) struct LiveView {
 }
 
 impl LiveView {
-    /// Serves the recording of a journal that begins with `first`; no line is shown yet.
+    /// Starts to serve the recording of a journal that begins with `first`, without showing a line yet.
     pub(super) fn start(live: Live, first: &Line) -> Result<Self, RecordingError> {
         let identity = Identity::of(first);
         let stream = live.stream(&identity)?;
@@ -88,11 +88,11 @@ impl LiveView {
     pub(super) fn show(&mut self, lines: &[Line]) {
         let Some(last) = lines.last() else { return };
         for line in lines {
-            self.renderer.take(line);
+            self.renderer.draw(line);
         }
-        let drawn = self.renderer.drawn();
+        let drawn = self.renderer.take_drawn();
         if let Some(layout) = drawn.layout {
-            // A layout that cannot be encoded leaves the viewer's own arrangement.
+            // Without a layout, because it could not be encoded, the viewer arranges itself.
             let messages = layout_messages(&self.identity, layout, &mut Ids::after(last)).into_iter().flatten();
             messages.for_each(|message| self.stream.record_msg(message));
         }
@@ -101,7 +101,7 @@ impl LiveView {
         }
     }
 
-    /// Ends the view. The library may wait for a viewer that does not answer, so it does that on a thread that nobody joins.
+    /// Ends the stream. The library may wait for a viewer that does not answer, so this happens on a thread that is never joined.
     pub(super) fn end(self) {
         drop(thread::Builder::new().name("live-end".to_owned()).spawn(move || drop(self)));
     }

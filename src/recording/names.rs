@@ -9,18 +9,18 @@ pub(super) const POSE: &str = "pose";
 pub(super) const PLAN_ITERATION: &str = "plan_iteration";
 /// Step of the solver; 0 is the nominal arm.
 pub(super) const SOLVER_ITERATION: &str = "solver_iteration";
-/// When it happened.
+/// Clock time.
 pub(super) const TIME: &str = "time";
 /// Number of the journal line.
 pub(super) const ENTRY: &str = "entry";
 
-/// Lines of the journal, as they stand there.
+/// Lines of the journal, byte by byte.
 pub(super) const JOURNAL: &str = "journal";
-/// What happened, in words.
+/// Journal entries in words.
 pub(super) const LOG: &str = "log";
-/// The result as a document.
+/// Report on the result.
 pub(super) const REPORT: &str = "report";
-/// How to read the picture.
+/// Guide to the picture.
 pub(super) const GUIDE: &str = "guide";
 
 /// Name and start of the recording.
@@ -30,7 +30,7 @@ pub(super) const SESSION_PROPERTIES: &str = "__properties/session";
 /// Properties of the last result.
 pub(super) const RESULT_PROPERTIES: &str = "__properties/result";
 
-/// Everything in the picture.
+/// Parent of everything in the picture.
 pub(super) const WORLD: &str = "world";
 /// Frames of the nominal arm at the pose.
 pub(super) const NOMINAL_FRAMES: &str = "world/nominal/frames";
@@ -38,7 +38,7 @@ pub(super) const NOMINAL_FRAMES: &str = "world/nominal/frames";
 pub(super) const NOMINAL_LINKS: &str = "world/nominal/link";
 /// Line through the joints of an arm without castings.
 pub(super) const NOMINAL_SKELETON: &str = "world/nominal/skeleton";
-/// Frames of the identified arm at the pose, as they are.
+/// Frames of the identified arm at the pose, true to scale.
 pub(super) const IDENTIFIED_FRAMES: &str = "world/identified/frames";
 /// Castings of the identified arm with its deviations enlarged; a line through its joints if it has none.
 pub(super) const ENLARGED: &str = "world/identified/enlarged";
@@ -48,15 +48,15 @@ pub(super) const FLOOR: &str = "world/cell/floor";
 pub(super) const BASE: &str = "world/cell/base";
 /// Boxes to keep out of.
 pub(super) const KEEP_OUT: &str = "world/cell/keep_out";
-/// The tracker.
+/// Body of the tracker.
 pub(super) const TRACKER: &str = "world/tracker/body";
-/// From the tracker to the reflector.
+/// Beam from the tracker to the reflector.
 pub(super) const BEAM: &str = "world/tracker/beam";
 /// Poses of the plan that are not skipped.
 pub(super) const PLAN: &str = "world/plan/poses";
-/// The pose to go to.
+/// Next pose.
 pub(super) const NEXT: &str = "world/plan/next";
-/// What is not used: poses that are skipped, samples that are left out.
+/// Skipped poses and excluded samples.
 pub(super) const UNUSED: &str = "world/plan/unused";
 /// Measured points, each at its pose.
 pub(super) const MEASURED: &str = "world/measured";
@@ -64,7 +64,7 @@ pub(super) const MEASURED: &str = "world/measured";
 pub(super) const ERRORS_NOMINAL: &str = "world/errors/nominal";
 /// Errors of the identified arm, enlarged.
 pub(super) const ERRORS_IDENTIFIED: &str = "world/errors/identified";
-/// Errors while the solver works, enlarged as those of the nominal arm.
+/// Errors at the steps of the solver, enlarged like those of the nominal arm.
 pub(super) const ERRORS_SOLVING: &str = "world/errors/solving";
 /// The pairs with the largest distance errors of the nominal arm.
 pub(super) const PAIRS_NOMINAL: &str = "world/pairs/nominal";
@@ -72,7 +72,7 @@ pub(super) const PAIRS_NOMINAL: &str = "world/pairs/nominal";
 pub(super) const PAIRS_IDENTIFIED: &str = "world/pairs/identified";
 /// Predicted uncertainty of positions, enlarged.
 pub(super) const UNCERTAINTY: &str = "world/uncertainty";
-/// What the enlargements are.
+/// Factors of enlargement.
 pub(super) const SCALE_NOTE: &str = "world/scale_note";
 
 /// Distance errors of all pairs, nominal arm.
@@ -103,21 +103,21 @@ pub(super) const FIT: &str = "solver/mean_error_mm";
 /// Deviations in units of their standard deviation, one bar per parameter.
 pub(super) const SIGNIFICANCE: &str = "parameters/deviation_in_sigma";
 
-/// Errors at each pose of the result number `run`: `quantity` is `position` or `distance`, `arm` is `nominal` or `identified`,
+/// Returns the entity of the errors at each pose of the result number `run`: `quantity` is `position` or `distance`, `arm` is `nominal` or `identified`,
 /// `samples` is `fit`, `verification` or `rejected`.
 pub(super) fn errors(run: usize, quantity: &str, arm: &str, samples: &str) -> String {
     format!("{}/{samples}_{run}", all_errors(quantity, arm))
 }
 
-/// What holds the errors of all results.
+/// Parent of the errors of all results.
 pub(super) fn all_errors(quantity: &str, arm: &str) -> String {
     format!("errors_mm/{quantity}_{arm}")
 }
 
-/// Frame `index` of an arm.
+/// Returns the name of frame `index` of an arm.
 pub(super) fn frame(arm: &str, index: usize) -> String {
     format!("{arm}/{index}")
 }
 
-/// The frame of the robot base.
+/// Frame of the robot base.
 pub(super) const WORLD_FRAME: &str = "tf#/world";

@@ -1,4 +1,4 @@
-//! Where the parts of an arm are at a configuration.
+//! Positions of the parts of an arm at a configuration.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -13,7 +13,7 @@ pub(super) struct Posture {
 }
 
 impl Posture {
-    /// `q` are pendant values ((rad) or (m)); missing ones are zero.
+    /// Computes the posture at the pendant values `q` ((rad) or (m)); missing ones are zero.
     pub(super) fn new(chain: &KinematicChain, target: &Point3<f64>, q: &[f64]) -> Self {
         let mut q = q.to_vec();
         q.resize(chain.dof(), 0.0);
@@ -27,19 +27,19 @@ impl Posture {
         Self { frames, line, reflector }
     }
 
-    /// The nominal arm of `profile` with its first target.
+    /// Computes the posture of the nominal arm of `profile` with its first target.
     pub(super) fn nominal(profile: &Profile, q: &[f64]) -> Self {
         let target = profile.targets().first().map_or_else(Point3::origin, |target| target.position_in_flange);
         Self::new(profile.chain(), &target, q)
     }
 }
 
-/// Length of the arm stretched out (m), for sizes in the picture.
+/// Returns the length of the stretched arm (m), the unit of sizes in the picture.
 pub(super) fn reach(profile: &Profile) -> f64 {
     profile.chain().length().max(0.1)
 }
 
-/// The middle of each range ((rad) or (m)).
+/// Returns the middle of each joint's range ((rad) or (m)).
 pub(super) fn rest(profile: &Profile) -> Vec<f64> {
     let middle =
         |range: &JointRange| range.planning_limits.or(range.limits).map_or(0.0, |(low, high)| f64::midpoint(low, high));

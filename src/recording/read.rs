@@ -1,4 +1,4 @@
-//! Reads the journal out of a recording, for its replay. Nothing that measures reads recordings.
+//! Reads the journal out of a recording, for a replay. A program that measures never reads recordings.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -15,8 +15,8 @@ use super::{RecordingError, names};
 use crate::session::journal::{self, Journal};
 use crate::store::StoreError;
 
-/// Reads the journal that the recording at `path` carries. Damage elsewhere in the file does not matter: the lines of a journal
-/// have check sums.
+/// Reads the journal that the recording at `path` carries. Its lines have check sums, so damage elsewhere in the file does not
+/// matter.
 ///
 /// # Errors
 /// The file cannot be read, is not a recording of this program, or its journal is damaged.
@@ -27,20 +27,20 @@ pub fn read(path: &Path) -> Result<Journal, RecordingError> {
     }
     let mut lines = BTreeMap::new();
     for message in decoded(path) {
-        // Damaged data may fit together and still break what looks at them.
+        // The library panics about some kinds of damage.
         let _damage = panic::catch_unwind(AssertUnwindSafe(|| collect(&message, &mut lines))).is_err();
     }
     let text: String = lines.into_values().collect();
     journal::read(text.as_bytes()).map_err(|source| RecordingError::Journal { path: path.to_owned(), source })
 }
 
-/// Whether the file at `path` is a recording of this program, whatever has become of its end.
+/// Returns whether the file at `path` begins like a recording of this program.
 pub fn is_recording(path: &Path) -> bool {
     matches!(decoded(path).next(), Some(LogMsg::SetStoreInfo(info))
         if info.info.store_id.application_id().as_str() == names::APPLICATION)
 }
 
-/// The messages of the file at `path`, up to the first that cannot be decoded.
+/// Returns the messages of the file at `path`, up to the first that cannot be decoded.
 fn decoded(path: &Path) -> impl Iterator<Item = LogMsg> {
     let file = File::open(path).into_iter();
     let mut messages = file.flat_map(|file| DecoderApp::decode_lazy(BufReader::new(file)));
@@ -48,7 +48,7 @@ fn decoded(path: &Path) -> impl Iterator<Item = LogMsg> {
     iter::from_fn(move || panic::catch_unwind(AssertUnwindSafe(|| messages.next())).ok()??.ok())
 }
 
-/// Takes the lines of the journal out of a message, by their numbers.
+/// Adds the lines of the journal in a message, by their numbers.
 fn collect(message: &LogMsg, lines: &mut BTreeMap<i64, String>) -> ChunkResult<()> {
     let LogMsg::ArrowMsg(_, arrow) = message else { return Ok(()) };
     let chunk = Chunk::from_arrow_msg(arrow)?;

@@ -1,4 +1,4 @@
-//! The thread that keeps the recording up to date while a session is measured. Nobody waits for it, and nothing depends on it.
+//! The thread that keeps the recording up to date while a session is measured. The session neither waits for it nor depends on it.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,14 +14,14 @@ use crate::text::causes;
 
 /// Shortest pause between two files.
 const PAUSE: Duration = Duration::from_secs(3);
-/// The pause is at least this many times as long as the file before took: a long session never costs more than a tenth of a core.
+/// Shortest pause as a multiple of the time that the last file took: even a long session costs at most a tenth of a core.
 const PAUSE_PER_FILE: u32 = 9;
-/// Longest wait for the last file: a hundred times what a long session takes.
+/// Longest wait for the final file: a hundred times what a long session takes.
 const FINISH: Duration = Duration::from_secs(20);
-/// Bytes of the disk that are left for the session: hundreds of times what a day of measuring adds to its journal.
+/// Free bytes of the disk that are left to the session: many times the files of a long one.
 const RESERVE: u64 = 16 << 20;
 
-/// Something that the operator should know about the recording.
+/// A problem of the recording that the operator should know.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RecordingEvent {
     /// The file could not be written.
@@ -40,7 +40,7 @@ pub struct Recorder {
 enum Message {
     /// Lines that are on disk.
     Lines(Vec<Line>),
-    /// Write the last file, answer with the outcome, and end.
+    /// Write the final file, answer with the outcome, and end.
     Finish(SyncSender<Result<(), RecordingError>>),
 }
 
@@ -67,17 +67,17 @@ impl Recorder {
             view: None,
         };
         thread::Builder::new().name("recorder".to_owned()).spawn(move || {
-            work.take(before);
+            work.add(before);
             work.run(&received);
         })?;
         Ok(Self { messages: Some(messages) })
     }
 
-    /// Takes lines that are on disk. Never waits.
+    /// Adds lines that are on disk. Never waits.
     ///
     /// # Errors
     /// The recorder has stopped because of a defect.
-    pub fn take(&mut self, lines: &[Line]) -> Result<(), &'static str> {
+    pub fn add(&mut self, lines: &[Line]) -> Result<(), &'static str> {
         let Some(messages) = &self.messages else { return Ok(()) };
         messages.send(Message::Lines(lines.to_vec())).map_err(|_gone| {
             self.messages = None;
@@ -85,14 +85,14 @@ impl Recorder {
         })
     }
 
-    /// Writes the last file and waits for it, but not for ever. Without it, dropping a recorder leaves the file as it is.
+    /// Writes the final file and waits for it, but not forever. A recorder that is dropped instead leaves the file as it is.
     ///
     /// # Errors
-    /// The file does not have the last lines.
+    /// The file lacks the last lines.
     pub fn finish(&mut self) -> Result<(), String> {
         let Some(messages) = self.messages.take() else { return Ok(()) };
         let (answer, outcome) = sync_channel(1);
-        // Where the thread is gone, the channel of the answer is closed as well.
+        // If the thread is gone, the channel of the answer is closed as well.
         drop(messages.send(Message::Finish(answer)));
         match outcome.recv_timeout(FINISH) {
             Ok(outcome) => outcome.map_err(|error| causes(&error)),
@@ -102,7 +102,7 @@ impl Recorder {
     }
 }
 
-/// What is said when the thread has panicked.
+/// The message after a panic of the thread.
 const DEFECT: &str = "a defect of this program has stopped it";
 
 /// The state of the thread.
@@ -111,13 +111,13 @@ struct Work<R> {
     report: R,
     /// All lines of the journal.
     lines: Vec<Line>,
-    /// How many of them are in the file.
+    /// Number of lines in the file.
     recorded: usize,
-    /// When the next file may be written.
+    /// Earliest time of the next file.
     next_file: Instant,
-    /// Writing has failed. Then there is one last try at the end.
+    /// Writing has failed. Then it is tried only once more, at the end.
     has_failed: bool,
-    /// The live view that was asked for, until the first line.
+    /// The requested live view, until the first line starts it.
     live: Option<Live>,
     view: Option<LiveView>,
 }
@@ -135,7 +135,7 @@ impl<R: Fn(RecordingEvent)> Work<R> {
                 false => received.recv().map_err(RecvTimeoutError::from),
             };
             match next {
-                Ok(Message::Lines(lines)) => self.take(lines),
+                Ok(Message::Lines(lines)) => self.add(lines),
                 Ok(Message::Finish(answer)) => {
                     // The receiver may have given up.
                     let _gone = answer.send(self.write()).is_err();
@@ -150,12 +150,12 @@ impl<R: Fn(RecordingEvent)> Work<R> {
         }
     }
 
-    /// Whether the file lacks lines.
+    /// Returns whether the file lacks lines.
     const fn is_behind(&self) -> bool {
         self.recorded < self.lines.len()
     }
 
-    fn take(&mut self, lines: Vec<Line>) {
+    fn add(&mut self, lines: Vec<Line>) {
         if let (Some(live), Some(first)) = (self.live, lines.first()) {
             self.live = None;
             match LiveView::start(live, first) {
@@ -169,7 +169,7 @@ impl<R: Fn(RecordingEvent)> Work<R> {
         self.lines.extend(lines);
     }
 
-    /// Writes a file and decides when the next one may follow. A failure is reported once.
+    /// Writes the file and sets the time of the next one. A failure is reported once.
     fn update(&mut self) {
         let begun = now();
         if let Err(error) = self.write() {
@@ -226,11 +226,11 @@ mod tests {
         let gone = folder.path().join("gone");
         let (report, reported) = channel();
         let mut recorder = Recorder::start(&gone, Vec::new(), None, move |event| drop(report.send(event))).unwrap();
-        recorder.take(&opened()).unwrap();
+        recorder.add(&opened()).unwrap();
         let event = reported.recv_timeout(Duration::from_secs(5)).unwrap();
         assert!(matches!(&event, RecordingEvent::Failed(cause) if cause.contains("No such file")), "{event:?}");
         for _ in 0..100 {
-            recorder.take(&opened()).unwrap();
+            recorder.add(&opened()).unwrap();
         }
         let cause = recorder.finish().unwrap_err();
         assert!(cause.contains("No such file"), "{cause}");
@@ -248,7 +248,7 @@ mod tests {
         let mut recorder = Recorder::start(&folder.path().join("gone"), opened(), None, report).unwrap();
         dead.recv_timeout(Duration::from_secs(5)).unwrap();
         let begun = now();
-        while recorder.take(&opened()).is_ok() {
+        while recorder.add(&opened()).is_ok() {
             assert!(begun.elapsed() < Duration::from_secs(5));
         }
         recorder.finish().unwrap();
@@ -281,7 +281,7 @@ mod tests {
             while recorded() != 1 {
                 assert!(begun.elapsed() < Duration::from_secs(5));
             }
-            recorder.take(&[Line { number: 2, ..opened().remove(0) }]).unwrap();
+            recorder.add(&[Line { number: 2, ..opened().remove(0) }]).unwrap();
             thread::sleep(Duration::from_millis(200));
             assert_eq!(recorded(), 1, "the pause is not over");
             recorder

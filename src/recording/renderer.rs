@@ -1,4 +1,4 @@
-//! Turns the journal into the picture, line by line: the same lines always draw the same.
+//! Turns the lines of a journal into rows of a recording. Equal lines give equal rows.
 
 mod cell;
 mod document;
@@ -20,7 +20,7 @@ use crate::session::journal::{Entry, Line, Sum, encode};
 use crate::session::state::Session;
 use tracker::Station;
 
-/// Draws the lines of a journal.
+/// Draws a session, line by line.
 #[derive(Debug)]
 pub(super) struct Renderer {
     canvas: Canvas,
@@ -28,20 +28,21 @@ pub(super) struct Renderer {
     session: Session,
     station: Station,
     sum: Sum,
-    /// Results so far.
+    /// Number of results so far.
     runs: usize,
-    /// A sample has a temperature.
+    /// Some sample has a temperature.
     has_temperatures: bool,
-    /// A line did not fit: nothing after it can be drawn.
+    /// A line did not fit the session, so nothing after it can be drawn.
     is_lost: bool,
 }
 
 impl Renderer {
-    /// Draws the recording `identity`, of which no line is drawn yet.
+    /// Starts the recording `identity`, of which no line is drawn yet.
     pub(super) fn new(identity: &Identity, purpose: Purpose) -> Self {
         let mut canvas = Canvas::default();
         let start = components::Timestamp::from(nanoseconds(identity.start));
-        canvas.fix(names::PROPERTIES, &RecordingInfo::new().with_name(identity.name.as_str()).with_start_time(start));
+        canvas
+            .draw_static(names::PROPERTIES, &RecordingInfo::new().with_name(identity.name.as_str()).with_start_time(start));
         Self {
             canvas,
             purpose,
@@ -54,13 +55,13 @@ impl Renderer {
         }
     }
 
-    /// Everything that was drawn since this was called last.
-    pub(super) fn drawn(&mut self) -> Canvas {
+    /// Returns everything that was drawn since the last call.
+    pub(super) fn take_drawn(&mut self) -> Canvas {
         std::mem::take(&mut self.canvas)
     }
 
     /// Draws a line of the journal.
-    pub(super) fn take(&mut self, line: &Line) {
+    pub(super) fn draw(&mut self, line: &Line) {
         if let Ok((text, sum)) = encode(line, &self.sum) {
             self.sum = sum;
             let number = i64::try_from(line.number).unwrap_or(i64::MAX);
@@ -78,7 +79,7 @@ impl Renderer {
         if self.is_lost {
             return;
         }
-        if self.station.follow(&self.session, &line.entry) {
+        if self.station.update(&self.session, &line.entry) {
             let taken = if let Entry::Sample(noted) = &line.entry { Some(noted.number) } else { None };
             self.station.draw_all(&mut self.canvas, &self.session, taken);
         }
@@ -101,7 +102,7 @@ impl Renderer {
                 }
             }
             Entry::Correction(_) => {
-                // It may have changed where the robot stood, or the unit, at any of them.
+                // It may have changed the configuration or the unit of any sample.
                 for sample in &self.session.samples {
                     measured::sample(&mut self.canvas, &self.session, &self.station, &sample.noted, sample.time);
                 }
@@ -118,14 +119,14 @@ impl Renderer {
         }
     }
 
-    /// The cell as soon as the robot is known.
+    /// Draws the cell as soon as the robot is known.
     fn cell(&mut self) {
         if let Some(profile) = self.session.mounted_profile() {
             cell::draw(&mut self.canvas, &profile, &self.station);
         }
     }
 
-    /// What a viewer arranges from now on.
+    /// Sets the layout of the viewer for what is known by now.
     fn layout(&mut self, line: u64) {
         let purpose = match self.purpose {
             Purpose::Capture if self.runs > 0 => Purpose::Result,
@@ -142,7 +143,7 @@ impl Renderer {
         plan::points(&mut self.canvas, &self.session, true);
     }
 
-    /// What happened in words.
+    /// Draws the line in words.
     fn log(&mut self, line: &Line) {
         let level = match &line.entry {
             Entry::Sample(noted) if !noted.findings.is_empty() => "WARN",
@@ -156,7 +157,7 @@ impl Renderer {
     }
 }
 
-/// When a measurement was made.
+/// Returns the moment of a measurement.
 fn pose_moment(number: u64, time: Timestamp) -> Moment {
     Moment { time: Some(time), ..Moment::pose(number) }
 }

@@ -1,4 +1,5 @@
-//! Recordings as files of the library. A file is a function of the lines of a journal: the same lines give the same bytes.
+//! Encodes recordings in the file format of the library. Equal lines give equal bytes up to the index, whose order the library
+//! draws at random.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,7 @@ use super::renderer::Renderer;
 use super::{RecordingError, names};
 use crate::session::journal::Line;
 
-/// The bytes of a recording of these lines.
+/// Returns the bytes of a recording of these lines.
 pub(super) fn encode(lines: &[Line], purpose: Purpose) -> Result<Vec<u8>, RecordingError> {
     let (Some(first), Some(last)) = (lines.first(), lines.last()) else {
         return Err(RecordingError::library("drawing the recording", "there is nothing to record"));
@@ -24,11 +25,11 @@ pub(super) fn encode(lines: &[Line], purpose: Purpose) -> Result<Vec<u8>, Record
     let identity = Identity::of(first);
     let mut renderer = Renderer::new(&identity, purpose);
     for line in lines {
-        renderer.take(line);
+        renderer.draw(line);
     }
-    let drawn = renderer.drawn();
+    let drawn = renderer.take_drawn();
     let mut ids = Ids::after(last);
-    // Layouts come first: a viewer then arranges itself before the data arrive.
+    // The layout comes first, so that a viewer arranges itself before the data arrive.
     let mut messages = match drawn.layout {
         Some(layout) => layout_messages(&identity, layout, &mut ids),
         None => Vec::new(),
@@ -40,7 +41,7 @@ pub(super) fn encode(lines: &[Line], purpose: Purpose) -> Result<Vec<u8>, Record
     Ok(bytes)
 }
 
-/// A layout, and the command that shows it.
+/// Returns the messages of a layout with the command that activates it.
 pub(super) fn layout_messages(identity: &Identity, layout: Layout, ids: &mut Ids) -> Vec<ChunkResult<LogMsg>> {
     let blueprint_id = identity.layout(layout.line);
     let mut messages = store_messages(&blueprint_id, layout.rows, ids);
@@ -49,7 +50,7 @@ pub(super) fn layout_messages(identity: &Identity, layout: Layout, ids: &mut Ids
     messages
 }
 
-/// The rows of a recording or of a layout, as few messages.
+/// Returns the messages of a recording or of a layout.
 fn store_messages(store: &StoreId, rows: Vec<Row>, ids: &mut Ids) -> Vec<ChunkResult<LogMsg>> {
     let source = StoreSource::Other(names::APPLICATION.to_owned());
     let info = SetStoreInfo { row_id: ids.next(), info: StoreInfo::new(store.clone(), source) };
@@ -58,7 +59,7 @@ fn store_messages(store: &StoreId, rows: Vec<Row>, ids: &mut Ids) -> Vec<ChunkRe
     messages
 }
 
-/// One chunk per entity and set of timelines: every chunk brings about 1 kB of description, however few rows it has.
+/// Returns one chunk per entity and set of timelines. Each chunk adds about 1 kB of description, however few rows it has.
 fn chunks(rows: Vec<Row>, ids: &mut Ids) -> impl Iterator<Item = ChunkResult<Chunk>> {
     let mut grouped = BTreeMap::new();
     for row in rows {
@@ -75,7 +76,7 @@ fn chunks(rows: Vec<Row>, ids: &mut Ids) -> impl Iterator<Item = ChunkResult<Chu
     })
 }
 
-/// What is always shown has no history: only the last value of every component is ever seen.
+/// Merges rows without a time into one with the last value of each component, which is all that a viewer shows.
 fn last_values(rows: Vec<(RowId, Row)>) -> Vec<(RowId, Row)> {
     let merged = rows.into_iter().reduce(|(_, before), (id, mut row)| {
         let is_kept = |batch: &SerializedComponentBatch| {
@@ -88,8 +89,8 @@ fn last_values(rows: Vec<(RowId, Row)>) -> Vec<(RowId, Row)> {
     merged.into_iter().collect()
 }
 
-/// Ids of rows and chunks. The library takes them from the clock; here they follow from the journal, so that equal journals
-/// give equal files, and from its end, so that recordings of a growing journal differ and the later one counts.
+/// Generates the ids of rows and chunks. The library would take them from the clock. Here they follow from the end of the journal:
+/// equal journals give equal files, and in a viewer that has an older recording of the session open the newer rows win.
 #[derive(Debug)]
 pub(super) struct Ids {
     time: u64,
@@ -97,7 +98,7 @@ pub(super) struct Ids {
 }
 
 impl Ids {
-    /// Ids of a recording that ends with `last`.
+    /// Starts the ids of a recording that ends with `last`.
     pub(super) fn after(last: &Line) -> Self {
         Self { time: nanoseconds(last.time).unsigned_abs(), next: last.number << 32 }
     }

@@ -1,4 +1,4 @@
-//! The time that the wizard is told: that of the system, or one that passes only when something is measured.
+//! The clock of the wizard: the system's, or a virtual one that advances only when something is measured.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -8,19 +8,19 @@ use jiff::Timestamp;
 /// A clock.
 #[derive(Clone, Debug)]
 pub enum Clock {
-    /// The system's.
+    /// The clock of the system.
     System,
-    /// Virtual: milliseconds since 1970, moved on by [`Clock::pass`].
+    /// Milliseconds since 1970, advanced by [`Clock::pass`].
     Virtual(Arc<AtomicI64>),
 }
 
 impl Clock {
-    /// A virtual clock that begins at `start`.
+    /// Returns a virtual clock that shows `start`.
     pub fn starting_at(start: Timestamp) -> Self {
         Self::Virtual(Arc::new(AtomicI64::new(start.as_millisecond())))
     }
 
-    /// The time.
+    /// Returns the current time.
     pub fn now(&self) -> Timestamp {
         match self {
             Self::System => system_time(),
@@ -30,7 +30,7 @@ impl Clock {
         }
     }
 
-    /// So many seconds pass, if they do not pass by themselves.
+    /// Advances a virtual clock by `seconds`; the system's clock does not need it.
     pub fn pass(&self, seconds: f64) {
         if let Self::Virtual(milliseconds) = self {
             #[expect(clippy::cast_possible_truncation, reason = "a float to integer cast saturates")]
@@ -40,7 +40,7 @@ impl Clock {
     }
 }
 
-/// The time of the system, to the millisecond: finer digits would only fill the journal.
+/// Returns the time of the system, to the millisecond: finer digits would only fill the journal.
 fn system_time() -> Timestamp {
     let now = Timestamp::now();
     Timestamp::from_millisecond(now.as_millisecond()).unwrap_or(now)

@@ -1,4 +1,4 @@
-//! The wizard with its threads: what both drivers, script and terminal, run.
+//! The engine that both drivers, script and terminal, run: the wizard with its threads.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
@@ -21,58 +21,57 @@ use crate::store::session::SessionFolder;
 use crate::text::counted;
 use crate::wizard::{Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard};
 
-/// Events that wait; answers wait at their thread when it is full, progress reports are dropped.
-const WAITING: usize = 256;
+/// Capacity of the channel of events. When it is full, a thread waits with its answer, and progress reports are dropped.
+const EVENT_CAPACITY: usize = 256;
 
-/// How an engine is set up.
+/// Settings of an engine.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Folder in which sessions are made.
+    /// Folder in which new sessions are created.
     pub sessions: PathBuf,
-    /// What time it is.
     pub clock: Clock,
-    /// Whether sessions are recorded for a 3D viewer.
+    /// Record sessions for a 3D viewer.
     pub is_recorded: bool,
-    /// Where a viewer may look on.
+    /// Port on which viewers can watch the recording grow.
     pub live: Option<Live>,
-    /// What takes every byte of instruments on a wire.
+    /// Log of every byte from and to instruments.
     pub raw_log: Option<RawLog>,
 }
 
 impl Options {
-    /// Sessions in this folder, without a recording.
+    /// Returns settings for sessions in this folder, without a recording.
     pub const fn unrecorded(sessions: PathBuf, clock: Clock) -> Self {
         Self { sessions, clock, is_recorded: false, live: None, raw_log: None }
     }
 }
 
-/// What a driver may want to show.
+/// An output of the engine that a driver may show.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Happening {
-    /// Lines of the journal are on disk.
-    Written(Vec<Line>),
-    /// There is a message to the operator.
-    Told(Notice),
+pub enum Output {
+    /// Lines of the journal that are on disk now.
+    Saved(Vec<Line>),
+    /// A new message to the operator.
+    Notice(Notice),
 }
 
 /// An intent that was carried out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Deed {
-    /// The intent.
+pub struct CompletedIntent {
     pub intent: Intent,
-    /// What was said if it failed.
+    /// The error message, if it failed.
     pub failure: Option<String>,
 }
 
-/// The recording for a 3D viewer, if one is wanted.
+/// The recording for a 3D viewer.
 #[derive(Debug)]
 struct Recording {
+    /// The session is to be recorded once it has a folder.
     is_wanted: bool,
     live: Option<Live>,
     recorder: Option<Recorder>,
 }
 
-/// The wizard with its threads.
+/// Runs the wizard and its threads.
 #[derive(Debug)]
 pub struct Engine {
     wizard: Wizard,
@@ -82,20 +81,20 @@ pub struct Engine {
     store: StoreThread,
     link: LinkThread,
     recording: Recording,
-    /// Flags of the requests under way.
+    /// Flags that cancel running requests.
     cancelled: BTreeMap<RequestId, Arc<AtomicBool>>,
-    /// Lines that the store works on.
+    /// Lines that the store thread is writing.
     writing: BTreeMap<RequestId, Vec<Line>>,
-    happenings: VecDeque<Happening>,
-    told: Option<Notice>,
-    deeds: Vec<Deed>,
-    /// The last intent, until it is known whether it failed.
+    outputs: VecDeque<Output>,
+    last_notice: Option<Notice>,
+    completed: Vec<CompletedIntent>,
+    /// The last intent, until its outcome is known.
     pending: Option<Intent>,
     has_exited: bool,
 }
 
 impl Engine {
-    /// A new calibration.
+    /// Starts a new calibration.
     ///
     /// # Errors
     /// The system refuses a thread.
@@ -104,7 +103,7 @@ impl Engine {
         Self::with(wizard, None, options)
     }
 
-    /// Goes on with a session.
+    /// Resumes a session.
     ///
     /// # Errors
     /// The system refuses a thread.
@@ -123,7 +122,7 @@ impl Engine {
     }
 
     fn with(wizard: Wizard, folder: Option<SessionFolder>, options: Options) -> io::Result<Self> {
-        let (sender, events) = sync_channel(WAITING);
+        let (sender, events) = sync_channel(EVENT_CAPACITY);
         let sender = Events(sender);
         Ok(Self {
             wizard,
@@ -135,71 +134,71 @@ impl Engine {
             events,
             cancelled: BTreeMap::new(),
             writing: BTreeMap::new(),
-            happenings: VecDeque::new(),
-            told: None,
-            deeds: Vec::new(),
+            outputs: VecDeque::new(),
+            last_notice: None,
+            completed: Vec::new(),
             pending: None,
             has_exited: false,
         })
     }
 
-    /// The wizard.
+    /// Returns the wizard.
     pub const fn wizard(&self) -> &Wizard {
         &self.wizard
     }
 
-    /// Where other threads (keys, signals) send events.
+    /// Returns a sender of events for other threads, such as those of keys and signals.
     pub fn sender(&self) -> Events {
         self.sender.clone()
     }
 
-    /// Whether the wizard has ended and the program may go.
+    /// Returns whether the wizard has ended, so that the program may end.
     pub const fn has_exited(&self) -> bool {
         self.has_exited
     }
 
-    /// The operator wants something.
+    /// Carries out an intent of the operator.
     pub fn intend(&mut self, intent: Intent) {
-        self.record(&intent);
-        self.take(Event::Intent(intent));
+        self.note(&intent);
+        self.handle(Event::Intent(intent));
     }
 
-    /// What the operator had done, in order. Without what was refused, what only stopped something, and the end.
-    pub fn deeds(&mut self) -> &[Deed] {
-        self.settle_deed();
-        &self.deeds
+    /// Returns the intents that were carried out, in order; refused ones, cancellations and quit are left out.
+    pub fn completed_intents(&mut self) -> &[CompletedIntent] {
+        self.complete_pending();
+        &self.completed
     }
 
-    /// Takes note of an intent that will be carried out.
-    fn record(&mut self, intent: &Intent) {
+    /// Remembers an intent that will be carried out.
+    fn note(&mut self, intent: &Intent) {
         let offers = self.wizard.intents();
         let is_possible = offers.iter().any(|offer| offer.intent.name() == intent.name() && offer.is_enabled());
         if is_possible && !matches!(intent, Intent::Cancel | Intent::Quit) {
-            self.settle_deed();
+            self.complete_pending();
             self.pending = Some(intent.clone());
         } else if self.wizard.is_idle() {
-            // What is said next is about an intent that is no deed.
-            self.settle_deed();
+            // The next notice is about this intent, which is refused or only stops something.
+            self.complete_pending();
         }
     }
 
-    fn settle_deed(&mut self) {
+    fn complete_pending(&mut self) {
         if let Some(intent) = self.pending.take() {
             let notice = self.wizard.notice().filter(|notice| notice.severity == Severity::Error);
-            self.deeds.push(Deed { intent, failure: notice.map(|notice| notice.what.clone()) });
+            self.completed.push(CompletedIntent { intent, failure: notice.map(|notice| notice.what.clone()) });
         }
     }
 
-    /// The program is to end, for a reason that is not the operator's wish.
+    /// Closes the session because the program has to end, without the operator having asked for it.
     pub fn shut_down(&mut self, cause: &str) {
-        self.take(Event::Shutdown { cause: cause.to_owned() });
+        self.handle(Event::Shutdown { cause: cause.to_owned() });
     }
 
-    /// Waits for an event and takes it, or to be woken; `false` after `timeout` without either.
+    /// Waits for an event and handles it, or until it is woken. Returns `false` after `timeout` without either.
     pub fn wait(&mut self, timeout: Duration) -> bool {
         match self.events.recv_timeout(timeout) {
             Ok(Message::Event(event)) => {
-                self.take(event);
+                self.handle(event);
                 true
             }
             Ok(Message::Wake) => true,
@@ -207,30 +206,30 @@ impl Engine {
         }
     }
 
-    /// Gives the session's folder back, with everything written that was asked for.
+    /// Finishes all writes and releases the session's folder.
     pub fn release(&mut self) {
         drop(self.end_recording());
         self.store.finish();
     }
 
-    /// Leaves the recording as it is, because there is little time to end. Resuming the session makes it again.
+    /// Leaves the recording as it is, so that the program ends without delay. Resuming the session makes it again.
     pub fn abandon_recording(&mut self) {
         self.recording.recorder = None;
     }
 
-    /// Writes the last recording while the session's folder is still held. Returns what the operator should know if that fails.
+    /// Writes the final recording while the session's folder is still held. Returns a message to the operator if that fails.
     pub fn end_recording(&mut self) -> Option<String> {
         let mut recorder = self.recording.recorder.take()?;
         let cause = recorder.finish().err()?;
         Some(format!("the 3D recording is not complete: {cause}; 'trupose record rebuild' makes it from the journal"))
     }
 
-    /// What has happened since it was asked last.
-    pub fn happenings(&mut self) -> impl Iterator<Item = Happening> + '_ {
-        self.happenings.drain(..)
+    /// Returns the outputs since the last call.
+    pub fn outputs(&mut self) -> impl Iterator<Item = Output> + '_ {
+        self.outputs.drain(..)
     }
 
-    /// Begins to record into a session's folder, which has these lines already.
+    /// Starts to record into a session's folder, whose journal has the lines `before`.
     fn begin_recording(&mut self, folder: &Path, before: Vec<Line>) {
         if !std::mem::take(&mut self.recording.is_wanted) {
             return;
@@ -242,28 +241,26 @@ impl Engine {
             self.sender.offer(Event::Remark(Notice::info(notice)));
         }
         let events = self.sender.clone();
-        // Nobody waits for the recorder, and the recorder does not wait for the wizard.
-        let tell = move |event: RecordingEvent| events.offer(Event::Remark(remark(&event)));
-        match Recorder::start(folder, before, self.recording.live.take(), tell) {
-            Ok(recorder) => {
-                self.recording.recorder = Some(recorder);
-            }
+        // The wizard never waits for the recorder, nor the recorder for the wizard.
+        let report = move |event: RecordingEvent| events.offer(Event::Remark(remark(&event)));
+        match Recorder::start(folder, before, self.recording.live.take(), report) {
+            Ok(recorder) => self.recording.recorder = Some(recorder),
             Err(error) => self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(error.to_string())))),
         }
     }
 
-    /// Lines that are on disk go on to the recording.
+    /// Passes lines that are on disk to the recorder.
     fn record_lines(&mut self, lines: &[Line]) {
         let Some(recorder) = &mut self.recording.recorder else { return };
-        if let Err(cause) = recorder.take(lines) {
+        if let Err(cause) = recorder.add(lines) {
             self.recording.recorder = None;
             self.sender.offer(Event::Remark(remark(&RecordingEvent::Failed(cause.to_owned()))));
         }
     }
 
-    /// An event goes in, its effects are done.
-    fn take(&mut self, event: Event) {
-        let mut written = None;
+    /// Gives an event to the wizard and performs its effects.
+    fn handle(&mut self, event: Event) {
+        let mut saved = None;
         match &event {
             Event::Store(StoreEvent::Created { folder, .. }) => {
                 let folder = PathBuf::from(folder);
@@ -272,7 +269,7 @@ impl Engine {
             Event::Store(StoreEvent::Written { id } | StoreEvent::Failed { id, .. }) => {
                 let lines = self.writing.remove(id);
                 if matches!(event, Event::Store(StoreEvent::Written { .. })) {
-                    written = lines;
+                    saved = lines;
                 }
             }
             Event::Answer { id, answer } => {
@@ -285,14 +282,14 @@ impl Engine {
         }
         let mut effects = self.wizard.update(Event::Tick(self.clock.now()));
         effects.extend(self.wizard.update(event));
-        if let Some(lines) = written {
+        if let Some(lines) = saved {
             self.record_lines(&lines);
-            self.happenings.push_back(Happening::Written(lines));
+            self.outputs.push_back(Output::Saved(lines));
         }
         let notice = self.wizard.notice();
-        if notice != self.told.as_ref() {
-            self.told = notice.cloned();
-            self.happenings.extend(notice.cloned().map(Happening::Told));
+        if notice != self.last_notice.as_ref() {
+            self.last_notice = notice.cloned();
+            self.outputs.extend(notice.cloned().map(Output::Notice));
         }
         self.perform(effects);
     }
@@ -337,7 +334,7 @@ impl Engine {
     }
 }
 
-/// What the operator is told about the recording.
+/// Returns the message to the operator about an event of the recording.
 fn remark(event: &RecordingEvent) -> Notice {
     match event {
         RecordingEvent::Failed(cause) => Notice::attention(format!(
@@ -350,15 +347,15 @@ fn remark(event: &RecordingEvent) -> Notice {
     }
 }
 
-/// Whoever works for the engine is told to stop.
+/// Tells all threads to stop.
 impl Drop for Engine {
     fn drop(&mut self) {
         for flag in self.cancelled.values() {
             flag.store(true, Ordering::Relaxed);
         }
-        // Room for threads that still want to answer.
+        // Make room in the channel for threads that still want to answer.
         while self.events.try_recv().is_ok() {}
-        // The folder is given back when nobody writes into it any more.
+        // Only then can the writing threads end and release the folder.
         self.release();
     }
 }
@@ -370,10 +367,10 @@ mod tests {
     use crate::session::wire::LinkChoice;
 
     #[test]
-    fn what_was_done_is_known_and_what_was_refused_is_not() {
+    fn completed_intents_are_known_and_refused_ones_are_not() {
         let folder = tempfile::tempdir().unwrap();
         let mut engine = Engine::new(Options::unrecorded(folder.path().to_owned(), Clock::System)).unwrap();
-        // No robot to go on with; a robot that is not there; one that is.
+        // There is no robot to continue with; then a robot that does not exist, and one that does.
         engine.intend(Intent::Next);
         for profile in ["missing", "soochow"] {
             engine.intend(Intent::ChooseProfile(profile.to_owned()));
@@ -382,9 +379,9 @@ mod tests {
             }
         }
         engine.intend(Intent::Quit);
-        let deeds: Vec<(&str, bool)> =
-            engine.deeds().iter().map(|deed| (deed.intent.name(), deed.failure.is_some())).collect();
-        assert_eq!(deeds, [("ChooseProfile", true), ("ChooseProfile", false)]);
+        let completed: Vec<(&str, bool)> =
+            engine.completed_intents().iter().map(|one| (one.intent.name(), one.failure.is_some())).collect();
+        assert_eq!(completed, [("ChooseProfile", true), ("ChooseProfile", false)]);
     }
 
     #[test]

@@ -1,38 +1,38 @@
-//! Where threads send what has happened.
+//! The channel through which threads report to the engine.
 
 use std::sync::mpsc::{SyncSender, TrySendError};
 
 use crate::wizard::Event;
 
-/// What ends a wait.
+/// Ends a wait of the engine.
 #[derive(Debug)]
 pub(super) enum Message {
-    /// For the wizard.
+    /// An event for the wizard.
     Event(Event),
-    /// For the driver: look at what else there is.
+    /// Tells the driver to look at its other inputs.
     Wake,
 }
 
-/// Where threads send what has happened.
+/// Sends events to an engine.
 #[derive(Clone, Debug)]
 pub struct Events(pub(super) SyncSender<Message>);
 
 impl Events {
-    /// Sends; waits for room. `false` if the engine is gone.
+    /// Sends an event, and waits while the channel is full. Returns `false` if the engine is gone.
     pub fn send(&self, event: Event) -> bool {
         self.0.send(Message::Event(event)).is_ok()
     }
 
-    /// Ends the driver's wait without an event: there is something else to look at, such as a key. `false` if the engine is
-    /// gone. Nothing is lost when there is no room: then the driver is not waiting.
+    /// Ends the driver's wait without an event, because it has another input such as a key. Returns `false` if the engine is
+    /// gone. A full channel is fine: the driver is not waiting then.
     pub fn wake(&self) -> bool {
         !matches!(self.0.try_send(Message::Wake), Err(TrySendError::Disconnected(_)))
     }
 
-    /// Sends if there is room.
+    /// Sends an event unless the channel is full.
     pub(super) fn offer(&self, event: Event) {
         match self.0.try_send(Message::Event(event)) {
-            // The next report says more than this one.
+            // The next report supersedes this one.
             Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
         }
     }

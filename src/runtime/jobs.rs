@@ -1,4 +1,4 @@
-//! Work that takes time, each on a thread of its own.
+//! Long-running jobs, one thread each.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,7 +15,7 @@ use crate::store;
 use crate::text::causes;
 use crate::wizard::{Answer, CircleConfigurations, Event, Problem, Request, RequestId, RequestProgress};
 
-/// Starts a request; `false` if the system refuses a thread.
+/// Starts a request. Returns `false` if the system refuses a thread.
 pub(super) fn start(id: RequestId, request: Request, cancelled: Arc<AtomicBool>, events: Events) -> bool {
     let name = match &request {
         Request::Plan { .. } => "plan",
@@ -48,7 +48,7 @@ impl Job {
     }
 
     fn run(&self, request: Request) -> Answer {
-        // A search that is stopped has a plan all the same: the best so far.
+        // A search that is stopped still has a plan: the best so far.
         let is_search = matches!(request, Request::Plan { .. });
         let answer = match request {
             Request::LoadProfile { source } => load_profile(source),
@@ -57,7 +57,7 @@ impl Job {
             Request::PlanCircles { profile } => circles(&profile),
             Request::Identify(request) => self.identify(&request),
             Request::Model(request) => Ok(Answer::Modelled(Box::new(procedure::models::models(&request)))),
-            // These have threads of their own.
+            // Other threads carry these out.
             Request::Connect { .. } | Request::Measure(_) | Request::Deliver { .. } => Ok(Answer::Cancelled),
         };
         match answer {
@@ -70,12 +70,12 @@ impl Job {
 
     fn plan(&self, profile: &Profile, text: &str, request: &procedure::plan::PlanRequest) -> Result<Answer, Problem> {
         let keep_going = || !self.is_cancelled();
-        let told = |progress: procedure::plan::Progress| {
+        let report = |progress: procedure::plan::Progress| {
             self.events.offer(Event::Progress { id: self.id, progress: RequestProgress::Search(progress) });
         };
-        let summary = procedure::plan::plan(profile, text, request, &keep_going, &told).map_err(Problem::from)?;
+        let summary = procedure::plan::plan(profile, text, request, &keep_going, &report).map_err(Problem::from)?;
         let rows = procedure::plan::rows(&summary, &procedure::joint_types(profile));
-        // Which set a search has when it is stopped depends on the machine: the seed does not bring it back.
+        // The set that a search has when it is stopped depends on the machine, so the seed does not reproduce it.
         let end = if self.is_cancelled() { "; the search was stopped before its end" } else { "" };
         let origin = format!("chosen from {} candidates, seed {}{end}", request.candidates, request.seed);
         Ok(Answer::Planned { summary: Some(Box::new(summary)), rows, origin })
@@ -90,7 +90,7 @@ impl Job {
     }
 }
 
-/// The text of a file.
+/// Reads a text file.
 fn read(path: &Path) -> Result<String, Problem> {
     let bytes = store::read(path).map_err(|error| Problem { message: causes(&error), hints: Vec::new() })?;
     String::from_utf8(bytes).map_err(|_error| Problem {

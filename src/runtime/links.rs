@@ -21,27 +21,27 @@ use crate::session::set_up::{InstrumentChoice, RecordedSet};
 use crate::store;
 use crate::wizard::{Answer, Event, Notice, Problem, RequestId};
 
-/// Commands that wait; the wizard never has more than one under way.
-const WAITING: usize = 4;
+/// Capacity of the channel of commands; the wizard never has more than one request running.
+const COMMAND_CAPACITY: usize = 4;
 
-/// A link is looked at so often while nothing is measured.
-const WATCH: Duration = Duration::from_millis(100);
+/// Interval at which a link is polled while nothing is measured.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 enum Command {
     Connect { id: RequestId, instrument: InstrumentChoice, profile: Box<Profile>, cancelled: Arc<AtomicBool> },
     Measure { id: RequestId, request: MeasureRequest, cancelled: Arc<AtomicBool> },
 }
 
-/// The thread's channel. The thread ends with it; nobody waits for an instrument that does not answer.
+/// The channel of the link thread. The thread ends with it; the engine does not wait for an instrument that does not answer.
 #[derive(Debug)]
 pub(super) struct LinkThread {
     commands: SyncSender<Command>,
 }
 
 impl LinkThread {
-    /// `log` takes every byte of instruments on a wire.
+    /// Starts the thread. `log` takes every byte from and to instruments.
     pub(super) fn start(events: Events, log: Option<RawLog>) -> io::Result<Self> {
-        let (commands, received) = sync_channel(WAITING);
+        let (commands, received) = sync_channel(COMMAND_CAPACITY);
         thread::Builder::new().name("link".to_owned()).spawn(move || work(&received, &events, log.as_ref()))?;
         Ok(Self { commands })
     }
@@ -84,7 +84,7 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
                 let keep_going = || {
                     // Show the live view during the measurement, at most once per interval.
                     if let Some(live) = live_poll.as_ref().map(|poll| poll())
-                        && live.seconds >= shown.get() + WATCH.as_secs_f64()
+                        && live.seconds >= shown.get() + POLL_INTERVAL.as_secs_f64()
                     {
                         shown.set(live.seconds);
                         events.offer(Event::Live(live));
@@ -117,7 +117,7 @@ fn next(commands: &Receiver<Command>, link: Option<&mut (dyn Link + 'static)>, e
             events.offer(Event::Remark(remark(event)));
         }
         // A command interrupts the wait for the next poll.
-        match commands.recv_timeout(WATCH) {
+        match commands.recv_timeout(POLL_INTERVAL) {
             Ok(command) => return Some(command),
             Err(RecvTimeoutError::Disconnected) => return None,
             Err(RecvTimeoutError::Timeout) => {}
@@ -189,8 +189,8 @@ fn connect(
     }
 }
 
-/// Several tables played as one instrument. Where a pose of a later table has the name of an earlier one, the name of its table
-/// is put before it.
+/// Several tables that are played as one instrument. A pose of a later table whose name is taken gets the name of its table as a
+/// prefix.
 struct Recordings {
     played: Vec<(Replay, Vec<PlannedPose>)>,
 }

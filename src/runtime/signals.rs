@@ -1,7 +1,7 @@
-//! Signals that end the program: turned into an event, so that the session is closed in good order.
+//! Turns signals that end the program into an event, so that the session is closed in good order.
 //!
-//! A script may end its engine and go on with another one ([`Received::follow`]): the event goes to whichever runs, and one that
-//! came between the two is not lost.
+//! A script may end its engine and continue with another one ([`SignalWatch::redirect`]): the event goes to the one that runs,
+//! and a signal between the two is not lost.
 
 use std::io;
 use std::sync::atomic::{AtomicI32, Ordering};
@@ -14,60 +14,60 @@ use signal_hook::iterator::Signals;
 use super::events::Events;
 use crate::wizard::Event;
 
-/// Which signal has arrived, and who is told.
+/// Remembers the last signal and reports it to an engine.
 #[derive(Clone, Debug)]
-pub struct Received {
-    /// 0: none.
+pub struct SignalWatch {
+    /// Number of the last signal; 0: none.
     number: Arc<AtomicI32>,
     engine: Arc<Mutex<Events>>,
 }
 
-impl Received {
-    /// Number of the signal.
+impl SignalWatch {
+    /// Returns the number of the last signal.
     pub fn signal(&self) -> Option<i32> {
         Some(self.number.load(Ordering::SeqCst)).filter(|signal| *signal != 0)
     }
 
-    /// From now on this engine is told; at once if a signal has arrived already.
-    pub fn follow(&self, events: Events) {
+    /// Reports to this engine from now on; at once if a signal has already arrived.
+    pub fn redirect(&self, events: Events) {
         *self.engine.lock().unwrap_or_else(PoisonError::into_inner) = events;
         if let Some(signal) = self.signal() {
-            self.tell(signal);
+            self.report(signal);
         }
     }
 
-    fn tell(&self, signal: i32) {
+    fn report(&self, signal: i32) {
         let cause = match signal {
             SIGINT => "interrupted (SIGINT)",
             SIGTERM => "terminated (SIGTERM)",
             _ => "the terminal went away (SIGHUP)",
         };
         let events = self.engine.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        // An engine that is gone has ended in good order; the next one, if any, is told when it is followed.
+        // An engine that is gone has ended in good order; the next one, if any, gets the signal from `redirect`.
         events.send(Event::Shutdown { cause: cause.to_owned() });
     }
 }
 
-/// Watches SIGINT, SIGTERM and SIGHUP on a thread of its own.
+/// Reports SIGINT, SIGTERM and SIGHUP to an engine, from a thread of its own.
 ///
 /// # Errors
 /// The system refuses.
-pub fn watch(events: Events) -> io::Result<Received> {
-    let received = Received { number: Arc::default(), engine: Arc::new(Mutex::new(events)) };
-    let noted = received.clone();
-    each(move |signal| {
+pub fn watch(events: Events) -> io::Result<SignalWatch> {
+    let watch = SignalWatch { number: Arc::default(), engine: Arc::new(Mutex::new(events)) };
+    let noted = watch.clone();
+    on_signal(move |signal| {
         noted.number.store(signal, Ordering::SeqCst);
-        noted.tell(signal);
+        noted.report(signal);
     })?;
-    Ok(received)
+    Ok(watch)
 }
 
-/// Has every SIGINT, SIGTERM and SIGHUP told, on a thread of its own.
+/// Calls `handle` for every SIGINT, SIGTERM and SIGHUP, on a thread of its own.
 ///
 /// # Errors
 /// The system refuses.
-pub fn each(tell: impl Fn(i32) + Send + 'static) -> io::Result<()> {
+pub fn on_signal(handle: impl Fn(i32) + Send + 'static) -> io::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
-    thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(tell))?;
+    thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(handle))?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The thread that writes: the only one that touches the session's folder.
+//! The thread that writes the journal and the result files of a session.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,10 +11,10 @@ use crate::store::session::{SessionError, SessionFolder};
 use crate::text::causes;
 use crate::wizard::{Answer, Event, Problem, RequestId, StoreEvent};
 
-/// Commands that wait; the wizard never has more than one under way.
-const WAITING: usize = 4;
+/// Capacity of the channel of commands; the wizard never has more than one request running.
+const COMMAND_CAPACITY: usize = 4;
 
-/// What the thread is asked for.
+/// A request to the thread.
 #[derive(Debug)]
 pub(super) enum Command {
     Create { id: RequestId, name: String },
@@ -22,7 +22,7 @@ pub(super) enum Command {
     Replace { id: RequestId, files: Vec<(String, String)>, left_out: Vec<String> },
 }
 
-/// The thread with its channel.
+/// The store thread with its channel.
 #[derive(Debug)]
 pub(super) struct StoreThread {
     commands: Option<SyncSender<Command>>,
@@ -30,22 +30,20 @@ pub(super) struct StoreThread {
 }
 
 impl StoreThread {
-    /// Begins with a folder that is held already, or makes one below `root` when asked.
+    /// Starts with a folder that is already held, or creates one below `root` on request.
     pub(super) fn start(root: PathBuf, folder: Option<SessionFolder>, events: Events) -> io::Result<Self> {
-        let (commands, received) = sync_channel(WAITING);
+        let (commands, received) = sync_channel(COMMAND_CAPACITY);
         let thread =
             thread::Builder::new().name("store".to_owned()).spawn(move || work(&root, folder, &received, &events))?;
         Ok(Self { commands: Some(commands), thread: Some(thread) })
     }
 
-    /// Asks; `false` if the thread is gone.
+    /// Sends a request. Returns `false` if the thread is gone.
     pub(super) fn ask(&self, command: Command) -> bool {
         self.commands.as_ref().is_some_and(|commands| commands.send(command).is_ok())
     }
-}
 
-impl StoreThread {
-    /// Does what was asked for before, gives the folder back and ends.
+    /// Carries out all requests, releases the folder and ends.
     pub(super) fn finish(&mut self) {
         self.commands = None;
         if let Some(thread) = self.thread.take() {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::expectation::Check;
 use super::grammar::{OnFinding, Script, ScriptStep};
 use super::transcript::Transcript;
-use crate::runtime::{Engine, Happening};
+use crate::runtime::{Engine, Output};
 use crate::session::state::Session;
 use crate::session::summary::IdentificationSummary;
 use crate::text::shortened;
@@ -258,15 +258,15 @@ impl<'a, W: Write> Runner<'a, W> {
     }
 
     fn report(&mut self) -> io::Result<()> {
-        let happenings: Vec<Happening> = self.engine.happenings().collect();
-        for happening in happenings {
-            match happening {
-                Happening::Written(lines) => {
+        let outputs: Vec<Output> = self.engine.outputs().collect();
+        for output in outputs {
+            match output {
+                Output::Saved(lines) => {
                     for line in lines {
                         self.transcript.entry(line.number, line.time, &line.entry.describe())?;
                     }
                 }
-                Happening::Told(notice) => {
+                Output::Notice(notice) => {
                     let hints: Vec<String> = notice.hints.iter().map(|hint| format!(" | hint: {hint}")).collect();
                     self.transcript.event("notice", &format!("{}{}", notice.what, hints.concat()))?;
                 }

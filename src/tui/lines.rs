@@ -55,7 +55,7 @@ pub fn run(
         engine.shut_down("the output cannot be written");
     }
     while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
-    at_end(engine.deeds());
+    at_end(engine.completed_intents());
     let remarks = engine.end_recording().into_iter().collect();
     let wizard = engine.wizard();
     Ok(Exit {
@@ -145,7 +145,7 @@ impl<W: Write> Driver<'_, W> {
             self.engine.wait(IDLE);
         }
         // They are not used here and must not pile up.
-        self.engine.happenings().for_each(drop);
+        self.engine.outputs().for_each(drop);
         Ok(())
     }
 

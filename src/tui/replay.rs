@@ -224,7 +224,7 @@ pub fn run(mut replay: Replay, options: Options) -> io::Result<Option<i32>> {
     let (waker, woken) = sync_channel(1);
     let received = Arc::new(AtomicI32::new(0));
     let noted = (Arc::clone(&received), waker.clone());
-    signals::each(move |signal| {
+    signals::on_signal(move |signal| {
         noted.0.store(signal, Ordering::SeqCst);
         wake(&noted.1);
     })?;

@@ -38,7 +38,7 @@ fn an_identification_from_files_is_recorded() {
     assert_eq!(fs::read(place.path("measured.csv")).unwrap(), table.stdout);
     let output = place.run(&["plan", "--profile", "soochow", "--record", "measured.csv"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("'measured.csv' is there already and is no recording"));
+    assert!(text(&output.stderr).contains("'measured.csv' already exists and is not a recording"));
     // Nor is the recording of another program.
     let other = place.path("other.rrd");
     drop(rerun::RecordingStreamBuilder::new("other_program").enabled(true).save(&other).unwrap());

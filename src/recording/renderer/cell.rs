@@ -1,4 +1,4 @@
-//! What does not move: floor, base, tracker, boxes, and the castings and axes that move with the frames of the arm.
+//! The cell: floor, base, boxes to keep out of, and the arm at a pose.
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rerun::{
@@ -12,14 +12,14 @@ use crate::profile::{Capsule, Profile};
 use crate::recording::canvas::{Canvas, Moment};
 use crate::recording::latin::plain;
 use crate::recording::posture::{Posture, reach, rest};
-use crate::recording::{layout, names};
+use crate::recording::{names, style};
 
-/// Lines of the floor are this far apart (m).
+/// Distance between the lines of the floor (m).
 const FLOOR_STEP: f64 = 0.5;
 
 /// Draws the cell of `profile` and its arm in the middle of its ranges.
 pub(super) fn draw(canvas: &mut Canvas, profile: &Profile, station: &Station) {
-    canvas.fix(names::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP());
+    canvas.draw_static(names::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP());
     floor(canvas, profile);
     station.draw(canvas, profile);
     keep_out(canvas, profile);
@@ -30,40 +30,40 @@ pub(super) fn draw(canvas: &mut Canvas, profile: &Profile, station: &Station) {
     pose(canvas, profile, station, &rest(profile), Moment::search(0));
 }
 
-/// Looks that never change are said once: every row is smaller without them.
+/// Draws radii and colours that never change once for all rows, which are smaller without them.
 fn styles(canvas: &mut Canvas, profile: &Profile) {
-    let beam = LineStrips3D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([layout::TRACKER]);
-    canvas.fix(names::BEAM, &beam);
+    let beam = LineStrips3D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([style::TRACKER]);
+    canvas.draw_static(names::BEAM, &beam);
     let points =
         |size: f32, color| Points3D::update_fields().with_radii([Radius::new_ui_points(size)]).with_colors([color]);
-    // Names of dozens of points would cover the picture: they are shown of the one that is pointed at.
+    // The names of dozens of points would cover the picture. The viewer shows the one that is pointed at.
     let measured = Points3D::update_fields().with_radii([Radius::new_ui_points(4.0)]).with_show_labels(false);
-    canvas.fix(names::MEASURED, &measured);
-    canvas.fix(names::NEXT, &points(7.0, layout::ATTENTION));
-    canvas.fix(names::UNUSED, &points(5.0, layout::OUT));
+    canvas.draw_static(names::MEASURED, &measured);
+    canvas.draw_static(names::NEXT, &points(7.0, style::ATTENTION));
+    canvas.draw_static(names::UNUSED, &points(5.0, style::OUT));
     if profile.bodies().is_empty() {
-        canvas.fix(names::NOMINAL_SKELETON, &skeleton_style(profile, layout::NOMINAL));
+        canvas.draw_static(names::NOMINAL_SKELETON, &skeleton_style(profile, style::NOMINAL));
     }
 }
 
-/// How the line through the joints of an arm without castings looks.
+/// Returns the radius and colour of the line through the joints of an arm without castings.
 pub(super) fn skeleton_style(profile: &Profile, color: Color) -> LineStrips3D {
-    let radius = layout::single(0.02 * reach(profile));
+    let radius = style::single(0.02 * reach(profile));
     LineStrips3D::update_fields().with_radii([radius]).with_colors([color])
 }
 
-/// The line through the joints of an arm without castings.
+/// Returns the line through the joints of an arm without castings.
 pub(super) fn skeleton(posture: &Posture) -> LineStrips3D {
-    LineStrips3D::update_fields().with_strips([posture.line.iter().map(layout::at).collect::<Vec<_>>()])
+    LineStrips3D::update_fields().with_strips([posture.line.iter().map(style::at).collect::<Vec<_>>()])
 }
 
-/// The nominal arm at the pendant configuration `q` ((rad) or (m)), with the beam to its reflector.
+/// Draws the nominal arm at the pendant configuration `q` ((rad) or (m)), with the beam to its reflector.
 pub(super) fn pose(canvas: &mut Canvas, profile: &Profile, station: &Station, q: &[f64], moment: Moment) {
     let posture = Posture::nominal(profile, q);
     for (index, frame) in posture.frames.iter().enumerate() {
-        canvas.draw(moment, names::NOMINAL_FRAMES, &layout::frame(frame, &names::frame("nominal", index)));
+        canvas.draw(moment, names::NOMINAL_FRAMES, &style::frame(frame, &names::frame("nominal", index)));
     }
-    // The timeline of clock times shows the arm and the points: more would make every file larger.
+    // The timeline of clock times shows only the arm and the points, to keep files small.
     let lines = Moment { time: None, ..moment };
     if profile.bodies().is_empty() {
         canvas.draw(lines, names::NOMINAL_SKELETON, &skeleton(&posture));
@@ -80,23 +80,23 @@ fn floor(canvas: &mut Canvas, profile: &Profile) {
     let mut strips = Vec::new();
     let mut at = -side;
     while at <= side + FLOOR_STEP / 2.0 {
-        strips.push([layout::at(&Point3::new(at, -side, height)), layout::at(&Point3::new(at, side, height))]);
-        strips.push([layout::at(&Point3::new(-side, at, height)), layout::at(&Point3::new(side, at, height))]);
+        strips.push([style::at(&Point3::new(at, -side, height)), style::at(&Point3::new(at, side, height))]);
+        strips.push([style::at(&Point3::new(-side, at, height)), style::at(&Point3::new(side, at, height))]);
         at += FLOOR_STEP;
     }
-    let grid = LineStrips3D::new(strips).with_radii([Radius::new_ui_points(0.5)]).with_colors([layout::CELL]);
-    canvas.fix(names::FLOOR, &grid);
+    let grid = LineStrips3D::new(strips).with_radii([Radius::new_ui_points(0.5)]).with_colors([style::CELL]);
+    canvas.draw_static(names::FLOOR, &grid);
     // A pedestal where the robot stands above the floor, a plate where it does not.
     let plate = 0.09 * reach(profile);
     let top = height.max(-0.001);
     let (low, high) = if height < -0.02 { (height, 0.0) } else { (top - 0.02, top) };
     let base = Boxes3D::from_centers_and_half_sizes(
-        [layout::at(&Point3::new(0.0, 0.0, f64::midpoint(low, high)))],
-        [layout::vector(&Vector3::new(plate, plate, (high - low) / 2.0))],
+        [style::at(&Point3::new(0.0, 0.0, f64::midpoint(low, high)))],
+        [style::vector(&Vector3::new(plate, plate, (high - low) / 2.0))],
     )
-    .with_colors([layout::CELL])
+    .with_colors([style::CELL])
     .with_fill_mode(FillMode::Solid);
-    canvas.fix(names::BASE, &base);
+    canvas.draw_static(names::BASE, &base);
 }
 
 fn keep_out(canvas: &mut Canvas, profile: &Profile) {
@@ -104,17 +104,17 @@ fn keep_out(canvas: &mut Canvas, profile: &Profile) {
     if boxes.is_empty() {
         return;
     }
-    let centres = boxes.iter().map(|one| layout::at(&nalgebra::center(&one.min, &one.max)));
-    let halves = boxes.iter().map(|one| layout::vector(&((one.max - one.min) / 2.0)));
+    let centres = boxes.iter().map(|one| style::at(&nalgebra::center(&one.min, &one.max)));
+    let halves = boxes.iter().map(|one| style::vector(&((one.max - one.min) / 2.0)));
     let names: Vec<String> = boxes.iter().map(|one| plain(&one.name)).collect();
     let drawn = Boxes3D::from_centers_and_half_sizes(centres, halves)
-        .with_colors([layout::OUT])
+        .with_colors([style::OUT])
         .with_radii([Radius::new_ui_points(1.5)])
         .with_labels(names);
-    canvas.fix(names::KEEP_OUT, &drawn);
+    canvas.draw_static(names::KEEP_OUT, &drawn);
 }
 
-/// Castings and joint axes of the nominal arm, fixed to its frames: one entity per frame.
+/// Draws castings and joint axes of the nominal arm, attached to its frames: one entity per frame.
 fn arm(canvas: &mut Canvas, profile: &Profile) {
     // A joint turns about or slides along the z axis of the frame before it, or of its own.
     let before = usize::from(profile.chain().convention() == Convention::Modified);
@@ -122,16 +122,16 @@ fn arm(canvas: &mut Canvas, profile: &Profile) {
     for frame in 0..=profile.chain().dof() + 1 {
         let name = CoordinateFrame::new(names::frame("nominal", frame));
         let bodies: Vec<&Capsule> = profile.bodies().iter().filter(|body| body.link == frame).collect();
-        let castings = capsules(&bodies, layout::NOMINAL)
-            .with_translations(bodies.iter().map(|body| layout::at(&body.from)))
-            .with_quaternions(bodies.iter().map(|body| layout::quaternion(&along(body).1)))
+        let castings = capsules(&bodies, style::NOMINAL)
+            .with_translations(bodies.iter().map(|body| style::at(&body.from)))
+            .with_quaternions(bodies.iter().map(|body| style::quaternion(&along(body).1)))
             .with_fill_mode(FillMode::Solid);
         let joint = frame.checked_sub(before).and_then(|index| profile.chain().joints().get(index));
         let axis = joint.map(|joint| {
-            Arrows3D::from_vectors([layout::vector(&Vector3::new(0.0, 0.0, 2.0 * half))])
-                .with_origins([layout::vector(&Vector3::new(0.0, 0.0, -half))])
+            Arrows3D::from_vectors([style::vector(&Vector3::new(0.0, 0.0, 2.0 * half))])
+                .with_origins([style::vector(&Vector3::new(0.0, 0.0, -half))])
                 .with_radii([Radius::new_ui_points(1.0)])
-                .with_colors([layout::AXIS])
+                .with_colors([style::AXIS])
                 .with_labels([plain(&joint.name)])
         });
         let mut parts: Vec<&dyn AsComponents> = vec![&name];
@@ -142,33 +142,33 @@ fn arm(canvas: &mut Canvas, profile: &Profile) {
             parts.push(axis);
         }
         if parts.len() > 1 {
-            canvas.fix(&format!("{}/{frame}", names::NOMINAL_LINKS), &parts);
+            canvas.draw_static(&format!("{}/{frame}", names::NOMINAL_LINKS), &parts);
         }
     }
 }
 
-/// Sizes and colour of castings.
+/// Returns castings with their sizes and colour.
 fn capsules(bodies: &[&Capsule], color: Color) -> Capsules3D {
     Capsules3D::from_lengths_and_radii(
-        bodies.iter().map(|body| layout::single(along(body).0)),
-        bodies.iter().map(|body| layout::single(body.radius)),
+        bodies.iter().map(|body| style::single(along(body).0)),
+        bodies.iter().map(|body| style::single(body.radius)),
     )
     .with_colors([color])
 }
 
-/// How the identified arm with its enlarged deviations looks: glassy, so that the nominal arm is seen in it.
+/// Draws the looks of the identified arm with its enlarged deviations: glassy, so that the nominal arm is visible inside.
 pub(super) fn enlarged_style(canvas: &mut Canvas, profile: &Profile) {
     if profile.bodies().is_empty() {
-        canvas.fix(names::ENLARGED, &skeleton_style(profile, layout::IDENTIFIED));
+        canvas.draw_static(names::ENLARGED, &skeleton_style(profile, style::IDENTIFIED));
     } else {
         let bodies: Vec<&Capsule> = profile.bodies().iter().collect();
-        let castings = capsules(&bodies, layout::IDENTIFIED).with_fill_mode(FillMode::TransparentFillMajorWireframe);
-        canvas.fix(names::ENLARGED, &castings);
+        let castings = capsules(&bodies, style::IDENTIFIED).with_fill_mode(FillMode::TransparentFillMajorWireframe);
+        canvas.draw_static(names::ENLARGED, &castings);
     }
 }
 
-/// The identified arm with its enlarged deviations at a pose. All castings are one entity, placed in the base: that takes a
-/// third of the room that frames would.
+/// Draws the identified arm with its enlarged deviations at a pose. All castings are one entity, placed in the base, which takes a
+/// third of the bytes that frames would.
 pub(super) fn enlarged(canvas: &mut Canvas, profile: &Profile, posture: &Posture, moment: Moment) {
     if profile.bodies().is_empty() {
         canvas.draw(moment, names::ENLARGED, &skeleton(posture));
@@ -183,12 +183,12 @@ pub(super) fn enlarged(canvas: &mut Canvas, profile: &Profile, posture: &Posture
         })
         .collect();
     let castings = Capsules3D::update_fields()
-        .with_translations(placed.iter().map(|place| layout::vector(&place.translation.vector)))
-        .with_quaternions(placed.iter().map(|place| layout::quaternion(&place.rotation)));
+        .with_translations(placed.iter().map(|place| style::vector(&place.translation.vector)))
+        .with_quaternions(placed.iter().map(|place| style::quaternion(&place.rotation)));
     canvas.draw(moment, names::ENLARGED, &castings);
 }
 
-/// Length of the line of a capsule (m), and the rotation from +z onto it.
+/// Returns the length of the line of a capsule (m), and the rotation from +z onto it.
 fn along(body: &Capsule) -> (f64, UnitQuaternion<f64>) {
     let line = body.to - body.from;
     let length = line.norm();

@@ -1,5 +1,5 @@
-//! Texts of the recording: what the session is, how to read the picture, and the result. Plain Latin letters only: some viewers
-//! cannot draw others.
+//! Texts of the recording: the session, a guide to the picture, and the result. They are in plain Latin letters, because some
+//! viewers cannot draw others.
 
 use jiff::Timestamp;
 use rerun::{AnyValues, TextDocument};
@@ -10,12 +10,12 @@ use crate::session::journal::IdentifiedText;
 use crate::session::state::Session;
 use crate::session::summary::{ModelSummary, StatisticsSummary, VerdictStatus};
 
-/// How to read the picture.
+/// The guide to the picture.
 const GUIDE: &str = "\
 # How to read this recording
 
 Drag the time cursor along **pose**: the arm goes from measurement to measurement. The timeline counts measurements: a pose that
-is measured again has several. Which pose of the plan it was says the log, and the name of the measured point.
+is measured again appears several times. The log and the name of the measured point say which pose of the plan it is.
 
 | in the picture | what it is |
 |---|---|
@@ -24,42 +24,42 @@ is measured again has several. Which pose of the plan it was says the log, and t
 | red arrows | errors of the nominal arm, enlarged |
 | green arrows | errors of the identified arm, enlarged much more |
 | white, blue points | measured for identification, for verification |
-| yellow points | next pose, or a sample in doubt |
-| small grey points | poses of the plan that wait |
-| brown points | skipped, or left out |
+| yellow points | next pose, or a questioned sample |
+| small grey points | poses of the plan that are not measured yet |
+| brown points | skipped poses, excluded samples |
 | violet | tracker and beam: as planned, from the fourth point on as measured |
 
-How much is enlarged stands above the robot. Errors are measured less predicted, in the robot base, after the tracker was
+The factors of enlargement are shown above the robot. Errors are measured less predicted, in the robot base, after the tracker was
 registered to each arm.
 
 Choose the timeline **solver_iteration** to see the arm bend from nominal to identified while the errors shrink, and
 **plan_iteration** to see the search for poses; **time** is the clock. The worst pairs and the uncertainty of positions are
 switched on in the list of entities on the left (open it with the button at the top right).
 
-The maps of all pairs show the size of every distance error: row and column are samples, the brighter the larger.
+The maps of all pairs show the size of every distance error: rows and columns are samples, brighter means larger.
 
-*fit* marks samples that the identification has used: their errors are residuals, not accuracy. Accuracy is what
+*fit* marks samples that the identification used: their errors are residuals, not accuracy. Accuracy is what
 *verification* shows.
 ";
 
-/// The first texts of a session.
+/// Draws the texts that a session starts with.
 pub(super) fn opening(canvas: &mut Canvas, program: &str, name: &str, opened: Timestamp) {
     let about = AnyValues::default()
         .with_component_from_data("program", text(program))
         .with_component_from_data("session", text(name))
         .with_component_from_data("opened", text(&opened.to_string()));
-    canvas.fix(names::SESSION_PROPERTIES, &about);
-    canvas.fix(names::GUIDE, &TextDocument::from_markdown(GUIDE));
+    canvas.draw_static(names::SESSION_PROPERTIES, &about);
+    canvas.draw_static(names::GUIDE, &TextDocument::from_markdown(GUIDE));
     let waiting = format!("# {}\n\nNot identified yet.\n", plain(name));
-    canvas.fix(names::REPORT, &TextDocument::from_markdown(waiting));
+    canvas.draw_static(names::REPORT, &TextDocument::from_markdown(waiting));
 }
 
-/// A text as the library stores it.
+/// Returns a text as an array of the library.
 fn text(value: &str) -> std::sync::Arc<dyn rerun::external::arrow::array::Array> {
     std::sync::Arc::new(rerun::external::arrow::array::StringArray::from(vec![plain(value)]))
 }
 
-/// The result.
+/// Draws the report on a result.
 pub(super) fn report(canvas: &mut Canvas, session: &Session, identified: &IdentifiedText, time: Timestamp) {
     let summary = &identified.summary;
     let about = AnyValues::default()
@@ -68,8 +68,8 @@ pub(super) fn report(canvas: &mut Canvas, session: &Session, identified: &Identi
         .with_component_from_data("profile_sha256", text(&summary.provenance.profile_sha256))
         .with_component_from_data("verdict", text(verdict(summary.verdict.status)))
         .with_component_from_data("identified", text(&time.to_string()));
-    canvas.fix(names::RESULT_PROPERTIES, &about);
-    canvas.fix(names::REPORT, &TextDocument::from_markdown(plain(&markdown(session, identified, time))));
+    canvas.draw_static(names::RESULT_PROPERTIES, &about);
+    canvas.draw_static(names::REPORT, &TextDocument::from_markdown(plain(&markdown(session, identified, time))));
 }
 
 const fn verdict(status: VerdictStatus) -> &'static str {

@@ -1,4 +1,4 @@
-//! A sample: the arm at its pose, the point, and what was known about it.
+//! A sample: the arm at its pose, the measured point, and the plotted figures.
 
 use jiff::Timestamp;
 use nalgebra::Point3;
@@ -10,25 +10,25 @@ use crate::profile::Profile;
 use crate::recording::canvas::Canvas;
 use crate::recording::latin::plain;
 use crate::recording::posture::Posture;
-use crate::recording::{layout, names};
+use crate::recording::{names, style};
 use crate::session::journal::MeasuredText;
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, Session};
 use crate::units::to_mm;
 
-/// Draws a sample that `session` has taken already.
+/// Draws a sample that is already in `session`.
 pub(super) fn sample(canvas: &mut Canvas, session: &Session, station: &Station, noted: &MeasuredText, time: Timestamp) {
     let (Some(profile), Some(sample)) = (session.mounted_profile(), session.sample(noted.number)) else { return };
     let moment = pose_moment(noted.number, time);
     let q = session.configuration_of(sample);
     cell::pose(canvas, &profile, station, &q, moment);
     let color = match session.kind_of(sample) {
-        _ if !noted.findings.is_empty() => layout::ATTENTION,
-        PoseKind::Verification => layout::VERIFICATION,
-        _ => layout::DONE,
+        _ if !noted.findings.is_empty() => style::ATTENTION,
+        PoseKind::Verification => style::VERIFICATION,
+        _ => style::DONE,
     };
     let dot = Points3D::update_fields()
-        .with_positions([layout::at(&place(session, &profile, station, sample))])
+        .with_positions([style::at(&place(session, &profile, station, sample))])
         .with_colors([color])
         .with_labels([plain(&format!("pose {}", session.pose_of(sample)))]);
     canvas.draw(moment, names::MEASURED, &dot);
@@ -50,8 +50,8 @@ pub(super) fn sample(canvas: &mut Canvas, session: &Session, station: &Station, 
     }
 }
 
-/// Where the point is in the base: the tracker is registered to the nominal arm by the samples so far; before there are
-/// enough of them, where the nominal arm has it.
+/// Returns the point in the base. The samples so far register the tracker to the nominal arm; before there are enough of them, it
+/// is where the nominal arm puts the reflector.
 fn place(session: &Session, profile: &Profile, station: &Station, sample: &Sample) -> Point3<f64> {
     let registered = station.base_from_tracker().map(|base_from_tracker| base_from_tracker * session.point_of(sample));
     let is_finite = |point: &Point3<f64>| point.coords.iter().all(|value| value.is_finite());
@@ -60,7 +60,7 @@ fn place(session: &Session, profile: &Profile, station: &Station, sample: &Sampl
         .unwrap_or_else(|| Posture::nominal(profile, &session.configuration_of(sample)).reflector)
 }
 
-/// How far a repeated pose is from its first measurement (mm).
+/// Returns the distance (mm) of a repeated pose from its first measurement.
 fn drift(session: &Session, sample: &Sample) -> Option<f64> {
     let pose = session.pose_of(sample);
     let first = session.counted().find(|other| session.pose_of(other) == pose)?;

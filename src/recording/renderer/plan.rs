@@ -1,4 +1,4 @@
-//! Poses that wait, are next or are not used, and how the search for them went on.
+//! The poses of the plan, and the search that found them.
 
 use nalgebra::Point3;
 use rerun::{Points3D, Radius, Scalars};
@@ -7,7 +7,7 @@ use crate::planning::Figures;
 use crate::recording::canvas::{Canvas, Moment};
 use crate::recording::latin::plain;
 use crate::recording::posture::Posture;
-use crate::recording::{layout, names};
+use crate::recording::{names, style};
 use crate::session::state::{SampleState, Session};
 use crate::units::to_mm;
 
@@ -21,19 +21,20 @@ pub(super) fn search(canvas: &mut Canvas, steps: &[Figures]) {
     }
 }
 
-/// Where the poses of the plan are. Those that are measured are covered by their points.
+/// Draws the poses of the plan that are not skipped. Measured points cover theirs.
 pub(super) fn poses(canvas: &mut Canvas, session: &Session) {
     let Some(profile) = session.mounted_profile() else { return };
     let planned = session.rows.iter().filter(|row| !row.skipped);
     let places = planned.map(|row| Posture::nominal(&profile, &row.planned.configuration).reflector);
-    let points = Points3D::new(places.map(|place| layout::at(&place)))
+    let points = Points3D::new(places.map(|place| style::at(&place)))
         .with_radii([Radius::new_ui_points(2.5)])
-        .with_colors([layout::LEFT]);
-    canvas.fix(names::PLAN, &points);
+        .with_colors([style::LEFT]);
+    canvas.draw_static(names::PLAN, &points);
 }
 
-/// Which pose is next, and what is not used. `is_new`: something may be used again.
-pub(super) fn points(canvas: &mut Canvas, session: &Session, is_new: bool) {
+/// Draws the next pose, and what is not used. `is_changed`: something may be in use again, so the unused points are drawn even if
+/// there are none.
+pub(super) fn points(canvas: &mut Canvas, session: &Session, is_changed: bool) {
     let Some(profile) = session.mounted_profile() else { return };
     let at = |q: &[f64]| Posture::nominal(&profile, q).reflector;
     let moment = Moment::pose(session.measurements);
@@ -41,7 +42,7 @@ pub(super) fn points(canvas: &mut Canvas, session: &Session, is_new: bool) {
     let shown = session.shown.and_then(|shown| open.iter().find(|row| **row >= shown)).or_else(|| open.first());
     let next = shown.and_then(|row| session.rows.get(*row)).map(|row| &row.planned);
     let point = Points3D::update_fields()
-        .with_positions(next.map(|next| layout::at(&at(&next.configuration))))
+        .with_positions(next.map(|next| style::at(&at(&next.configuration))))
         .with_labels(next.map(|next| plain(&format!("next: {}", next.pose))));
     canvas.draw(moment, names::NEXT, &point);
     let skipped = session.rows.iter().filter(|row| row.skipped).map(|row| row.planned.configuration.clone());
@@ -51,7 +52,7 @@ pub(super) fn points(canvas: &mut Canvas, session: &Session, is_new: bool) {
         .filter(|sample| matches!(sample.state, SampleState::LeftOut | SampleState::Undone))
         .map(|sample| session.configuration_of(sample));
     let unused: Vec<Point3<f64>> = skipped.chain(out).map(|q| at(&q)).collect();
-    if is_new || !unused.is_empty() {
-        canvas.draw(moment, names::UNUSED, &Points3D::update_fields().with_positions(unused.iter().map(layout::at)));
+    if is_changed || !unused.is_empty() {
+        canvas.draw(moment, names::UNUSED, &Points3D::update_fields().with_positions(unused.iter().map(style::at)));
     }
 }

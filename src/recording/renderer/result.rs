@@ -1,4 +1,4 @@
-//! A result: both arms, their errors at every sample, and how the solver got there.
+//! A result: both arms, their errors at every sample, and the steps of the solver.
 
 use std::iter;
 
@@ -15,34 +15,34 @@ use crate::geometry::{enlargement, register};
 use crate::profile::Profile;
 use crate::recording::canvas::{Canvas, Moment};
 use crate::recording::posture::{Posture, reach, rest};
-use crate::recording::{layout, names};
+use crate::recording::{names, style};
 use crate::session::calibration::Calibration;
 use crate::session::journal::{IdentifiedText, PointErrorText, from_xyz_mm};
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, Session};
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
-/// Errors and differences are drawn up to this part of the arm's reach.
+/// Largest drawn length of errors and differences, as a fraction of the arm's reach.
 const SHOWN: f64 = 0.15;
-/// Ellipsoids are drawn up to this part of the arm's reach.
+/// Largest drawn half axis of ellipsoids, as a fraction of the arm's reach.
 const SHOWN_ELLIPSOID: f64 = 0.05;
-/// Pairs that are drawn.
+/// Number of pairs that are drawn.
 const WORST_PAIRS: usize = 12;
-/// Samples of the map of all pairs; more are thinned out evenly.
+/// Most samples in the map of all pairs; more are thinned out evenly.
 const MAP_SIZE: usize = 128;
 
-/// A sample with what it says about both arms (m).
+/// A sample with the errors of both arms (m).
 struct Judged<'a> {
     sample: &'a Sample,
-    /// Its configuration: pendant values ((rad) or (m)).
+    /// Pendant values ((rad) or (m)).
     q: Vec<f64>,
-    /// Measured, in the frame of the tracker.
+    /// Measured point in the frame of the tracker.
     point: Point3<f64>,
-    /// Measured, in the base of the identified arm.
+    /// Measured point in the base of the identified arm.
     measured: Point3<f64>,
-    /// Where the nominal arm has it, in its own registration.
+    /// Point of the nominal arm, in its own registration.
     nominal_at: Point3<f64>,
-    /// Where the identified arm has it.
+    /// Point of the identified arm.
     identified_at: Point3<f64>,
     nominal: Vector3<f64>,
     identified: Vector3<f64>,
@@ -80,7 +80,7 @@ pub(super) fn draw(
     note(canvas, &profile, &scales);
 }
 
-/// How many times larger things are drawn than they are.
+/// Factors by which things are drawn larger than they are.
 struct Scales {
     nominal: f64,
     identified: f64,
@@ -126,7 +126,7 @@ fn scale(profile: &Profile, lengths: impl Iterator<Item = f64>) -> f64 {
     enlargement(lengths.fold(0.0, f64::max), SHOWN * reach(profile))
 }
 
-/// How much the deviations of the arm are enlarged so that the difference is seen.
+/// Returns the factor by which the deviations of the arm are enlarged so that the difference is visible.
 fn arm_scale(profile: &Profile, calibration: &Calibration, judged: &[Judged<'_>]) -> f64 {
     let Ok(arm) = calibration.identified(profile) else { return 1.0 };
     let target = Point3::origin();
@@ -139,42 +139,42 @@ fn arm_scale(profile: &Profile, calibration: &Calibration, judged: &[Judged<'_>]
 }
 
 fn ellipsoid_scale(profile: &Profile, judged: &[Judged<'_>]) -> f64 {
-    let axes = judged.iter().filter_map(|one| covariance(one.text)).map(|one| layout::ellipsoid(&one).0.max());
+    let axes = judged.iter().filter_map(|one| covariance(one.text)).map(|one| style::ellipsoid(&one).0.max());
     enlargement(axes.fold(0.0, f64::max), SHOWN_ELLIPSOID * reach(profile))
 }
 
-/// An error as long as it is drawn. That of a rejected sample, which no scale is for, is cut.
+/// Returns an error as it is drawn. That of a rejected sample is cut, because the scale is not made for it.
 fn drawn_error(profile: &Profile, one: &Judged<'_>, error: &Vector3<f64>, scale: f64) -> Vector3<f64> {
     let drawn = error * scale;
     if one.text.rejected { drawn.cap_magnitude(SHOWN * reach(profile)) } else { drawn }
 }
 
-/// Errors as arrows from where the identified arm has the point. Not on the timeline of the solver, which has its own.
+/// Draws errors as arrows from the point of the identified arm. The timeline of the solver has arrows of its own.
 fn vectors(canvas: &mut Canvas, profile: &Profile, judged: &[Judged<'_>], scales: &Scales, time: Timestamp) {
     let moment = Moment { time: Some(time), ..Moment::pose(0) };
     let arrows = |scale: f64, pick: fn(&Judged<'_>) -> Vector3<f64>| {
         Arrows3D::update_fields()
-            .with_vectors(judged.iter().map(|one| layout::vector(&drawn_error(profile, one, &pick(one), scale))))
-            .with_origins(judged.iter().map(|one| layout::at(&one.identified_at)))
+            .with_vectors(judged.iter().map(|one| style::vector(&drawn_error(profile, one, &pick(one), scale))))
+            .with_origins(judged.iter().map(|one| style::at(&one.identified_at)))
     };
     let nominal = arrows(scales.nominal, |one| one.nominal);
     let identified = arrows(scales.identified, |one| one.identified);
     let all = [
-        (names::ERRORS_NOMINAL, nominal, layout::NOMINAL_ERROR),
-        (names::ERRORS_IDENTIFIED, identified, layout::IDENTIFIED),
+        (names::ERRORS_NOMINAL, nominal, style::NOMINAL_ERROR),
+        (names::ERRORS_IDENTIFIED, identified, style::IDENTIFIED),
     ];
     for (path, drawn, color) in all {
-        canvas.fix(path, &arrow_style(color));
+        canvas.draw_static(path, &arrow_style(color));
         canvas.draw(moment, path, &drawn);
     }
 }
 
-/// How arrows look.
+/// Returns the looks of arrows.
 fn arrow_style(color: Color) -> Arrows3D {
     Arrows3D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_colors([color])
 }
 
-/// The identified arm at every pose, as it is and enlarged.
+/// Draws the identified arm at every pose, true to scale and enlarged.
 fn arms(canvas: &mut Canvas, session: &Session, profile: &Profile, calibration: &Calibration, enlarged: f64) {
     let larger = calibration.parameters.iter().map(|parameter| parameter.deviation * enlarged);
     let (Ok(arm), Ok(bent)) = (calibration.identified(profile), calibration.identified_with(profile, larger)) else {
@@ -182,7 +182,7 @@ fn arms(canvas: &mut Canvas, session: &Session, profile: &Profile, calibration: 
     };
     cell::enlarged_style(canvas, profile);
     if let Some(target) = bent.targets.first() {
-        // Before the first pose, and while the search goes on.
+        // Before the first pose, and on the timeline of the search.
         let posture = Posture::new(&bent.chain, target, &rest(profile));
         cell::enlarged(canvas, profile, &posture, Moment::pose(0));
         cell::enlarged(canvas, profile, &posture, Moment::search(0));
@@ -194,13 +194,13 @@ fn arms(canvas: &mut Canvas, session: &Session, profile: &Profile, calibration: 
         let q = session.configuration_of(sample);
         let posture = Posture::new(&arm.chain, at, &q);
         for (index, frame) in posture.frames.iter().enumerate() {
-            canvas.draw(moment, names::IDENTIFIED_FRAMES, &layout::frame(frame, &names::frame("identified", index)));
+            canvas.draw(moment, names::IDENTIFIED_FRAMES, &style::frame(frame, &names::frame("identified", index)));
         }
         cell::enlarged(canvas, profile, &Posture::new(&bent.chain, bent_at, &q), moment);
     }
 }
 
-/// What became of a sample.
+/// The use that the identification made of a sample.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Group {
     Fit,
@@ -218,7 +218,7 @@ impl Group {
     }
 }
 
-/// Errors at each pose. What the identification has seen is a residual, and is named so.
+/// Plots errors at each pose. Those of samples that the identification used are residuals, and are named so.
 fn series(canvas: &mut Canvas, session: &Session, judged: &[Judged<'_>], run: usize) {
     let is_verification = |one: &Judged<'_>| session.kind_of(one.sample) == PoseKind::Verification;
     let group_of = |one: &Judged<'_>| match one.text.rejected {
@@ -237,17 +237,17 @@ fn series(canvas: &mut Canvas, session: &Session, judged: &[Judged<'_>], run: us
         // A rejected sample is compared with those that were used.
         let others = if group == Group::Rejected { &used } else { &members };
         for quantity in ["position", "distance"] {
-            for (arm, color) in [("nominal", layout::NOMINAL_ERROR), ("identified", layout::IDENTIFIED)] {
+            for (arm, color) in [("nominal", style::NOMINAL_ERROR), ("identified", style::IDENTIFIED)] {
                 let (path, name) = (names::errors(run, quantity, arm, suffix), format!("{arm}, {suffix}{again}"));
-                // Single ones are far apart: a line would invent what is between them.
+                // A line between verification samples, which are far apart, would suggest values between them.
                 let points =
                     |color| SeriesPoints::new().with_names([&*name]).with_colors([color]).with_marker_sizes([3.0]);
                 match group {
                     Group::Fit => {
-                        canvas.fix(&path, &SeriesLines::new().with_names([&*name]).with_colors([color]));
+                        canvas.draw_static(&path, &SeriesLines::new().with_names([&*name]).with_colors([color]));
                     }
-                    Group::Verification => canvas.fix(&path, &points(layout::VERIFICATION)),
-                    Group::Rejected => canvas.fix(&path, &points(layout::OUT)),
+                    Group::Verification => canvas.draw_static(&path, &points(style::VERIFICATION)),
+                    Group::Rejected => canvas.draw_static(&path, &points(style::OUT)),
                 }
             }
         }
@@ -266,7 +266,7 @@ fn series(canvas: &mut Canvas, session: &Session, judged: &[Judged<'_>], run: us
     }
 }
 
-/// Mean absolute distance error (m) of the pairs of one sample with all others, of both arms.
+/// Returns the mean absolute distance errors (m) of the pairs of one sample with all others, of both arms.
 fn distance_errors(one: &Judged<'_>, group: &[&Judged<'_>]) -> Option<(f64, f64)> {
     let others = group.iter().filter(|other| other.sample.noted.number != one.sample.noted.number);
     let (mut count, mut nominal, mut identified) = (0_u32, 0.0, 0.0);
@@ -279,16 +279,16 @@ fn distance_errors(one: &Judged<'_>, group: &[&Judged<'_>]) -> Option<(f64, f64)
     (count > 0).then(|| (nominal / f64::from(count), identified / f64::from(count)))
 }
 
-/// Distance errors (m) of a pair, measured less predicted: of the nominal and of the identified arm.
+/// Returns the distance errors (m) of a pair, measured less predicted: of the nominal and of the identified arm.
 fn pair(one: &Judged<'_>, other: &Judged<'_>) -> (f64, f64) {
     let measured = (one.point - other.point).norm();
     (measured - (one.nominal_at - other.nominal_at).norm(), measured - (one.identified_at - other.identified_at).norm())
 }
 
-/// The nominal or the identified one of two errors.
+/// Picks the nominal or the identified one of two errors.
 type Pick = fn(&(f64, f64)) -> f64;
 
-/// The worst pairs as lines, and the errors of all pairs as a picture.
+/// Draws the worst pairs as lines, and the errors of all pairs as a map.
 fn pairs(canvas: &mut Canvas, judged: &[Judged<'_>]) {
     let trusted: Vec<&Judged<'_>> = judged.iter().filter(|one| !one.text.rejected).collect();
     let step = trusted.len().div_ceil(MAP_SIZE).max(1);
@@ -299,7 +299,7 @@ fn pairs(canvas: &mut Canvas, judged: &[Judged<'_>]) {
     for (i, one) in shown.iter().enumerate() {
         for (j, other) in shown.iter().enumerate().filter(|(j, _)| *j != i) {
             let errors = pair(one, other);
-            // The other half would be the same.
+            // The map is symmetric: only one half is filled.
             if j > i {
                 maps.0[i * count + j] = micrometres(errors.0);
                 maps.1[i * count + j] = micrometres(errors.1);
@@ -313,7 +313,7 @@ fn pairs(canvas: &mut Canvas, judged: &[Judged<'_>]) {
     let shape = || vec![count as u64, count as u64];
     for (path, map) in [(names::MAP_NOMINAL, maps.0), (names::MAP_IDENTIFIED, maps.1)] {
         let data = TensorData::new(shape(), rerun::TensorBuffer::U16(map.into()));
-        canvas.fix(path, &Tensor::new(data).with_dim_names(["sample", "with sample"]));
+        canvas.draw_static(path, &Tensor::new(data).with_dim_names(["sample", "with sample"]));
     }
     let picks: [(&str, Pick); 2] =
         [(names::PAIRS_NOMINAL, |errors| errors.0), (names::PAIRS_IDENTIFIED, |errors| errors.1)];
@@ -321,23 +321,23 @@ fn pairs(canvas: &mut Canvas, judged: &[Judged<'_>]) {
         all.sort_by(|(one, ..), (other, ..)| pick(other).abs().total_cmp(&pick(one).abs()));
         let worst: Vec<_> = all.iter().take(WORST_PAIRS).collect();
         let largest = worst.first().map_or(1.0, |(errors, ..)| pick(errors).abs());
-        let strips = worst.iter().map(|(_, one, other)| [layout::at(&one.measured), layout::at(&other.measured)]);
+        let strips = worst.iter().map(|(_, one, other)| [style::at(&one.measured), style::at(&other.measured)]);
         let labels = worst.iter().map(|(errors, ..)| format!("{:+.3} mm", to_mm(pick(errors))));
         let lines = LineStrips3D::new(strips)
-            .with_colors(worst.iter().map(|(errors, ..)| layout::two_sided(pick(errors) / largest)))
+            .with_colors(worst.iter().map(|(errors, ..)| style::two_sided(pick(errors) / largest)))
             .with_radii([Radius::new_ui_points(1.5)])
             .with_labels(labels);
-        canvas.fix(path, &lines);
+        canvas.draw_static(path, &lines);
     }
 }
 
-/// The size of an error (m) in whole micrometres, up to 65 mm.
+/// Returns the size of an error (m) in whole micrometres, up to 65 mm.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
 const fn micrometres(error: f64) -> u16 {
     (error.abs() / MICROMETRE).round() as u16
 }
 
-/// Covariance of a predicted position (m²).
+/// Returns the covariance of a predicted position (m²).
 fn covariance(text: &PointErrorText) -> Option<Matrix3<f64>> {
     let (xx, xy, xz, yy, yz, zz) = text.covariance_um2?;
     Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * MICROMETRE.powi(2))
@@ -345,19 +345,19 @@ fn covariance(text: &PointErrorText) -> Option<Matrix3<f64>> {
 
 fn ellipsoids(canvas: &mut Canvas, judged: &[Judged<'_>], scale: f64) {
     let known: Vec<_> =
-        judged.iter().filter_map(|one| Some((one.identified_at, layout::ellipsoid(&covariance(one.text)?)))).collect();
+        judged.iter().filter_map(|one| Some((one.identified_at, style::ellipsoid(&covariance(one.text)?)))).collect();
     let drawn = Ellipsoids3D::from_centers_and_half_sizes(
-        known.iter().map(|(at, _)| layout::at(at)),
-        known.iter().map(|(_, (axes, _))| layout::vector(&(axes * scale))),
+        known.iter().map(|(at, _)| style::at(at)),
+        known.iter().map(|(_, (axes, _))| style::vector(&(axes * scale))),
     )
-    .with_quaternions(known.iter().map(|(_, (_, rotation))| layout::quaternion(rotation)))
-    .with_colors([layout::VERIFICATION])
+    .with_quaternions(known.iter().map(|(_, (_, rotation))| style::quaternion(rotation)))
+    .with_colors([style::VERIFICATION])
     .with_line_radii([Radius::new_ui_points(0.4)])
     .with_fill_mode(FillMode::MajorWireframe);
-    canvas.fix(names::UNCERTAINTY, &drawn);
+    canvas.draw_static(names::UNCERTAINTY, &drawn);
 }
 
-/// The solver, step by step: the arm bends from nominal to identified, and the errors shrink.
+/// Draws the steps of the solver: the arm bends from nominal to identified, and the errors shrink.
 fn solver(
     canvas: &mut Canvas,
     profile: &Profile,
@@ -368,8 +368,8 @@ fn solver(
 ) {
     let middle = rest(profile);
     let nothing = vec![0.0; calibration.parameters.len()];
-    canvas.fix(names::ERRORS_SOLVING, &arrow_style(layout::NOMINAL_ERROR));
-    canvas.fix(names::COST_AND_STEP, &SeriesLines::new().with_names(["cost", "largest step"]));
+    canvas.draw_static(names::ERRORS_SOLVING, &arrow_style(style::NOMINAL_ERROR));
+    canvas.draw_static(names::COST_AND_STEP, &SeriesLines::new().with_names(["cost", "largest step"]));
     let steps = identified.summary.iterations.iter().map(|step| (Some(step), &step.deviations));
     for (index, (step, deviations)) in iter::once((None, &nothing)).chain(steps).enumerate() {
         let moment = Moment::solver(index);
@@ -402,9 +402,9 @@ fn solver(
                 judged
                     .iter()
                     .zip(&errors)
-                    .map(|(one, error)| layout::vector(&drawn_error(profile, one, error, scales.nominal))),
+                    .map(|(one, error)| style::vector(&drawn_error(profile, one, error, scales.nominal))),
             )
-            .with_origins(predicted.iter().map(layout::at));
+            .with_origins(predicted.iter().map(style::at));
         canvas.draw(moment, names::ERRORS_SOLVING, &arrows);
         let counted = judged.iter().zip(&errors).filter(|(one, _)| !one.text.rejected);
         let (count, sum) = counted.fold((0_u32, 0.0), |(count, sum), (_, error)| (count + 1, sum + error.norm()));
@@ -413,7 +413,7 @@ fn solver(
     }
 }
 
-/// Deviations of the parameters as bars, in units of their standard deviation.
+/// Draws the deviations of the parameters as bars, in units of their standard deviation.
 fn parameters(canvas: &mut Canvas, identified: &IdentifiedText) {
     let parameters = &identified.summary.parameters;
     let of_sigma: Vec<f64> = parameters
@@ -421,26 +421,26 @@ fn parameters(canvas: &mut Canvas, identified: &IdentifiedText) {
         .map(|parameter| parameter.sigma.map_or(0.0, |sigma| finite(parameter.deviation / sigma)))
         .collect();
     let data = TensorData::new(vec![of_sigma.len() as u64], rerun::TensorBuffer::F64(of_sigma.into()));
-    canvas.fix(names::SIGNIFICANCE, &BarChart::new(data).with_color(layout::IDENTIFIED));
+    canvas.draw_static(names::SIGNIFICANCE, &BarChart::new(data).with_color(style::IDENTIFIED));
 }
 
-/// Zero instead of what cannot be drawn.
+/// Returns zero for values that cannot be drawn.
 const fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }
 
-/// What the enlargements are, above the robot.
+/// Draws the factors of enlargement above the robot.
 fn note(canvas: &mut Canvas, profile: &Profile, scales: &Scales) {
     let text = format!(
         "drawn larger:\nred errors (nominal) {} x\ngreen errors (identified) {} x\ngreen arm's deviations {} x",
         scales.nominal, scales.identified, scales.arm
     );
-    // Above the arm: points are rarely there.
+    // Points are rarely above the arm.
     let at = Point3::new(0.0, 0.0, 0.85 * reach(profile));
-    let note = Points3D::new([layout::at(&at)])
-        .with_radii([layout::single(0.1 * MILLIMETRE)])
-        .with_colors([layout::NOMINAL])
+    let note = Points3D::new([style::at(&at)])
+        .with_radii([style::single(0.1 * MILLIMETRE)])
+        .with_colors([style::NOMINAL])
         .with_labels([text])
         .with_show_labels(true);
-    canvas.fix(names::SCALE_NOTE, &note);
+    canvas.draw_static(names::SCALE_NOTE, &note);
 }
