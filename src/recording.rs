@@ -49,28 +49,16 @@ pub enum RecordingError {
     },
     /// The library has failed.
     #[error("{what}: {message}")]
-    Library {
-        what: &'static str,
-        message: String,
-    },
+    Library { what: &'static str, message: String },
     /// The file is not a recording of this program.
     #[error("'{}' is no recording of trupose: {message}", path.display())]
-    Foreign {
-        path: PathBuf,
-        message: String,
-    },
+    Foreign { path: PathBuf, message: String },
     /// The journal in a recording is damaged.
     #[error("the journal in '{}'", path.display())]
-    Journal {
-        path: PathBuf,
-        source: JournalError,
-    },
+    Journal { path: PathBuf, source: JournalError },
     /// The port of the live view cannot be used.
     #[error("the live view cannot listen on 127.0.0.1:{port}: {message}")]
-    Port {
-        port: u16,
-        message: String,
-    },
+    Port { port: u16, message: String },
 }
 
 impl RecordingError {

@@ -27,7 +27,10 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
         None => None,
         Some(entry) => {
             Some(usize::try_from(entry).ok().filter(|entry| (1..=count).contains(entry)).ok_or_else(|| {
-                Failure::new(ExitStatus::Usage, format!("the session has no entry {entry}: its entries are 1 to {count}"))
+                Failure::new(
+                    ExitStatus::Usage,
+                    format!("the session has no entry {entry}: its entries are 1 to {count}"),
+                )
             })?)
         }
     };
@@ -38,7 +41,10 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
             console.print(&entries_and_points(&journal, &session))?;
         } else {
             let robot = session.robot.as_ref().ok_or_else(|| {
-                Failure::new(ExitStatus::Usage, format!("session '{}' has no robot at that entry", args.folder.display()))
+                Failure::new(
+                    ExitStatus::Usage,
+                    format!("session '{}' has no robot at that entry", args.folder.display()),
+                )
             })?;
             console.print(&export::measurements_csv(&session, robot))?;
         }

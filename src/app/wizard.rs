@@ -105,7 +105,8 @@ fn play<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let mut recorded = Ok(());
-    let mut at_end = |completed: &[CompletedIntent]| recorded = record.map_or(Ok(()), |file| write_script(file, completed));
+    let mut at_end =
+        |completed: &[CompletedIntent]| recorded = record.map_or(Ok(()), |file| write_script(file, completed));
     let exit = match surface {
         Surface::Screen(options) => tui::run(engine, options, &mut at_end),
         Surface::Lines(glyphs) => tui::lines::run(engine, stdin(), &mut console.out, glyphs, &mut at_end),

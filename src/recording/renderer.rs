@@ -41,8 +41,10 @@ impl Renderer {
     pub(super) fn new(identity: &Identity, purpose: Purpose) -> Self {
         let mut canvas = Canvas::default();
         let start = components::Timestamp::from(nanoseconds(identity.start));
-        canvas
-            .draw_static(names::PROPERTIES, &RecordingInfo::new().with_name(identity.name.as_str()).with_start_time(start));
+        canvas.draw_static(
+            names::PROPERTIES,
+            &RecordingInfo::new().with_name(identity.name.as_str()).with_start_time(start),
+        );
         Self {
             canvas,
             purpose,
