@@ -16,6 +16,7 @@
 //! here reads a file, a clock or a random number.
 
 #![warn(missing_docs)]
+#![warn(clippy::wildcard_enum_match_arm)]
 
 pub mod circle_point;
 mod error;

@@ -4,9 +4,32 @@
 //! it by direction and coupling ([`Joint::variable`]). Transforms are named so that products cancel:
 //! `base_from_flange = base_from_link1 · link1_from_link2 · …`.
 //!
-//! This module does not read files, does not know a tracker, and never estimates anything.
+//! This module reads no files, knows no tracker, and estimates nothing.
+//!
+//! An arm of two links whose second link is 1 mm longer than drawn:
+//!
+//! ```
+//! use nalgebra::{Isometry3, Point3};
+//! use trupose::kinematics::{Arm, Convention, Joint, JointType, KinematicChain, Link, Place};
+//!
+//! let joint = |name: &str| Joint {
+//!     name: name.to_owned(),
+//!     joint_type: JointType::Revolute,
+//!     link: Link { a: 0.5, ..Link::default() },
+//!     direction: 1.0,
+//!     coupling: Vec::new(),
+//! };
+//! let fixed = Isometry3::identity();
+//! let chain = KinematicChain::new(Convention::Standard, fixed, vec![joint("J1"), joint("J2")], fixed)?;
+//! let nominal = Arm { chain, targets: vec![Point3::origin()] };
+//! let real = nominal.with([("a2".parse()?, 1e-3)])?;
+//! let place = Place { configuration: vec![0.0, 0.0], target: 0 };
+//! assert!((real.point_in_base(&place).x - 1.001).abs() < 1e-12);
+//! # Ok::<(), trupose::kinematics::KinematicsError>(())
+//! ```
 
 #![warn(missing_docs)]
+#![warn(clippy::wildcard_enum_match_arm)]
 
 mod arm;
 mod chain;
@@ -22,7 +45,7 @@ pub use forward::ForwardKinematics;
 pub use jacobian::{ConfigurationJacobian, IdentificationJacobian};
 pub use parameters::{Axis, FreeParameter, LinkParameter, ParameterId, ParameterUnit};
 
-/// Misuse of a chain: a geometry that cannot be built.
+/// A geometry that cannot be built, or a parameter that does not exist.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum KinematicsError {
@@ -40,7 +63,7 @@ pub enum KinematicsError {
     Direction {
         /// Name of the joint.
         joint: String,
-        /// What was given.
+        /// The direction given.
         direction: f64,
     },
     /// A coupling row that does not have one entry per joint.
@@ -53,7 +76,7 @@ pub enum KinematicsError {
         /// Joints of the arm.
         joints: usize,
     },
-    /// A parameter that the chain does not have.
+    /// A parameter that the arm does not have.
     #[error("the arm has no parameter '{parameter}'")]
     UnknownParameter {
         /// Name of the parameter.

@@ -6,6 +6,8 @@
 //! This module reads no file and no clock, and never estimates anything. All defects of a table are reported together
 //! ([`TableErrors`]), each with its place and what to do about it.
 
+#![warn(clippy::wildcard_enum_match_arm)]
+
 pub mod advice;
 pub mod calibration;
 pub mod constraints;

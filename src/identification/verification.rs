@@ -49,7 +49,7 @@ impl ErrorStatistics {
     }
 }
 
-/// Errors of one model on one set of samples.
+/// Errors of one arm on one set of samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelErrors {
     /// Measured − predicted per sample, in the robot base (m).
@@ -66,7 +66,7 @@ pub struct ModelErrors {
 }
 
 impl ModelErrors {
-    /// Errors of `model` on `samples` with the instrument at `base_from_station`; `None` without samples.
+    /// Errors of `arm` on `samples` with the instrument at `base_from_station`; `None` without samples.
     pub fn new(arm: &Arm, base_from_station: &[Isometry3<f64>], samples: &[PointSample]) -> Option<Self> {
         let predicted = arm.points_in_base(samples.iter().map(|sample| &sample.at));
         let vectors: Vec<Vector3<f64>> = samples
@@ -116,7 +116,7 @@ pub struct DirectErrors {
 }
 
 impl DirectErrors {
-    /// Errors of `model` on shared points and lengths.
+    /// Errors of `arm` on shared points and lengths.
     pub fn new(arm: &Arm, observations: &Observations) -> Self {
         let mut means = Vec::with_capacity(observations.shared.len());
         let mut seats = Vec::new();
@@ -278,7 +278,7 @@ pub fn coverage_gaps(joints: &[Joint], identification: &[&[f64]], verification: 
         .collect()
 }
 
-/// A model with the set-up (instrument frame, and target where it is free) fitted to some samples.
+/// An arm with the set-up (instrument frame, and target where it is free) fitted to some samples.
 #[derive(Clone, Debug)]
 pub struct FittedSetup {
     /// The arm; only its targets may differ from what was given.
@@ -289,7 +289,7 @@ pub struct FittedSetup {
 
 /// Fits the instrument frame, and the target coordinates among `free`, of a given arm to observations. The arm is not changed.
 ///
-/// This is how a nominal model is compared fairly: it gets the same frame and target fit as the identified one.
+/// This is how a nominal arm is compared fairly: it gets the same frame and target fit as the identified one.
 ///
 /// # Errors
 /// Sizes or indices that do not fit, or a mirrored frame.

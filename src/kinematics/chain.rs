@@ -154,12 +154,12 @@ impl KinematicChain {
         self.joints.len()
     }
 
-    /// Length of all links in a line (m): no point of the arm is farther from its base than about this.
+    /// Length of the arm stretched out (m): no point of it is much farther from its base.
     pub fn length(&self) -> f64 {
         self.joints.iter().map(|joint| joint.link.a.abs() + joint.link.d.abs()).sum()
     }
 
-    /// The links, for a model with other link constants.
+    /// The link driven by a joint, to change its constants.
     pub(super) fn link_mut(&mut self, joint: usize) -> Option<&mut Link> {
         self.joints.get_mut(joint).map(|joint| &mut joint.link)
     }

@@ -161,8 +161,7 @@ impl<'a> ForwardKinematics<'a> {
         self.chain
     }
 
-    /// Pose of the flange in the base at the pendant configuration `q` ((rad) or (m), one entry per joint; missing entries
-    /// count as zero joints left out, extra ones are ignored).
+    /// Pose of the flange in the base at the pendant configuration `q` ((rad) or (m), one entry per joint).
     pub fn base_from_flange(&self, q: &[f64]) -> Isometry3<f64> {
         self.flange_frame(q, |_, _| {}).to_isometry()
     }
@@ -173,8 +172,8 @@ impl<'a> ForwardKinematics<'a> {
         Point3::from(flange.origin + flange.axes() * target_in_flange.coords)
     }
 
-    /// Poses of all link frames in the base: entry 0 is the first link frame (`base`), entry i the frame after link i, and
-    /// the last one the flange; `dof + 2` entries.
+    /// Poses of all link frames in the base, `dof + 2` entries: entry 0 is the first link frame (`base`), entry i the frame
+    /// after link i, and the last entry the flange.
     pub fn base_from_links(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
         let mut poses = Vec::with_capacity(self.links.len() + 2);
         poses.push(self.base.to_isometry());
@@ -187,7 +186,7 @@ impl<'a> ForwardKinematics<'a> {
         poses
     }
 
-    /// Walks from base to flange; `visit` sees the axes of each link on the way.
+    /// Moves a frame from the base to the flange; `visit` receives the axes of each link on the way.
     #[inline]
     pub(super) fn flange_frame(&self, q: &[f64], mut visit: impl FnMut(usize, &LinkAxes)) -> Frame {
         let mut frame = self.base;

@@ -16,7 +16,7 @@ pub struct IdentificationJacobian {
 }
 
 impl IdentificationJacobian {
-    /// For these parameters, in this order.
+    /// Prepares the derivatives by these parameters, in this order.
     pub fn new(parameters: &[ParameterId]) -> Self {
         Self { parameters: parameters.to_vec(), links: Vec::new() }
     }
@@ -39,8 +39,8 @@ impl IdentificationJacobian {
 
     /// Position of the target in the base (m) at configuration `q`, and its derivatives.
     ///
-    /// `rows` takes the 3 × n Jacobian row by row: `n` entries for x, then y, then z ((m) per (m) or (rad)); it must hold
-    /// `3 n` numbers. `target` is the index that target coordinates must have to count for this point.
+    /// `rows` receives the 3 × n Jacobian row by row: `n` entries for x, then y, then z ((m) per (m) or (rad)); it must hold
+    /// `3 n` numbers. `target` is the index of the observed target: the coordinates of other targets have no effect.
     #[inline]
     pub fn evaluate(
         &mut self,

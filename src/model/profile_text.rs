@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::transforms::{number, roll_pitch_yaw};
-use crate::kinematics::{Convention, Joint, JointType, KinematicChain, ParameterUnit};
+use crate::kinematics::{Convention, Joint, JointType, KinematicChain};
 use crate::profile::{ExpectedDeviations, JointRange, Profile, Target};
 use crate::text::printable;
-use crate::units::{MICROMETRE, MILLIMETRE, MILLIRADIAN, Quantity, to_deg, to_mm};
+use crate::units::{MICROMETRE, MILLIRADIAN, Quantity, to_deg, to_mm};
 
 /// What stands at the top of every profile and about its arm.
 #[derive(Clone, Copy, Debug)]
@@ -226,14 +226,11 @@ fn expected(deviations: &ExpectedDeviations) -> String {
         format!("joint_offset_mrad: {}", number(deviations.joint_offset / MILLIRADIAN)),
         format!("prismatic_offset_mm: {}", number(to_mm(deviations.prismatic_offset))),
     ];
-    for (field, unit, size) in [
-        ("parameters_mm", ParameterUnit::Millimetre, MILLIMETRE),
-        ("parameters_mrad", ParameterUnit::Degree, MILLIRADIAN),
-    ] {
+    for (field, size) in ExpectedDeviations::FIELDS {
         let own: Vec<String> = deviations
             .overrides
             .iter()
-            .filter(|(id, _)| id.unit() == unit)
+            .filter(|(id, _)| ExpectedDeviations::field_of(**id) == field)
             .map(|(id, value)| format!("{}: {}", quoted(&id.to_string()), number(value / size)))
             .collect();
         if !own.is_empty() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use super::Target;
-use crate::kinematics::{FreeParameter, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{FreeParameter, JointType, KinematicChain, LinkParameter, ParameterId, ParameterUnit};
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, MILLIRADIAN, Quantity};
 
 /// Standard deviations of the zero-mean prior (m) and (rad), each above zero.
@@ -36,6 +36,17 @@ impl Default for ExpectedDeviations {
 }
 
 impl ExpectedDeviations {
+    /// The fields of a profile for single parameters, with the size of their unit (m) or (rad).
+    pub const FIELDS: [(&'static str, f64); 2] = [("parameters_mm", MILLIMETRE), ("parameters_mrad", MILLIRADIAN)];
+
+    /// The one of [`Self::FIELDS`] that a parameter belongs in.
+    pub const fn field_of(id: ParameterId) -> &'static str {
+        match id.unit() {
+            ParameterUnit::Millimetre => "parameters_mm",
+            ParameterUnit::Degree => "parameters_mrad",
+        }
+    }
+
     /// The expected deviation of a parameter (m) or (rad). A target coordinate has the uncertainty of its target.
     pub fn of(&self, id: ParameterId, chain: &KinematicChain, targets: &[Target]) -> f64 {
         if let Some(own) = self.overrides.get(&id) {

@@ -5,7 +5,7 @@ use super::super::diagnostic::{Findings, Span};
 use super::super::syntax::{Node, shortened};
 use super::super::{ExpectedDeviations, Target};
 use super::joint::JointShape;
-use crate::kinematics::{LinkParameter, ParameterId, ParameterUnit};
+use crate::kinematics::{LinkParameter, ParameterId};
 use crate::units::{MILLIMETRE, MILLIRADIAN};
 
 /// The parameters that an arm has.
@@ -15,13 +15,12 @@ pub(super) struct Known {
 
 impl Known {
     pub(super) fn new(joints: &[JointShape], targets: &[Target]) -> Self {
-        let is_known = |id: &ParameterId| match *id {
-            ParameterId::Link { joint, parameter: LinkParameter::Beta } => {
-                joints.get(joint).is_some_and(|joint| joint.has_beta)
-            }
-            ParameterId::Link { .. } | ParameterId::Target { .. } => true,
-        };
-        Self { ids: ParameterId::all(joints.len(), targets.len()).filter(is_known).collect() }
+        let without_beta: Vec<ParameterId> = (joints.iter().enumerate())
+            .filter(|(_, shape)| !shape.has_beta)
+            .map(|(joint, _)| ParameterId::Link { joint, parameter: LinkParameter::Beta })
+            .collect();
+        let all = ParameterId::all(joints.len(), targets.len());
+        Self { ids: all.filter(|id| !without_beta.contains(id)).collect() }
     }
 
     fn find(&self, name: &str, span: Span, findings: &mut Findings<'_>) -> Option<ParameterId> {
@@ -86,11 +85,7 @@ pub(super) fn expected_deviations(
             }
         }
     }
-    let own = [
-        ("parameters_mm", ParameterUnit::Millimetre, MILLIMETRE, "parameters_mrad"),
-        ("parameters_mrad", ParameterUnit::Degree, MILLIRADIAN, "parameters_mm"),
-    ];
-    for (field, unit, size, other) in own {
+    for (field, size) in ExpectedDeviations::FIELDS {
         let Some(entries) = inside.get(field).map(|ast| number_map(ast, findings)) else { continue };
         let (Some(entries), Some(known)) = (entries, known) else {
             good = false;
@@ -100,8 +95,8 @@ pub(super) fn expected_deviations(
             let id = known.find(name, span, findings);
             let value = positive(value, findings);
             match (id, value) {
-                (Some(id), _) if id.unit() != unit => {
-                    let hint = format!("move it to '{other}'");
+                (Some(id), _) if ExpectedDeviations::field_of(id) != field => {
+                    let hint = format!("move it to '{}'", ExpectedDeviations::field_of(id));
                     findings.error(span, format!("'{name}' does not belong in '{field}'"), hint);
                     good = false;
                 }

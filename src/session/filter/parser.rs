@@ -209,7 +209,9 @@ impl Parser<'_> {
                 let equal = match operator {
                     Operator::Equal => true,
                     Operator::NotEqual => false,
-                    _ => return self.expected("expected a number: texts are compared by '==' and '!=' only"),
+                    Operator::Less | Operator::LessOrEqual | Operator::Greater | Operator::GreaterOrEqual => {
+                        return self.expected("expected a number: texts are compared by '==' and '!=' only");
+                    }
                 };
                 Condition::Text { column, equal, value: value.clone() }
             }

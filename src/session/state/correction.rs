@@ -54,7 +54,10 @@ impl Session {
             Correction::Scale { since, factor, until } => {
                 (since <= number && until.is_none_or(|until| number <= until)).then_some(factor)
             }
-            _ => None,
+            Correction::Swap { .. }
+            | Correction::Row { .. }
+            | Correction::Joints { .. }
+            | Correction::TakenBack { .. } => None,
         });
         factors.product()
     }
