@@ -16,50 +16,47 @@ fn number(value: &Value, path: &str) -> f64 {
     path.split('.').fold(value, |value, key| &value[key]).as_f64().unwrap_or_else(|| panic!("no number at {path}"))
 }
 
-const REFERENCE: [&str; 12] = [
+/// The paper's robot without filters, with few candidates: `cargo bench --bench planning_quality` has the figures of many.
+const SMALL: [&str; 13] = [
     "plan",
     "--profile",
     "soochow",
     "--candidates",
-    "1500",
+    "300",
     "--poses",
-    "56",
-    "--seed",
-    "1",
+    "30",
+    "--verification",
+    "8",
     "--no-filters",
     "--expected-deviation",
     "1mm,0.1deg",
+    "--seed=1",
 ];
 
-/// The reference case: the paper's robot, 56 of 1500 candidates, expected deviations of 1 mm and 0.1°.
 #[test]
-fn the_reference_case_reaches_its_figures() {
-    let balanced = json(&REFERENCE);
-    assert!(number(&balanced, "predicted_error_sigma") <= 0.68, "{}", number(&balanced, "predicted_error_sigma"));
-    assert!(number(&balanced, "condition_number") <= 68.0, "{}", number(&balanced, "condition_number"));
+fn a_plan_comes_with_its_figures_and_an_objective_with_its_price() {
+    let balanced = json(&SMALL);
+    let error = |plan: &Value| number(plan, "predicted_error_sigma");
+    assert!(error(&balanced) < number(&balanced, "random.predicted_error_sigma.best"), "{}", error(&balanced));
+    assert!(number(&balanced, "condition_number") < number(&balanced, "random.condition_number.best"));
     assert_eq!(balanced["rank"], 21);
-    // Random sets: published medians 92 and 0.75 σ.
-    let random = number(&balanced, "random.condition_number.median");
-    assert!((86.0..100.0).contains(&random), "{random}");
-    let random = number(&balanced, "random.predicted_error_sigma.median");
-    assert!((0.72..0.78).contains(&random), "{random}");
     for key in ["o1", "o2", "o3", "o4", "o5"] {
         assert!(number(&balanced, &format!("observability.{key}")) > 0.0);
     }
     assert!((0.8..1.0).contains(&number(&balanced, "d_efficiency")));
-    assert!((number(&balanced, "predicted_rms_mm") - 0.01 * number(&balanced, "predicted_error_sigma")).abs() < 1e-9);
+    assert!((number(&balanced, "predicted_rms_mm") - 0.01 * error(&balanced)).abs() < 1e-9);
     assert!(number(&balanced, "elapsed_s") > 0.0 && number(&balanced, "condition_number_raw") > 1000.0);
     let poses = balanced["poses"].as_array().unwrap();
     let of_kind = |kind: &str| poses.iter().filter(|pose| pose["kind"] == kind).count();
-    assert_eq!((of_kind("identification"), of_kind("verification"), of_kind("home")), (56, 20, 2));
+    assert_eq!((of_kind("identification"), of_kind("verification"), of_kind("home")), (30, 8, 2));
     assert_eq!((&poses[0]["kind"], &poses.last().unwrap()["kind"]), (&"home".into(), &"home".into()));
 
-    let condition = json(&[&REFERENCE[..], &["--objective", "condition"]].concat());
-    assert!(number(&condition, "condition_number") <= 32.0, "{}", number(&condition, "condition_number"));
+    let condition = json(&[&SMALL[..], &["--objective", "condition"]].concat());
+    assert!(number(&condition, "condition_number") < 0.7 * number(&balanced, "condition_number"));
     // And why it is a bad master.
-    assert!(number(&condition, "predicted_error_sigma") > number(&condition, "random.predicted_error_sigma.median"));
-    let prediction = json(&[&REFERENCE[..], &["--objective", "prediction"]].concat());
-    assert!(number(&prediction, "predicted_error_sigma") <= 0.65, "{}", number(&prediction, "predicted_error_sigma"));
+    assert!(error(&condition) > number(&condition, "random.predicted_error_sigma.median"));
+    let prediction = json(&[&SMALL[..], &["--objective", "prediction"]].concat());
+    assert!(error(&prediction) <= error(&balanced), "{} {}", error(&prediction), error(&balanced));
 }
 
 #[test]

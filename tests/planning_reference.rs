@@ -101,9 +101,9 @@ fn the_predicted_error_is_what_identification_makes() {
 
 #[test]
 fn the_result_does_not_depend_on_the_threads() {
-    let reference = Reference::new(600);
+    let reference = Reference::new(300);
     for objective in [Objective::Balanced, Objective::O5] {
-        let settings = SearchSettings { objective, sweeps: 3, poses: 30, window: 250, ..SearchSettings::default() };
+        let settings = SearchSettings { objective, sweeps: 3, poses: 30, window: 120, ..SearchSettings::default() };
         let search = Search::new(&reference.information, settings.clone()).unwrap();
         let one = search.run(&|| true, &|_| {}).unwrap();
         for threads in [0, 1, 2, 4] {
