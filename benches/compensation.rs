@@ -1,7 +1,7 @@
 //! Speed of compensation on one core: targets per second, and what a target costs in forward kinematics of the same arm. The
 //! ratio hardly depends on the machine and on what else it does: both are measured in turns.
 //!
-//! `cargo bench --bench compensation`, or with `--profile test`.
+//! `cargo bench --bench compensation`, or with `--profile dev`.
 
 #![expect(
     clippy::unwrap_used,

@@ -17,7 +17,8 @@ use clap::Parser as _;
 use trupose::cli::{Cli, Command as Told};
 
 /// Other programs that the documents show; none of them is run.
-const OTHERS: [&str; 7] = ["cargo", "pip", "rerun", "ssh", "apt-get", "mkdir", "XDG_RUNTIME_DIR=$(mktemp"];
+const OTHERS: [&str; 9] =
+    ["cargo", "git", "pip", "rerun", "ssh", "apt-get", "mkdir", "INSTA_UPDATE=always", "XDG_RUNTIME_DIR=$(mktemp"];
 
 /// Languages of blocks.
 const LANGUAGES: [&str; 4] = ["sh", "text", "ron", ""];

@@ -1,6 +1,6 @@
 //! The examples in `sessions/`, made anew and checked against what is committed.
 //!
-//! `soochow-example` is made here from the method paper's tables. To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test example`.
+//! `soochow-example` is made here from the method paper's tables. To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test main example`.
 //! `example` is a finished session; the head of `sessions/example.script.ron` has the command that makes it.
 
 use std::fs;
