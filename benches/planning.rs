@@ -24,10 +24,7 @@ fn places(count: usize, seed: u64) -> Vec<Place> {
 fn information(candidates: &[Place]) -> Information {
     let model = Arm { chain: paper_chain(), targets: vec![paper_target()] };
     let expected = |parameter: FreeParameter| FreeParameter {
-        expected: match parameter.id.unit() {
-            ParameterUnit::Millimetre => MILLIMETRE,
-            ParameterUnit::Degree => 0.1 * DEGREE,
-        },
+        expected: if parameter.id.unit() == ParameterUnit::Millimetre { MILLIMETRE } else { 0.1 * DEGREE },
         ..parameter
     };
     let parameters: Vec<_> = paper_parameters().into_iter().map(expected).collect();

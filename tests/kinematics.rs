@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Matrix4, Point3, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use trupose::kinematics::{
-    Arm, Axis, Convention, ForwardKinematics, IdentificationJacobian, Joint, JointType, KinematicChain, Link,
-    LinkParameter, ParameterId, Place,
+    Arm, Convention, ForwardKinematics, IdentificationJacobian, Joint, JointType, KinematicChain, Link, ParameterId,
+    Place,
 };
 use trupose::profile::{Profile, builtin, builtin_names};
 
@@ -19,11 +19,9 @@ fn shipped() -> Vec<Profile> {
     builtin_names().map(|name| Profile::parse(builtin(name).unwrap(), name).unwrap().0).collect()
 }
 
-/// All five constants of every link, and the target: more than any profile frees.
+/// All parameters that an arm with one target can have: more than any profile frees.
 fn all_parameters(chain: &KinematicChain) -> Vec<ParameterId> {
-    let links =
-        (0..chain.dof()).flat_map(|joint| LinkParameter::ALL.map(|parameter| ParameterId::Link { joint, parameter }));
-    links.chain(Axis::ALL.map(|axis| ParameterId::Target { target: 0, axis })).collect()
+    ParameterId::all(chain.dof(), 1).collect()
 }
 
 fn random_configuration(chain: &KinematicChain, rng: &mut ChaCha8Rng) -> Vec<f64> {

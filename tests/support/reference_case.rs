@@ -35,10 +35,8 @@ impl Reference {
         let model = Arm { chain: paper_chain(), targets: vec![paper_target()] };
         let mut parameters = paper_parameters();
         for parameter in &mut parameters {
-            parameter.expected = match parameter.id.unit() {
-                ParameterUnit::Millimetre => MILLIMETRE,
-                ParameterUnit::Degree => 0.1 * DEGREE,
-            };
+            parameter.expected =
+                if parameter.id.unit() == ParameterUnit::Millimetre { MILLIMETRE } else { 0.1 * DEGREE };
         }
         let candidates = places(random_configurations(candidates, &mut seeded(1)));
         let fresh = places(random_configurations(FRESH, &mut seeded(2)));

@@ -153,10 +153,7 @@ fn circles(is_complete: bool) -> CirclesView {
 
 fn parameter(name: &str, deviation: f64, sigma: Option<f64>, identifiable: bool) -> ParameterSummary {
     let id: ParameterId = name.parse().unwrap();
-    let expected = match id.unit() {
-        ParameterUnit::Millimetre => 1.0,
-        ParameterUnit::Degree => 0.114,
-    };
+    let expected = if id.unit() == ParameterUnit::Millimetre { 1.0 } else { 0.114 };
     ParameterSummary { id, unit: id.unit(), nominal: 170.0, deviation, sigma, expected, identifiable }
 }
 
