@@ -73,7 +73,6 @@ pub struct Wizard {
     ended: Option<String>,
 }
 
-/// The running request.
 #[derive(Clone, Debug)]
 struct Busy {
     id: RequestId,
@@ -243,7 +242,6 @@ impl Wizard {
         intents
     }
 
-    /// The current view.
     pub fn view(&self) -> ViewModel {
         view::build(self)
     }

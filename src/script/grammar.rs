@@ -9,7 +9,6 @@ use super::expectation::Check;
 use super::placeholders;
 use crate::wizard::Intent;
 
-/// A script.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Script {

@@ -10,7 +10,6 @@ use crate::text::printable;
 /// Format of a transcript.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
-    /// Lines of text.
     #[default]
     Text,
     /// One JSON object per line.

@@ -83,7 +83,6 @@ impl Dialog {
         }
     }
 
-    /// Handles a key.
     pub fn on_key(&mut self, key: Key) -> DialogOutcome {
         let (reaction, intent) = match self {
             Self::Confirm { intent, is_yes, .. } => match key.code {
@@ -114,7 +113,6 @@ impl Dialog {
         }
     }
 
-    /// Inserts pasted text.
     pub fn paste(&mut self, text: &str) {
         match self {
             Self::Confirm { .. } => {}
@@ -142,7 +140,6 @@ impl Dialog {
         items
     }
 
-    /// Draws the dialog.
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         match self {
             Self::Confirm { lines, is_yes, .. } => draw_confirmation(lines, *is_yes, theme, area, buf),

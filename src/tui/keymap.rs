@@ -19,12 +19,10 @@ impl Key {
         Self::plain_code(KeyCode::Char(c))
     }
 
-    /// A key with Ctrl.
     pub const fn ctrl(c: char) -> Self {
         Self { code: KeyCode::Char(c), modifiers: KeyModifiers::CONTROL }
     }
 
-    /// A key without modifiers.
     pub const fn plain_code(code: KeyCode) -> Self {
         Self { code, modifiers: KeyModifiers::NONE }
     }
@@ -70,7 +68,6 @@ impl From<KeyEvent> for Key {
 pub enum LocalAction {
     /// Show all keys of this screen.
     Help,
-    /// Suspend the program.
     Suspend,
     /// Redraw the whole screen.
     Redraw,
@@ -169,7 +166,6 @@ pub enum Action {
 /// A key and its effect, for footer and help.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyHint {
-    /// Name of the key.
     pub key: String,
     /// Effect in a few words.
     pub label: String,

@@ -44,13 +44,11 @@ enum Page {
 /// A command to the driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReplayCommand {
-    /// Nothing has changed.
     None,
     /// Draw a frame.
     Draw,
     /// Redraw the whole screen.
     Redraw,
-    /// Suspend the program.
     Suspend,
     /// Quit the replay.
     Quit,
@@ -138,7 +136,6 @@ impl Replay {
         self.is_playing &= !self.is_at_end();
     }
 
-    /// Handles a key.
     pub fn on_key(&mut self, key: Key) -> ReplayCommand {
         match key.code {
             KeyCode::Char('z') if key.has_modifier() => return ReplayCommand::Suspend,

@@ -81,7 +81,6 @@ pub trait Screen: fmt::Debug {
     /// Keys that the screen handles itself, for footer and help. They replace the same keys of the table.
     fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint>;
 
-    /// Handles a key.
     fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome;
 
     /// Handles pasted text.

@@ -24,7 +24,6 @@ pub enum Command {
     None,
     /// Send an intent to the wizard.
     Intent(Intent),
-    /// Suspend the program.
     Suspend,
     /// Redraw the whole screen.
     Redraw,
@@ -123,7 +122,6 @@ impl Ui {
         std::mem::take(&mut self.is_dirty)
     }
 
-    /// Handles an input.
     pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Command {
         let was_dirty = std::mem::replace(&mut self.is_dirty, true);
         let command = self.take_input(input, view);

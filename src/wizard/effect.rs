@@ -133,14 +133,21 @@ pub enum RequestProgress {
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// Create the folder of a session and lock it.
-    Create { id: RequestId, name: String },
+    Create {
+        id: RequestId,
+        name: String,
+    },
     /// Append lines to the journal and force them to disk.
-    Append { id: RequestId, lines: Vec<Line> },
-    /// Start a request.
-    Start { id: RequestId, request: Request },
+    Append {
+        id: RequestId,
+        lines: Vec<Line>,
+    },
+    Start {
+        id: RequestId,
+        request: Request,
+    },
     /// Cancel a request, which still ends with an answer.
     Cancel(RequestId),
-    /// End the program.
     Exit,
 }
 
@@ -148,7 +155,6 @@ pub enum Effect {
 #[derive(Clone, Debug)]
 pub enum Request {
     LoadProfile {
-        /// Name or path.
         source: String,
     },
     Connect {
@@ -157,7 +163,6 @@ pub enum Request {
         profile: Box<Profile>,
     },
     Measure(MeasureRequest),
-    /// Choose poses.
     Plan {
         /// Profile with the target as chosen.
         profile: Box<Profile>,

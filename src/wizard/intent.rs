@@ -15,9 +15,7 @@ pub enum Intent {
     Cancel,
     /// Quit the program; the session can be resumed.
     Quit,
-    /// Dismiss the message.
     Dismiss,
-    /// Retry what failed.
     Retry,
 
     /// Choose a robot by the name of a bundled profile or the path of a file.
@@ -33,7 +31,6 @@ pub enum Intent {
     /// Discard the measured circles and start again.
     DiscardCircles,
 
-    /// Choose poses.
     MakePlan(PlanSettings),
     /// Load the poses from a file.
     LoadPlan(String),

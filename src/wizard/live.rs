@@ -67,7 +67,6 @@ impl Live {
         self.latest.as_ref()?.down.as_deref()
     }
 
-    /// Forgets all readings.
     pub(super) fn clear(&mut self) {
         *self = Self::default();
     }

@@ -69,11 +69,9 @@ pub(super) enum Action {
     },
     /// Write entries; later actions wait until they are on disk.
     Write(Vec<Entry>),
-    /// Start a request.
     Ask(Request),
     /// Drop the connection to the instrument.
     Disconnect,
-    /// Show a message.
     Say(Notice),
     Exit,
 }

@@ -25,7 +25,7 @@ pub struct ViewModel {
     pub header: Header,
     /// Purpose of the step, in one sentence.
     pub purpose: &'static str,
-    /// The step's own part.
+    /// The part of the step.
     pub content: Content,
     /// Live reading of the instrument between measurements, if it has one.
     pub live: Option<LiveView>,
@@ -42,7 +42,7 @@ pub struct ViewModel {
 /// Live reading of the instrument between measurements. Never a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LiveView {
-    /// The SMR in the frame of the instrument, if it is seen.
+    /// Position of the SMR in the frame of the instrument, if it is seen.
     pub point_mm: Option<[f64; 3]>,
     /// Whether the instrument shows nothing between measurements, whatever it sees.
     pub is_blind: bool,
@@ -56,13 +56,13 @@ pub struct LiveView {
     pub from_predicted_mm: Option<f64>,
     /// Joints that the robot reports: pendant values (rad).
     pub joints: Option<Vec<f64>>,
-    /// The joint that is farthest from the pose shown, from 0, and by how much (deg).
+    /// Index (from 0) of the joint that is farthest from the pose shown, and its difference (deg).
     pub joint_difference: Option<(usize, f64)>,
     /// Whether the robot is at rest, if it reports that.
     pub is_still: Option<bool>,
     /// Reason why the instrument cannot be used.
     pub down: Option<String>,
-    /// The last seconds.
+    /// Readings of the last seconds.
     pub track: Vec<LivePoint>,
 }
 
@@ -71,7 +71,7 @@ pub struct LiveView {
 pub struct LivePoint {
     /// Time before the last reading (s).
     pub seconds: f64,
-    /// Distance from where it is now.
+    /// Distance from the latest position.
     pub offset_mm: f64,
 }
 
@@ -82,7 +82,7 @@ pub struct Header {
     pub session: Option<String>,
     pub folder: Option<String>,
     pub step: Step,
-    /// Its number, from 1.
+    /// Number of the step, from 1.
     pub number: usize,
     pub steps: usize,
     /// Identity of the instrument, if it is connected.
@@ -93,7 +93,7 @@ pub struct Header {
     pub elapsed_min: f64,
     /// Journal entries that are safely on disk.
     pub saved_entries: u64,
-    /// Whether an entry is on its way to the disk.
+    /// Whether an entry is being written.
     pub is_saving: bool,
 }
 
@@ -111,7 +111,7 @@ pub struct BusyView {
     pub is_cancelled: bool,
 }
 
-/// A step's own part.
+/// The part of a step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Content {
@@ -133,14 +133,14 @@ pub enum Content {
     Deliver(DeliverView),
 }
 
-/// The profile step.
+/// The view of the profile step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProfileView {
-    /// Names of the shipped profiles.
+    /// Names of the bundled profiles.
     pub profiles: Vec<String>,
     /// The selected profile.
     pub chosen: Option<ProfileCard>,
-    /// Name that the session has or will have.
+    /// Name of the session, or the proposed one.
     pub session: String,
     /// Whether the robot can no longer be changed.
     pub is_fixed: bool,
@@ -154,11 +154,11 @@ pub struct ProfileCard {
     /// Origin of its numbers.
     pub source: String,
     pub joints: Vec<String>,
-    /// Parameters that will be identified.
+    /// Number of parameters to identify.
     pub free_parameters: usize,
     /// Maker and type of the instrument.
     pub instrument: Option<String>,
-    /// Nominal place of the SMR in the flange.
+    /// Nominal position of the SMR in the flange frame.
     pub target_mm: Option<[f64; 3]>,
     /// Oddities found when the profile was read.
     pub warnings: Vec<String>,
@@ -182,10 +182,10 @@ impl ProfileCard {
     }
 }
 
-/// The instrument step.
+/// The view of the instrument step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InstrumentView {
-    /// Instrument on a wire that the profile names.
+    /// Link described in the profile.
     pub link: Option<LinkChoice>,
     /// The choice in words.
     pub choice: Option<String>,
@@ -197,7 +197,7 @@ pub struct InstrumentView {
     pub stated_sigma: Option<String>,
 }
 
-/// The target step.
+/// The view of the target step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TargetView {
     /// Position of the SMR in the flange frame, from the profile.
@@ -210,7 +210,7 @@ pub struct TargetView {
     pub circles: Option<CirclesView>,
 }
 
-/// The circle-point analysis.
+/// The view of the circle-point analysis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CirclesView {
     /// Joint that is turned.
@@ -227,7 +227,7 @@ pub struct CirclesView {
     pub result: Option<CirclesResult>,
     /// Reason why there is no result.
     pub problem: Option<String>,
-    /// Unit of the coordinates, where they are typed in.
+    /// Unit of the coordinates, if they are typed.
     pub typed_unit: Option<String>,
 }
 
@@ -273,14 +273,14 @@ pub struct JointShown {
     pub moves_most: bool,
 }
 
-/// The plan step.
+/// The view of the plan step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanView {
-    /// Settings for the next choice.
+    /// Settings of the next search.
     pub settings: PlanSettings,
     /// The proposed plan.
     pub proposal: Option<PlanFigures>,
-    /// All numbers of the proposal, if poses were chosen.
+    /// All figures of the proposal, if poses were chosen.
     pub summary: Option<Box<PlanSummary>>,
     /// The plan that is being measured.
     pub accepted: Option<PlanFigures>,
@@ -290,26 +290,26 @@ pub struct PlanView {
     pub measured: usize,
 }
 
-/// A plan in short.
+/// A summary of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanFigures {
     /// The plan without its rows.
     #[serde(flatten)]
     pub plan: PlanText,
-    /// Poses to identify from.
+    /// Number of identification poses.
     pub identification: usize,
-    /// Poses to verify with.
+    /// Number of verification poses.
     pub verification: usize,
 }
 
-/// The capture step.
+/// The view of the capture step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CaptureView {
     /// Row of the plan that is shown.
     pub row: Option<usize>,
     pub pose: Option<String>,
     pub kind: Option<PoseKind>,
-    /// Configuration to go to, pendant convention.
+    /// Configuration to go to, in pendant values.
     pub joints: Vec<JointShown>,
     /// Poses to pass through on the way.
     pub on_the_way: Vec<String>,
@@ -319,13 +319,13 @@ pub struct CaptureView {
     pub measured: usize,
     /// Poses still to be measured.
     pub open: usize,
-    /// Poses that are skipped.
+    /// Number of skipped poses.
     pub skipped: usize,
     /// Identification samples that count.
     pub identification: usize,
     /// Verification samples that count.
     pub verification: usize,
-    /// Time for the rest at the pace so far.
+    /// Time for the open poses at the pace so far.
     pub minutes_left: Option<f64>,
     pub last: Option<SampleView>,
     /// Reason why a reading is held back.
@@ -336,19 +336,19 @@ pub struct CaptureView {
     pub drift: Vec<DriftView>,
     /// Predicted quality of a calibration from the samples so far.
     pub prediction: Option<PredictionView>,
-    /// Unit of the coordinates, where they are typed in.
+    /// Unit of the coordinates, if they are typed.
     pub typed_unit: Option<String>,
     /// Reason why it is too early to identify.
     pub too_few: Option<String>,
-    /// All measured rows of the plan.
+    /// All rows of the plan that are to be measured.
     pub rows: Vec<RowView>,
-    /// Remarks with their poses.
+    /// Notes with their poses.
     pub notes: Vec<(Option<String>, String)>,
-    /// Measurements that gave no sample, with their poses and reasons.
+    /// Refused measurements: pose and reason.
     pub refused: Vec<(String, String)>,
 }
 
-/// A sample in short.
+/// A summary of a sample.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SampleView {
     /// Number of the measurement.
@@ -356,7 +356,7 @@ pub struct SampleView {
     pub pose: String,
     /// Measured point in the tracker frame.
     pub xyz_mm: [f64; 3],
-    /// Scatter of its shots.
+    /// Scatter of the shots.
     pub scatter_mm: Option<f64>,
     /// Whether the sample counts.
     pub counts: bool,
@@ -372,11 +372,11 @@ pub struct FindingView {
     pub message: String,
     /// Whether a correction is proposed.
     pub has_remedy: bool,
-    /// The distances from this sample that fit least, worst first.
+    /// The distances from this sample that fit worst, the worst first.
     pub worst: Vec<PairView>,
 }
 
-/// A measured distance against its prediction.
+/// A measured distance and its prediction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PairView {
     /// Pose at the other end.
@@ -389,7 +389,7 @@ pub struct PairView {
     pub predicted_mm: f64,
     /// Measured − predicted.
     pub difference_mm: f64,
-    /// Standard deviation that the difference should have.
+    /// Expected standard deviation of the difference.
     pub expected_mm: f64,
 }
 
@@ -425,11 +425,11 @@ pub struct PredictionView {
 pub enum RowState {
     /// Still to be measured.
     Open,
-    /// Its sample counts.
+    /// Measured, and the sample counts.
     Measured,
-    /// Its sample does not count.
+    /// Measured, but the sample is excluded.
     LeftOut,
-    /// Not to be measured.
+    /// Skipped by the operator.
     Skipped,
 }
 
@@ -444,7 +444,7 @@ pub struct RowView {
     pub state: RowState,
 }
 
-/// The identify step.
+/// The view of the identify step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IdentifyView {
     /// Identification samples that count.
@@ -457,7 +457,7 @@ pub struct IdentifyView {
     pub is_usable: bool,
 }
 
-/// The verify step.
+/// The view of the verify step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerifyView {
     /// Verification samples that count.
@@ -466,7 +466,7 @@ pub struct VerifyView {
     pub is_current: bool,
     /// Reason why nothing can be verified.
     pub too_few: Option<String>,
-    /// Errors on points that the identification did not see.
+    /// Errors at points that the identification did not use.
     pub verification: Option<Box<VerificationSummary>>,
     /// Comparison with the acceptance limits.
     pub verdict: Option<Box<Verdict>>,
@@ -474,7 +474,7 @@ pub struct VerifyView {
     pub warnings: Vec<Warning>,
 }
 
-/// The deliver step.
+/// The view of the deliver step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeliverView {
     pub files: Vec<String>,
@@ -484,7 +484,7 @@ pub struct DeliverView {
     pub verdict: Option<Box<Verdict>>,
     /// Whether the result is based on exactly the samples that count now.
     pub is_current: bool,
-    /// Serial number, operator and place, as the report will have them.
+    /// Serial number, operator and place for the report.
     pub about: About,
 }
 

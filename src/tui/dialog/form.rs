@@ -11,7 +11,6 @@ use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::wizard::Intent;
 
-/// Columns of the labels.
 const LABELS: u16 = 24;
 
 /// Builds the intent from the values of the fields, or says what is wrong with them.
@@ -52,7 +51,6 @@ impl Value {
 }
 
 impl Form {
-    /// A form without fields.
     pub fn new(title: impl Into<String>, build: Build) -> Self {
         Self { title: title.into(), fields: Vec::new(), focus: 0, build, is_tried: false }
     }
@@ -86,7 +84,6 @@ impl Form {
         (self.build)(&values)
     }
 
-    /// Handles a key.
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let count = self.fields.len().max(1);
         match key.code {

@@ -45,7 +45,6 @@ impl ChoiceList {
         matching.get(self.selected).or_else(|| matching.last()).copied()
     }
 
-    /// Handles a key.
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let last = self.matching().len().saturating_sub(1);
         let now = self.selected.min(last);

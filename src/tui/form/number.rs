@@ -47,7 +47,6 @@ impl NumberField {
         }
     }
 
-    /// Handles a key.
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         match self.field.on_key(key) {
             FieldOutcome::Submitted if self.value().is_err() => FieldOutcome::Changed,
@@ -55,7 +54,6 @@ impl NumberField {
         }
     }
 
-    /// Inserts pasted text.
     pub fn paste(&mut self, text: &str) {
         self.field.paste(text);
     }

@@ -56,7 +56,6 @@ impl TextField {
         &self.label
     }
 
-    /// The text.
     pub fn text(&self) -> String {
         self.characters.iter().collect()
     }
@@ -90,7 +89,6 @@ impl TextField {
         self.cursor += count;
     }
 
-    /// Handles a key.
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let was_proposal = self.is_proposal;
         let reaction = self.edited(key);

@@ -44,7 +44,6 @@ pub(super) enum Material {
     Error,
 }
 
-/// A dot of the raster.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Dot {
     material: Material,

@@ -42,7 +42,6 @@ const GAP: u16 = 2;
 /// Rows that PgUp and PgDn scroll.
 const PAGE: usize = 8;
 
-/// The views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Tab {
     #[default]

@@ -21,7 +21,6 @@ const PICTURE: u16 = 26;
 /// Columns of the names in [`Page::pair`].
 const NAMES: usize = 12;
 
-/// Lines of text.
 #[derive(Clone, Debug)]
 pub(super) struct Page {
     theme: Theme,
@@ -42,7 +41,6 @@ impl Page {
         self.kept = Some((first, self.lines.len().saturating_sub(1)));
     }
 
-    /// Number of lines.
     pub(super) const fn len(&self) -> usize {
         self.lines.len()
     }
@@ -71,7 +69,6 @@ impl Page {
         self.lines.push(line);
     }
 
-    /// A heading.
     pub(super) fn title(&mut self, text: &str) {
         self.gap();
         self.line(vec![(text.to_owned(), Role::Title)]);
@@ -87,7 +84,6 @@ impl Page {
         }
     }
 
-    /// Adds a paragraph.
     pub(super) fn paragraph(&mut self, text: &str, role: Role) {
         self.marked(("", role), text, role);
     }
@@ -211,7 +207,6 @@ pub(super) const fn split(area: Rect, wanted: u16, has_picture: bool) -> (Rect, 
     (text, Some(Rect { x: area.x + left, y: area.y, width: area.width - left, height: area.height }))
 }
 
-/// Draws the preview.
 pub(super) fn picture(cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Buffer) {
     use ratatui::widgets::Widget as _;
     Preview { scene, camera: cx.camera, theme: cx.theme }.render(area, buf);

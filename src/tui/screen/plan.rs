@@ -48,7 +48,6 @@ const HELP: [&str; 3] = [
     "3. You see its predicted error and its measuring time, then accept it or change the settings.",
 ];
 
-/// The views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Tab {
     #[default]
@@ -77,7 +76,6 @@ pub(super) struct PlanScreen {
     tab: Tab,
     form: SettingsForm,
     search: Search,
-    /// Scroll position.
     scroll: usize,
 }
 
@@ -220,7 +218,6 @@ impl Screen for PlanScreen {
     }
 }
 
-/// Draws the explanation.
 fn what_happens(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
     let lines = HELP.iter().flat_map(|line| wrapped(&cx.theme.glyphs.show(line), usize::from(area.width)));
     for (row, line) in (0_u16..area.height).zip(lines) {

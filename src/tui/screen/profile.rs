@@ -25,7 +25,6 @@ const ALL: u16 = 106;
 /// The entry after the bundled profiles.
 const FILE: &str = "file...";
 
-/// Cursor and search.
 #[derive(Clone, Debug)]
 pub(super) struct ProfileScreen {
     /// Position among the entries that match the search; `None` if the operator has not moved it.

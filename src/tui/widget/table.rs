@@ -34,7 +34,6 @@ impl<'a> Column<'a> {
     }
 }
 
-/// A table.
 #[derive(Clone, Copy, Debug)]
 pub struct Table<'a> {
     /// Columns from left to right.

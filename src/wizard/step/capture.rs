@@ -31,7 +31,6 @@ const SHOTS: u32 = 3;
 /// Number of poses that are suggested at a time.
 const SUGGESTED: usize = 5;
 
-/// The capture step.
 #[derive(Clone, Debug)]
 pub(in crate::wizard) struct CaptureStep {
     /// Row of the plan that is shown.

@@ -10,7 +10,6 @@ use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::view::{Content, DeliverView};
 
-/// The deliver step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct DeliverStep;
 

@@ -22,7 +22,6 @@ use crate::wizard::view::{Content, IdentifyView, VerifyView};
 /// Fewest verification samples from which accuracy can be stated.
 const FEWEST_VERIFICATION: usize = 3;
 
-/// The identify step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct IdentifyStep {
     /// Fewest identification samples, if known.
@@ -35,7 +34,6 @@ impl IdentifyStep {
     }
 }
 
-/// The verify step.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::wizard) struct VerifyStep;
 

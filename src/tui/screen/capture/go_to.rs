@@ -25,7 +25,6 @@ const MESSAGE: usize = 4;
 /// Largest number of distances shown.
 const PAIRS: u16 = 5;
 
-/// Draws the view.
 pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
     let theme = cx.theme;
     let room = usize::from(area.width);

@@ -14,7 +14,6 @@ use crate::wizard::view::{CaptureView, LiveView};
 /// Largest number of rows of the chart.
 const CHART: u16 = 12;
 
-/// Draws the view.
 pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &mut Buffer) {
     let theme = cx.theme;
     let Some(live) = &cx.view.live else {

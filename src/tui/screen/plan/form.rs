@@ -16,7 +16,6 @@ const NUMBERS: usize = 30;
 /// Largest number of digits.
 const MOST_DIGITS: usize = 9;
 
-/// A setting.
 #[derive(Clone, Copy, Debug)]
 struct Field {
     label: &'static str,

@@ -51,7 +51,6 @@ fn lines(content: &PlanView) -> Vec<(Role, String)> {
     lines
 }
 
-/// Draws the lines.
 pub(super) fn draw(theme: Theme, content: &PlanView, scroll: usize, area: Rect, buf: &mut Buffer) {
     let mut row = 0;
     for (role, line) in lines(content).into_iter().skip(scroll) {
