@@ -1,10 +1,10 @@
 //! Compensation: the joint values to command so that the real arm reaches what the nominal one would have reached.
 //!
-//! The identified arm is inverted numerically: damped least squares from the configuration that was meant (Levenberg 1944,
+//! The identified arm is inverted numerically: damped least squares from the intended configuration (Levenberg 1944,
 //! Marquardt 1963; Wampler 1986 for arms), on position and orientation of a point of the tool together, an angle counted as the
 //! arc it makes at 1 m. Corrections are small, so two or three steps do. A joint that would pass its limit is held there and
-//! the others go on without it. Where the orientation cannot be had with small corrections (near a singularity), the position
-//! alone is reached and the result says so; where the position cannot be had either, nothing is commanded.
+//! the others continue without it. If the orientation cannot be reached with small corrections (near a singularity), only the
+//! position is reached and the result says so; if the position cannot be reached either, nothing is commanded.
 //!
 //! No files, no profiles, no randomness but from a seed.
 
@@ -17,16 +17,15 @@ use rand_chacha::ChaCha8Rng;
 use crate::kinematics::{ForwardKinematics, KinematicChain};
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, Quantity};
 
-/// An arm with the tool whose point counts.
+/// An arm with its tool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToolArm {
-    /// The arm.
     pub chain: KinematicChain,
     /// The tool frame in the flange; identity for the flange itself.
     pub flange_from_tool: Isometry3<f64>,
 }
 
-/// How compensation goes about it.
+/// Settings of the compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Only the position of the tool point counts.
@@ -54,31 +53,31 @@ impl Default for Settings {
     }
 }
 
-/// What is to be reached.
+/// A goal for the tool.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Goal {
-    /// What the nominal arm reaches at this pendant configuration ((rad) or (m)).
+    /// The pose that the nominal arm reaches at this pendant configuration ((rad) or (m)).
     Configuration(Vec<f64>),
     /// A pose of the tool in the base; the nearest nominal solution to `near`, or to the middle of the limits.
     Pose {
         /// The pose (m).
         base_from_tool: Isometry3<f64>,
-        /// A configuration of the branch that is meant.
+        /// A configuration of the intended branch.
         near: Option<Vec<f64>>,
     },
     /// A point in the base; orientation free.
     Position {
         /// The point (m).
         point_in_base: Point3<f64>,
-        /// A configuration of the branch that is meant.
+        /// A configuration of the intended branch.
         near: Option<Vec<f64>>,
     },
 }
 
-/// How well a goal is reached.
+/// How far a goal is reached.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Position and orientation, or the position where only that was asked for.
+    /// Position and orientation, or the position if only that was requested.
     Reached,
     /// The position; the orientation would need larger corrections than allowed: near a singularity.
     PositionOnly,
@@ -88,7 +87,7 @@ pub enum Status {
     Singular,
     /// Nothing: the goal is out of reach.
     OutOfReach,
-    /// Nothing: the configuration that was meant is itself beyond the limit of these joints (from 0).
+    /// Nothing: the intended configuration is itself beyond the limit of these joints (from 0).
     BeyondLimit(Vec<usize>),
 }
 
@@ -98,7 +97,7 @@ impl Status {
         matches!(self, Self::Reached | Self::PositionOnly)
     }
 
-    /// As in tables.
+    /// The word in tables.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Reached => "reached",
@@ -116,13 +115,13 @@ impl Status {
 pub struct Compensated {
     /// Pendant configuration that the nominal arm would need ((rad) or (m)); none if it cannot reach the goal.
     pub meant: Option<Vec<f64>>,
-    /// Pendant configuration to command; where the goal is not reached, the best one found. Use it only if the status says so.
+    /// Pendant configuration to command; if the goal is not reached, the best one found. Use it only if the status allows it.
     pub command: Vec<f64>,
-    /// What is left between the identified arm at `command` and the goal (m).
+    /// Remaining distance between the identified arm at `command` and the goal (m).
     pub position_error: f64,
-    /// What is left of the orientation (rad); zero where the orientation is free.
+    /// Remaining orientation error (rad); zero if the orientation is free.
     pub angle_error: f64,
-    /// How well the goal is reached.
+    /// How far the goal is reached.
     pub status: Status,
 }
 
@@ -136,7 +135,7 @@ pub struct Compensator<'a> {
     settings: Settings,
 }
 
-/// One of the two arms, prepared.
+/// One of the two arms with its kinematics.
 #[derive(Clone, Debug)]
 struct Side<'a> {
     arm: ForwardKinematics<'a>,
@@ -149,7 +148,7 @@ impl Side<'_> {
     }
 }
 
-/// Where a search ended.
+/// The result of a search.
 #[derive(Clone, Debug)]
 struct Found {
     q: Vec<f64>,
@@ -160,7 +159,7 @@ struct Found {
 
 /// Largest number of steps; a search that converges needs a handful.
 const MOST_STEPS: usize = 60;
-/// Starts of the search for a Cartesian goal: the branch is not known.
+/// Number of starts of the search for a Cartesian goal, whose branch is not known.
 const STARTS: usize = 60;
 /// Below this share of the tolerance a search stops.
 const FINE: f64 = 1e-4;
@@ -170,7 +169,7 @@ const ROUNDING: f64 = 1e-9;
 const UNLIMITED: (f64, f64) = (PI, 1.0);
 
 impl<'a> Compensator<'a> {
-    /// For these arms, which have the same joints. `limits`: pendant values ((rad) or (m)), one entry per joint.
+    /// Prepares two arms with the same joints. `limits` are pendant values ((rad) or (m)), one entry per joint.
     pub fn new(
         nominal: &'a ToolArm,
         identified: &'a ToolArm,
@@ -219,7 +218,7 @@ impl<'a> Compensator<'a> {
         }
     }
 
-    /// First the nominal arm to the goal, which gives the branch, then the identified one from there.
+    /// Moves first the nominal arm to the goal, which gives the branch, then the identified one from there.
     fn reach(&self, goal: &Isometry3<f64>, with_angle: bool, near: Option<&[f64]>) -> Compensated {
         let middle: Vec<f64> = self.ranges().map(|(low, high)| f64::midpoint(low, high)).collect();
         let first = near.filter(|near| near.len() == middle.len()).unwrap_or(&middle);
@@ -245,7 +244,7 @@ impl<'a> Compensator<'a> {
             if is_better {
                 best = Some(found);
             }
-            // A given configuration says which branch is meant; without one the nearest of some is taken.
+            // A given configuration selects the branch; without one the nearest of several solutions is taken.
             if is_reached && (near.is_some() || start >= STARTS / 4) {
                 break;
             }
@@ -281,7 +280,7 @@ impl<'a> Compensator<'a> {
         joints.iter().all(|joint| joint.coupling.get(index).is_none_or(|coefficient| *coefficient == 0.0))
     }
 
-    /// The identified arm to the goal, from the configuration that was meant.
+    /// Moves the identified arm to the goal, from the intended configuration.
     fn correct(&self, meant: &[f64], goal: &Isometry3<f64>, with_angle: bool) -> Compensated {
         let result = |found: Found, status: Status| Compensated {
             meant: Some(meant.to_vec()),
@@ -424,7 +423,7 @@ impl<'a> Compensator<'a> {
                 Quantity::Length => UNLIMITED.1,
             };
             let (low, high) = limits.unwrap_or((-wide, wide));
-            // More than a turn to both sides reaches nothing new.
+            // More than one turn to each side reaches no new pose.
             match quantity {
                 Quantity::Angle => (low.max(-PI).min(high), high.min(PI).max(low)),
                 Quantity::Length => (low, high),
@@ -437,7 +436,7 @@ impl<'a> Compensator<'a> {
         pairs.map(|(value, limits)| limits.map_or(*value, |(low, high)| value.clamp(low, high))).collect()
     }
 
-    /// Joints whose value is beyond its limits, or no number.
+    /// Joints whose value is beyond its limits or not a number.
     fn beyond(&self, q: &[f64]) -> Vec<usize> {
         let inside = |value: f64, limits: Option<(f64, f64)>| {
             value.is_finite() && limits.is_none_or(|(low, high)| (low - ROUNDING..=high + ROUNDING).contains(&value))

@@ -9,13 +9,13 @@ use crate::text::{causes, printable};
 /// How a command ended, with the exit code of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExitStatus {
-    /// Done; where there are acceptance limits they are met.
+    /// Done; the acceptance limits, if there are any, are met.
     Accepted,
     /// Done; the acceptance limits are not met.
     NotAccepted,
-    /// The command line, a profile or an input file is not usable.
+    /// The command line, a profile or an input file cannot be used.
     Usage,
-    /// An instrument or robot does not answer, or not as it should.
+    /// An instrument or robot does not answer, or does not answer correctly.
     Instrument,
     /// No usable solution.
     Numerical,
@@ -23,7 +23,7 @@ pub enum ExitStatus {
     Store,
     /// A defect of this program.
     Internal,
-    /// Ended by a signal with this number, in good order.
+    /// Ended cleanly by the signal with this number.
     Signal(i32),
 }
 
@@ -49,10 +49,10 @@ impl From<ExitStatus> for ExitCode {
     }
 }
 
-/// Why a command failed, as it is told to the operator.
+/// Why a command failed, in words for the operator.
 #[derive(Debug)]
 pub struct Failure {
-    /// Decides the exit code.
+    /// The kind of failure, which decides the exit code.
     pub status: ExitStatus,
     /// What happened, with names and numbers.
     pub message: String,
@@ -91,11 +91,11 @@ impl fmt::Display for Failure {
 
 /// Width of a message on a terminal.
 const WIDTH: usize = 80;
-/// Deepest indentation that the lines below a broken one take over.
+/// Deepest indentation that continuation lines keep.
 const DEEPEST: usize = 8;
 
-/// A message fit for a terminal: no control characters, lines broken at 80 columns and indented. A message with carets below an
-/// excerpt keeps its lines, or the carets would point elsewhere.
+/// A message made safe for a terminal: control characters replaced, lines broken at 80 columns and indented. A message with carets
+/// below an excerpt keeps its lines, because the carets would point elsewhere.
 fn laid_out(lead: &str, message: &str) -> String {
     let lines: Vec<String> = format!("{lead}{message}").split('\n').map(printable).collect();
     let is_caret_line = |line: &String| line.contains('^') && line.chars().all(|c| matches!(c, ' ' | '|' | '^'));
@@ -105,7 +105,7 @@ fn laid_out(lead: &str, message: &str) -> String {
     lines.iter().map(|line| broken(line)).collect::<Vec<_>>().join("\n")
 }
 
-/// A line broken at blanks; what follows is indented two deeper. A word that is longer than a line stays whole.
+/// A line broken at blanks, continuation lines indented by two more. A word that is longer than a line stays whole.
 fn broken(line: &str) -> String {
     if line.chars().count() <= WIDTH {
         return line.to_owned();

@@ -1,7 +1,7 @@
-//! Models of an arm in the formats of others: URDF in, corrected models out.
+//! Models of an arm in other formats: import of URDF, export of corrected models.
 //!
 //! An export is written, read back from its own text, and compared with the identified arm at 1,000 random configurations
-//! ([`proof`]); a text that is off by more than 1 µm or 1 µrad anywhere is not handed out. Text in, text out: no files here.
+//! ([`proof`]); a text that is off by more than 1 µm or 1 µrad anywhere is refused. Text in, text out: this module knows no files.
 
 mod export;
 mod import;
@@ -27,7 +27,7 @@ use crate::kinematics::KinematicsError;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// What was written is not what was meant.
+    /// The written model differs from the arm.
     #[error("the written model differs from the arm by {position_mm:.6} mm and {angle_deg:.6} deg; nothing is written")]
     Differs {
         /// Distance between the two flanges (mm).
@@ -35,10 +35,10 @@ pub enum ModelError {
         /// Angle between them (degree).
         angle_deg: f64,
     },
-    /// A URDF that cannot be used.
+    /// An unusable URDF.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
-    /// A geometry that cannot be built.
+    /// A geometry without a valid chain.
     #[error(transparent)]
     Geometry(#[from] KinematicsError),
     /// A flange that the UR kinematics file cannot carry.
@@ -54,6 +54,6 @@ pub enum ModelError {
     #[error("{0}")]
     Unsuitable(String),
     /// A written text that cannot be read back.
-    #[error("what was written cannot be read back: {0}; nothing is written")]
+    #[error("the written model cannot be read back: {0}; nothing is written")]
     ReadBack(String),
 }

@@ -1,4 +1,4 @@
-//! `trupose compensate`: joint values to command so that the real arm reaches what was meant.
+//! `trupose compensate`: joint values to command so that the real arm reaches its targets.
 
 mod program;
 
@@ -19,7 +19,7 @@ use crate::store;
 use crate::text::printable;
 use crate::units::{to_deg, to_mm};
 
-/// Places that are named one by one.
+/// Targets that a message lists one by one.
 const SHOWN: usize = 20;
 
 pub(super) fn run<O: Write, E: Write>(
@@ -29,16 +29,16 @@ pub(super) fn run<O: Write, E: Write>(
     if let (Some(out), Some(source)) = (&args.out, args.targets.as_ref().or(args.program.as_ref()))
         && is_same_file(out, source)
     {
-        let message = format!("'{}' is what is to be compensated", out.display());
+        let message = format!("'{}' is the file to compensate", out.display());
         return Err(Failure::new(ExitStatus::Usage, message)
-            .hint("write to another file: what is corrected already must not be corrected again"));
+            .hint("write to another file: corrected targets must not be corrected a second time"));
     }
     let arm = export::calibrated_arm(&args.calibration, console)?;
     if !args.position_only && args.target.is_none() && !arm.untold.is_empty() {
         let names: Vec<&str> = arm.profile.targets().iter().map(|target| target.name.as_str()).collect();
         console.remark(&format!(
-            "note: the measured points tell these constants only combined with others (standard deviations): {}. As uncertain are \
-             orientations, and points of the tool away from the target that was measured; '--target {}' compensates that point",
+            "note: the measured points determine these constants only in combination with others (standard deviations): {}. Orientations, and \
+             tool points away from the measured target, are as uncertain; '--target {}' compensates the measured point",
             arm.untold.join(", "),
             names.first().unwrap_or(&"NAME")
         ));
@@ -100,7 +100,7 @@ fn table<O: Write, E: Write>(
     Ok(if failed == 0 { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
 }
 
-/// Both arms with the point that counts: the flange, or a target where each of them has it.
+/// The nominal and the identified arm with the point to bring to the targets: the flange, or a target of the profile.
 fn tool_arms(arm: &CalibratedArm, target: Option<&str>) -> Result<(ToolArm, ToolArm), Failure> {
     let index = match target {
         None => None,
@@ -134,14 +134,14 @@ fn goal(goal: &TargetGoal) -> Goal {
     }
 }
 
-/// `pose,status,q1_deg,…,left_mm,left_deg`: what is left is that of the calculation, no error of the arm.
+/// `pose,status,q1_deg,…,left_mm,left_deg`: the last two are what the calculation leaves, not errors of the arm.
 fn header(joints: &[Joint]) -> String {
     let names = joints.iter().enumerate();
     let names = names.map(|(index, joint)| format!("q{}_{}", index + 1, joint.joint_type.quantity().unit()));
     format!("pose,status,{},left_mm,left_deg", names.collect::<Vec<_>>().join(","))
 }
 
-/// A target that is not reached has no joint values: they must not be commanded.
+/// Joint values to command; none for a target that is not reached.
 fn line(pose: &str, done: &Compensated, joints: &[Joint]) -> String {
     let usable = done.status.is_usable();
     let value = |(joint, q): (&Joint, &f64)| {
@@ -171,6 +171,6 @@ fn reason(done: &Compensated, joints: &[Joint]) -> String {
         Status::AtLimit(held) => format!("not reached: {} would have to pass its limit; {left}", names(held)),
         Status::Singular => format!("not reached: near a singularity the corrections become too large; {left}"),
         Status::OutOfReach => "not reached: it is out of reach of this arm".to_owned(),
-        Status::BeyondLimit(held) => format!("not reached: {} is meant to be beyond its limit", names(held)),
+        Status::BeyondLimit(held) => format!("not reached: {} has a target beyond its limit", names(held)),
     }
 }

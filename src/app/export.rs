@@ -1,4 +1,4 @@
-//! `trupose export` and `trupose profile import-urdf`: models out and in.
+//! `trupose export` and `trupose profile import-urdf`: exports and imports of models.
 
 use std::io::Write;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::session::calibration::Calibration;
 use crate::store;
 use crate::units::{MICROMETRE, MILLIRADIAN};
 
-/// No arm is longer (m).
+/// Length that no arm exceeds (m).
 const LONGEST_ARM: f64 = 20.0;
 
 pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
@@ -46,7 +46,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O
     Ok(ExitStatus::Accepted)
 }
 
-/// The arm of a calibration file. Says what speaks against applying it.
+/// The arm of a calibration file. Prints the reasons not to apply it.
 pub(super) fn calibrated_arm<O: Write, E: Write>(
     path: &Path,
     console: &mut Console<O, E>,
@@ -87,7 +87,7 @@ pub(super) fn import_urdf<O: Write, E: Write>(
     };
     let part = Arm { chain: &arm.chain, ranges: &arm.ranges, beta_joints: &arm.beta_joints };
     let profile = geometry_only(&heading, &part);
-    // What is handed out can be read.
+    // A written profile must be readable.
     load::parse_profile(profile.clone(), "the imported profile")?;
     for note in &arm.notes {
         console.remark(&format!("note: {note}"));

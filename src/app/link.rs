@@ -32,7 +32,7 @@ pub(super) fn run<O: Write, E: Write>(
     test(args, console)
 }
 
-/// A raw log in a new file.
+/// Opens the raw log in a new file.
 pub(super) fn raw_log(path: Option<&Path>) -> Result<Option<RawLog>, Failure> {
     let Some(path) = path else { return Ok(None) };
     let file = File::options().create(true).append(true).open(path).map_err(|error| {

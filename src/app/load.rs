@@ -12,6 +12,7 @@ use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, Measurements, Row, read_bytes_as};
 use crate::session::summary::{InputFile, InputRole, Warning};
 use crate::store;
+use crate::text::counted;
 
 /// A profile with the text it came from.
 #[derive(Clone, Debug)]
@@ -31,7 +32,7 @@ pub(super) fn text(path: &Path) -> Result<String, Failure> {
     })
 }
 
-/// A profile by the name of a shipped one, or by its path.
+/// Loads a shipped profile by name, or any profile by path.
 pub(super) fn profile(name_or_path: &str) -> Result<LoadedProfile, Failure> {
     let path = Path::new(name_or_path);
     let (text, file) = match builtin(name_or_path) {
@@ -51,9 +52,8 @@ pub(super) fn parse_profile(text: String, file: &str) -> Result<LoadedProfile, F
     match Profile::parse(&text, file) {
         Ok((profile, warnings)) => Ok(LoadedProfile { profile, text, warnings }),
         Err(errors) => {
-            let count = errors.error_count();
-            let noun = if count == 1 { "error" } else { "errors" };
-            Err(Failure::new(ExitStatus::Usage, format!("profile '{file}' has {count} {noun}\n\n{errors}\n")))
+            let count = counted(errors.error_count(), "error");
+            Err(Failure::new(ExitStatus::Usage, format!("profile '{file}' has {count}\n\n{errors}\n")))
         }
     }
 }
@@ -63,7 +63,7 @@ pub(super) fn parse_profile(text: String, file: &str) -> Result<LoadedProfile, F
 pub(super) struct LoadedTable {
     pub(super) table: Measurements,
     pub(super) input: InputFile,
-    /// It says that its points are simulated.
+    /// The warning of a table whose points are simulated.
     pub(super) simulated: Option<Warning>,
 }
 
@@ -82,7 +82,7 @@ pub(super) fn measurements(
     Ok(LoadedTable { table, input: input_file(role, file, &bytes), simulated })
 }
 
-/// A filter and whether it fits the columns of a table.
+/// Parses a filter and checks it against the columns of a table.
 pub(super) fn filter(text: Option<&str>, columns: &[String]) -> Result<Option<Filter>, Failure> {
     let Some(text) = text else { return Ok(None) };
     let usage = |error: &dyn std::error::Error| {
@@ -139,13 +139,13 @@ fn target_index(profile: &Profile, name: &str) -> Option<usize> {
     profile.targets().iter().position(|target| target.name == name)
 }
 
-/// The time, in UTC to the second.
+/// The current time in UTC, to the second.
 pub(super) fn now() -> String {
     let now = jiff::Timestamp::now();
     now.round(jiff::Unit::Second).unwrap_or(now).to_string()
 }
 
-/// Date and time of now, in UTC, for the heads of robot programs.
+/// The current date and time in UTC, for the heads of robot programs.
 pub(super) fn today() -> jiff::civil::DateTime {
     jiff::Timestamp::now().to_zoned(jiff::tz::TimeZone::UTC).datetime()
 }

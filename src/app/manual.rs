@@ -1,4 +1,4 @@
-//! `trupose completions SHELL` and `trupose man`: what shells and `man` want to know of the command line.
+//! `trupose completions SHELL` and `trupose man`: completion scripts and manual pages of the command line.
 
 use std::io::Write;
 
@@ -20,10 +20,10 @@ pub(super) fn completions<O: Write, E: Write>(
     Ok(ExitStatus::Accepted)
 }
 
-/// The first page is printed; with a folder, the pages of all commands are written there.
+/// Prints the first page; with a folder, writes the pages of all commands into it.
 pub(super) fn man<O: Write, E: Write>(args: &ManArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let mut command = Cli::command();
-    // Gives the commands inside their full names.
+    // Completes the full names of subcommands.
     command.build();
     let Some(folder) = &args.out else {
         console.print_bytes(&page(command)?.1)?;

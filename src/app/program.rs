@@ -44,7 +44,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
                         unit = quantity.unit()
                     ),
                 )
-                .hint("a program with a pose that the arm cannot take is not written; correct the plan"));
+                .hint("correct the plan: no program is written for a pose that the arm cannot reach"));
             }
         }
     }
@@ -88,7 +88,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
     Ok(if options.dangers.is_empty() { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
 }
 
-/// What the arm would run into, by the bodies of the profile: the first few findings of poses and of moves between them.
+/// The first few collisions of poses, and of moves between them, according to the bodies of the profile.
 fn dangers(profile: &Profile, rows: &[PlannedPose]) -> Result<Vec<String>, Failure> {
     const SHOWN: usize = 5;
     if profile.bodies().is_empty() {

@@ -5,10 +5,10 @@ use std::time::{Duration, Instant};
 
 use crate::identification::Iteration;
 
-/// Silence before the first line, and between two lines.
+/// Least time before the first line, and between two lines.
 const INTERVAL: Duration = Duration::from_millis(500);
 
-/// Time since it was made.
+/// Measures the time since it was created.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stopwatch {
     started: Instant,
@@ -20,13 +20,13 @@ impl Stopwatch {
         Self { started: Instant::now() }
     }
 
-    /// Seconds so far.
+    /// Seconds since it was created.
     pub(super) fn seconds(&self) -> f64 {
         self.started.elapsed().as_secs_f64()
     }
 }
 
-/// Prints remarks, but only when there is time to read them.
+/// Prints progress lines, at most one per interval.
 #[derive(Debug)]
 pub(super) struct Progress<'a, W: Write> {
     out: &'a mut W,
@@ -39,7 +39,7 @@ impl<'a, W: Write> Progress<'a, W> {
         Self { out, last: Stopwatch::new(), steps: 0 }
     }
 
-    /// Takes note of a solver step.
+    /// Counts a solver step and prints a line about it.
     pub(super) fn step(&mut self, iteration: &Iteration) {
         self.steps += 1;
         let Iteration { cost, step, .. } = iteration;
@@ -49,11 +49,11 @@ impl<'a, W: Write> Progress<'a, W> {
         });
     }
 
-    /// Says something, if the last time was long enough ago.
+    /// Prints a line if the last one was long enough ago.
     pub(super) fn say(&mut self, text: impl FnOnce() -> String) {
         if self.last.seconds() >= INTERVAL.as_secs_f64() {
             self.last = Stopwatch::new();
-            // Nobody may be listening.
+            // Progress is optional: a closed stderr is no failure.
             drop(writeln!(self.out, "{}", text()));
         }
     }

@@ -51,7 +51,7 @@ pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O,
     play(engine, &script, &script_args, console)
 }
 
-/// Goes on with a session by a script.
+/// Resumes a session and runs a script in it.
 pub(super) fn resume<O: Write, E: Write>(
     folder: &Path,
     file: &Path,
@@ -74,9 +74,13 @@ fn parse(text: &str, file: &str, args: &ScriptArgs) -> Result<Script, Failure> {
     Script::parse(text, &values).map_err(|error| {
         let failure = Failure::new(ExitStatus::Usage, format!("'{file}': {error}"));
         let set: Vec<String> = values.iter().map(|(name, value)| format!("{name}={value}")).collect();
-        // A value that does not fit in its place is an error of the text around it.
+        // A value of the wrong type makes the script around it unreadable.
         let may_be_a_value = matches!(error, ScriptError::Syntax { .. }) && !set.is_empty();
-        if may_be_a_value { failure.hint(format!("does a given value fit there? {}", set.join(", "))) } else { failure }
+        if may_be_a_value {
+            failure.hint(format!("does the value given with '--set' fit here? {}", set.join(", ")))
+        } else {
+            failure
+        }
     })
 }
 
@@ -91,7 +95,7 @@ fn options(script: &Script, args: &ScriptArgs) -> Result<Options, Failure> {
     })
 }
 
-/// The port for a live view, if one is asked for.
+/// Opens the port of the live view, if there is to be one.
 pub(super) fn live<O: Write, E: Write>(
     args: RecordingArgs,
     console: &mut Console<O, E>,
@@ -108,7 +112,7 @@ pub(super) fn live<O: Write, E: Write>(
     Ok(Some(live))
 }
 
-/// Opens a session to go on with it.
+/// Opens a session to resume it.
 pub(super) fn open(folder: &Path, options: Options) -> Result<Engine, Failure> {
     let (held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
     let session = Session::of(&journal)
@@ -116,15 +120,15 @@ pub(super) fn open(folder: &Path, options: Options) -> Result<Engine, Failure> {
     Engine::resume(held, session, journal, options).map_err(|error| internal(&error))
 }
 
-/// What a session error means to the operator.
+/// The failure that a session error means, with hints.
 pub(super) fn session_failure(error: &SessionError) -> Failure {
     let failure = Failure::from_error(ExitStatus::Store, error);
     match error {
-        SessionError::Locked { .. } => failure.hint("end the other program first, or go on there"),
+        SessionError::Locked { .. } => failure.hint("close the other program first, or continue there"),
         SessionError::NotASession { .. } => failure.hint("'trupose session list' shows the sessions of a folder"),
         SessionError::Journal { source: JournalError::Newer { .. }, .. } => failure.hint("use the program that wrote it"),
         SessionError::Journal { source: JournalError::Empty, .. } => {
-            failure.hint("the program ended before the first entry was on disk: the folder can be removed")
+            failure.hint("the program stopped before anything was saved: the folder can be deleted")
         }
         SessionError::Journal { source: JournalError::NotAJournal, .. } => failure.hint("is this the right folder?"),
         SessionError::Journal { .. } => {
@@ -134,7 +138,7 @@ pub(super) fn session_failure(error: &SessionError) -> Failure {
             if matches!(source.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem) =>
         {
             failure.hint(
-                "it belongs to somebody else, or is write-protected: go on as that user, or copy the folder and go on with the copy",
+                "it belongs to another user or is read-only: run as that user, or copy the folder and resume the copy",
             )
         }
         SessionError::Store(_) => failure,
@@ -163,19 +167,19 @@ fn play<O: Write, E: Write>(
     };
     let mut runner = Runner::new(engine, transcript, &reopen);
     let signalled = |saved: bool| {
-        let saved = if saved { "the session is saved" } else { "no session was begun" };
+        let saved = if saved { "the session is saved" } else { "no session was started" };
         received
             .signal()
             .map(|signal| Failure::new(ExitStatus::Signal(signal), format!("ended by signal {signal}; {saved}")))
     };
     let outcome = runner.run(script);
     let has_session = runner.session().opened.is_some();
-    // A terminal that went away sends SIGHUP: that is the cause, not the writing that failed.
+    // A closed terminal sends SIGHUP: that is the cause, not the failed write.
     let output = |error: std::io::Error| {
         signalled(has_session).unwrap_or_else(|| match error.kind() {
             std::io::ErrorKind::BrokenPipe => Failure::new(
                 ExitStatus::Store,
-                "the reader of the transcript went away: the script was ended; the session is saved",
+                "the reader of the transcript has gone, so the script was stopped; the session is saved",
             ),
             _ => Failure::new(ExitStatus::Store, format!("cannot write the transcript: {error}")),
         })
@@ -204,7 +208,7 @@ fn play<O: Write, E: Write>(
         }
         Outcome::Ended { cause } => match (signalled(has_session), has_session) {
             (Some(failure), true) => Err(Failure::new(failure.status, format!("{cause}; the session is saved"))),
-            (Some(failure), false) => Err(Failure::new(failure.status, format!("{cause}; no session was begun"))),
+            (Some(failure), false) => Err(Failure::new(failure.status, format!("{cause}; no session was started"))),
             (None, _) => Ok(ExitStatus::Accepted),
         },
     }

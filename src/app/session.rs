@@ -1,4 +1,4 @@
-//! `trupose session list | show | export | report`: sessions on disk, without holding them.
+//! `trupose session list | show | export | report`: sessions on disk, without locking them.
 
 use std::io::Write;
 use std::path::Path;
@@ -156,7 +156,7 @@ fn show<O: Write, E: Write>(
     Ok(ExitStatus::Accepted)
 }
 
-/// Writes the report of a session anew from its journal. Sessions of earlier versions get one so.
+/// Writes the report of a session from its journal, also for sessions of earlier versions.
 fn report<O: Write, E: Write>(
     folder: &Path,
     out: Option<&Path>,
@@ -184,13 +184,13 @@ fn report<O: Write, E: Write>(
     Ok(ExitStatus::Accepted)
 }
 
-/// The report as text.
+/// Prints the report as text.
 fn print_report<O: Write, E: Write>(folder: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let (_, session) = load(folder)?;
     let Some(result) = &session.identified else {
         let message = format!("nothing has been identified in session '{}' yet", folder.display());
         return Err(Failure::new(ExitStatus::Numerical, message)
-            .hint("'trupose session show DIR' shows what it has; 'trupose resume DIR' goes on with it"));
+            .hint("'trupose session show DIR' shows what it has; 'trupose resume DIR' resumes it"));
     };
     if !session.is_current() {
         console.print("OUT OF DATE: samples have changed since this result; identify again\n\n")?;
@@ -211,7 +211,7 @@ fn export_tables<O: Write, E: Write>(
         .as_ref()
         .ok_or_else(|| Failure::new(ExitStatus::Usage, format!("session '{}' has no robot yet", folder.display())))?;
     if !csv {
-        return Err(Failure::new(ExitStatus::Usage, "nothing to export was named").hint("give '--csv'"));
+        return Err(Failure::new(ExitStatus::Usage, "nothing was selected for export").hint("give '--csv'"));
     }
     let Some(out) = out else {
         console.print(&export::measurements_csv(&session, robot))?;

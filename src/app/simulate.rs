@@ -1,4 +1,4 @@
-//! `trupose simulate`: an instrument or a robot's controller that is not there, for rehearsals and for whoever writes a driver.
+//! `trupose simulate`: a simulated instrument or robot controller, for rehearsals and for the development of drivers.
 
 use std::io::{BufRead as _, Write, stdin};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -17,20 +17,20 @@ use crate::session::simulation::Simulation;
 use crate::session::wire::WireProtocol;
 use crate::store;
 
-/// How often it is looked whether the robot goes on.
+/// Interval at which the robot checks whether to move on.
 const LOOK: Duration = Duration::from_millis(50);
-/// The robot goes on when no shot came for so many looks: whoever measures looks at its joints once more after the last one.
+/// The robot moves on after this many checks without a shot: a driver reads the joints once more after its last shot.
 const PAUSE: u32 = 20;
 
-/// What may happen.
+/// An event that the simulation reacts to.
 enum Order {
-    /// A line was typed.
+    /// A typed line.
     Line(String),
     /// A signal.
     End,
 }
 
-/// Where the robot goes.
+/// The poses that the robot visits.
 struct Route {
     poses: Vec<PlannedPose>,
     at: usize,
@@ -56,9 +56,10 @@ impl Route {
 
 pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     if args.protocol == WireProtocol::Ndi && args.shots > 0 {
-        let text = "an NDI tracker is asked for a shot as it is for a look: '--shots' cannot count them";
+        let text =
+            "an NDI tracker is polled for live positions and for shots in the same way: '--shots' cannot count them";
         return Err(
-            Failure::new(ExitStatus::Usage, text).hint("leave '--shots' out and give 'next' when a pose is measured")
+            Failure::new(ExitStatus::Usage, text).hint("leave out '--shots', and type 'next' after each measured pose")
         );
     }
     let loaded = load::profile(&args.profile)?;
@@ -82,7 +83,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     console.remark("'next', 'goto POSE', 'where', 'quit' or Ctrl-C");
     let (sender, orders) = channel();
     let signalled = sender.clone();
-    // Nobody listens any more once this ends.
+    // The receiver is gone once this function has returned.
     signals::on_signal(move |_signal| drop(signalled.send(Order::End)))
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     read_lines(sender)?;
@@ -109,7 +110,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     Ok(ExitStatus::Accepted)
 }
 
-/// What is said to a line; none: it ends the program.
+/// The answer to a typed line; `None` ends the program.
 fn obey(line: &str, route: &mut Route, served: &mut Served) -> Option<String> {
     let target = match line.split_once(char::is_whitespace) {
         _ if line == "quit" => return None,
@@ -122,11 +123,11 @@ fn obey(line: &str, route: &mut Route, served: &mut Served) -> Option<String> {
             Some(found) => found,
             None => return Some(format!("there is no pose '{}'", pose.trim())),
         },
-        _ => return Some(format!("'{line}' is no order; there are next, goto POSE, where and quit")),
+        _ => return Some(format!("'{line}' is not a command; use next, goto POSE, where or quit")),
     };
     let before = std::mem::replace(&mut route.at, target);
     match route.go(served) {
-        Ok(()) => Some(format!("the robot goes to {}", route.text())),
+        Ok(()) => Some(format!("the robot moves to {}", route.text())),
         Err(error) => {
             route.at = before;
             Some(error.to_string())
@@ -134,7 +135,7 @@ fn obey(line: &str, route: &mut Route, served: &mut Served) -> Option<String> {
     }
 }
 
-/// Has the lines of standard input told. Its end ends nothing: a simulator may run without a terminal.
+/// Sends the lines of standard input. Its end is not an event: a simulator may run without a terminal.
 fn read_lines(sender: Sender<Order>) -> Result<(), Failure> {
     let read = move || {
         for line in stdin().lock().lines() {
@@ -151,7 +152,7 @@ fn read_lines(sender: Sender<Order>) -> Result<(), Failure> {
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))
 }
 
-/// The measured rows of the plan, or one pose in the middle.
+/// The measured rows of the plan; without a plan one pose in the middle of the joint ranges.
 fn poses(args: &SimulateArgs, profile: &Profile) -> Result<Vec<PlannedPose>, Failure> {
     let Some(path) = &args.plan else {
         let middle = |range: &crate::profile::JointRange| {

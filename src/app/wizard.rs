@@ -14,7 +14,7 @@ use crate::tui::glyphs::Glyphs;
 use crate::tui::theme::Theme;
 use crate::wizard::Intent;
 
-/// Begins a calibration, with a profile if one is given.
+/// Starts a calibration, with a profile if one is given.
 pub(super) fn run<O: Write, E: Write>(
     profile: Option<&str>,
     args: &ScriptArgs,
@@ -30,7 +30,7 @@ pub(super) fn run<O: Write, E: Write>(
     play(engine, surface, args.record_script.as_deref(), console)
 }
 
-/// Goes on with a session.
+/// Resumes a session.
 pub(super) fn resume<O: Write, E: Write>(
     folder: &Path,
     args: &ScriptArgs,
@@ -52,7 +52,7 @@ fn options<O: Write, E: Write>(args: &ScriptArgs, console: &mut Console<O, E>) -
     })
 }
 
-/// What the wizard is shown on.
+/// Where the wizard is shown.
 #[derive(Clone, Copy, Debug)]
 enum Surface {
     Screen(tui::Options),
@@ -67,7 +67,7 @@ fn surface(args: TerminalArgs) -> Result<Surface, Failure> {
     screen(args, &environment).map(Surface::Screen)
 }
 
-/// How the terminal is used, if there is one that will do.
+/// The settings of the terminal, if it is suitable.
 pub(super) fn screen(args: TerminalArgs, environment: &TerminalEnvironment) -> Result<tui::Options, Failure> {
     let refused = |message: &str| {
         Err(Failure::new(ExitStatus::Usage, message)
@@ -116,7 +116,7 @@ fn play<O: Write, E: Write>(
     for remark in &exit.remarks {
         console.remark(remark);
     }
-    let saved = exit.folder.map(|folder| format!("the session is saved; go on with 'trupose resume {folder}'"));
+    let saved = exit.folder.map(|folder| format!("the session is saved; resume it with 'trupose resume {folder}'"));
     match exit.signal {
         None => {
             if let Some(saved) = saved {
@@ -131,7 +131,7 @@ fn play<O: Write, E: Write>(
     }
 }
 
-/// Writes what was done as a script.
+/// Writes the operator's actions as a script.
 fn write_script(file: &Path, completed: &[CompletedIntent]) -> Result<(), Failure> {
     let step = |done: &CompletedIntent| match &done.failure {
         None => ScriptStep::Do(done.intent.clone()),

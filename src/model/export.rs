@@ -1,4 +1,4 @@
-//! The identified arm in each format, with the proof.
+//! Exports of the identified arm in each format, each checked by reading it back.
 
 use clap::ValueEnum;
 use nalgebra::{Isometry3, Vector3};
@@ -42,7 +42,7 @@ impl Format {
         }
     }
 
-    /// Whether the place of the targets on the flange is in it.
+    /// Whether the format carries the positions of the targets on the flange.
     const fn has_targets(self) -> bool {
         matches!(self, Self::CorrectedProfile | Self::Json)
     }
@@ -51,16 +51,16 @@ impl Format {
 /// A calibrated arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibratedArm {
-    /// The robot as its maker says, with the targets as they were mounted.
+    /// The nominal robot with the targets as they were mounted.
     pub profile: Profile,
     /// The identified arm.
     pub identified: Arm,
-    /// Where the result comes from and how it was judged, a few lines.
+    /// A few lines about the origin of the result and its verdict.
     pub about: Vec<String>,
-    /// What speaks against applying it: it was not accepted, or nothing was measured.
+    /// Reasons not to apply it: it was not accepted, or nothing was measured.
     pub cautions: Vec<String>,
-    /// Constants of the last link that the data tell only combined with others, with their standard deviations: as uncertain are
-    /// orientations, and points of the tool away from the target that was measured.
+    /// Constants of the last link that the data determine only in combination with others, with their standard deviations.
+    /// Orientations, and tool points away from the measured target, are as uncertain.
     pub untold: Vec<String>,
 }
 
@@ -86,7 +86,7 @@ impl CalibratedArm {
         Ok(Self { profile, identified, about, cautions, untold })
     }
 
-    /// The targets where they were identified.
+    /// The targets at their identified positions.
     pub fn targets(&self) -> Vec<Target> {
         let identified = self.profile.targets().iter().zip(&self.identified.targets);
         identified.map(|(target, place)| Target { position_in_flange: *place, ..target.clone() }).collect()
@@ -105,7 +105,7 @@ const fn words(status: VerdictStatus) -> &'static str {
     }
 }
 
-/// What speaks against applying a calibration.
+/// Reasons not to apply a calibration.
 fn cautions(calibration: &Calibration) -> Vec<String> {
     let verdict = &calibration.verdict;
     let refused = (verdict.status == VerdictStatus::NotAccepted)
@@ -115,7 +115,7 @@ fn cautions(calibration: &Calibration) -> Vec<String> {
     refused.into_iter().chain(serious.map(|warning| warning.message.clone())).collect()
 }
 
-/// Constants of the last of `joints` links that the data tell only combined with others.
+/// Constants of the last of `joints` links that the data determine only in combination with others.
 fn untold(calibration: &Calibration, joints: usize) -> Vec<String> {
     let is_of_last_link = |id: ParameterId| id.joint().is_some_and(|joint| joint + 1 == joints);
     let parameters = calibration.parameters.iter();
@@ -131,7 +131,6 @@ fn untold(calibration: &Calibration, joints: usize) -> Vec<String> {
 /// A URDF that is to take the identified geometry.
 #[derive(Clone, Copy, Debug)]
 pub struct GivenUrdf<'a> {
-    /// Its text.
     pub text: &'a str,
     /// Link that is the base of the profile.
     pub base: &'a str,
@@ -139,23 +138,22 @@ pub struct GivenUrdf<'a> {
     pub tip: &'a str,
 }
 
-/// What may be asked of an export.
+/// Options of an export.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ExportOptions<'a> {
-    /// URDF only: put the geometry into this one.
+    /// URDF only: put the geometry into this URDF.
     pub into: Option<GivenUrdf<'a>>,
-    /// UR kinematics only: leave to the tool what the format cannot say about the flange.
+    /// UR kinematics only: leave to the tool what the format cannot express about the flange.
     pub with_tool_offset: bool,
 }
 
-/// A proven model.
+/// A written model that was read back and checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Export {
-    /// Text of the file.
     pub text: String,
-    /// How well it agrees with the identified arm, read back from the text.
+    /// Its agreement with the identified arm after reading it back.
     pub agreement: Agreement,
-    /// What must be known to use it.
+    /// Remarks for its use.
     pub remarks: Vec<String>,
 }
 
@@ -201,9 +199,9 @@ fn corrected_profile(arm: &CalibratedArm) -> String {
     let profile = &arm.profile;
     let mut comments = arm.about.clone();
     comments.push(
-        "The constants are the identified ones. Targets stand where they were identified: mount them anew,".to_owned(),
+        "The constants are the identified ones. Targets stand where they were identified: mount them again,".to_owned(),
     );
-    comments.push("measure them anew.".to_owned());
+    comments.push("and measure them.".to_owned());
     let heading = Heading {
         comments: &comments,
         name: &format!("{}-corrected", profile.name()),
@@ -227,7 +225,7 @@ fn ur_kinematics(
         return Err(ModelError::FlangeOffset { offset });
     }
     if !is_small {
-        remarks.push(format!("the tool must take what the file cannot say: in front of every tool {offset}"));
+        remarks.push(format!("the tool must carry what the file cannot express: in front of every tool {offset}"));
     }
     let origins = read_ur(&written.text)?;
     let agreement = prove(&arm.identified.chain, &arm.limits(), proof::EXPORT, |q| {
@@ -262,7 +260,7 @@ fn urdf(
     let mut comments = arm.about.clone();
     if !coupled.is_empty() {
         let note = format!(
-            "Joint values of {} turn one link against the one before: they are not those of the pendant, where it is coupled.",
+            "Joint values of {} turn one link against the one before: the pendant shows other values where joints are coupled.",
             coupled.join(", ")
         );
         comments.push(note.clone());
@@ -278,7 +276,7 @@ fn urdf(
             remarks.push(format!("origins replaced: {}", patched.joints.join(", ")));
             if patched.flange_from_tip != Isometry3::identity() {
                 let offset = offset_text(&patched.flange_from_tip);
-                remarks.push(format!("link '{tip}' stays where it is on the flange of the profile: {offset}"));
+                remarks.push(format!("link '{tip}' keeps its position on the flange of the profile: {offset}"));
             }
             (patched.text, base, tip, patched.flange_from_tip)
         }

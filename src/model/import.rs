@@ -1,4 +1,4 @@
-//! From a URDF to link constants: the axes of a serial chain at rest, walked from base to tip.
+//! Import of a URDF: link constants from the axes of a serial chain at rest, from base to tip.
 //!
 //! Between the axes i and i+1 there are four free numbers and one more where they are (nearly) parallel:
 //! `Rot(z,θ_i) Trans(z,d_i) Trans(x,a) Rot(x,α) Rot(y,β)`. This product is a link of the standard convention; the modified
@@ -21,7 +21,7 @@ use super::urdf::UrdfChain;
 use crate::kinematics::{Convention, Joint, JointType, KinematicChain, Link};
 use crate::profile::{JointRange, PARALLEL_TOLERANCE};
 
-/// Shorter lengths (m) are taken as none where only a direction depends on them.
+/// Lengths (m) below this count as zero where only a direction depends on them.
 const NO_LENGTH: f64 = 1e-12;
 
 /// Angles and lengths below this (rad, m) are rounding of the walk: an axis along z is along z.
@@ -36,9 +36,9 @@ pub struct ImportedArm {
     pub ranges: Vec<JointRange>,
     /// Joints whose link has a β.
     pub beta_joints: Vec<usize>,
-    /// What the URDF leaves open, one sentence each.
+    /// Remarks about what the URDF leaves open, one sentence each.
     pub notes: Vec<String>,
-    /// How well it agrees with the URDF at random configurations.
+    /// Its agreement with the URDF at random configurations.
     pub agreement: Agreement,
 }
 
@@ -123,7 +123,7 @@ struct Screw {
     d: f64,
 }
 
-/// What lies between two axes; only α, a and β of `link` are used.
+/// The transform between two axes; only α, a and β of `link` are used.
 #[derive(Clone, Copy, Debug, Default)]
 struct Between {
     link: Link,
@@ -158,7 +158,7 @@ fn walk(axes: &[Axis], base_from_tip: &Isometry3<f64>) -> Walked {
     Walked { base, flange: tidied(&(screw_z(last.theta, last.d).inverse() * tip)), screws, between }
 }
 
-/// A frame with z along the first axis: the base itself where that is possible, otherwise as near as can be.
+/// A frame with z along the first axis: the base itself if possible, otherwise as near to it as possible.
 fn base_frame(axis: &Axis) -> Isometry3<f64> {
     let z = axis.direction.into_inner();
     let (point, along) = (axis.point.coords, z.z);
@@ -173,7 +173,7 @@ fn base_frame(axis: &Axis) -> Isometry3<f64> {
     tidied(&from_axes(origin, x, z))
 }
 
-/// From `frame`, whose z is the present axis, to the next one. `after` is the axis behind the next one.
+/// The link from `frame`, whose z is the current axis, to the next axis. `after` is the axis behind the next one.
 fn step(frame: &Isometry3<f64>, next: &Axis, after: Option<&Axis>) -> (Screw, Between) {
     let seen = |axis: &Axis| {
         (frame.inverse_transform_point(&axis.point), frame.inverse_transform_unit_vector(&axis.direction))

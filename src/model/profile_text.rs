@@ -8,14 +8,14 @@ use crate::profile::{ExpectedDeviations, JointRange, Profile, Target};
 use crate::text::printable;
 use crate::units::{MICROMETRE, MILLIRADIAN, Quantity, to_deg, to_mm};
 
-/// What stands at the top of every profile and about its arm.
+/// The head of a profile: comments, names and source.
 #[derive(Clone, Copy, Debug)]
 pub struct Heading<'a> {
     /// Comment lines, without `//`.
     pub comments: &'a [String],
     /// Short name.
     pub name: &'a str,
-    /// Name for people.
+    /// Title for people.
     pub title: &'a str,
     /// Where the numbers come from.
     pub source: &'a str,
@@ -24,7 +24,6 @@ pub struct Heading<'a> {
 /// The arm of a profile.
 #[derive(Clone, Copy, Debug)]
 pub struct Arm<'a> {
-    /// Its geometry.
     pub chain: &'a KinematicChain,
     /// Limits and speeds, one entry per joint.
     pub ranges: &'a [JointRange],
@@ -32,8 +31,8 @@ pub struct Arm<'a> {
     pub beta_joints: &'a [usize],
 }
 
-/// A profile of an arm of which only the geometry and the limits are known: all else is left at its default, and the text
-/// says what is open.
+/// A profile of an arm of which only geometry and limits are known. Everything else keeps its default, and comments in the text
+/// list it.
 pub fn geometry_only(heading: &Heading<'_>, arm: &Arm<'_>) -> String {
     let mut lines = Vec::new();
     head(&mut lines, heading, arm);
@@ -51,7 +50,7 @@ pub fn geometry_only(heading: &Heading<'_>, arm: &Arm<'_>) -> String {
     finished(lines)
 }
 
-/// The profile with another arm and other targets: everything else as it was, comments aside.
+/// The profile with another arm and other targets; everything else but the comments is kept.
 pub fn complete(heading: &Heading<'_>, profile: &Profile, chain: &KinematicChain, targets: &[Target]) -> String {
     let mut lines = Vec::new();
     let arm = Arm { chain, ranges: profile.joints(), beta_joints: profile.beta_joints() };
@@ -263,7 +262,7 @@ fn finished(mut lines: Vec<String>) -> String {
     lines.join("\n") + "\n"
 }
 
-/// A text in quotation marks; what would need an escape sequence is replaced.
+/// A text in quotation marks; characters that would need an escape sequence are replaced.
 fn quoted(text: &str) -> String {
     let clean: String = printable(text).chars().map(|c| if matches!(c, '"' | '\\') { '\'' } else { c }).collect();
     let clean = clean.trim();

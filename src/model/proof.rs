@@ -1,4 +1,4 @@
-//! Proof that a written model is the model: forward kinematics of what was read back, against what was meant, at random
+//! Proof that a written model is correct: its forward kinematics after reading it back, compared with the arm at random
 //! configurations.
 
 use std::f64::consts::PI;
@@ -11,16 +11,16 @@ use super::ModelError;
 use crate::kinematics::{ForwardKinematics, JointType, KinematicChain};
 use crate::units::{MICROMETRE, to_deg, to_mm};
 
-/// Random configurations of a proof.
+/// Number of random configurations of a proof.
 pub const CONFIGURATIONS: usize = 1000;
 
 /// Seed of the configurations: the same ones each time.
 const SEED: u64 = 0x5eed;
 
-/// How far a joint without limits goes, to both sides (rad, m).
+/// Range of a joint without limits, to both sides (rad, m).
 const UNLIMITED: (f64, f64) = (PI, 1.0);
 
-/// How well two models agree.
+/// Agreement of two models.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Agreement {
     /// Largest difference of the flange's position (m).
@@ -29,7 +29,7 @@ pub struct Agreement {
     pub angle: f64,
 }
 
-/// The largest differences that are let pass.
+/// Largest tolerated differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Position (m).
@@ -38,10 +38,10 @@ pub struct Tolerance {
     pub angle: f64,
 }
 
-/// What every export must reach: 1 µm and 1 µrad.
+/// Tolerance of exports: 1 µm and 1 µrad.
 pub const EXPORT: Tolerance = Tolerance { position: MICROMETRE, angle: 1e-6 };
 
-/// What every import must reach: 1 nm and 1 nrad.
+/// Tolerance of imports: 1 nm and 1 nrad.
 pub const IMPORT: Tolerance = Tolerance { position: 1e-9, angle: 1e-9 };
 
 /// Configurations of a chain, evenly random within `limits` ((rad) or (m), one entry per joint).

@@ -182,7 +182,7 @@ pub(super) fn read_json(text: &str) -> Result<KinematicChain, ModelError> {
 /// Columns of the CSV before those of the couplings.
 const COLUMNS: [&str; 8] = ["joint", "type", "alpha_deg", "a_mm", "d_mm", "theta_deg", "beta_deg", "direction"];
 
-/// The table of link constants. What concerns the whole arm stands above it, in lines `# name: value`.
+/// The table of link constants. Values of the whole arm are above it, in lines `# name: value`.
 pub(super) fn write_csv(about: &[String], chain: &KinematicChain) -> Result<String, ModelError> {
     let failed = |error: &dyn std::error::Error| ModelError::ReadBack(error.to_string());
     let mut text: String = about.iter().flat_map(|line| ["# ".to_owned(), printable(line), "\n".to_owned()]).collect();
@@ -260,11 +260,11 @@ pub(super) fn read_csv(text: &str) -> Result<KinematicChain, ModelError> {
 /// Links of a Universal Robots arm in the ROS description, from base to flange.
 const UR_LINKS: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
 
-/// An arm in the parameters of the ROS description of Universal Robots, and what is left behind the last axis.
+/// An arm in the parameters of the ROS description of Universal Robots, and the rest behind the last axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct UrKinematics {
     pub(super) text: String,
-    /// The flange of the arm seen from the last link: identity, or what a tool must take.
+    /// Pose of the flange in the last link: identity, or the part that a tool must carry.
     pub(super) flange_in_wrist_3: Isometry3<f64>,
 }
 
@@ -275,13 +275,13 @@ pub(super) fn write_ur(about: &[String], chain: &KinematicChain) -> Result<UrKin
         Err(ModelError::Unsuitable(message))
     };
     if chain.dof() != UR_LINKS.len() || chain.joints().iter().any(|joint| joint.joint_type != JointType::Revolute) {
-        return unsuitable("six turning joints; this arm has others");
+        return unsuitable("six turning joints are needed; this arm has other joints");
     }
     if chain.joints().iter().any(is_coupled) {
-        return unsuitable("no coupled joints; this arm has them");
+        return unsuitable("coupled joints are not possible; this arm has some");
     }
     if chain.joints().iter().any(|joint| joint.direction < 0.0) {
-        return unsuitable("all joints count about +z; this arm has one that counts the other way");
+        return unsuitable("all joints must turn positively about +z; this arm has one that turns the other way");
     }
     let mut frames = JointFrames::new(chain);
     // What turns about and moves along the last axis belongs to its origin.
@@ -313,7 +313,7 @@ pub(super) fn write_ur(about: &[String], chain: &KinematicChain) -> Result<UrKin
     Ok(UrKinematics { text, flange_in_wrist_3: rest })
 }
 
-/// A pose as what a joint about z can take, and the rest.
+/// Splits a pose into the part that a joint about z can carry, and the rest.
 fn split_screw(pose: &Isometry3<f64>) -> (Isometry3<f64>, Isometry3<f64>) {
     let x = pose.rotation * nalgebra::Vector3::x();
     let along = screw_z(x.y.atan2(x.x), pose.translation.vector.z);

@@ -7,7 +7,7 @@ use crate::kinematics::{Convention, Joint, JointType, KinematicChain, Link};
 /// Digits after the point in all files (m, rad, mm, degree): a picometre.
 const DECIMALS: usize = 12;
 
-/// A number as written: fixed decimals without trailing zeros, at least one after the point, never `-0.0`.
+/// Formats a number: fixed decimals without trailing zeros, at least one after the point, never `-0.0`.
 pub(super) fn number(value: f64) -> String {
     let text = format!("{value:.DECIMALS$}");
     let short = text.trim_end_matches('0');
@@ -17,7 +17,7 @@ pub(super) fn number(value: f64) -> String {
 
 /// Roll, pitch, yaw (rad) about the fixed axes x, y, z, as in URDF: `R = Rz(yaw) Ry(pitch) Rx(roll)`.
 ///
-/// Pitch and yaw are taken from what the roll leaves, so the product is exact to rounding also where the pitch is ±90° and
+/// Pitch and yaw are computed after removing the roll, so that the product is exact to rounding even if the pitch is ±90° and
 /// roll and yaw turn about the same axis.
 pub fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let m: Matrix3<f64> = *rotation.to_rotation_matrix().matrix();
@@ -41,14 +41,14 @@ pub(super) fn screw_z(theta: f64, d: f64) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(0.0, 0.0, d), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), theta))
 }
 
-/// `Trans(x,a) Rot(x,α) Rot(y,β)`: what is between the axes of two neighbouring joints, in both conventions.
+/// `Trans(x,a) Rot(x,α) Rot(y,β)`: the transform between the axes of two neighbouring joints, in both conventions.
 pub(super) fn between_axes(link: &Link) -> Isometry3<f64> {
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha)
         * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), link.beta);
     Isometry3::from_parts(Translation3::new(link.a, 0.0, 0.0), rotation)
 }
 
-/// What a joint does at this value ((rad) or (m)) along or about its axis.
+/// The motion of a joint at this value ((rad) or (m)) along or about its axis.
 pub(super) fn motion(joint_type: JointType, axis: &Unit<Vector3<f64>>, value: f64) -> Isometry3<f64> {
     match joint_type {
         JointType::Revolute => {
@@ -92,8 +92,8 @@ impl JointFrames {
     }
 }
 
-/// Values of joints that each turn one link against the one before, in the sense of the pendant: the joints of a URDF.
-/// They are the pendant values unless joints are coupled.
+/// Values of the joints of a URDF, each of which turns one link against the one before, with the signs of the pendant. They equal
+/// the pendant values unless joints are coupled.
 pub fn link_values(chain: &KinematicChain, q: &[f64]) -> Vec<f64> {
     let joints = chain.joints().iter().enumerate();
     joints.map(|(index, joint)| joint.direction * joint.variable(index, q)).collect()

@@ -14,28 +14,25 @@ use super::transforms::{from_roll_pitch_yaw, motion};
 use crate::kinematics::JointType;
 use crate::text::printable;
 
-/// What is wrong with a URDF.
+/// A defect of a URDF.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum UrdfError {
     /// Not well-formed XML.
     #[error("line {line}, column {column}: not well-formed XML: {message}")]
     Xml {
-        /// Line, from 1.
         line: u32,
-        /// Column, from 1.
         column: u32,
-        /// What the reader says.
+        /// Message of the XML reader.
         message: String,
     },
     /// An element that cannot be used.
     #[error("line {line}: {element}: {message}")]
     Element {
-        /// Line, from 1.
         line: u32,
         /// The element with its name, such as `joint 'elbow'`.
         element: String,
-        /// What is wrong, and what to do.
+        /// The defect, and what to do about it.
         message: String,
     },
     /// No chain between the links asked for.
@@ -43,12 +40,12 @@ pub enum UrdfError {
     Chain(String),
 }
 
-/// What a joint of a URDF can do.
+/// The motion of a joint of a URDF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UrdfJointType {
-    /// Nothing.
+    /// No motion.
     Fixed,
-    /// Turn or slide.
+    /// Turning or sliding.
     Moving(JointType),
     /// `floating`, `planar` or an unknown word.
     Unsupported,
@@ -57,11 +54,10 @@ pub enum UrdfJointType {
 /// A joint of a URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfJoint {
-    /// Name.
     pub name: String,
-    /// What it can do.
+    /// Its motion.
     pub joint_type: UrdfJointType,
-    /// The word for it in the file.
+    /// The type as written in the file.
     pub type_name: String,
     /// Link before it.
     pub parent: String,
@@ -79,7 +75,7 @@ pub struct UrdfJoint {
     pub mimic: Option<String>,
     /// Line in the file, from 1.
     pub line: u32,
-    /// Bytes of its `<origin>` element, or the place where one can be put.
+    /// Byte range of its `<origin>` element, or the position where one can be inserted.
     pub(super) origin_bytes: Range<usize>,
 }
 
@@ -94,7 +90,7 @@ pub struct Urdf {
     pub joints: Vec<UrdfJoint>,
 }
 
-/// The way between two links.
+/// The path between two links.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfChain<'u> {
     /// From the base link up to the link where the way turns down; identity if the base is above the tip.
@@ -171,7 +167,7 @@ impl Urdf {
             }
         }
         let (up, down) = (self.above(base)?, self.above(tip)?);
-        // Both lists end at the root: what they share at the end is above the turning point.
+        // Both lists of ancestors end at the root, so the common end of the lists is the part above the turning point.
         let shared = up.iter().rev().zip(down.iter().rev()).take_while(|(a, b)| a.name == b.name).count();
         let is_connected = root_of(&up, base) == root_of(&down, tip);
         let up: Vec<&UrdfJoint> = up.into_iter().rev().skip(shared).rev().collect();
@@ -184,7 +180,7 @@ impl Urdf {
         for joint in up {
             if joint.joint_type != UrdfJointType::Fixed {
                 let message = format!(
-                    "the way from '{}' to '{}' leads up over this {} joint; take a base link above it",
+                    "the way from '{}' to '{}' leads up over this {} joint; use a base link above it",
                     printable(base),
                     printable(tip),
                     printable(&joint.type_name)
@@ -203,7 +199,7 @@ impl Urdf {
             }
             if let Some(other) = &joint.mimic {
                 let message = format!(
-                    "it follows joint '{}' (<mimic>), so it is no joint of its own; take a tip link before it",
+                    "it follows joint '{}' (<mimic>), so it does not move independently; use a tip link before it",
                     printable(other)
                 );
                 return Err(joint.error(message));
@@ -276,7 +272,7 @@ fn is_xacro(node: &Node<'_, '_>) -> bool {
 /// Lowest and highest value, and highest speed.
 type RangeAndSpeed = (Option<(f64, f64)>, Option<f64>);
 
-/// Gives lines to errors.
+/// Adds line numbers to errors.
 struct Reader<'d, 'i> {
     document: &'d Document<'i>,
 }
@@ -355,7 +351,7 @@ impl Reader<'_, '_> {
         })
     }
 
-    /// Range and speed. A range that is empty (as `lower="0" upper="0"`) is none.
+    /// Range and speed. An empty range (such as `lower="0" upper="0"`) counts as none.
     fn limits(&self, node: Node<'_, '_>, what: &str, type_name: &str) -> Result<RangeAndSpeed, UrdfError> {
         let Some(limit) = elements(node, "limit").next() else { return Ok((None, None)) };
         let element = format!("<limit> of {what}");

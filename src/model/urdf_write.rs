@@ -1,4 +1,4 @@
-//! Writing URDF: a fresh one of an arm, or the origins of a given one.
+//! Writing URDF: a new one for an arm, or new origins in a given one.
 //!
 //! In a given URDF only the `<origin>` elements of the chain's joints change. Its link frames keep their place on their link
 //! (meshes stay where they are): frame i of the URDF is `F_i K_i`, with `F_i` the frame of joint i of the arm and `K_i`, along
@@ -16,15 +16,15 @@ use crate::profile::JointRange;
 use crate::text::printable;
 use crate::units::{MILLIMETRE, MILLIRADIAN, to_deg, to_mm};
 
-/// Link names of a fresh URDF.
+/// Base link of a new URDF.
 pub(super) const BASE: &str = "base";
-/// The tip of a fresh URDF.
+/// Tip link of a new URDF.
 pub(super) const FLANGE: &str = "flange";
 
-/// How far a given URDF may be from the nominal arm: makers round, but another robot is farther off.
+/// Largest difference between a given URDF and the nominal arm: makers round, but another robot is farther off.
 const SAME_ROBOT: Tolerance = Tolerance { position: MILLIMETRE, angle: 2.0 * MILLIRADIAN };
 
-/// Configurations at which a given URDF is compared with the nominal arm.
+/// Number of configurations at which a given URDF is compared with the nominal arm.
 const COMPARED: usize = 100;
 
 /// A URDF of an arm: one link without shape per joint, between the links `base` and `flange`.
@@ -90,7 +90,7 @@ fn flange_joint(chain: &KinematicChain) -> String {
     name
 }
 
-/// Range of the value of a URDF joint. For a coupled joint: all that the pendant's limits allow it.
+/// Range of the value of a URDF joint. For a coupled joint it is everything that the limits of the pendant values allow.
 fn link_limits(chain: &KinematicChain, ranges: &[JointRange], index: usize) -> Option<(f64, f64)> {
     let joint = chain.joints().get(index)?;
     let own = ranges.get(index)?.limits?;
@@ -123,7 +123,7 @@ fn escaped(text: &str) -> String {
 pub(super) struct Patched {
     /// The text.
     pub(super) text: String,
-    /// The tip link seen from the flange of the arm; it stays as it is.
+    /// Pose of the tip link in the flange of the arm, which does not change.
     pub(super) flange_from_tip: Isometry3<f64>,
     /// Joints whose origin was replaced.
     pub(super) joints: Vec<String>,
@@ -133,7 +133,7 @@ pub(super) struct Patched {
 ///
 /// # Errors
 /// No such chain, another number or kind of joints, another robot or zero position, or no fixed joint behind the last axis
-/// that could take what the axis cannot.
+/// that could carry the rest.
 pub(super) fn patch(
     text: &str,
     base: &str,
@@ -165,7 +165,7 @@ pub(super) fn patch(
                 after * on_axis(&(before.inverse() * given), arm_joint.direction, &joint.axis, joint)?
             }
             _ if left > 0 => parent * joint.origin,
-            // Behind the last axis: the first fixed joint takes it all.
+            // Behind the last axis the first fixed joint carries the whole rest.
             _ if chain.joints.get(place - 1).is_some_and(|joint| joint.joint_type != UrdfJointType::Fixed) => {
                 let behind = chain.joints.iter().skip(place + 1);
                 let rest = behind.fold(Isometry3::identity(), |pose, joint| pose * joint.origin);
@@ -202,12 +202,12 @@ pub(super) fn patch(
     Ok(Patched { text: patched, flange_from_tip, joints })
 }
 
-/// Whether two origins are written alike.
+/// Whether two origins are written identically.
 fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     (a.translation.vector - b.translation.vector).norm() < 1e-12 && a.rotation.angle_to(&b.rotation) < 1e-12
 }
 
-/// A frame of the URDF seen from the frame of the arm's joint, brought onto the axis: turned about it, moved along it.
+/// A frame of the URDF in the frame of the arm's joint, moved onto the axis: turned about it and shifted along it.
 fn on_axis(
     seen: &Isometry3<f64>,
     direction: f64,
@@ -217,12 +217,13 @@ fn on_axis(
     let axis_in_urdf = seen.rotation.inverse() * (Vector3::z() * direction);
     let correction = UnitQuaternion::rotation_between(axis, &axis_in_urdf);
     let Some(correction) = correction.filter(|turn| turn.angle() < SAME_ROBOT.angle) else {
-        let message = "its axis points elsewhere than that of the profile; is it the same robot, with the same senses?";
+        let message =
+            "its axis points elsewhere than that of the profile; is it the same robot, with the same joint directions?";
         return Err(ModelError::Urdf(joint.error(message.to_owned())));
     };
     let along = Translation3::new(0.0, 0.0, seen.translation.vector.z);
     let is_sliding = joint.joint_type == UrdfJointType::Moving(JointType::Prismatic);
-    // The place of a sliding joint is free: it is kept.
+    // The position of a sliding joint is arbitrary, so it is kept.
     let along = if is_sliding { seen.translation } else { along };
     Ok(Isometry3::from_parts(along, seen.rotation * correction))
 }

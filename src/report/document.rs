@@ -21,7 +21,7 @@ const SCHEMA: u32 = 1;
 /// A report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Document {
-    /// The result, its fields at the top of the object; none before anything was identified.
+    /// The result, whose fields are at the top level of the object; none before the first identification.
     #[serde(flatten)]
     pub result: Option<IdentificationSummary>,
     /// Everything besides the result.
@@ -104,7 +104,7 @@ pub struct Details {
     pub files: Vec<FilePart>,
 }
 
-/// Writes a plan with its search, which the journal leaves out where it is empty, and without its rows.
+/// Writes a plan without its rows, but with its search even if that is empty.
 fn plan<S: Serializer>(plan: &Option<PlanText>, serializer: S) -> Result<S::Ok, S::Error> {
     let Some(PlanText { origin, condition_number, predicted_error_sigma, minutes, search, rows: _ }) = plan else {
         return serializer.serialize_none();
@@ -118,7 +118,7 @@ fn plan<S: Serializer>(plan: &Option<PlanText>, serializer: S) -> Result<S::Ok, 
     fields.end()
 }
 
-/// The session; all but the program empty or zero for a result from tables.
+/// The session; for a result from tables everything but the program is empty or zero.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SessionPart {
     pub name: String,
@@ -190,7 +190,7 @@ pub struct Counts {
 pub enum Found {
     /// Well determined.
     Yes,
-    /// The data say less than half of what is expected anyway.
+    /// The data contribute less than the expected deviation.
     Weakly,
     /// Only a combination with others.
     OnlyCombined,

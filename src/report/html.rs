@@ -1,6 +1,6 @@
 //! `report.html`: one file that needs nothing else. Style and drawings are inside, there is no script and no address, so that it
 //! looks the same in the quality folder in ten years. Printable on A4, readable on a phone and in greyscale: marks and dashes
-//! say what colours say.
+//! repeat what colours show.
 //!
 //! It shows a [`Document`] and computes nothing but the drawings.
 
@@ -15,7 +15,8 @@ mod verdict;
 mod views;
 
 use crate::report::document::{Document, PointOrigin};
-use markup::{add, css_string, escape, shortened};
+use crate::text::shortened;
+use markup::{add, css_string, escape};
 
 /// The rules of the page.
 const STYLE: &str = include_str!("html/style.css");
@@ -45,7 +46,7 @@ pub fn report_html(document: &Document) -> String {
     html
 }
 
-/// What stands at the edges of a printed page.
+/// Headers and footers of a printed page.
 fn page_rules(document: &Document) -> String {
     let report = &document.report;
     let robot = report.robot.as_ref().map_or(String::new(), |robot| shortened(&robot.title, HEAD));

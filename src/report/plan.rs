@@ -4,7 +4,7 @@ use super::tables::{fixed, paragraph, push_line};
 use super::text::{title, warnings};
 use crate::session::plan_summary::PlanSummary;
 
-/// Report of a plan: how good it is, compared with what, what it costs, what stays weak.
+/// The report of a plan: its quality compared with random sets, its time, and what stays weak.
 pub fn plan_text(summary: &PlanSummary) -> String {
     let mut text = title("Pose plan", &summary.provenance);
     text.push_str(&warnings(&summary.warnings));
@@ -50,7 +50,7 @@ fn figures(summary: &PlanSummary) -> String {
         push_line(
             &mut text,
             &format!(
-                "  about {:.0} min: {:.0} min on the way, {:.0} min measuring",
+                "  about {:.0} min: {:.0} min moving, {:.0} min measuring",
                 time.total_min, time.moving_min, time.measuring_min
             ),
         );
@@ -94,7 +94,7 @@ fn trade_off(summary: &PlanSummary) -> String {
     if summary.trade_off.is_empty() {
         return text;
     }
-    push_line(&mut text, "What more or fewer poses would give (quick sets):");
+    push_line(&mut text, "What more or fewer poses would give (quick searches):");
     push_line(
         &mut text,
         &format!("  {:>6}{:>18}{:>18}{:>12}", "poses", "error (sigma)", "error rms (mm)", "time (min)"),

@@ -5,7 +5,7 @@ use crate::text::printable;
 /// Width of a report.
 pub(super) const WIDTH: usize = 80;
 
-/// Numbers beyond this are shown with an exponent: nobody reads three hundred digits.
+/// Numbers beyond this are shown with an exponent.
 const LARGE: f64 = 1e9;
 
 /// A number with fixed decimals; no negative zero, and an exponent above 1e9.

@@ -7,6 +7,7 @@ use crate::session::summary::{
     IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict,
     VerdictStatus, VerificationReport, VerificationSummary, Warning,
 };
+use crate::text::counted;
 
 /// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
 const WEAK: f64 = 0.5;
@@ -102,10 +103,9 @@ type Pick = fn(&ModelSummary) -> Option<StatisticsSummary>;
 /// Nominal and identified side by side: tables III and IV of the method paper, with root mean square and 95 %.
 fn verification_tables(verification: &VerificationSummary) -> String {
     let VerificationSummary { samples, basis, independent, nominal, identified, .. } = verification;
-    let noun = if *samples == 1 { "sample" } else { "samples" };
     let which =
         if *independent { "that the identification did not see" } else { "that the identification saw in part or all" };
-    let mut text = paragraph("", &format!("Accuracy on {samples} {noun} {which}: {basis}"));
+    let mut text = paragraph("", &format!("Accuracy on {} {which}: {basis}", counted(*samples, "sample")));
     push_line(&mut text, &format!("  {:<34}{:>12}{:>14}", "mm", "nominal", "identified"));
     let pairs: [(&str, Pick); 3] = [
         ("position error", |model| model.position_mm),
@@ -170,7 +170,7 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
     );
     let residual = match sigma.from_residuals_mm {
         Some(residual) if sigma.source != SigmaSource::Residuals => {
-            format!("; the residuals say {} mm", fixed(residual, 4))
+            format!("; the residuals give {} mm", fixed(residual, 4))
         }
         _ => String::new(),
     };
@@ -193,18 +193,18 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
     text
 }
 
-/// Where the measurement σ comes from.
+/// The source of the measurement σ in words.
 pub(super) const fn sigma_origin(origin: SigmaSource) -> &'static str {
     match origin {
         SigmaSource::Readings => "given with the readings",
         SigmaSource::Option => "given on the command line",
         SigmaSource::Instrument => "of the profile's instrument",
         SigmaSource::Residuals => "estimated from the residuals",
-        SigmaSource::Assumed => "assumed, for want of data to estimate it",
+        SigmaSource::Assumed => "assumed, because there are too few data to estimate it",
     }
 }
 
-/// Why the solver stopped.
+/// The reason why the solver stopped, in words.
 pub(super) const fn termination(reason: TerminationReason) -> &'static str {
     match reason {
         TerminationReason::Converged => "converged",
@@ -302,7 +302,7 @@ pub(super) fn is_worth_naming(joint: &JointSummary) -> bool {
     joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64)
 }
 
-/// Mean error over each joint's range, so that a pattern is seen, and the joints that the errors follow.
+/// Mean error over each joint's range, which shows patterns, and the joints that the errors follow.
 fn joint_lines(joints: &[JointSummary]) -> String {
     let mut text = String::new();
     if joints.iter().all(|joint| joint.bins.is_empty()) {

@@ -22,7 +22,7 @@ use crate::units::to_mm;
 /// Points of the drawn arm closer than this (mm) are one.
 const SAME_POINT: f64 = 0.001;
 
-/// Whether the table that a result was made from said so.
+/// Whether the points of a result are simulated according to its table.
 fn says_simulated(result: Option<&IdentificationSummary>) -> bool {
     result.is_some_and(|result| result.warnings.iter().any(|warning| warning.code == SIMULATED))
 }

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::markup::{counted, number};
+use super::markup::number;
 use super::plot::{Mark, Plot, Scale, WIDTH};
 use crate::planning::Figures;
 use crate::report::document::{Details, DriftPart, PointPart, PredictionPart, RobotPart};
+use crate::text::counted;
 
 /// Bars of a histogram.
 const BINS: usize = 12;
@@ -14,7 +15,7 @@ const SMALL: (f64, f64) = (236.0, 150.0);
 
 /// Most points of a drawing and rows of a table; with more a page could not be opened.
 pub(super) const MOST: usize = 500;
-/// So many of the points of a thinned drawing are the worst.
+/// Number of worst points in a thinned drawing.
 const WORST: usize = 100;
 
 /// The points of a drawing with their places in `points`: all, or the worst and some evenly chosen.
@@ -36,7 +37,7 @@ pub(super) fn worst(points: &[&PointPart]) -> Vec<usize> {
     order
 }
 
-/// What is said where not all of `count` points are drawn; empty where all are.
+/// A remark if not all of `count` points are drawn; otherwise empty.
 pub(super) fn thinned(count: usize) -> String {
     if count <= MOST {
         return String::new();
@@ -72,7 +73,7 @@ pub(super) fn per_pose(points: &[&PointPart], title: &str, caption: &str) -> Str
     plot.figure(title, &format!("{caption}{}", thinned(points.len())))
 }
 
-/// How the errors of one model are spread.
+/// Histogram of the errors of one model.
 pub(super) fn histogram(errors: &[f64], is_identified: bool) -> String {
     let finite: Vec<f64> = errors.iter().copied().filter(|error| error.is_finite()).collect();
     let largest = finite.iter().copied().fold(0.0, f64::max);
@@ -97,7 +98,7 @@ pub(super) fn histogram(errors: &[f64], is_identified: bool) -> String {
         plot.bar(if is_identified { "idn" } else { "nom" }, (from, from + width), f64::from(*count));
     }
     let title = if is_identified { "Spread, identified arm" } else { "Spread, nominal arm" };
-    let poses = counted(finite.len(), "verification pose", "verification poses");
+    let poses = counted(finite.len(), "verification pose");
     plot.figure(title, &format!("{poses}; largest {} mm", number(largest, 3)))
 }
 
@@ -150,7 +151,7 @@ pub(super) fn search(steps: &[Figures]) -> String {
         + &drawn("Predicted error over the search", "× sigma", |step| step.predicted_error)
 }
 
-/// What more and more samples promise.
+/// Predicted error against the number of samples.
 pub(super) fn prediction(steps: &[PredictionPart]) -> String {
     let x = Scale::around(steps.iter().map(|step| step.samples as f64));
     let y = Scale::log(steps.iter().map(|step| step.predicted_error_sigma));
@@ -162,7 +163,7 @@ pub(super) fn prediction(steps: &[PredictionPart]) -> String {
     )
 }
 
-/// How far the repeated pose moved.
+/// Distance of the repeated pose from its first measurement, over time.
 pub(super) fn drift(parts: &[DriftPart]) -> String {
     let x = Scale::from_zero(parts.iter().map(|part| part.minutes));
     let y = Scale::from_zero(parts.iter().map(|part| norm(part.moved_mm)));

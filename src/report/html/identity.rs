@@ -1,9 +1,10 @@
-//! What the report is about: robot, instrument, people, time, conditions; and where its numbers come from.
+//! The subject of the report: robot, instrument, people, time, conditions; and the origin of its numbers.
 
-use super::markup::{NONE, add, counted, escape, facts, number, paragraph, time};
+use super::markup::{NONE, add, escape, facts, number, paragraph, time};
 use crate::report::document::{Counts, Details, Document, PointOrigin, ResultState, TemperaturePart};
+use crate::text::counted;
 
-/// What must be seen before anything else.
+/// Banners at the top of the report.
 pub(super) fn banners(document: &Document) -> String {
     let report = &document.report;
     let mut html = String::new();
@@ -98,7 +99,7 @@ fn temperature(range: Option<TemperaturePart>) -> String {
         |range| {
             let (low, high) = (number(range.lowest_degc, 1), number(range.highest_degc, 1));
             let span = number(range.highest_degc - range.lowest_degc, 1);
-            format!("{low} to {high} °C over {} (range {span} °C)", counted(range.samples, "sample", "samples"))
+            format!("{low} to {high} °C over {} (range {span} °C)", counted(range.samples, "sample"))
         },
     )
 }
@@ -126,7 +127,7 @@ pub(super) fn origins(document: &Document) -> String {
     let session = &report.session;
     let resumed = match session.resumed {
         0 => String::new(),
-        times => format!(", opened again {}", counted(times, "time", "times")),
+        times => format!(", opened again {}", counted(times, "time")),
     };
     if session.journal_entries > 0 {
         let text = format!("{} entries up to this report{resumed}", session.journal_entries);

@@ -1,20 +1,20 @@
-//! Text, numbers and tables as HTML. Nothing foreign gets in but through [`escape`]; nothing refers to the outside.
+//! Text, numbers and tables as HTML. Text from outside passes through [`escape`]; nothing refers to other files or addresses.
 
 use crate::report::tables::fixed;
 use crate::text::printable;
 
-/// Stands for a number that is not there or not finite.
+/// Shown for a number that is missing or not finite.
 pub(super) const NONE: &str = "–";
-/// As wide as a digit.
+/// A blank as wide as a digit.
 const FIGURE_SPACE: &str = "\u{2007}";
 
-/// Adds a part that was formatted.
+/// Appends formatted text.
 pub(super) fn add(html: &mut String, part: &str) {
     html.push_str(part);
 }
 
-/// A text of others: control characters are replaced, marks of HTML are written so that they are only read. An address stays
-/// readable, but no double slash stands in the file.
+/// Escapes text from outside: control characters and special characters of HTML are replaced. An address stays readable, but the
+/// file contains no double slash.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in printable(text).chars() {
@@ -31,7 +31,7 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// A text of others as a CSS string, quotes included. Only letters and digits of ASCII stay what they are.
+/// Text from outside as a CSS string, with quotes. Only ASCII letters and digits are not escaped.
 pub(super) fn css_string(text: &str) -> String {
     let escaped = |c: char| {
         if c.is_ascii_alphanumeric() || matches!(c, ' ' | '-' | '_' | '.' | ',') {
@@ -42,14 +42,6 @@ pub(super) fn css_string(text: &str) -> String {
     };
     let text: String = printable(text).chars().map(escaped).collect();
     format!("\"{text}\"")
-}
-
-/// A text of others of at most so many characters.
-pub(super) fn shortened(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
-        return text.to_owned();
-    }
-    text.chars().take(most.saturating_sub(1)).chain(['…']).collect()
 }
 
 /// A number with fixed decimals and a true minus sign.
@@ -68,14 +60,14 @@ pub(super) fn aligned(value: Option<f64>, decimals: usize, most: usize) -> Strin
     if shown == NONE { shown } else { shown + &FIGURE_SPACE.repeat(most.saturating_sub(decimals)) }
 }
 
-/// What stands in a column.
+/// Kind of a table column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Column {
-    /// Text that may break.
+    /// Text with line breaks.
     Text,
-    /// Text in one line.
+    /// Text on one line.
     Word,
-    /// Numbers, to the right.
+    /// Numbers, aligned to the right.
     Number,
 }
 
@@ -131,11 +123,6 @@ pub(super) fn paragraph(html: &str) -> String {
 pub(super) fn list(points: &[String]) -> String {
     let points: Vec<String> = points.iter().map(|point| format!("<li>{point}</li>\n")).collect();
     format!("<ul>\n{}</ul>\n", points.concat())
-}
-
-/// A number of things with its noun.
-pub(super) fn counted(count: usize, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// A time of RFC 3339 in UTC as it is read: date, time to the minute.

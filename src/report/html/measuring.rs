@@ -1,13 +1,14 @@
-//! How it was planned, measured and fitted; what was left out and why; what was found and how it was decided.
+//! Sections about planning, measuring and fitting, about samples left out, and about findings with their decisions.
 
 use super::charts::{MOST, drift, norm, prediction, search};
-use super::markup::{Column, add, counted, escape, facts, number, optional, paragraph, table, time};
+use super::markup::{Column, add, escape, facts, number, optional, paragraph, table, time};
 use crate::identification::Estimator;
 use crate::report::document::{Details, Document};
 use crate::report::text::{gap, sigma_origin, termination};
 use crate::session::journal::PlanText;
 use crate::session::state::Refused;
 use crate::session::summary::{IdentificationSummary, RejectedSummary};
+use crate::text::{counted, counted_as};
 
 /// Plan, fit and drift.
 pub(super) fn section(document: &Document) -> String {
@@ -60,7 +61,7 @@ fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
         let raw = optional(result.condition_number_mm_rad, 0);
         format!("{} in expected deviations, {raw} in mm and rad", number(scaled, 1))
     });
-    let steps = counted(result.iterations.len(), "solver step", "solver steps");
+    let steps = counted(result.iterations.len(), "solver step");
     vec![
         ("Identification samples", format!("{}, {} of them rejected", result.samples, result.rejected.len())),
         (
@@ -79,10 +80,10 @@ fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
 fn plan_facts(plan: &PlanText, report: &Details) -> Vec<(&'static str, String)> {
     let mut missing = Vec::new();
     if report.counts.open > 0 {
-        missing.push(counted(report.counts.open, "pose was not measured", "poses were not measured"));
+        missing.push(counted_as(report.counts.open, "pose was not measured", "poses were not measured"));
     }
     if report.counts.skipped > 0 {
-        missing.push(counted(report.counts.skipped, "pose was skipped", "poses were skipped"));
+        missing.push(counted_as(report.counts.skipped, "pose was skipped", "poses were skipped"));
     }
     vec![
         ("Plan", escape(&plan.origin)),
@@ -129,7 +130,7 @@ fn drift_table(report: &Details) -> String {
     )
 }
 
-/// Samples without use, findings, corrections, remarks.
+/// Samples that do not count, findings, corrections, remarks.
 pub(super) fn samples(document: &Document) -> String {
     let report = &document.report;
     let mut html = String::from("<h2>Samples left out, findings, remarks</h2>\n");

@@ -1,4 +1,4 @@
-//! The parameters with their uncertainty, and what the data cannot tell.
+//! The parameters with their uncertainty, and what the data cannot determine.
 
 use super::markup::{Column, aligned, escape, list, number, paragraph, table};
 use crate::kinematics::ParameterId;
@@ -9,13 +9,13 @@ use crate::session::summary::{IdentificationSummary, ParameterSummary};
 /// Decimals where there is no standard deviation.
 const PLAIN: usize = 4;
 
-/// The section; nothing before anything was identified.
+/// The section; empty before the first identification.
 pub(super) fn section(document: &Document) -> String {
     let Some(result) = &document.result else { return String::new() };
     let mut html = String::from("<h2>Identified parameters</h2>\n");
     let rank = result.rank.map_or_else(|| "an unclear number".to_owned(), |rank| rank.to_string());
     html.push_str(&paragraph(&format!(
-        "{} parameters (level {}), of which the data determine {rank} independent combinations. Sigma is one standard deviation of the deviation. <b>Found:</b> <i>yes</i>; <i>weakly</i>: the data say less than half of what one expects anyway; <i>only combined</i>: not by itself, see below.",
+        "{} parameters (level {}), of which the data determine {rank} independent combinations. Sigma is one standard deviation of the deviation. <b>Found:</b> <i>yes</i>; <i>weakly</i>: the data contribute less than the expected deviation; <i>only combined</i>: not on its own, see below.",
         result.parameter_count,
         result.settings.level
     )));
@@ -65,7 +65,7 @@ fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> Stri
     table("", &columns, &rows, false)
 }
 
-/// Number of the group of which a parameter is only known together with others, from 1.
+/// Number, from 1, of the group of parameters that are only known together.
 fn group_of(document: &Document, id: ParameterId) -> Option<usize> {
     let groups = &document.result.as_ref()?.blind_groups;
     groups.iter().position(|group| group.parameters.iter().any(|parameter| *parameter == id)).map(|index| index + 1)
@@ -76,7 +76,7 @@ fn blind(result: &IdentificationSummary) -> String {
     if !result.blind_groups.is_empty() {
         html.push_str("<h3>What these data cannot tell</h3>\n");
         html.push_str(&paragraph(
-            "The parameters of a group are right together, not one by one: apply all of a group, or none.",
+            "The parameters of a group are correct together, not one by one: apply all of a group, or none.",
         ));
         let groups = result.blind_groups.iter().enumerate();
         let groups: Vec<String> =

@@ -4,7 +4,7 @@ use super::markup::{add, escape, number};
 
 /// Width of a drawing in its own units; about a column of the page, so that text comes out as large as it is meant.
 pub(super) const WIDTH: f64 = 360.0;
-/// Room for what stands beside the axes.
+/// Space beside the axes.
 const LEFT: f64 = 42.0;
 const RIGHT: f64 = 8.0;
 const TOP: f64 = 18.0;
@@ -14,7 +14,7 @@ const SLOT: f64 = 68.0;
 /// A logarithmic axis does not go further down than this below its largest value (decades).
 const MOST_DECADES: f64 = 7.0;
 
-/// From values to places.
+/// Maps values to positions in a drawing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     low: f64,

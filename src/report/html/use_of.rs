@@ -1,10 +1,10 @@
-//! How to apply the result, and what must not be done with it.
+//! How to apply the result, and what not to do with it.
 
 use super::markup::{add, escape, list, paragraph};
 use crate::report::document::{Document, PointOrigin, ResultState};
 use crate::session::summary::VerdictStatus;
 
-/// What is in a file beside the report.
+/// The content of a file beside the report.
 fn about(file: &str) -> &'static str {
     match file {
         "calibration.ron" => "the identified arm with everything needed to use or verify it: the result to apply",
@@ -14,7 +14,7 @@ fn about(file: &str) -> &'static str {
         "corrected.urdf" => "the identified chain as a robot description (URDF); read back and compared",
         "dh.csv" => "the identified link constants with all digits, convention and couplings",
         "default_kinematics.yaml" => "kinematics for the ROS description of Universal Robots",
-        "drift.csv" => "the pose that was measured again and again",
+        "drift.csv" => "the pose that was measured repeatedly",
         _ => "",
     }
 }
@@ -31,11 +31,9 @@ pub(super) fn section(document: &Document) -> String {
         }
         (ResultState::Unusable, ..) => Some("There is nothing to apply: the data gave no usable solution."),
         (_, PointOrigin::Simulated, _) => Some("Do not apply it to a robot: the points are simulated."),
-        (_, _, Some(VerdictStatus::NotAccepted)) => {
-            Some("Do not apply it before the reason for NOT ACCEPTED is found.")
-        }
+        (_, _, Some(VerdictStatus::NotAccepted)) => Some("Do not apply it until the reason for NOT ACCEPTED is found."),
         (_, _, Some(VerdictStatus::NotEvaluated)) => {
-            Some("Nobody has evaluated it against all limits: verify it before it is relied on.")
+            Some("It was not evaluated against all limits: verify it before relying on it.")
         }
         _ => None,
     };
@@ -60,7 +58,7 @@ pub(super) fn section(document: &Document) -> String {
     html.push_str("<h3>What to do</h3>\n");
     let todo = [
         "Put the identified link constants of the table above into the offline programming system, or into the controller where it takes them. Use the values of <code>calibration.ron</code>: they have all digits.",
-        "Check the signs and the order of the joints on one pose at low speed, with the hand on the enabling switch.",
+        "Check the signs and the order of the joints on one pose at low speed, with a hand on the enabling switch.",
         "Teach tool and user frames again, or convert them: those taught with the nominal model do not fit the identified one.",
         "Verify on new poses, now and after every event that may move something (collision, change of a motor or gear, new mastering): <code>trupose verify --calibration calibration.ron --measurements NEW.csv --refit frame+target</code>",
         "Keep this report, <code>measurements.csv</code> and <code>calibration.ron</code> together.",
@@ -71,7 +69,7 @@ pub(super) fn section(document: &Document) -> String {
         "Do not apply it to another arm of the same type: it belongs to this serial number.",
         "Do not apply it on top of a correction that was off while measuring (an accuracy option of the controller): measure and run with the same setting.",
         "Do not take single parameters out of a group marked <i>only combined</i>.",
-        "Do not rely on it outside the joint ranges that were measured, or with a much larger payload than while measuring.",
+        "Do not rely on it outside the measured joint ranges, or with a much larger payload than during the measurement.",
         "Do not quote the residuals of the fit as accuracy.",
     ];
     html.push_str(&list(&never.map(str::to_owned)));

@@ -1,15 +1,16 @@
 //! The verdict, and the accuracy on poses that the identification did not see.
 
 use super::charts::{MOST, against_joints, histogram, norm, of_kind, per_pose, worst};
-use super::markup::{Column, NONE, add, counted, escape, list, number, optional, paragraph, table};
+use super::markup::{Column, NONE, add, escape, list, number, optional, paragraph, table};
 use super::views::views;
 use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
 use crate::session::summary::{
     IdentificationSummary, LimitCheck, LimitedQuantity, ModelSummary, StatisticsSummary, VerdictStatus,
     VerificationMode, VerificationSummary, Warning,
 };
+use crate::text::{counted, counted_as};
 
-/// The verdict with every limit, and what must be known before the numbers.
+/// The verdict with every limit, and the warnings.
 pub(super) fn section(document: &Document) -> String {
     let Some(result) = &document.result else {
         return "<div class=\"verdict open\"><div class=\"word\">– NOT EVALUATED</div>\n<div>Nothing has been identified yet.</div></div>\n"
@@ -36,7 +37,7 @@ pub(super) fn section(document: &Document) -> String {
     html
 }
 
-/// The warnings; of very many those that block the acceptance come first, and not all are shown.
+/// The warnings. If there are very many, those that block acceptance come first and the rest is cut.
 fn warnings(all: &[Warning]) -> String {
     let mut shown: Vec<&Warning> = all.iter().collect();
     if all.len() <= MOST {
@@ -110,15 +111,15 @@ pub(super) fn accuracy(document: &Document) -> String {
     html
 }
 
-/// What was done, in words, and what was not.
+/// The verification procedure in words.
 fn procedure(result: &IdentificationSummary, verification: &VerificationSummary, report: &Details) -> String {
-    let samples = counted(verification.samples, "verification pose", "verification poses");
-    let pairs = verification.identified.distance_mm.map(|distance| counted(distance.count, "distance", "distances"));
+    let samples = counted(verification.samples, "verification pose");
+    let pairs = verification.identified.distance_mm.map(|distance| counted(distance.count, "distance"));
     let visits = match (result.settings.verification, report.counts.repeats) {
-        (VerificationMode::File | VerificationMode::Rest, 0) => "no pose stands twice in the tables".to_owned(),
+        (VerificationMode::File | VerificationMode::Rest, 0) => "no pose occurs twice in the tables".to_owned(),
         (VerificationMode::Session, 0) => "each pose was visited once".to_owned(),
         (VerificationMode::Session | VerificationMode::File | VerificationMode::Rest, repeats) => {
-            format!("{} at a pose that was measured before", counted(repeats, "sample is", "samples are"))
+            format!("{} at a pose that was measured before", counted_as(repeats, "sample is", "samples are"))
         }
         (VerificationMode::LeaveOneOut, _) => "each position of the plate was left out in turn".to_owned(),
         (VerificationMode::None, _) => String::new(),
@@ -133,7 +134,7 @@ fn procedure(result: &IdentificationSummary, verification: &VerificationSummary,
         format!(" Distance errors are measured less predicted length, over {pairs}.")
     });
     let positions = if verification.identified.position_mm.is_some() {
-        " Position errors are after the place of the instrument was fitted on the identification poses only, for each model by itself."
+        " Position errors are after the place of the instrument was fitted on the identification poses only, for each model separately."
     } else {
         ""
     };
@@ -196,7 +197,7 @@ fn positions(before: &ModelSummary, after: &ModelSummary) -> String {
         html.push_str(&table("Position error per axis", &columns, &rows, true));
     }
     if let (Some(before), Some(after)) = (&before.position_mm, &after.position_mm) {
-        let caption = format!("Position error (length of the vector), {}", counted(after.count, "pose", "poses"));
+        let caption = format!("Position error (length of the vector), {}", counted(after.count, "pose"));
         html.push_str(&table(&caption, &COLUMNS, &statistics(before, after), true));
     }
     html
@@ -243,7 +244,7 @@ pub(super) fn drawings(document: &Document) -> String {
     html
 }
 
-/// How much of the error follows each joint, as far as the verification tells.
+/// Share of the error that follows each joint, according to the verification.
 fn joints_named(document: &Document) -> String {
     let joints = document.result.iter().filter_map(|result| result.verification.as_ref());
     let named: Vec<String> = joints

@@ -1,10 +1,11 @@
 //! The poses in space: two projections, with the errors drawn larger than they are by a factor that is stated.
 
 use super::charts::{norm, shown, thinned};
-use super::markup::{add, counted};
+use super::markup::add;
 use super::plot::{Mark, figure, nice_above};
 use crate::geometry::enlargement;
 use crate::report::document::{Details, PointPart};
+use crate::text::counted;
 
 /// Size of a view.
 const WIDTH: f64 = 360.0;
@@ -93,11 +94,8 @@ fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pi
     }
     body.push_str(&bar(wide, scale));
     body.push_str(&cross(view.labels));
-    let caption = format!(
-        "{}: errors drawn {exaggeration:.0} times as long as they are{}",
-        counted(all, "pose", "poses"),
-        thinned(all)
-    );
+    let caption =
+        format!("{}: errors drawn {exaggeration:.0} times as long as they are{}", counted(all, "pose"), thinned(all));
     figure(&format!("{name}, {}", view.name), &caption, (WIDTH, HEIGHT), &body)
 }
 
