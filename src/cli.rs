@@ -7,19 +7,23 @@ mod terminal;
 
 pub mod compensate;
 
+use std::error::Error;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use nalgebra::Point3;
 
-use crate::identification::{Estimator, Prior, Weighting};
+use crate::identification::{Estimator, Prior, Settings, Weighting};
+use crate::planning::order::Pace;
 use crate::planning::{BoxInBase, Objective};
+use crate::procedure::plan::PlanRequest;
 use crate::profile::{ExpectedDeviation, Level};
-use crate::program::{DEFAULT_DWELL, Dialect, MAX_SPEED};
+use crate::program::{Dialect, MAX_SPEED};
 use crate::session::measurements::Layout;
 use crate::session::summary::Refit;
-use crate::units::from_mm;
+use crate::units::{from_mm, to_mm};
 
 use link::wires;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
@@ -243,7 +247,7 @@ pub struct EstimationArgs {
     #[arg(long, value_enum, default_value_t)]
     pub level: Level,
     /// Largest number of solver steps; 1 is the paper's single linear step
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = Settings::default().iterations, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=100_000))]
     pub iterations: usize,
     /// Standard deviation of a measured coordinate [default: of the readings, else of the profile's instrument, else estimated]
     #[arg(long, value_name = "MM", value_parser = positive)]
@@ -272,7 +276,7 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
     /// Layout of the tables
-    #[arg(long, value_parser = Layout::from_str, default_value = "named", value_name = "named|robodk|delmia")]
+    #[arg(long, value_parser = one_of(Layout::ALL, Layout::name), ignore_case = true, default_value_t)]
     pub layout: Layout,
     /// Verify on the points of another file measured in the same set-up
     #[arg(long, value_name = "CSV", conflicts_with = "verify_rest")]
@@ -295,7 +299,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
     /// Layout of the table
-    #[arg(long, value_parser = Layout::from_str, default_value = "named", value_name = "named|robodk|delmia")]
+    #[arg(long, value_parser = one_of(Layout::ALL, Layout::name), ignore_case = true, default_value_t)]
     pub layout: Layout,
     /// Rows to verify on, such as 'pose < 20'
     #[arg(long = "use", value_name = "CONDITION")]
@@ -344,19 +348,19 @@ pub struct PlanArgs {
     #[arg(long, value_name = "CSV", conflicts_with_all = ["poses", "objective", "include", "out"])]
     pub check: Option<PathBuf>,
     /// Number of new poses to identify from; those of '--include' come on top
-    #[arg(long, value_name = "N", default_value_t = 56)]
+    #[arg(long, value_name = "N", default_value_t = PlanRequest::default().poses)]
     pub poses: usize,
     /// Number of poses to verify with
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N", default_value_t = PlanRequest::default().verification)]
     pub verification: usize,
     /// Number of candidates to choose from
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(10..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = PlanRequest::default().candidates, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(10..=1_000_000))]
     pub candidates: usize,
     /// What to choose for
     #[arg(long, value_enum, default_value_t)]
     pub objective: Objective,
     /// Seed of all random decisions: the same seed gives the same plan
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = PlanRequest::default().seed)]
     pub seed: u64,
     /// Stop searching after this many seconds and take the best set so far
     #[arg(long, value_name = "S", value_parser = positive)]
@@ -377,7 +381,7 @@ pub struct PlanArgs {
     #[arg(long)]
     pub no_filters: bool,
     /// Clearance to keep from everything
-    #[arg(long, value_name = "MM", default_value_t = 10.0, value_parser = positive)]
+    #[arg(long, value_name = "MM", default_value_t = to_mm(PlanRequest::default().clearance), value_parser = positive)]
     pub clearance_mm: f64,
     /// Expected deviation of every length and every angle instead of the profile's, such as '1mm,0.1deg'
     #[arg(long, value_name = "LENGTH,ANGLE")]
@@ -389,16 +393,16 @@ pub struct PlanArgs {
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub sigma_mm: Option<f64>,
     /// Repeat the first pose after every N poses to detect drift; 0: never
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N", default_value_t = PlanRequest::default().drift_every)]
     pub drift_every: usize,
     /// Part of the full joint speed that the program will use
-    #[arg(long, value_name = "PERCENT", default_value_t = 10.0, value_parser = speed_percent)]
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * Pace::default().speed, value_parser = speed_percent)]
     pub speed_percent: f64,
     /// Wait before the first reading of a pose
-    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = Pace::default().settle, value_parser = positive)]
     pub settle_s: f64,
     /// Readings per pose, one second each
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = Pace::default().shots, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub shots: u32,
     /// File for the plan
     #[arg(long, value_name = "CSV")]
@@ -418,19 +422,19 @@ pub struct ProgramArgs {
     #[arg(long, value_name = "CSV")]
     pub plan: PathBuf,
     /// Language of the robot controller
-    #[arg(long, value_parser = Dialect::from_str, value_name = "rapid|krl|fanuc|urscript|val3|inform|ros")]
+    #[arg(long, value_parser = one_of(Dialect::ALL, Dialect::name), ignore_case = true)]
     pub dialect: Dialect,
     /// Name of the program
     #[arg(long, default_value = "calposes")]
     pub name: String,
     /// Wait at each pose that is measured
-    #[arg(long, value_name = "S", default_value_t = DEFAULT_DWELL, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = Pace::default().measuring_time(), value_parser = positive)]
     pub dwell_s: f64,
     /// Wait for the operator at each pose instead of a fixed time
     #[arg(long, conflicts_with = "dwell_s")]
     pub acknowledge: bool,
     /// Part of the full joint speed
-    #[arg(long, value_name = "PERCENT", default_value_t = 10.0, value_parser = speed_percent)]
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * Pace::default().speed, value_parser = speed_percent)]
     pub speed_percent: f64,
     /// Folder for the program's files [default: print them]
     #[arg(long, value_name = "DIR")]
@@ -514,6 +518,14 @@ fn speed_percent(text: &str) -> Result<f64, String> {
         Ok(value) if value > 0.0 && value <= 100.0 * MAX_SPEED => Ok(value),
         _ => Err(format!("'{text}' is not a speed between 0 and {:.0} percent", 100.0 * MAX_SPEED)),
     }
+}
+
+/// A parser of the names of a closed set, which the help and the completions list.
+fn one_of<T, const N: usize>(all: [T; N], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err: Into<Box<dyn Error + Send + Sync>>> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(all.map(name)).try_map(|name| name.parse::<T>())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -158,12 +158,6 @@ pub struct Options {
     pub dangers: Vec<String>,
 }
 
-/// Default fraction of full speed.
-pub const DEFAULT_SPEED: f64 = 0.1;
-
-/// Default wait at a pose (s): the arm stops swinging in 2 s, a reading takes 1 s.
-pub const DEFAULT_DWELL: f64 = 3.0;
-
 /// Largest fraction of full speed of a measuring program.
 pub const MAX_SPEED: f64 = 0.5;
 

@@ -1,10 +1,10 @@
 //! Arguments of the commands that apply a calibration: `compensate`, `export`, and `profile import-urdf`.
 
 use std::path::PathBuf;
-use std::str::FromStr as _;
 
 use clap::Args;
 
+use super::one_of;
 use crate::kinematics::Convention;
 use crate::model::Format;
 use crate::program::Dialect;
@@ -22,7 +22,7 @@ pub struct CompensateArgs {
     #[arg(long, value_name = "FILE", requires = "dialect")]
     pub program: Option<PathBuf>,
     /// Language of the program
-    #[arg(long, value_parser = Dialect::from_str, value_name = "rapid|krl|fanuc|urscript|val3|inform|ros")]
+    #[arg(long, value_parser = one_of(Dialect::ALL, Dialect::name), ignore_case = true)]
     pub dialect: Option<Dialect>,
     /// ROS: names of the joints in the trajectory, from base to flange [default: those of the profile]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]

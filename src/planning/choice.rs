@@ -1,151 +1,17 @@
-//! The choice of a set: what for, how hard to search, and the stages of a search.
+//! The choice of a set: the starts and the stages of a search.
 //!
 //! A search is a fixed number of independent starts, each a pure function of the settings and its number ([`Search::start`]), so
 //! that the result does not depend on who runs them or in which order. The balanced objective takes two stages: the first
 //! finds how well a set can predict, the second lowers the condition number without giving much of that away.
 
-use clap::ValueEnum;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use super::descent::Descent;
 use super::information::Information;
+use super::objective::{Chosen, Objective, Progress, SearchSettings, Stage};
 use super::{PlanningError, check_count, check_members};
-
-/// The figure that a search improves. The indices O1 to O5 are those of [`super::ObservabilityIndices`].
-//
-// The first line of each variant is the help of `--objective`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Objective {
-    /// Lowest condition number among sets that predict within 4 % of the best
-    #[default]
-    Balanced,
-    /// Lowest condition number; predicts worse than random poses
-    Condition,
-    /// Lowest predicted error
-    Prediction,
-    /// D-optimal: largest determinant of the information
-    D,
-    /// Observability index O1
-    O1,
-    /// Observability index O2
-    O2,
-    /// Observability index O3
-    O3,
-    /// Observability index O4
-    O4,
-    /// Observability index O5
-    O5,
-}
-
-crate::text::names_of_option!(Objective);
-
-impl Objective {
-    /// Whether it looks at the singular values of the pair rows (else at the information matrix).
-    pub(super) const fn is_spectral(self) -> bool {
-        !matches!(self, Self::Prediction | Self::D)
-    }
-}
-
-/// How to search.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SearchSettings {
-    /// Number of poses, the required ones included.
-    pub poses: usize,
-    /// Candidates that must be in, such as poses already measured.
-    pub required: Vec<usize>,
-    /// What to choose for.
-    pub objective: Objective,
-    /// Predicted error that [`Objective::Balanced`] may give away, relative to the best found.
-    pub prediction_slack: f64,
-    /// Seed of every random decision.
-    pub seed: u64,
-    /// Number of independent starts; the best result counts.
-    pub starts: usize,
-    /// Sweeps over all poses per start and stage: the work of an uninterrupted search. Prediction and D alone get three times
-    /// as many, which take no longer.
-    pub sweeps: usize,
-    /// Candidates that a place looks at in one visit; a larger pool is gone through in turn.
-    pub window: usize,
-}
-
-impl Default for SearchSettings {
-    fn default() -> Self {
-        Self {
-            poses: 56,
-            required: Vec::new(),
-            objective: Objective::default(),
-            prediction_slack: 0.04,
-            seed: 1,
-            starts: 4,
-            sweeps: 8,
-            window: 1500,
-        }
-    }
-}
-
-impl SearchSettings {
-    /// Sweeps per start of a stage.
-    pub const fn sweeps_of(&self, stage: Stage) -> usize {
-        match (stage, self.objective) {
-            (Stage::Objective { .. }, Objective::Prediction | Objective::D) => 3 * self.sweeps,
-            _ => self.sweeps,
-        }
-    }
-}
-
-/// A part of a search that runs on all starts before the next one begins.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stage {
-    /// Exchange on the predicted error: the reference of the balanced objective.
-    Prediction,
-    /// Exchange on the objective, with a predicted error of at most this.
-    Objective {
-        /// Largest predicted error allowed; infinite without a bound.
-        limit: f64,
-    },
-}
-
-/// Figures of merit of a set during the search, for progress and for the curve of the search.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
-    /// Condition number of `A·S`; infinite for a singular set.
-    pub condition_number: f64,
-    /// Observability index O1 (m), see [`super::ObservabilityIndices`].
-    pub o1: f64,
-    /// Predicted error (σ).
-    #[serde(rename = "predicted_error_sigma")]
-    pub predicted_error: f64,
-}
-
-/// A chosen set.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Chosen {
-    /// Candidates, ascending.
-    pub set: Vec<usize>,
-    /// What the stage minimised: condition number, predicted error, −ln det M or −O.
-    pub cost: f64,
-    /// Its figures of merit.
-    pub figures: Figures,
-    /// Whether the search was cut short; the set is the best so far.
-    pub interrupted: bool,
-}
-
-/// The state of one start, after every sweep.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
-    /// Which start.
-    pub start: usize,
-    /// Which stage.
-    pub stage: Stage,
-    /// Sweeps done, of [`SearchSettings::sweeps_of`].
-    pub sweep: usize,
-    /// Figures of merit of the best set of this start.
-    pub figures: Figures,
-}
 
 /// A search, checked.
 #[derive(Clone, Debug)]

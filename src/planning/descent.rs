@@ -8,9 +8,9 @@ use rand::RngExt as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::choice::{Chosen, Figures, Objective, Progress, SearchSettings, Stage};
 use super::exchange::{Merit, Prediction, add_pose};
 use super::information::Information;
+use super::objective::{Chosen, Figures, Objective, Progress, SearchSettings, Stage};
 use super::pair_exchange::{Vacancy, spectral_cost};
 use super::pairs::{add_pairs, pair_gram};
 use super::score::{ObservabilityIndices, condition_number};

@@ -255,7 +255,7 @@ fn with_drift(visits: &[usize], every: Option<usize>) -> Vec<(StepKind, usize)> 
 }
 
 /// A home pose: the middle of the limits if the arm can stand there, or else the one of `others` (rad, sliding joints m) that
-/// is nearest to it in parts of the limits. `None` if there is none.
+/// is nearest to it relative to the limits. `None` if there is none.
 ///
 /// The result is on the grid of [`on_grid`](super::candidates::on_grid).
 pub fn home_pose<'q>(shape: &ArmShape<'_>, others: impl IntoIterator<Item = &'q [f64]>) -> Option<Vec<f64>> {

@@ -11,8 +11,8 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::choice::Objective;
 use super::information::Information;
+use super::objective::Objective;
 use super::pairs::{add_pairs, direction};
 use super::score::ObservabilityIndices;
 

@@ -4,9 +4,10 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::PlanningError;
-use super::choice::{Objective, Search, SearchSettings, Stage};
+use super::choice::Search;
 use super::descent::Descent;
 use super::information::Information;
+use super::objective::{Objective, SearchSettings, Stage};
 
 /// Sweeps that settle the smallest set, and each larger one after it has grown.
 const FIRST_SWEEPS: usize = 4;

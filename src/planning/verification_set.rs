@@ -1,6 +1,6 @@
 //! Poses for verification: spread over the same space as the identification set, none of them in it.
 //!
-//! Distance between two candidates: root mean square of the joint differences in parts of the limits, and the distance of
+//! Distance between two candidates: root mean square of the joint differences relative to the limits, and the distance of
 //! their SMR positions in parts of the size of the candidates' cloud, both together.
 
 use nalgebra::Point3;

@@ -22,6 +22,7 @@ pub(super) fn words(advice: Advice) -> String {
         | Advice::IdentifyGeometry
         | Advice::VerifyDistances
         | Advice::SeparateVerification
+        | Advice::StateSocketDistance
         | Advice::StateTarget
         | Advice::MountBesideAxis => advice.to_string(),
     }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::procedure::plan::{INTERACTIVE_CANDIDATES, PlanRequest};
 use crate::session::set_up::{About, InstrumentChoice, TargetChoice};
 
 /// A command of the operator.
@@ -129,7 +130,8 @@ pub struct PlanSettings {
 
 impl Default for PlanSettings {
     fn default() -> Self {
-        Self { poses: 56, verification: 20, candidates: 5000, seed: 1, drift_every: 20 }
+        let PlanRequest { poses, verification, seed, drift_every, .. } = PlanRequest::default();
+        Self { poses, verification, candidates: INTERACTIVE_CANDIDATES, seed, drift_every }
     }
 }
 

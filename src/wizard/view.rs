@@ -540,7 +540,7 @@ fn progress_text(progress: &RequestProgress) -> String {
     match progress {
         RequestProgress::Search(plan::Progress::Searching) => "the candidates are known".to_owned(),
         RequestProgress::Search(plan::Progress::Unreachable { poses }) => {
-            format!("{poses} poses cannot be reached without a collision: choosing again")
+            format!("{poses} poses cannot be reached without a collision: choosing others")
         }
         RequestProgress::Search(plan::Progress::Sweep { found, starts, .. }) => {
             let stage = match found.stage {

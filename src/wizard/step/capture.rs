@@ -4,7 +4,7 @@ mod checks;
 mod prediction;
 mod show;
 
-use super::plan::{plan_request, plan_text};
+use super::plan::{measuring_pace, plan_request, plan_text};
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::session::journal::{
     Correction, Decision, Entry, FindingCause, FindingText, Line, MeasuredText, from_xyz_mm, to_edge, to_xyz_mm,
@@ -24,10 +24,6 @@ use crate::wizard::view::Content;
 use prediction::Prediction;
 pub(super) use prediction::fewest_samples;
 
-/// Wait before the first shot (s), as in the method paper.
-const SETTLE: f64 = 2.0;
-/// Shots per pose.
-const SHOTS: u32 = 3;
 /// Number of poses that are suggested at a time.
 const SUGGESTED: usize = 5;
 
@@ -109,6 +105,7 @@ impl CaptureStep {
     fn measure(&mut self, cx: &Cx<'_>, row: usize) -> Vec<Action> {
         let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
         self.measuring = true;
+        let pace = measuring_pace();
         let following = self.following(cx.session).and_then(|row| cx.session.rows.get(row));
         vec![Action::Ask(Request::Measure(MeasureRequest {
             number: cx.session.measurements + 1,
@@ -116,8 +113,8 @@ impl CaptureStep {
             target: 0,
             configuration: shown.planned.configuration.clone(),
             following: following.map(|row| row.planned.configuration.clone()),
-            settle: SETTLE,
-            shots: SHOTS,
+            settle: pace.settle,
+            shots: pace.shots,
         }))]
     }
 

@@ -72,17 +72,18 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
         settings: EstimationSettings::default(),
         identification: SampleSet {
             samples: samples(cx.session, PoseKind::Identification),
-            file: None,
             warnings: remarks(cx.session),
+            ..SampleSet::default()
         },
         verification: SampleSet {
             samples: verification,
-            file: None,
             warnings: left_out(cx.session, PoseKind::Verification).into_iter().collect(),
+            ..SampleSet::default()
         },
         basis: "the verification poses of this session, same set-up".to_owned(),
         verification_mode: mode,
         layout: None,
+        socket_distance_mm: None,
     })))
 }
 

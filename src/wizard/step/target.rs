@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 
+use super::plan::measuring_pace;
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::identification::circle_point::{CirclePointError, CircleSeries, TargetLocation, locate_target};
 use crate::profile::{FREE_TARGET_UNCERTAINTY, Level};
@@ -15,11 +16,6 @@ use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
 use crate::wizard::view::{CircleView, CirclesResult, CirclesView, Content, JointShown, TargetView};
-
-/// Wait before the first shot (s).
-const SETTLE: f64 = 2.0;
-/// Shots per point.
-const SHOTS: u32 = 3;
 
 /// The target step with the planned circles. The measured points of the circles are in the session.
 #[derive(Clone, Debug, Default)]
@@ -232,14 +228,15 @@ impl StepMachine for TargetStep {
             }
             Intent::Measure => {
                 let (Some(next), Some(robot)) = (self.next(session), cx.robot()) else { return Vec::new() };
+                let pace = measuring_pace();
                 vec![Action::Ask(Request::Measure(MeasureRequest {
                     number: session.measurements + 1,
                     pose: pose_name(robot, next.joint, next.index),
                     target: 0,
                     configuration: next.configuration.to_vec(),
                     following: next.following.map(<[f64]>::to_vec),
-                    settle: SETTLE,
-                    shots: SHOTS,
+                    settle: pace.settle,
+                    shots: pace.shots,
                 }))]
             }
             Intent::TypeReading(text) => {

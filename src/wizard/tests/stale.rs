@@ -98,7 +98,7 @@ fn progress_is_shown_while_it_lasts() {
     assert!(bench.wizard.update(Event::Progress { id, progress }).is_empty());
     let busy = bench.wizard.view().busy.unwrap();
     assert_eq!(busy.what, "choosing poses");
-    assert_eq!(busy.progress.unwrap(), "3 poses cannot be reached without a collision: choosing again");
+    assert_eq!(busy.progress.unwrap(), "3 poses cannot be reached without a collision: choosing others");
     bench.settle(effects);
     assert_eq!(bench.wizard.view().busy, None);
 }
