@@ -1,4 +1,4 @@
-//! Runs a command: loads its files, has the procedure done, writes the results.
+//! Runs a command: loads its files, calls the procedure, writes the results.
 
 mod advice;
 mod compensate;
@@ -29,7 +29,7 @@ use crate::procedure::EstimationSettings;
 use crate::text::printable;
 use crate::units::from_mm;
 
-/// Where a command prints: data to `out`, everything else to `err`.
+/// The output of a command: data to `out`, everything else to `err`.
 #[derive(Debug)]
 pub struct Console<O: Write, E: Write> {
     /// Data.
@@ -39,12 +39,12 @@ pub struct Console<O: Write, E: Write> {
 }
 
 impl<O: Write, E: Write> Console<O, E> {
-    /// Prints data. A reader that went away is not a failure.
+    /// Prints data. A closed pipe is not a failure.
     fn print(&mut self, text: &str) -> Result<(), Failure> {
         self.print_bytes(text.as_bytes())
     }
 
-    /// As [`Console::print`], for what may be no UTF-8.
+    /// Prints data that may not be UTF-8.
     fn print_bytes(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         match self.out.write_all(bytes).and_then(|()| self.out.flush()) {
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -54,14 +54,14 @@ impl<O: Write, E: Write> Console<O, E> {
         }
     }
 
-    /// Prints a remark. Nobody may be listening, and nothing depends on it.
+    /// Prints a remark. A closed stderr is not a failure.
     fn remark(&mut self, text: &str) {
         let lines: Vec<String> = text.split('\n').map(printable).collect();
         drop(writeln!(self.err, "{}", lines.join("\n")));
     }
 }
 
-/// Runs what was typed.
+/// Runs the command that was typed.
 ///
 /// # Errors
 /// The command could not be done.
@@ -107,7 +107,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
     }
 }
 
-/// How to identify, as the command line asks for it.
+/// The estimation settings of the command line.
 fn estimation_settings(args: &EstimationArgs, weighting: Weighting) -> EstimationSettings {
     EstimationSettings {
         level: args.level,

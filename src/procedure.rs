@@ -1,9 +1,8 @@
-//! The procedure of a calibration on data in memory: samples in, summary and calibration out ([`identify`]); wishes in, a plan
-//! out ([`plan`]). The commands and the wizard run the very same one.
+//! The procedures of a calibration on data in memory, shared by the commands and the wizard: [`identify`] turns samples into a
+//! summary and a calibration, [`plan`] turns a request into a plan.
 //!
-//! It knows no file, clock or terminal: the time of creation, names of files and their hashes come in as data, and what is said
-//! on the way goes to a callback. Errors are typed; what can be done about them and about warnings is typed [`Advice`], which
-//! whoever runs a procedure puts into words.
+//! They know no file, clock or terminal: the time of creation, file names and hashes come in as data, and progress goes to a
+//! callback. Errors are typed, and so is the [`Advice`] about errors and warnings; the caller puts it into words.
 //!
 //! [`Advice`]: crate::session::advice::Advice
 
@@ -18,15 +17,16 @@ pub mod models;
 pub mod plan;
 pub mod points;
 mod provenance;
-pub(crate) mod result;
+mod result;
 mod settings;
-pub(crate) mod summary;
+mod summary;
 
 pub use error::{ErrorKind, ProcedureError};
 pub use provenance::input_file;
 pub(crate) use provenance::provenance;
 pub use settings::EstimationSettings;
 pub(crate) use settings::target_parameters;
+pub use summary::SampleName;
 
 use crate::kinematics::JointType;
 use crate::profile::Profile;

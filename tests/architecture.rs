@@ -46,7 +46,10 @@ const LAYERS: &[(&str, &[&str])] = &[
         "tui",
         &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "wizard", "runtime"],
     ),
-    ("cli", &["units", "kinematics", "identification", "planning", "profile", "session", "program", "model"]),
+    (
+        "cli",
+        &["units", "kinematics", "identification", "planning", "procedure", "profile", "session", "program", "model"],
+    ),
     (
         "app",
         &[

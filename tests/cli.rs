@@ -658,7 +658,7 @@ fn another_set_up_is_fitted_and_said_so() {
     assert!(report["verification"]["identified"]["position_mm"]["rms"].as_f64().unwrap() > 100.0);
     let (code, report) = verify("frame");
     assert_eq!((code, report["verification"]["refit"].as_str()), (0, Some("frame")));
-    assert!(report["verification"]["basis"].as_str().unwrap().contains("fitted to these very points"));
+    assert!(report["verification"]["basis"].as_str().unwrap().contains("fitted to these same points"));
     assert!(report["verification"]["identified"]["position_mm"]["rms"].as_f64().unwrap() < 0.03);
 }
 

@@ -202,7 +202,7 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
     let lines: Vec<&str> = out.lines().collect();
     assert_eq!(lines[0], "pose,status,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,left_mm,left_deg");
     assert!(lines[1].starts_with("a,reached,") && lines[2] == "b,beyond_limit,,,,,,,,", "{out}");
-    assert!(err.contains("pose b (line 3): not reached: J5 is meant to be beyond its limit"), "{err}");
+    assert!(err.contains("pose b (line 3): not reached: J5 has a target beyond its limit"), "{err}");
     assert!(err.contains("1 of 2 targets reached"), "{err}");
     let commanded: Vec<f64> = lines[1].split(',').skip(2).take(6).map(|cell| cell.parse().unwrap()).collect();
     let correction =

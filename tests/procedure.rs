@@ -60,6 +60,7 @@ fn request() -> IdentifyRequest {
         basis: "every fourth pose".to_owned(),
         verification_mode: VerificationMode::Rest,
         layout: None,
+        socket_distance_mm: None,
     }
 }
 

@@ -323,7 +323,7 @@ fn a_session_that_is_open_in_another_process_is_refused_with_its_number() {
     assert_eq!(output.status.code(), Some(5));
     insta::assert_snapshot!(text(&output.stderr).replace(&process.to_string(), "PROCESS"), @r"
     error: session 'sessions/s' is open in another program (process PROCESS)
-    hint: end the other program first, or go on there
+    hint: close the other program first, or continue there
     ");
     assert_eq!(fs::read(place.session().join("journal.ron")).unwrap(), before);
     // Looking at it is allowed.

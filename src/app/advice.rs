@@ -17,6 +17,7 @@ pub(super) fn words(advice: Advice) -> String {
         Advice::VerifyPoints => "give '--verify FILE', or '--use CONDITION --verify-rest'",
         Advice::VerifyDistances => "give '--use CONDITION --verify-rest', or '--leave-one-out position'",
         Advice::SeparateVerification => "'--use' picks rows, such as \"kind == 'verification'\"",
+        Advice::StateSocketDistance => "give '--socket-distance-mm'",
         Advice::StateLimits
         | Advice::OmitKind
         | Advice::PlanPoses

@@ -1,4 +1,4 @@
-//! `trupose identify`.
+//! `trupose identify`: kinematic errors from measured points.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -50,13 +50,13 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
             .hint("'--use' must leave some rows out"));
     }
 
-    // With two files in play, what is said about rows names the file.
+    // With two files, warnings about rows name the file.
     let file = verification.as_ref().map(|_| identification.input.file.as_str());
     let mut set = sample_set(&rows, profile, file, &identification.table.warnings)?;
     let file = verification.as_ref().map(|loaded| loaded.input.file.as_str());
     let odd = verification.as_ref().map_or(&[][..], |loaded| &loaded.table.warnings);
     let verification_set = sample_set(&verification_rows, profile, file, odd)?;
-    // What either is made of, all of the result is.
+    // A result is simulated if either of its tables is.
     let of_verification = || verification.as_ref().and_then(|loaded| loaded.simulated.clone());
     set.warnings.extend(identification.simulated.clone().or_else(of_verification));
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
@@ -72,19 +72,30 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         basis,
         verification_mode,
         layout: Some(args.layout),
+        socket_distance_mm: None,
     };
+    run_request(&request, estimation, args.record.record.as_deref(), console)
+}
+
+/// Identifies as requested, writes a recording if there is a path for it, and delivers the result.
+pub(super) fn run_request<O: Write, E: Write>(
+    request: &IdentifyRequest,
+    args: &EstimationArgs,
+    recording: Option<&Path>,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
     let mut progress = Progress::new(&mut console.err);
-    let mut identified = identify(&request, &mut |iteration| {
+    let mut identified = identify(request, &mut |iteration| {
         progress.step(iteration);
         ControlFlow::Continue(())
     })?;
     identified.put_into_words(advice::words);
-    if let Some(path) = &args.record.record {
-        record::identification(path, &estimation.profile, &request, &identified)?;
+    if let Some(path) = recording {
+        record::identification(path, &args.profile, request, &identified)?;
     }
-    let out = estimation.out.as_deref();
-    let session = out.map(|folder| record::identification_session(folder, &estimation.profile, &request, &identified));
-    deliver(identified.summary, identified.calibration.as_ref(), session.transpose()?.as_ref(), estimation, console)
+    let session =
+        args.out.as_deref().map(|folder| record::identification_session(folder, &args.profile, request, &identified));
+    deliver(identified.summary, identified.calibration.as_ref(), session.transpose()?.as_ref(), args, console)
 }
 
 /// The samples of rows with their names; `file` is named where there are several.
@@ -105,12 +116,13 @@ fn sample_set(
         samples: rows.iter().zip(samples).map(named).collect(),
         file: file.map(str::to_owned),
         warnings: checks::table_warnings(file, odd),
+        ..SampleSet::default()
     })
 }
 
-/// Writes the result files and prints the summary: also where writing fails, so that the numbers are not lost. Without a
-/// `calibration` there is no usable solution, and only the report is written. `session` is what the report shows.
-pub(super) fn deliver<O: Write, E: Write>(
+/// Writes the result files and prints the summary, even if writing fails, so that the numbers are not lost. Without a
+/// `calibration` there is no usable solution, and only the report of `session` is written.
+fn deliver<O: Write, E: Write>(
     mut summary: IdentificationSummary,
     calibration: Option<&Calibration>,
     session: Option<&Session>,
@@ -166,7 +178,7 @@ fn save(
     store::replace(&html, &report::report_html(&document)).map_err(store_failure)
 }
 
-/// 1 only where limits were checked and not met.
+/// The exit status of a verdict: `NotAccepted` only if limits were checked and are not met.
 pub(super) fn exit_status(verdict: VerdictStatus) -> ExitStatus {
     if verdict == VerdictStatus::NotAccepted { ExitStatus::NotAccepted } else { ExitStatus::Accepted }
 }

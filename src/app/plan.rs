@@ -72,8 +72,8 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
     Ok(if is_blocked { ExitStatus::NotAccepted } else { ExitStatus::Accepted })
 }
 
-/// Set by Ctrl-C: the search ends with the best set so far. A second Ctrl-C changes nothing, since wrappers send two at once and
-/// the rest takes a second or two.
+/// A flag that Ctrl-C sets: the search then ends with the best set so far. A second Ctrl-C changes nothing, since wrappers send two
+/// at once, and the rest takes only a second or two.
 fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&flag))
@@ -81,7 +81,7 @@ fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// What the command line asks for; files are still to be read.
+/// The request of the command line; its files are not read yet.
 fn request(args: &PlanArgs, profile: &Profile) -> Result<PlanRequest, Failure> {
     let limits = (!args.limits.is_empty()).then(|| limits::narrowed(profile, &args.limits)).transpose()?;
     Ok(PlanRequest {
@@ -106,14 +106,14 @@ fn request(args: &PlanArgs, profile: &Profile) -> Result<PlanRequest, Failure> {
     })
 }
 
-/// Poses of a file.
+/// The poses of a file.
 struct Listed {
     rows: Vec<PlannedPose>,
     warnings: Vec<Warning>,
     input: InputFile,
 }
 
-/// All rows of a plan or of a plain list.
+/// Reads all rows of a plan or of a plain list.
 fn listed_poses(file: &Path, profile: &Profile) -> Result<Listed, Failure> {
     let bytes = store::read(file).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let name = file.display().to_string();
@@ -123,7 +123,7 @@ fn listed_poses(file: &Path, profile: &Profile) -> Result<Listed, Failure> {
     Ok(Listed { rows: listed.rows, warnings, input: input_file(InputRole::Plan, name, &bytes) })
 }
 
-/// The identification poses that are already measured, and what to say about the file.
+/// The identification poses that are already measured, and warnings about the file.
 fn included(file: &Path, profile: &Profile) -> Result<(Vec<PlannedPose>, Vec<Warning>), Failure> {
     let Listed { rows, mut warnings, .. } = listed_poses(file, profile)?;
     let all = rows.len();
@@ -139,7 +139,7 @@ fn included(file: &Path, profile: &Profile) -> Result<(Vec<PlannedPose>, Vec<War
     Ok((included, warnings))
 }
 
-/// Chooses on a thread of its own, so that this one can write the progress.
+/// Chooses poses on another thread while this one prints the progress.
 fn choose<O: Write, E: Write>(
     loaded: &LoadedProfile,
     request: &PlanRequest,
@@ -161,18 +161,18 @@ fn choose<O: Write, E: Write>(
                     lines.say(|| sweep_text(&found, &bar(done, sweeps), starts));
                 }
                 procedure::Progress::Unreachable { poses } => {
-                    console.remark(&format!("{poses} poses cannot be reached without a collision: choosing again"));
+                    console.remark(&format!("{poses} poses cannot be reached without a collision: choosing others"));
                     lines = Progress::new(&mut console.err);
                 }
             }
         }
-        // A panic of the search is a defect: let it be seen where it happened.
+        // A panic of the search is a defect: it is passed on so that it shows where it happened.
         Ok(worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?)
     })
 }
 
-/// Hands progress to the thread that writes it. Sweeps that nobody has room for are dropped: the search never waits for a
-/// terminal. Nobody is listening once the other thread has gone.
+/// Hands progress to the printing thread. Sweeps are dropped when its channel is full, so that the search never waits for a
+/// terminal; once that thread has ended, everything is.
 fn tell(sender: &SyncSender<procedure::Progress>, progress: procedure::Progress) {
     let _was_lost = match progress {
         procedure::Progress::Sweep { .. } => sender.try_send(progress).is_err(),
@@ -180,7 +180,7 @@ fn tell(sender: &SyncSender<procedure::Progress>, progress: procedure::Progress)
     };
 }
 
-/// A line about a sweep.
+/// The progress line of a sweep.
 fn sweep_text(found: &crate::planning::Progress, bar: &str, starts: usize) -> String {
     let stage = match found.stage {
         Stage::Prediction => "predicting",
@@ -194,7 +194,7 @@ fn sweep_text(found: &crate::planning::Progress, bar: &str, starts: usize) -> St
     )
 }
 
-/// A bar of twenty signs.
+/// A progress bar of twenty characters.
 fn bar(done: usize, of: usize) -> String {
     const WIDTH: usize = 20;
     let full = (WIDTH * done / of.max(1)).min(WIDTH);

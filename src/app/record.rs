@@ -15,7 +15,6 @@ use crate::procedure::joint_types;
 use crate::procedure::points::point_errors;
 use crate::profile::Profile;
 use crate::recording::{self, RecordingError, Written};
-use crate::session::calibration::Calibration;
 use crate::session::journal::{
     Entry, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText, SCHEMA, to_edge, to_xyz_mm,
 };
@@ -23,7 +22,6 @@ use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
 use crate::session::sha256;
 use crate::session::state::Session;
-use crate::session::summary::IdentificationSummary;
 use crate::store::session::SessionFolder;
 use crate::text::{counted, counted_as};
 use crate::units::to_mm;
@@ -86,24 +84,6 @@ pub(super) fn identification_session(
     session(identification_lines(folder, source, request, identified))
 }
 
-/// Returns an identification without coordinates as a session, for its report.
-pub(super) fn bare_session(
-    folder: &Path,
-    source: &str,
-    profile_text: &str,
-    summary: &IdentificationSummary,
-    calibration: Option<&Calibration>,
-) -> Result<Session, Failure> {
-    let mut lines = Lines::new(folder, source, profile_text);
-    lines.push(Entry::Identified(Box::new(IdentifiedText {
-        samples: Vec::new(),
-        summary: summary.clone(),
-        calibration: calibration.cloned(),
-        points: Vec::new(),
-    })));
-    session(lines.lines)
-}
-
 fn session(lines: Vec<Line>) -> Result<Session, Failure> {
     let journal = Journal { lines, ..Journal::default() };
     Session::of(&journal).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))
@@ -125,14 +105,17 @@ fn identification_lines(path: &Path, source: &str, request: &IdentifyRequest, id
         point_in_base: None,
     });
     let summary = &identified.summary;
-    lines.push(Entry::Plan(PlanText {
-        origin: "the rows of the measured files".to_owned(),
-        condition_number: summary.condition_number,
-        predicted_error_sigma: None,
-        minutes: None,
-        search: Vec::new(),
-        rows: rows.map(|row| PlannedText::new(&row, &types)).collect(),
-    }));
+    // Direct distances are of no planned pose.
+    if !all.is_empty() {
+        lines.push(Entry::Plan(PlanText {
+            origin: "the rows of the measured files".to_owned(),
+            condition_number: summary.condition_number,
+            predicted_error_sigma: None,
+            minutes: None,
+            search: Vec::new(),
+            rows: rows.map(|row| PlannedText::new(&row, &types)).collect(),
+        }));
+    }
     for (row, (kind, sample)) in all.iter().enumerate() {
         lines.push(Entry::Sample(measured(row, *kind, sample, &types)));
     }

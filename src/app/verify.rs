@@ -24,7 +24,7 @@ use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
 /// Prior standard deviation of a remounted target (m).
 const NEW_MOUNTING: f64 = 50.0 * MILLIMETRE;
-/// Positions this many times worse than distances are not those of the same set-up.
+/// Positions this many times worse than distances show that the set-up has changed.
 const MOVED: f64 = 10.0;
 
 pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
@@ -61,9 +61,9 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     warnings.extend(plausible);
     let (basis, fitted) = match args.refit {
         Refit::None => ("same set-up as the identification", 0),
-        Refit::Frame => ("another set-up: the place of the tracker was fitted to these very points", 6),
+        Refit::Frame => ("another set-up: the position of the tracker was fitted to these same points", 6),
         Refit::FrameAndTarget => {
-            let basis = "another set-up: the place of the tracker and the SMR were fitted to these very points";
+            let basis = "another set-up: the positions of tracker and SMR were fitted to these same points";
             (basis, 6 + remounted_targets(profile, &samples).len())
         }
     };
@@ -71,9 +71,9 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let tested: Vec<Place> = samples.iter().map(|sample| sample.at.clone()).collect();
     let poses = Places::new(joints, &tested).distinct();
     if fitted > 0 && 3 * poses < 4 * fitted {
-        let noun = if poses == 1 { "pose" } else { "poses" };
         let message = format!(
-            "{fitted} numbers of the set-up were fitted to only {poses} {noun}: the position errors are too small to be believed"
+            "{fitted} numbers of the set-up were fitted to only {}: the position errors look better than they are",
+            text::counted(poses, "pose")
         );
         warnings.push(Warning::new("few_data", message, true));
     }
@@ -100,7 +100,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let report = VerificationReport {
         schema: SCHEMA,
         provenance: provenance(profile, &calibration.profile, load::now(), inputs),
-        verdict: verdict(profile.acceptance(), Some(&verification), &warnings),
+        verdict: verdict(profile.acceptance(), Ok(&verification), &warnings),
         warnings,
         verification,
     };
@@ -121,12 +121,12 @@ fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) ->
     Ok(checks::check_verification(&problem, samples)?)
 }
 
-/// Distances do not feel where the tracker stands, positions do.
+/// A warning if positions are much worse than distances: only positions depend on where the tracker is.
 fn moved_set_up(identified: &ModelSummary) -> Option<Warning> {
     let (position, distance) = (identified.position_mm?.mean, identified.distance_mm?.mean);
     (position > MOVED * distance.max(to_mm(MICROMETRE))).then(|| {
         let message = format!(
-            "the distances fit ({} mm), the positions do not ({} mm): the tracker, or the SMR, is not where it was at the identification. '--refit frame' fits the place of the tracker, '--refit frame+target' that of the SMR too",
+            "the distances fit ({} mm), the positions do not ({} mm): the tracker, or the SMR, is not where it was at the identification. '--refit frame' fits the position of the tracker, '--refit frame+target' that of the SMR too",
             report::number(distance, 4),
             report::number(position, 4)
         );
@@ -134,7 +134,7 @@ fn moved_set_up(identified: &ModelSummary) -> Option<Warning> {
     })
 }
 
-/// What ruled out acceptance of the identification itself also rules it out here.
+/// A warning if the identification itself was not acceptable: then a good verification is not enough.
 fn carried_over(calibration: &Calibration) -> Option<Warning> {
     let mut codes: Vec<&str> = Vec::new();
     for warning in calibration.warnings.iter().filter(|warning| warning.blocks_acceptance) {
@@ -143,7 +143,7 @@ fn carried_over(calibration: &Calibration) -> Option<Warning> {
         }
     }
     let message = format!(
-        "the calibration itself was not acceptable: {}; a good figure here does not mend it. Identify again from better data",
+        "the calibration itself was not acceptable: {}; good figures here do not change that. Identify again from better data",
         codes.join(", ")
     );
     (!codes.is_empty()).then(|| Warning::new("calibration_not_acceptable", message, true))
@@ -184,7 +184,7 @@ impl Models {
         })
     }
 
-    /// Both models with the set-up in which `samples` were measured.
+    /// Both arms with the set-up in which `samples` were measured.
     fn set_up(
         self,
         refit: Refit,
@@ -196,7 +196,7 @@ impl Models {
             Refit::None => {
                 let known = |arm, station: Option<Isometry3<f64>>| -> Result<FittedSetup, Failure> {
                     let base_from_station = vec![station.ok_or_else(|| {
-                        Failure::new(ExitStatus::Usage, format!("'{file}' knows no place of a tracker"))
+                        Failure::new(ExitStatus::Usage, format!("'{file}' contains no tracker position"))
                             .hint("use '--refit frame' or '--refit frame+target'")
                     })?];
                     Ok(FittedSetup { arm, base_from_station })
@@ -212,7 +212,7 @@ impl Models {
     }
 }
 
-/// The coordinates of all targets that the samples show, free.
+/// Free coordinates of all targets that the samples contain.
 fn remounted_targets(profile: &Profile, samples: &[PointSample]) -> Vec<FreeParameter> {
     (0..profile.targets().len())
         .filter(|target| samples.iter().any(|sample| sample.at.target == *target))

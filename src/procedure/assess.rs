@@ -1,7 +1,7 @@
-//! From errors to a verification summary and a verdict.
+//! Verification summaries, and the verdict on them.
 
-use crate::identification::PointSample;
 use crate::identification::verification::{DirectErrors, ErrorStatistics, ModelErrors, residual_against_joints};
+use crate::identification::{Observations, PointSample};
 use crate::kinematics::Joint;
 use crate::profile::Acceptance;
 use crate::report::number;
@@ -12,12 +12,12 @@ use crate::session::summary::{
 };
 use crate::units::to_mm;
 
-pub(crate) fn statistics(statistics: &ErrorStatistics) -> StatisticsSummary {
+fn statistics(statistics: &ErrorStatistics) -> StatisticsSummary {
     let ErrorStatistics { count, mean, rms, p95, max } = *statistics;
     StatisticsSummary { count, mean: to_mm(mean), rms: to_mm(rms), p95: to_mm(p95), max: to_mm(max) }
 }
 
-pub(crate) fn model_summary(errors: &ModelErrors) -> ModelSummary {
+fn model_summary(errors: &ModelErrors) -> ModelSummary {
     ModelSummary {
         position_mm: Some(statistics(&errors.position)),
         axis_mm: Some(AxisSummary { mean: errors.axis_mean.map(to_mm), max: errors.axis_max.map(to_mm) }),
@@ -26,7 +26,7 @@ pub(crate) fn model_summary(errors: &ModelErrors) -> ModelSummary {
     }
 }
 
-pub(crate) fn direct_summary(errors: &DirectErrors) -> ModelSummary {
+fn direct_summary(errors: &DirectErrors) -> ModelSummary {
     ModelSummary {
         position_mm: None,
         axis_mm: None,
@@ -36,7 +36,7 @@ pub(crate) fn direct_summary(errors: &DirectErrors) -> ModelSummary {
 }
 
 /// Errors of the identified model against each joint.
-pub(crate) fn joint_summaries(
+fn joint_summaries(
     joints: &[Joint],
     configurations: &[&[f64]],
     vectors: &[nalgebra::Vector3<f64>],
@@ -65,7 +65,7 @@ pub(crate) fn joint_summaries(
         .collect()
 }
 
-/// A verification by points.
+/// The summary of a verification by points.
 pub(crate) fn point_verification(
     joints: &[Joint],
     samples: &[PointSample],
@@ -86,17 +86,45 @@ pub(crate) fn point_verification(
     }
 }
 
-/// Compares a verification with the acceptance limits of the profile.
+/// The summary of a verification by direct distances.
+pub(crate) fn direct_verification(
+    joints: &[Joint],
+    nominal: &DirectErrors,
+    identified: &DirectErrors,
+    observations: &Observations,
+    basis: String,
+) -> VerificationSummary {
+    let seats = observations.shared.iter().filter(|shared| shared.at.len() > 1).flat_map(|shared| &shared.at);
+    let configurations: Vec<&[f64]> = seats.map(|at| at.configuration.as_slice()).collect();
+    let residual_by_joint = if configurations.is_empty() {
+        Vec::new()
+    } else {
+        joint_summaries(joints, &configurations, &identified.seats)
+    };
+    VerificationSummary {
+        samples: identified.seats.len() + identified.lengths.len(),
+        basis,
+        independent: true,
+        refit: Refit::None,
+        nominal: direct_summary(nominal),
+        identified: direct_summary(identified),
+        residual_by_joint,
+    }
+}
+
+/// Compares a verification with the acceptance limits of the profile; if there is none, the verdict carries advice how to get one.
 pub(crate) fn verdict(
     acceptance: &Acceptance,
-    verification: Option<&VerificationSummary>,
+    verification: Result<&VerificationSummary, Advice>,
     warnings: &[Warning],
 ) -> Verdict {
     let decided = |status, reasons: Vec<String>, checks| Verdict { status, reasons, checks, advice: None };
-    let Some(verification) = verification else {
-        let reasons = vec!["there are no verification samples".to_owned()];
-        let advice = Some(Advice::VerifyPoints);
-        return Verdict { advice, ..decided(VerdictStatus::NotEvaluated, reasons, Vec::new()) };
+    let verification = match verification {
+        Ok(verification) => verification,
+        Err(advice) => {
+            let reasons = vec!["there are no verification samples".to_owned()];
+            return Verdict { advice: Some(advice), ..decided(VerdictStatus::NotEvaluated, reasons, Vec::new()) };
+        }
     };
     let checks = limit_checks(acceptance, &verification.identified);
     let mut reasons: Vec<String> = checks
@@ -127,7 +155,7 @@ pub(crate) fn verdict(
         checks.iter().filter(|check| check.met.is_none()).map(|check| check.quantity.words()).collect();
     let refused = !reasons.is_empty();
     if !open.is_empty() {
-        reasons.push(format!("these data do not tell: {}", open.join(", ")));
+        reasons.push(format!("these data cannot show: {}", open.join(", ")));
     }
     if refused {
         return decided(VerdictStatus::NotAccepted, reasons, checks);
@@ -144,7 +172,7 @@ pub(crate) fn verdict(
     decided(VerdictStatus::Accepted, vec![reason], checks)
 }
 
-/// Every limit of the profile with what was found. The distance of a seat from its shared point is a position error.
+/// Compares every limit of the profile with the errors found. The distance of a seat from its shared point is a position error.
 fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck> {
     let position_errors = found.position_mm.as_ref().or(found.seat_mm.as_ref());
     let position = |pick: fn(&StatisticsSummary) -> f64| position_errors.map(pick);
@@ -160,7 +188,7 @@ fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck
     .into_iter()
     .filter_map(|(quantity, limit, value_mm)| {
         let limit_mm = to_mm(limit?);
-        // Not a number is not met.
+        // A value that is not a number does not meet the limit.
         let met = value_mm.map(|value| value <= limit_mm);
         Some(LimitCheck { quantity, value_mm, limit_mm, met })
     })
@@ -192,14 +220,14 @@ mod tests {
     #[test]
     fn limits_that_cannot_be_evaluated_are_never_accepted() {
         let acceptance = Acceptance { position_rms: Some(2e-4), distance_rms: Some(2e-4), ..Acceptance::default() };
-        let status = |distance, warnings: &[Warning]| verdict(&acceptance, Some(&of(distance)), warnings).status;
+        let status = |distance, warnings: &[Warning]| verdict(&acceptance, Ok(&of(distance)), warnings).status;
         assert_eq!(status(Some(0.1), &[]), VerdictStatus::Accepted);
         assert_eq!(status(None, &[]), VerdictStatus::NotEvaluated);
         assert_eq!(status(Some(0.3), &[]), VerdictStatus::NotAccepted);
         assert_eq!(status(Some(f64::NAN), &[]), VerdictStatus::NotAccepted);
         let twice = [Warning::new("poor_data", "", true), Warning::new("poor_data", "", true)];
-        let found = verdict(&acceptance, Some(&of(None)), &twice);
+        let found = verdict(&acceptance, Ok(&of(None)), &twice);
         assert_eq!(found.status, VerdictStatus::NotAccepted);
-        assert_eq!(found.reasons, ["see the warning 'poor_data'", "these data do not tell: distance rms"]);
+        assert_eq!(found.reasons, ["see the warning 'poor_data'", "these data cannot show: distance rms"]);
     }
 }

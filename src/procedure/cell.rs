@@ -1,10 +1,10 @@
-//! The cell of a profile as planning sees it.
+//! The cell of a profile in the form that planning takes.
 
 use super::ProcedureError;
 use crate::planning::{Body, BoxInBase, Cell, KeepOutBox, MountedTarget, TrackerStand};
 use crate::profile::Profile;
 
-/// The ranges of the joints (rad, sliding joints m) that the profile plans in where a request does not narrow them.
+/// The joint ranges (rad, sliding joints m) for plans, as the profile states them.
 ///
 /// # Errors
 /// A joint without limits.

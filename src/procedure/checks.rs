@@ -1,5 +1,5 @@
-//! What `identify`, `verify` and `constraints` check about their data in the same way: odd rows, joint limits, mistakes in a
-//! whole table, and whether the verification samples are independent, enough, and where the identification samples are.
+//! Checks of the data that `identify`, `verify` and `constraints` share: odd rows, joint limits, mistakes in a whole table, and
+//! whether the verification samples are independent, numerous enough, and in the same range as the identification samples.
 
 use nalgebra::Vector3;
 
@@ -13,28 +13,36 @@ use crate::report::number;
 use crate::session::TableProblem;
 use crate::session::advice::Advice;
 use crate::session::summary::Warning;
+use crate::text::counted;
 use crate::units::{MICROMETRE, Quantity, to_mm};
 
-/// Verification samples that were also identification samples.
+/// Code of the warning that verification samples were also identification samples.
 pub(crate) const NOT_INDEPENDENT: &str = "not_independent";
-/// Fewer verification poses than this rule acceptance out.
+/// Acceptance needs at least this many verification poses.
 const TOO_FEW_POSES: usize = 5;
 /// Fewer verification poses than this say little about the largest error.
 const FEW_POSES: usize = 10;
 /// Fewer points than this cannot show a mistake in a whole table.
 const ENOUGH_TO_COMPARE: usize = 4;
-/// A verification sample is far off if its error is so many times the median of all.
+/// A verification sample is far off if its error is this many times the median of all.
 const FAR: f64 = 10.0;
-/// Problems of one kind that a warning lists.
+/// Most problems of one kind that a warning lists.
 const SHOWN: usize = 3;
 
-/// What the reader of a table found odd; `file` names it where there are several.
+/// Warnings about what the reader of a table found odd; they name `file` if it is given.
 pub(crate) fn table_warnings(file: Option<&str>, problems: &[TableProblem]) -> Vec<Warning> {
     let place = file.map_or_else(String::new, |file| format!("'{file}', "));
     problems.iter().map(|problem| Warning::new("table", format!("{place}{problem}"), false)).collect()
 }
 
-/// Rows, as line and configuration, whose joints are outside the limits of the profile.
+/// The first `shown` of many findings, with the number of the others.
+pub(super) fn first_of(findings: &[String], shown: usize) -> String {
+    let list = findings.iter().take(shown).cloned().collect::<Vec<_>>().join("; ");
+    let more = findings.len().saturating_sub(shown);
+    if more > 0 { format!("{list}; and {more} more") } else { list }
+}
+
+/// A warning about rows (line and configuration) whose joints are outside the limits of the profile.
 pub(crate) fn limit_warning<'a>(
     profile: &Profile,
     file: Option<&str>,
@@ -59,17 +67,15 @@ pub(crate) fn limit_warning<'a>(
             }
         }
     }
-    let more = outside.len().saturating_sub(SHOWN);
-    let list = outside.iter().take(SHOWN).cloned().collect::<Vec<_>>().join("; ");
-    let tail = if more > 0 { format!("; and {more} more") } else { String::new() };
+    let list = first_of(&outside, SHOWN);
     let place = file.map_or_else(String::new, |file| format!(" in '{file}'"));
     let message = format!(
-        "joint values outside the limits of the profile{place} (degrees and radians mixed up, or another robot?): {list}{tail}"
+        "joint values outside the limits of the profile{place} (degrees and radians mixed up, or another robot?): {list}"
     );
     (!outside.is_empty()).then(|| Warning::new("joint_limits", message, false))
 }
 
-/// What a comparison with the nominal robot says.
+/// The result of a comparison with the nominal robot.
 #[derive(Debug)]
 pub(crate) struct Compared {
     /// Root mean square residual that the expected deviations explain (m).
@@ -77,8 +83,8 @@ pub(crate) struct Compared {
     pub(crate) warning: Option<Warning>,
 }
 
-/// Refuses points that a known mistake explains better than this robot does. `problem` frees all that the robot may deviate in,
-/// whatever is to be identified; `what` comes before the message.
+/// Refuses points that a known mistake explains better than this robot does. `problem` frees all parameters that may deviate, not
+/// only those to identify; `what` is the beginning of the message.
 pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Compared, ProcedureError> {
     let plausibility = compare_with_nominal(problem)?;
     let expected = plausibility.expected;
@@ -100,8 +106,8 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
     Ok(Compared { expected, warning: Some(Warning::new("implausible", message, true)) })
 }
 
-/// Looks for the same mistakes in the verification points of a table. Too few to tell are left to other checks. The other
-/// observations of `problem` do not matter.
+/// Looks for the same mistakes in the verification points of a table. Very few points are left to other checks. The
+/// observations of `problem` are not used.
 pub(crate) fn check_verification(
     problem: &Problem<'_>,
     tested: &[PointSample],
@@ -114,8 +120,8 @@ pub(crate) fn check_verification(
     check_plausibility(&problem, "verification: ").map(|compared| compared.warning)
 }
 
-/// Verification samples that are far worse than the others: what they have in common hides in a mean. `named` are the samples,
-/// as pose and line, with their errors.
+/// A warning about verification samples that are far worse than the others, which a mean would hide. `named` has pose, line and
+/// error of each.
 pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &'a Vector3<f64>)>) -> Option<Warning> {
     let mut samples: Vec<(&str, usize, f64)> =
         named.into_iter().map(|(pose, line, error)| (pose, line, error.norm())).collect();
@@ -130,7 +136,7 @@ pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &
     let more = if far > SHOWN { format!(" and {} more", far - SHOWN) } else { String::new() };
     (far > 0).then(|| {
         let message = format!(
-            "verification samples far off where others are off by {} mm: {}{more}; a bumped SMR, another unit, a row in another place? Nothing is left out of a verification",
+            "verification samples far off (the others typically by {} mm): {}{more}; a bumped SMR, another unit, rows in another order? A verification leaves nothing out",
             number(to_mm(typical), 3),
             worst.join(", ")
         );
@@ -138,7 +144,7 @@ pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &
     })
 }
 
-/// What is doubtful about a pair of identification and verification sets.
+/// Warnings about a pair of identification and verification sets.
 pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let places = Places::new(joints, known);
@@ -147,7 +153,7 @@ pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) 
         let verb = if shared == 1 { "is" } else { "are" };
         let message = format!(
             "{shared} of {} {verb} of a pose that is also in the identification set: the figures below say nothing about other poses and are no independent verification",
-            counted(tested.len())
+            counted(tested.len(), "verification sample")
         );
         warnings.push(Warning::new(NOT_INDEPENDENT, message, true).with_advice(Advice::SeparateVerification));
     }
@@ -157,27 +163,21 @@ pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) 
     warnings
 }
 
-/// Whether `warnings` say that the verification samples are not independent.
+/// Whether no warning says that the verification samples depend on the identification samples.
 pub(crate) fn is_independent(warnings: &[Warning]) -> bool {
     warnings.iter().all(|warning| warning.code != NOT_INDEPENDENT)
 }
 
-/// Too few verification poses: `samples` show `poses`. One that is measured again tells nothing new.
+/// A warning about too few verification poses: `samples` show `poses`. A pose that is measured again adds nothing new.
 pub(crate) fn few_warning(samples: usize, poses: usize) -> Option<Warning> {
     (poses < FEW_POSES).then(|| {
-        let mut what = counted(samples);
+        let mut what = counted(samples, "verification sample");
         if poses < samples {
-            let noun = if poses == 1 { "pose" } else { "poses" };
-            what = format!("{poses} {noun} in {what}");
+            what = format!("{} in {what}", counted(poses, "pose"));
         }
-        let message = format!("only {what}: the largest error is hardly known");
+        let message = format!("only {what}: they say little about the largest error");
         Warning::new("few_verification_samples", message, poses < TOO_FEW_POSES)
     })
-}
-
-fn counted(samples: usize) -> String {
-    let noun = if samples == 1 { "sample" } else { "samples" };
-    format!("{samples} verification {noun}")
 }
 
 fn coverage_warning(joints: &[Joint], gap: &CoverageGap) -> Warning {
@@ -191,7 +191,7 @@ fn coverage_warning(joints: &[Joint], gap: &CoverageGap) -> Warning {
         format!("verification reaches outside the identification set: {} {tested}, identified on {known}", joint.name)
     } else {
         format!(
-            "verification covers a part only: {} {tested}, identified on {known}; the rest is not verified",
+            "verification covers only a part: {} {tested}, identified on {known}; the rest is not verified",
             joint.name
         )
     };

@@ -1,22 +1,19 @@
-//! Where to stand for a circle-point analysis: a configuration from which the last two joints can turn far without touching
-//! anything.
+//! Configurations for a circle-point analysis, in which the last two joints can turn far without touching anything.
 
 use super::ProcedureError;
 use super::cell::{cell, planning_limits};
 use crate::identification::circle_point::{circle_plan, fit_circle};
 use crate::kinematics::ForwardKinematics;
-use crate::planning::collision::ArmShape;
+use crate::planning::collision::{ArmShape, DEFAULT_CLEARANCE};
 use crate::planning::{JointBox, low_discrepancy};
 use crate::profile::Profile;
-use crate::units::{DEGREE, MILLIMETRE};
+use crate::units::DEGREE;
 
-/// Points per circle.
+/// Number of points per circle.
 const POINTS: usize = 8;
-/// Clearance to keep from everything (m).
-const CLEARANCE: f64 = 10.0 * MILLIMETRE;
-/// Arcs that are tried (rad), the widest first: the wider the circle, the better its centre is known.
+/// Arcs to try (rad), the widest first: the wider the arc, the better the centre of its circle is known.
 const ARCS: [f64; 4] = [300.0 * DEGREE, 200.0 * DEGREE, 120.0 * DEGREE, 80.0 * DEGREE];
-/// Base configurations that are tried for each.
+/// Number of base configurations to try for each arc.
 const TRIES: usize = 500;
 /// Seed of the base configurations.
 const SEED: u64 = 1;
@@ -31,11 +28,11 @@ pub type Circle = (usize, Vec<Vec<f64>>);
 pub fn plan(profile: &Profile) -> Result<Vec<Circle>, ProcedureError> {
     let limits = planning_limits(profile)?;
     let cell = cell(profile, limits.clone(), None, true)?;
-    let shape = ArmShape::new(profile.chain(), &cell, CLEARANCE)?;
+    let shape = ArmShape::new(profile.chain(), &cell, DEFAULT_CLEARANCE)?;
     let joints = profile.chain().dof();
     let turned = [joints.saturating_sub(1), joints.saturating_sub(2)];
     let joint_box = JointBox::new(limits.clone())?;
-    // The middle of the limits first: nobody wants to measure in a corner.
+    // The middle of the limits first: measuring is easiest there.
     let middle: Vec<f64> = limits.iter().map(|(low, high)| f64::midpoint(*low, *high)).collect();
     let bases = || std::iter::once(middle.clone()).chain(low_discrepancy(&joint_box, SEED).take(TRIES));
     for (arc, base) in ARCS.into_iter().flat_map(|arc| bases().map(move |base| (arc, base))) {
@@ -58,7 +55,7 @@ pub fn plan(profile: &Profile) -> Result<Vec<Circle>, ProcedureError> {
     Err(ProcedureError::NoFreeCircles)
 }
 
-/// The SMR must be beside the axes that are turned, or there is no circle: known before anything is measured.
+/// Checks before anything is measured that the SMR is beside the turned axes: on an axis it draws no circle.
 fn check_offset(profile: &Profile, circles: &[Circle]) -> Result<(), ProcedureError> {
     let Some(target) = profile.targets().first() else { return Ok(()) };
     let kinematics = ForwardKinematics::new(profile.chain());

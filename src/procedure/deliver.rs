@@ -4,9 +4,9 @@ use crate::report::{Document, report_html};
 use crate::session::export;
 use crate::session::state::Session;
 
-/// Name of the report to read and print.
+/// File name of the report for people.
 pub const REPORT_HTML: &str = "report.html";
-/// Name of the report for other programs.
+/// File name of the report for other programs.
 pub const REPORT_JSON: &str = "report.json";
 
 /// The files of a session that has a result, with their names: tables, calibration, the corrected `models`, report.
@@ -26,7 +26,7 @@ pub fn files(session: &Session, models: Vec<(String, String)>) -> Result<Vec<(St
     Ok(files)
 }
 
-/// What a report stands on: the tables, and the calibration where there is a usable result. Nothing without a robot.
+/// The files that a report describes: the tables, and the calibration if there is a usable result. None without a robot.
 ///
 /// # Errors
 /// The serialiser refuses, which is a defect.
@@ -43,7 +43,7 @@ pub fn data_files(session: &Session) -> Result<Vec<(String, String)>, String> {
     Ok(files)
 }
 
-/// The report in both forms, with the hashes of the `files` that lie beside it.
+/// The report in both forms, with the hashes of the `files` beside it.
 ///
 /// # Errors
 /// The serialiser refuses, which is a defect.

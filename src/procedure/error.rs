@@ -19,7 +19,7 @@ pub enum ProcedureError {
     /// A profile without a target.
     #[error("the profile has no target")]
     NoTarget,
-    /// A cell that cannot be.
+    /// A cell that makes no sense.
     #[error(transparent)]
     Cell(#[from] CellError),
     /// Too few configurations can be measured.
@@ -60,7 +60,7 @@ pub enum ProcedureError {
         gap: String,
         mistake: String,
     },
-    /// Fewer positions than leaving one out needs.
+    /// Too few positions to leave one out.
     #[error("leaving one position out needs at least two positions")]
     OnePosition,
     /// Nothing can be identified.
@@ -71,9 +71,9 @@ pub enum ProcedureError {
 /// Where the cause of a [`ProcedureError`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// In the profile, the measurements or the request.
+    /// The profile, the measurements or the request.
     Input,
-    /// In the numbers: there is no usable solution.
+    /// The numbers: there is no usable solution.
     Numerical,
 }
 

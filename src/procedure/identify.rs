@@ -1,44 +1,56 @@
-//! From measured points to an identified, verified arm.
+//! Identification of the arm from measured points or direct distances, and its verification.
 
 use std::ops::ControlFlow;
 
-use super::assess::point_verification;
+use super::assess::{direct_verification, point_verification};
 use super::result::{self, Context};
 use super::summary::{Finished, SampleName};
 use super::{EstimationSettings, ProcedureError, checks, target_parameters};
-use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{Identification, Iteration, Observations, Places, PointSample, Problem, identify_while};
+use crate::identification::verification::{DirectErrors, FittedSetup, ModelErrors, fit_setup};
+use crate::identification::{Identification, Iteration, Observations, PointSample, Problem, Settings, identify_while};
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
 use crate::session::advice::Advice;
 use crate::session::calibration::{self, Calibration, MountedText, SampleText};
 use crate::session::measurements::Layout;
 use crate::session::summary::{
-    IdentificationSettings, IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
+    IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
 };
 use crate::units::to_mm;
 
-/// A sample with the place where it was written down.
+/// A measured point with the place where it was recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedSample {
-    /// Name of the pose.
     pub pose: String,
     /// Line of the file, or number of the measurement.
     pub line: usize,
-    /// What was measured: configuration (rad, sliding joints m) and point (m).
+    /// Configuration (rad, sliding joints m) and point (m).
     pub sample: PointSample,
-    /// Temperature when it was measured (°C), for the record only.
+    /// Temperature during the measurement (°C), for the record only.
     pub temperature: Option<f64>,
 }
 
-/// Samples that serve one purpose.
+/// Direct distances, measured without any coordinates.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Distances {
+    /// Shared points and lengths.
+    pub observations: Observations,
+    /// Names of their places, in the order of [`Observations::places`].
+    pub names: Vec<SampleName>,
+    /// Position of the plate that each shared point belongs to.
+    pub positions: Vec<String>,
+}
+
+/// Samples for one purpose: measured points, direct distances, or both.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SampleSet {
-    /// The samples.
+    /// Measured points.
     pub samples: Vec<NamedSample>,
-    /// The file that warnings name; `None` where there is only one.
+    /// Direct distances.
+    pub distances: Distances,
+    /// The file that warnings name; `None` if there is only one.
     pub file: Option<String>,
-    /// What is already known to be odd about them.
+    /// Warnings from reading the samples.
     pub warnings: Vec<Warning>,
 }
 
@@ -49,50 +61,53 @@ impl From<Vec<NamedSample>> for SampleSet {
 }
 
 impl SampleSet {
-    /// Line and configuration of the samples.
-    fn configurations(&self) -> impl Iterator<Item = (usize, &[f64])> {
-        self.samples.iter().map(|named| (named.line, named.sample.at.configuration.as_slice()))
+    fn observations(&self) -> Observations {
+        let points = self.samples.iter().map(|named| named.sample.clone()).collect();
+        Observations { points, ..self.distances.observations.clone() }
     }
 
-    /// The samples without their names.
-    fn points(&self) -> Vec<PointSample> {
-        self.samples.iter().map(|named| named.sample.clone()).collect()
+    /// Names of the places, in the order of [`Observations::places`].
+    fn names(&self) -> Vec<SampleName> {
+        let of_points = self.samples.iter().map(|named| SampleName { pose: named.pose.clone(), line: named.line });
+        of_points.chain(self.distances.names.iter().cloned()).collect()
     }
 }
 
-/// What is to be identified, and from what.
+/// A request to identify an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentifyRequest {
     /// The nominal robot in its cell.
     pub profile: Profile,
-    /// The text of the profile, which the calibration carries along.
+    /// The text of the profile, which the calibration contains.
     pub profile_text: String,
-    /// Where the first target is mounted, if not where the profile has it.
+    /// Position of the first target, if it differs from the profile.
     pub mounted: Option<MountedText>,
-    /// When this is asked for (RFC 3339, UTC).
+    /// Time of the request (RFC 3339, UTC).
     pub created: String,
     /// Files that the samples came from.
     pub inputs: Vec<InputFile>,
     /// How to identify.
     pub settings: EstimationSettings,
-    /// What to identify from.
+    /// Samples to identify from.
     pub identification: SampleSet,
-    /// What to verify with, measured in the same set-up; without samples nothing is verified.
+    /// Samples to verify with, measured in the same set-up; without any there is no verification.
     pub verification: SampleSet,
     /// Where the verification samples come from, in words.
     pub basis: String,
-    /// The same as a setting of the summary.
+    /// The kind of verification, as a setting of the summary.
     pub verification_mode: VerificationMode,
-    /// Layout of the tables, where there was a choice.
+    /// Layout of the tables, if there was a choice.
     pub layout: Option<Layout>,
+    /// Known distance between the two sockets of one position (mm) and its standard deviation, for the record only.
+    pub socket_distance_mm: Option<(f64, f64)>,
 }
 
 /// An identified arm.
 #[derive(Clone, Debug)]
 pub struct Identified {
-    /// Everything about it in mm and degree, with the verdict.
+    /// The summary in mm and degree, with the verdict.
     pub summary: IdentificationSummary,
-    /// What is kept of it; none if there is no usable solution.
+    /// The calibration; none if there is no usable solution.
     pub calibration: Option<Calibration>,
     /// The identified arm with the pose of the instrument in its base (rad, m).
     pub found: Identification,
@@ -101,7 +116,7 @@ pub struct Identified {
 }
 
 impl Identified {
-    /// Puts all advice into `words`, in the summary and in what the calibration keeps of it.
+    /// Puts all advice into `words`, in the summary and in the calibration.
     pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
         let Self { summary, calibration, .. } = self;
         let of_calibration = calibration.iter_mut().flat_map(|calibration| &mut calibration.warnings);
@@ -116,80 +131,67 @@ impl Identified {
 /// Identifies the arm and verifies it. `progress` sees every step of the solver and may ask to stop there.
 ///
 /// # Errors
-/// The samples cannot be of this robot, or nothing can be identified from them; or `progress` has asked to stop.
+/// The samples do not fit this robot, nothing can be identified from them, or `progress` has asked to stop.
 pub fn identify(
     request: &IdentifyRequest,
     progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Identified, ProcedureError> {
-    let IdentifyRequest { identification, verification, mounted, .. } = request;
+    let IdentifyRequest { identification, mounted, .. } = request;
     let profile = &mounted.map_or_else(|| request.profile.clone(), |mounted| mounted.on(&request.profile));
     let parameters = request.settings.parameters(profile);
     let arm = profile.arm();
-    let observations = Observations { points: identification.points(), ..Observations::default() };
+    let observations = identification.observations();
     let problem = Problem { arm: &arm, parameters: &parameters, observations: &observations };
+    let all_constants = request.settings.parameters_of(Level::default(), profile);
+    let plausible = Problem { parameters: &all_constants, ..problem };
 
-    let file = identification.file.as_deref();
-    let mut warnings = identification.warnings.clone();
-    warnings.extend(checks::limit_warning(profile, file, identification.configurations()));
-    let expected = request.settings.parameters_of(Level::default(), profile);
-    let expected = Problem { parameters: &expected, ..problem };
-    let compared = checks::check_plausibility(&expected, "")?;
-    warnings.extend(compared.warning);
-
-    let distance = observations.points.iter().map(|sample| sample.point.coords.norm()).sum::<f64>()
-        / observations.points.len().max(1) as f64;
-    let settings = request.settings.solver(profile, Some(distance));
+    let mut warnings = set_warnings(identification, &observations, profile);
+    let mut expected = None;
+    if !observations.points.is_empty() {
+        let compared = checks::check_plausibility(&plausible, "")?;
+        warnings.extend(compared.warning);
+        expected = Some(compared.expected);
+    } else if observations.lengths.is_empty() && !observations.shared.is_empty() {
+        let message = "shared points without any known length leave the size of the robot to the prior";
+        warnings.push(Warning::new("no_scale", message, true).with_advice(Advice::StateSocketDistance));
+    }
+    let settings = request.settings.solver(profile, typical_distance(&observations));
     let found = identify_while(&problem, &settings, progress)?;
-    let context = Context { level: request.settings.level, expected: Some(compared.expected) };
+    let context = Context { level: request.settings.level, expected };
     warnings.extend(result::result_warnings(&problem, &found, &settings, context));
-
     let nominal = nominal_setup(&problem, &found)?;
     let of_identification = warnings.clone();
-    warnings.extend(verification.warnings.iter().cloned());
-    warnings.extend(checks::limit_warning(profile, verification.file.as_deref(), verification.configurations()));
-    let tested = verification.points();
-    // In a session every reading was looked at by itself.
-    if request.verification_mode != VerificationMode::Session {
-        warnings.extend(checks::check_verification(&expected, &tested)?);
-    }
-    let verified = verify(profile, &nominal, &found, &tested, request.basis.clone());
-    let verified = verified.map(|(mut verified, errors)| {
-        let places = |samples: &[PointSample]| samples.iter().map(|sample| sample.at.clone()).collect::<Vec<_>>();
-        let (known, tested) = (places(&observations.points), places(&tested));
-        let joints = profile.chain().joints();
-        let doubts = checks::set_warnings(joints, &known, &tested);
-        verified.independent = checks::is_independent(&doubts);
-        warnings.extend(doubts);
-        warnings.extend(checks::few_warning(verified.samples, Places::new(joints, &tested).distinct()));
-        let named = verification.samples.iter().zip(&errors.vectors);
-        warnings.extend(checks::far_warning(named.map(|(named, error)| (named.pose.as_str(), named.line, error))));
-        verified
-    });
-    warnings.sort_by_key(|warning| !warning.blocks_acceptance);
-    let unusable = result::is_unusable(&warnings, &found, &settings);
-    let name = |named: &NamedSample| SampleName { pose: named.pose.clone(), line: named.line };
-    let names: Vec<SampleName> = identification.samples.iter().map(name).collect();
-    let finished = Finished {
-        profile,
-        profile_text: &request.profile_text,
-        created: request.created.clone(),
-        inputs: request.inputs.clone(),
-        settings: IdentificationSettings {
-            layout: request.layout,
-            verification: request.verification_mode,
-            ..request.settings.record()
-        },
-        found: &found,
-        names: &names,
-        warnings,
-        verification: verified,
+
+    let Verified { verification, warnings: doubts } = match request.verification_mode {
+        VerificationMode::LeaveOneOut => {
+            leave_one_out(&problem, &settings, &identification.distances.positions, progress)?
+        }
+        _ => verify(request, &plausible, &nominal, &found)?,
     };
-    let summary = finished.summary();
-    let calibration = (!unusable).then(|| Calibration {
+    warnings.extend(doubts);
+    warnings.sort_by_key(|warning| !warning.blocks_acceptance);
+    let is_usable = !result::is_unusable(&warnings, &found, &settings);
+    let names = identification.names();
+    let summary = Finished { profile, request, found: &found, names: &names, warnings, verification }.summary();
+    let calibration = is_usable.then(|| Calibration {
         mounted: *mounted,
-        ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, Some(&found))
+        ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, &found)
     });
     Ok(Identified { summary, calibration, found, nominal })
+}
+
+/// Warnings about a set of samples as such.
+fn set_warnings(set: &SampleSet, observations: &Observations, profile: &Profile) -> Vec<Warning> {
+    let names = set.names();
+    let rows = names.iter().zip(observations.places()).map(|(name, place)| (name.line, place.configuration.as_slice()));
+    set.warnings.iter().cloned().chain(checks::limit_warning(profile, set.file.as_deref(), rows)).collect()
+}
+
+/// Mean distance of the measured points from the instrument (m).
+fn typical_distance(observations: &Observations) -> Option<f64> {
+    let distances = observations.points.iter().map(|sample| sample.point.coords.norm());
+    let count = observations.points.len();
+    (count > 0).then(|| distances.sum::<f64>() / count as f64)
 }
 
 /// The nominal arm with frame and free target fitted to the accepted identification samples.
@@ -206,29 +208,95 @@ fn nominal_setup(problem: &Problem<'_>, found: &Identification) -> Result<Fitted
     Ok(fit_setup(problem.arm, &target_parameters(problem.parameters), &accepted)?)
 }
 
-fn verify(
-    profile: &Profile,
-    nominal: &FittedSetup,
-    found: &Identification,
-    samples: &[PointSample],
-    basis: String,
-) -> Option<(VerificationSummary, ModelErrors)> {
-    let nominal = ModelErrors::new(&nominal.arm, &nominal.base_from_station, samples)?;
-    let identified = ModelErrors::new(&found.arm, &found.base_from_station, samples)?;
-    let summary = point_verification(profile.chain().joints(), samples, &nominal, &identified, basis, Refit::None);
-    Some((summary, identified))
+/// A verification, if there are samples for it, with warnings about it.
+struct Verified {
+    verification: Option<VerificationSummary>,
+    warnings: Vec<Warning>,
 }
 
-/// The calibration file of a result; `warnings` are those about the identification itself.
-pub(crate) fn calibration(
+/// Verifies with the verification samples, if there are any. `plausible` frees all parameters that may deviate.
+fn verify(
+    request: &IdentifyRequest,
+    plausible: &Problem<'_>,
+    nominal: &FittedSetup,
+    found: &Identification,
+) -> Result<Verified, ProcedureError> {
+    let set = &request.verification;
+    let tested = set.observations();
+    let joints = plausible.arm.chain.joints();
+    let mut warnings = set_warnings(set, &tested, &request.profile);
+    // In a session every reading was checked as it was measured.
+    if request.verification_mode != VerificationMode::Session {
+        warnings.extend(checks::check_verification(plausible, &tested.points)?);
+    }
+    let basis = request.basis.clone();
+    let errors = |arm: &FittedSetup| ModelErrors::new(&arm.arm, &arm.base_from_station, &tested.points);
+    let identified = FittedSetup { arm: found.arm.clone(), base_from_station: found.base_from_station.clone() };
+    let (mut summary, vectors) = if let (Some(nominal), Some(identified)) = (errors(nominal), errors(&identified)) {
+        let summary = point_verification(joints, &tested.points, &nominal, &identified, basis, Refit::None);
+        (summary, identified.vectors)
+    } else if tested.places().next().is_some() {
+        let [nominal, identified] = [&nominal.arm, &found.arm].map(|arm| DirectErrors::new(arm, &tested));
+        (direct_verification(joints, &nominal, &identified, &tested, basis), Vec::new())
+    } else {
+        return Ok(Verified { verification: None, warnings });
+    };
+    let places = |observations: &Observations| observations.places().cloned().collect::<Vec<_>>();
+    let doubts = checks::set_warnings(joints, &places(plausible.observations), &places(&tested));
+    summary.independent = checks::is_independent(&doubts);
+    warnings.extend(doubts);
+    warnings.extend(checks::few_warning(summary.samples, tested.distinct(joints).min(summary.samples)));
+    let named = set.samples.iter().zip(&vectors);
+    warnings.extend(checks::far_warning(named.map(|(named, error)| (named.pose.as_str(), named.line, error))));
+    Ok(Verified { verification: Some(summary), warnings })
+}
+
+/// Identifies once per position of the plate without it, and pools the errors on the positions left out. `positions` has the
+/// position of every shared point.
+fn leave_one_out(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    positions: &[String],
+    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+) -> Result<Verified, ProcedureError> {
+    let mut distinct: Vec<&String> = Vec::new();
+    for position in positions {
+        if !distinct.contains(&position) {
+            distinct.push(position);
+        }
+    }
+    if distinct.len() < 2 {
+        return Err(ProcedureError::OnePosition);
+    }
+    let empty = || DirectErrors::new(problem.arm, &Observations::default());
+    let (mut nominal, mut identified, mut tested) = (empty(), empty(), Observations::default());
+    for position in &distinct {
+        let kept = problem.observations.of_shared(|index| positions.get(index) != Some(*position));
+        let left_out = problem.observations.of_shared(|index| positions.get(index) == Some(*position));
+        let without = Problem { observations: &kept, ..*problem };
+        let found = identify_while(&without, settings, progress)?;
+        let of_nominal = nominal_setup(&without, &found)?;
+        nominal = nominal.pooled_with(&DirectErrors::new(&of_nominal.arm, &left_out));
+        identified = identified.pooled_with(&DirectErrors::new(&found.arm, &left_out));
+        tested.shared.extend(left_out.shared);
+    }
+    let joints = problem.arm.chain.joints();
+    let basis = format!("leaving out each of {} positions in turn", distinct.len());
+    let summary = direct_verification(joints, &nominal, &identified, &tested, basis);
+    let poses = problem.observations.distinct(joints).min(summary.samples);
+    let warnings = checks::few_warning(summary.samples, poses).into_iter().collect();
+    Ok(Verified { verification: Some(summary), warnings })
+}
+
+/// The calibration of a result; `warnings` are those about the identification itself.
+fn calibration(
     summary: &IdentificationSummary,
     profile_text: &str,
     nominal: &FittedSetup,
     problem: &Problem<'_>,
     warnings: Vec<Warning>,
-    found: Option<&Identification>,
+    found: &Identification,
 ) -> Calibration {
-    let station = found.and_then(|found| found.base_from_station.first());
     let joints = problem.arm.chain.joints();
     let sample = |at: &Place| {
         let values = at.configuration.iter().zip(joints);
@@ -243,7 +311,7 @@ pub(crate) fn calibration(
         warnings,
         rank: summary.rank,
         parameters: summary.parameters.clone(),
-        base_from_station: station.map(Into::into),
+        base_from_station: found.base_from_station.first().map(Into::into),
         nominal_base_from_station: nominal.base_from_station.first().map(Into::into),
         nominal_targets_mm: nominal
             .arm

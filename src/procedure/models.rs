@@ -1,4 +1,4 @@
-//! The models that a session delivers: the identified arm in every format that can carry it, each read back and proven.
+//! The models that a session delivers: the identified arm in every suitable format, each read back and checked.
 
 use std::path::Path;
 
@@ -9,21 +9,21 @@ use crate::session::calibration::Calibration;
 use crate::session::state::Session;
 use crate::units::{DEGREE, MICROMETRE};
 
-/// What is asked for.
+/// A request for the models of an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelsRequest {
-    /// The result.
+    /// The identified arm.
     pub calibration: Calibration,
     /// The nominal robot, without the target as it was mounted for the session.
     pub profile: Profile,
 }
 
-/// The models of an arm.
+/// The models of an identified arm.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Models {
-    /// Name and text of each file; each was read back and is the identified arm within 1 µm and 1 µrad.
+    /// Name and text of each file; each was read back and equals the identified arm within 1 µm and 1 µrad.
     pub files: Vec<(String, String)>,
-    /// The files that this arm does not fit into, with the reason: `NAME: REASON`.
+    /// The files that cannot carry this arm, with the reason: `NAME: REASON`.
     pub left_out: Vec<String>,
 }
 
@@ -35,7 +35,7 @@ impl ModelsRequest {
     }
 }
 
-/// The models that were delivered with the result of a session, written anew.
+/// The models that were delivered with the result of a session, written again.
 pub fn delivered(session: &Session) -> Vec<(String, String)> {
     if session.delivered.is_empty() {
         return Vec::new();
@@ -45,7 +45,7 @@ pub fn delivered(session: &Session) -> Vec<(String, String)> {
     files
 }
 
-/// Writes the models and proves them.
+/// Writes the models and checks them.
 pub fn models(request: &ModelsRequest) -> Models {
     let mut models = Models::default();
     let mut formats = vec![Format::CorrectedProfile, Format::Urdf, Format::DhCsv];
@@ -66,8 +66,8 @@ pub fn models(request: &ModelsRequest) -> Models {
     models
 }
 
-/// Whether the nominal arm is built as those of Universal Robots: six joints that turn, the axes 2 to 4 parallel, all others
-/// square to their neighbours, the wrist axes 5 and 6 without lateral offset.
+/// Whether the nominal arm is built like those of Universal Robots: six turning joints, axes 2 to 4 parallel, all others
+/// perpendicular to their neighbours, wrist axes 5 and 6 without lateral offset.
 fn is_like_universal_robots(chain: &KinematicChain) -> bool {
     let is = |angle: f64, degrees: f64| (angle.abs() - degrees * DEGREE).abs() < 1e-6;
     let links: Vec<Link> = chain.joints().iter().map(|joint| joint.link).collect();

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use history::History;
 
 use super::cell::cell;
+use super::checks::first_of;
 use super::{ProcedureError, joint_types};
 use crate::kinematics::{Arm, FreeParameter, JointType, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
@@ -24,28 +25,30 @@ use crate::session::summary::Warning;
 use crate::units::{from_mm, to_mm};
 
 pub use super::cell::planning_limits as limits;
-pub use request::{PlanRequest, Progress};
+pub use request::{INTERACTIVE_CANDIDATES, PlanRequest, Progress};
 
-/// Configurations tried per candidate asked for: with ±30° of acceptance about one in twenty faces the tracker.
+/// Configurations tried per requested candidate: with an acceptance of ±30° about one in twenty faces the tracker.
 const TRIES_PER_CANDIDATE: usize = 200;
-/// Fresh poses over which a prediction is averaged.
+/// Number of fresh poses over which a prediction is averaged.
 const FRESH_POSES: usize = 1000;
-/// Random sets of equal size to compare with.
+/// Number of random sets of equal size to compare with.
 const RANDOM_SETS: usize = 500;
 /// Sizes of the trade-off table.
 const SIZES: [usize; 9] = [20, 30, 40, 50, 60, 70, 80, 90, 100];
-/// Rounds of leaving out poses that cannot be reached and choosing again.
+/// Most rounds of leaving out unreachable poses and choosing again.
 const ROUNDS: usize = 8;
-/// Candidates offered as intermediate stops where a direct move is blocked.
+/// Most findings of one kind that a warning lists.
+const SHOWN: usize = 5;
+/// Candidates offered as intermediate stops for blocked moves.
 const VIAS: usize = 30;
 
 /// Chooses poses, orders and scores them. With [`PlanRequest::included`] these are the next best poses after those.
 ///
-/// `keep_going` is asked during the search from any thread; once it says no, the plan is made of the best set so far and says
-/// that it was interrupted. `progress` is called from any thread too. The time it took is left to the caller.
+/// Any thread may call `keep_going` and `progress` during the search. Once `keep_going` returns false, the plan is made of the best
+/// set so far and marked as interrupted. The caller fills in the elapsed time.
 ///
 /// # Errors
-/// The profile does not tell what planning needs, or no such plan exists.
+/// The profile lacks something that planning needs, or no such plan exists.
 pub fn plan(
     profile: &Profile,
     profile_text: &str,
@@ -56,11 +59,10 @@ pub fn plan(
     Planner::new(profile, profile_text, request)?.choose(keep_going, progress)
 }
 
-/// Scores the poses of a list, which is called `name` in messages. Of the request, how many poses to choose and what for does
-/// not matter.
+/// Scores the poses of a list, which messages call `name`. The number of poses and the objective of the request are not used.
 ///
 /// # Errors
-/// As [`plan`]; no row of the list is to identify from.
+/// As [`plan`]; or the list has no identification poses.
 pub fn check(
     profile: &Profile,
     profile_text: &str,
@@ -71,11 +73,11 @@ pub fn check(
     Planner::new(profile, profile_text, request)?.check(listed, name)
 }
 
-/// Whether the profile tells what planning needs and the limits, region and clearance of the request make sense: what [`plan`]
-/// and [`check`] look at first.
+/// Checks whether the profile states what planning needs, and whether limits, region and clearance of the request make sense.
+/// [`plan`] and [`check`] do this first.
 ///
 /// # Errors
-/// It does not.
+/// Something is missing or makes no sense.
 pub fn check_request(profile: &Profile, request: &PlanRequest) -> Result<(), ProcedureError> {
     Planner::new(profile, "", request).map(drop)
 }
@@ -100,7 +102,7 @@ pub fn rows(summary: &PlanSummary, joint_types: &[JointType]) -> Vec<PlannedPose
         .collect()
 }
 
-/// What stays the same over all ways of planning.
+/// The common data of choosing and checking a plan.
 struct Planner<'a> {
     profile: &'a Profile,
     profile_text: &'a str,
@@ -115,7 +117,7 @@ struct Planner<'a> {
 /// A chosen set with its order.
 struct Ordered {
     chosen: Chosen,
-    /// Poses to measure with their kinds, in the order of `Stops::poses`.
+    /// The poses to measure with their kinds, in the order of `Stops::poses`.
     stops: Vec<(PoseKind, Candidate)>,
     route: Route,
 }
@@ -125,7 +127,7 @@ impl<'a> Planner<'a> {
         let limits = request.limits.clone().map_or_else(|| limits(profile), Ok)?;
         let cell = cell(profile, limits.clone(), request.region, request.filters)?;
         let filter = CandidateFilter::new(profile.chain(), &cell, request.clearance)?;
-        // The poses are for the first target: coordinates of others cannot be seen with it.
+        // The poses are for the first target, which says nothing about the coordinates of others.
         let is_seen = |parameter: &FreeParameter| parameter.id.target().is_none_or(|target| target == 0);
         let mut parameters = profile.parameters(request.level);
         parameters.retain(is_seen);
@@ -144,14 +146,14 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// Standard deviation of a coordinate (m) that predictions are for.
+    /// Standard deviation of a coordinate (m) for predictions.
     fn sigma(&self) -> Option<f64> {
         let distance = self.profile.tracker().position_in_base.coords.norm();
         let instrument = || self.profile.instrument().map(|instrument| instrument.sigma_at(distance));
         self.request.sigma.or_else(instrument)
     }
 
-    /// How fast the program will be.
+    /// The pace of the program, with the joint speeds of the profile.
     fn pace(&self) -> Pace {
         let max_speeds = self.profile.joints().iter().map(|joint| joint.max_speed).collect();
         Pace { max_speeds, ..self.request.pace.clone() }
@@ -168,7 +170,7 @@ impl<'a> Planner<'a> {
         Ok(Information::new(&self.arm, &self.parameters, &candidates, &fresh)?)
     }
 
-    /// Candidates, those that must be in first.
+    /// Candidates for the plan; required poses come first.
     fn candidates(&self, needed: usize, included: &[PlannedPose]) -> Result<Candidates, ProcedureError> {
         let count = self.request.candidates;
         let joint_box = self.joint_box()?;
@@ -180,16 +182,16 @@ impl<'a> Planner<'a> {
         Ok(candidates)
     }
 
-    /// What to say about the poses that are already measured.
+    /// A warning about poses that are already measured, but outside the joint limits.
     fn included_warning(&self) -> Option<Warning> {
         let included = self.request.included.iter();
         let outside: Vec<String> =
             included.filter(|row| self.is_outside(&row.configuration)).map(|row| row.pose.clone()).collect();
-        let text = || format!("measured poses outside the joint limits of the profile: {}", shortened(&outside));
+        let text = || format!("measured poses outside the joint limits of the profile: {}", first_of(&outside, SHOWN));
         (!outside.is_empty()).then(|| Warning::new("joint_limits", text(), false))
     }
 
-    /// Whether a configuration is outside the limits that the arm itself has.
+    /// Whether a configuration is outside the mechanical limits of the arm.
     fn is_outside(&self, configuration: &[f64]) -> bool {
         let ranges = self.profile.joints().iter().zip(configuration);
         ranges
@@ -197,7 +199,7 @@ impl<'a> Planner<'a> {
             .any(|((low, high), value)| !(low - 1e-9..=high + 1e-9).contains(value))
     }
 
-    /// What makes a plan unfit to be run as it is.
+    /// Warnings that a plan must not be run without further checks.
     fn safety_warnings(&self) -> Vec<Warning> {
         if !self.request.filters {
             let text = "collision and line-of-sight checks were skipped: the plan is for comparison only, do not run it on a robot";
@@ -292,7 +294,7 @@ impl<'a> Planner<'a> {
         let starts = settings.starts;
         let search = Search::new(information, settings)?;
         let threads = self.request.threads.unwrap_or_else(available_threads);
-        // Starts run side by side: what each has done says nothing about the whole.
+        // Starts run in parallel, so the sweeps of all of them are counted together.
         let (predicted, optimised) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let told = |found: &crate::planning::Progress| {
             let count = if found.stage == Stage::Prediction { &predicted } else { &optimised };
@@ -388,7 +390,7 @@ impl<'a> Planner<'a> {
         let information = Information::new(&self.arm, &self.parameters, &chosen, &verification)?;
         let all: Vec<usize> = (0..chosen.len()).collect();
         let score = Score::new(&information, &all)?;
-        // Three coordinates of a reading scatter by σ each on top of what the robot misses.
+        // Each of the three coordinates of a reading adds its own scatter σ to the error of the robot.
         Ok(Some(to_mm(sigma * (score.predicted_error.powi(2) + 3.0).sqrt())))
     }
 
@@ -441,7 +443,7 @@ impl<'a> Planner<'a> {
             .map(|pose| format!("pose {}: {}", pose.pose, pose.problems.join(", ")))
             .collect();
         if !bad.is_empty() {
-            warnings.push(Warning::new("not_measurable", shortened(&bad), true));
+            warnings.push(Warning::new("not_measurable", first_of(&bad, SHOWN), true));
         }
         let blocked: Vec<String> = rows
             .windows(2)
@@ -452,8 +454,10 @@ impl<'a> Planner<'a> {
             })
             .collect();
         if !blocked.is_empty() {
-            let text =
-                format!("moves that are not free (joint moves in the order of the file): {}", shortened(&blocked));
+            let text = format!(
+                "moves that are not free (joint moves in the order of the file): {}",
+                first_of(&blocked, SHOWN)
+            );
             warnings.push(Warning::new("blocked_move", text, true));
         }
         summary.verification_poses = rows.iter().filter(|row| row.kind == PoseKind::Verification).count();
@@ -461,12 +465,4 @@ impl<'a> Planner<'a> {
         summary.warnings = warnings;
         Ok(summary)
     }
-}
-
-/// The first few of many findings.
-fn shortened(findings: &[String]) -> String {
-    const SHOWN: usize = 5;
-    let more = findings.len().saturating_sub(SHOWN);
-    let list = findings.iter().take(SHOWN).cloned().collect::<Vec<_>>().join("; ");
-    if more > 0 { format!("{list}; and {more} more") } else { list }
 }

@@ -1,4 +1,4 @@
-//! What every sample says about the nominal and the identified arm.
+//! Errors of the nominal and the identified arm at every sample.
 
 use nalgebra::{Matrix3, Point3};
 
@@ -35,7 +35,7 @@ pub fn point_errors(identified: &Identified, judged: &[NamedSample], tested: &[N
         .collect()
 }
 
-/// A covariance (m²) in µm², rounded to what it is worth.
+/// A covariance (m²) in µm², rounded to six decimals.
 fn text(covariance: &Matrix3<f64>) -> Option<(f64, f64, f64, f64, f64, f64)> {
     let edge = |row, column| (covariance[(row, column)] / MICROMETRE.powi(2) * 1e6).round() / 1e6 + 0.0;
     covariance

@@ -1,4 +1,4 @@
-//! Where results come from: program, profile and inputs with their hashes.
+//! The origin of results: program, profile and inputs with their hashes.
 
 use crate::profile::Profile;
 use crate::session::sha256;

@@ -1,4 +1,4 @@
-//! What the result of an identification itself gives reason to warn about, and when it is of no use.
+//! Warnings about the result of an identification, and whether it is usable.
 
 use crate::identification::plausibility::weaknesses;
 use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason};
@@ -8,32 +8,32 @@ use crate::session::advice::Advice;
 use crate::session::summary::Warning;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
-/// A parameter further from nominal than this many expected deviations is called out.
+/// A parameter further from nominal than this many expected deviations gets a warning.
 const RAN_AWAY: f64 = 5.0;
-/// A parameter further from nominal than this many expected deviations, prior and all, is not this robot's.
+/// A parameter further from nominal than this many expected deviations, in spite of the prior, belongs to another robot.
 const FAR_AWAY: f64 = 10.0;
-/// Residuals up to this many times what the fixed constants are expected to cause are put down to them.
+/// Residuals up to this many times the expected effect of the fixed constants are attributed to them.
 const FIXED_CONSTANTS: f64 = 6.0;
-/// Codes of warnings that leave nothing to use.
+/// Codes of warnings that make a result unusable.
 const UNUSABLE: [&str; 3] = ["does_not_fit", "implausible", NOT_CONVERGED];
 const NOT_CONVERGED: &str = "not_converged";
-/// Residuals larger than stated by this factor are called out.
+/// Residuals that exceed the stated sigma by this factor get a warning.
 const SIGMA_EXCESS: f64 = 1.5;
-/// Residuals beyond this (m) after identification mean that the data are not this robot's.
+/// Residuals beyond this (m) after identification mean that the data belong to another robot.
 const NONSENSE_RESIDUAL: f64 = MILLIMETRE;
 /// A larger share of rejected samples means that there is no consistent majority to trust.
 const MANY_REJECTED: f64 = 0.2;
 
-/// What is known about a problem besides its data.
+/// Knowledge about a problem besides its data.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Context {
     /// What is identified.
     pub(crate) level: Level,
-    /// Root mean square residual (m) that the expected deviations of all link constants explain, where points tell.
+    /// Root mean square residual (m) that the expected deviations of all link constants explain; only known for points.
     pub(crate) expected: Option<f64>,
 }
 
-/// What the result itself gives reason to warn about.
+/// Warnings about the result itself.
 pub(crate) fn result_warnings(
     problem: &Problem<'_>,
     found: &Identification,
@@ -77,7 +77,7 @@ pub(crate) fn result_warnings(
     let share = found.rejected.len() as f64 / judged.max(1) as f64;
     if share > MANY_REJECTED {
         let message = format!(
-            "{} of {judged} samples were rejected: there is no consistent majority to trust; look for rows in a wrong order or a moved instrument",
+            "{} of {judged} samples were rejected: there is no consistent majority to trust; check for rows in the wrong order and for a moved instrument",
             found.rejected.len()
         );
         warnings.push(Warning::new("many_rejected", message, true));
@@ -99,7 +99,7 @@ pub(crate) fn result_warnings(
     warnings
 }
 
-/// Parameters that are further from nominal than any robot of this make should be.
+/// A warning about parameters further from nominal than on any robot of this make.
 fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
     let listed: Vec<String> = found
         .estimates
@@ -141,7 +141,7 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
     })
 }
 
-/// Whether `found` with its warnings is of no use; a limit on the steps that the operator asked for is no defect.
+/// Whether `found` with its warnings is unusable. A step limit that the operator asked for does not make it so.
 pub(crate) fn is_unusable(warnings: &[Warning], found: &Identification, settings: &Settings) -> bool {
     let as_asked =
         found.termination == TerminationReason::IterationLimit && settings.iterations < Settings::default().iterations;

@@ -1,4 +1,4 @@
-//! How to identify, as the operator asks for it, and what that means to the solver.
+//! The settings of an identification, and the solver settings that follow from them.
 
 use crate::identification::{Estimator, Prior, Settings, SigmaSource, Weighting};
 use crate::kinematics::FreeParameter;
@@ -6,16 +6,16 @@ use crate::profile::{ExpectedDeviation, Level, Profile};
 use crate::session::summary::{IdentificationSettings, VerificationMode};
 use crate::units::{to_deg, to_mm};
 
-/// How to identify. The default is what `trupose identify` does without options.
+/// Settings of an identification. The defaults are those of every command and of the wizard.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimationSettings {
-    /// What is identified.
+    /// The parameters to identify.
     pub level: Level,
     /// How distances are weighted.
     pub weighting: Weighting,
-    /// What is assumed about deviations.
+    /// The assumption about deviations.
     pub prior: Prior,
-    /// How samples are trusted.
+    /// The treatment of outliers.
     pub estimator: Estimator,
     /// Largest number of solver steps; 1 is the paper's single linear step.
     pub iterations: usize,
@@ -63,12 +63,12 @@ impl EstimationSettings {
         }
     }
 
-    /// The free parameters that are asked for.
+    /// The free parameters of the chosen level.
     pub(crate) fn parameters(&self, profile: &Profile) -> Vec<FreeParameter> {
         self.parameters_of(self.level, profile)
     }
 
-    /// The free parameters of a level with the expected deviations that are asked for.
+    /// The free parameters of a level with the chosen expected deviations.
     pub(crate) fn parameters_of(&self, level: Level, profile: &Profile) -> Vec<FreeParameter> {
         let mut parameters = profile.parameters(level);
         if let Some(expected) = self.expected_deviation {

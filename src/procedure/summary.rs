@@ -1,22 +1,25 @@
 //! The summary of an identification: its numbers in mm and degree, with names and the verdict.
 
+use super::identify::IdentifyRequest;
 use super::{assess, provenance};
 use crate::identification::{Estimate, Identification, Observability, Prior, RejectionReason, SampleIndex, Sigma};
 use crate::profile::Profile;
+use crate::session::advice::Advice;
 use crate::session::summary::{
-    BlindGroupSummary, CorrelationSummary, IdentificationSettings, IdentificationSummary, InputFile, IterationSummary,
+    BlindGroupSummary, CorrelationSummary, IdentificationSettings, IdentificationSummary, IterationSummary,
     ParameterSummary, RejectedSummary, SCHEMA, SigmaSummary, Verdict, VerificationSummary, Warning,
 };
 use crate::units::to_mm;
 
-/// Correlations beyond this are listed.
+/// Smallest correlation that is listed.
 const STRONG_CORRELATION: f64 = 0.9;
 
 /// Name of a sample: its pose and where it was recorded.
-#[derive(Clone, Debug)]
-pub(crate) struct SampleName {
-    pub(crate) pose: String,
-    pub(crate) line: usize,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SampleName {
+    pub pose: String,
+    /// Line of the file, or number of the measurement.
+    pub line: usize,
 }
 
 impl SampleName {
@@ -96,14 +99,22 @@ fn sigma_summary(found: &Identification) -> SigmaSummary {
     SigmaSummary { used_mm: to_mm(used), source, from_residuals_mm: from_residuals.map(to_mm) }
 }
 
+/// The record of the settings.
+fn settings_summary(request: &IdentifyRequest) -> IdentificationSettings {
+    IdentificationSettings {
+        layout: request.layout,
+        socket_distance_mm: request.socket_distance_mm.map(|(distance, _)| distance),
+        socket_distance_sigma_mm: request.socket_distance_mm.map(|(_, sigma)| sigma),
+        verification: request.verification_mode,
+        ..request.settings.record()
+    }
+}
+
 /// A finished identification, ready to be summed up.
 pub(crate) struct Finished<'a> {
+    /// The nominal robot with the target as it was mounted.
     pub(crate) profile: &'a Profile,
-    pub(crate) profile_text: &'a str,
-    /// RFC 3339, UTC.
-    pub(crate) created: String,
-    pub(crate) inputs: Vec<InputFile>,
-    pub(crate) settings: IdentificationSettings,
+    pub(crate) request: &'a IdentifyRequest,
     pub(crate) found: &'a Identification,
     pub(crate) names: &'a [SampleName],
     pub(crate) warnings: Vec<Warning>,
@@ -113,13 +124,16 @@ pub(crate) struct Finished<'a> {
 impl Finished<'_> {
     /// The summary with its verdict.
     pub(crate) fn summary(self) -> IdentificationSummary {
-        let Self { profile, profile_text, created, inputs, settings, found, names, warnings, verification } = self;
+        let Self { profile, request, found, names, warnings, verification } = self;
+        let settings = settings_summary(request);
         let Observability { rank, gap, condition_number, condition_number_raw, scored_points, groups, .. } =
             &found.observability;
-        let verdict: Verdict = assess::verdict(profile.acceptance(), verification.as_ref(), &warnings);
+        let has_points = !request.identification.samples.is_empty();
+        let advice = if has_points { Advice::VerifyPoints } else { Advice::VerifyDistances };
+        let verdict: Verdict = assess::verdict(profile.acceptance(), verification.as_ref().ok_or(advice), &warnings);
         IdentificationSummary {
             schema: SCHEMA,
-            provenance: provenance(profile, profile_text, created, inputs),
+            provenance: provenance(profile, &request.profile_text, request.created.clone(), request.inputs.clone()),
             warnings,
             verdict,
             verification,

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-/// Advice to the operator. `Display` says what can be done however the program is used; a command says it with its options, the
-/// wizard with its steps.
+/// Advice to the operator. `Display` words it independently of how the program is used; commands word it with their options, and
+/// the wizard with its steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Advice {
     /// State the standard deviation of the instrument.
@@ -34,6 +34,8 @@ pub enum Advice {
     VerifyDistances,
     /// Verify with poses that are not in the identification set.
     SeparateVerification,
+    /// State the known distance between the two sockets of a position.
+    StateSocketDistance,
     /// State where the target is, or identify it with the arm.
     StateTarget,
     /// Mount the target beside the axis that is turned.
@@ -60,6 +62,7 @@ impl fmt::Display for Advice {
             Self::IdentifyGeometry => "identify all link constants",
             Self::VerifyPoints | Self::VerifyDistances => "measure some verification poses",
             Self::SeparateVerification => "verify with poses that are not in the identification set",
+            Self::StateSocketDistance => "state the distance between the sockets",
             Self::StateTarget => "state where the SMR is, or leave it free: it is then identified with the arm",
             Self::MountBesideAxis => {
                 "mount the SMR beside the axis and state roughly where, state exactly where it is, or leave it free"

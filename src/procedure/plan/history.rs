@@ -1,18 +1,18 @@
-//! The progress of a search, sweep by sweep.
+//! The history of a search, sweep by sweep.
 
 use std::sync::{Mutex, PoisonError};
 
 use super::request::Progress;
 use crate::planning::{self, Figures, Stage};
 
-/// The sweeps of a search, told from any thread in any order.
+/// The sweeps of a search, reported by any thread in any order.
 #[derive(Debug, Default)]
 pub(super) struct History {
     sweeps: Mutex<Vec<planning::Progress>>,
 }
 
 impl History {
-    /// Keeps a sweep; another search makes those before it void.
+    /// Keeps a sweep; a new search discards all earlier ones.
     pub(super) fn take(&self, step: &Progress) {
         let mut sweeps = self.sweeps.lock().unwrap_or_else(PoisonError::into_inner);
         match step {
@@ -22,7 +22,7 @@ impl History {
         }
     }
 
-    /// The best start after every sweep, in order: whatever the threads did, the same for the same search.
+    /// The best start after every sweep, in order. It does not depend on the threads.
     pub(super) fn steps(&self) -> Vec<Figures> {
         let mut sweeps = self.sweeps.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let stage = |found: &planning::Progress| u8::from(matches!(found.stage, Stage::Objective { .. }));

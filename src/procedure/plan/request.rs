@@ -1,15 +1,21 @@
-//! What a plan is asked for with, and what is told while it is made.
+//! The request for a plan, and its progress.
 
+use crate::planning::collision::DEFAULT_CLEARANCE;
 use crate::planning::order::Pace;
-use crate::planning::{self, BoxInBase, Objective};
+use crate::planning::{self, BoxInBase, Objective, SearchSettings};
 use crate::profile::{ExpectedDeviation, Level};
 use crate::session::plan::PlannedPose;
-use crate::units::MILLIMETRE;
 
-/// How to plan. The default is what `trupose plan` does without options.
+/// Number of candidates of a plan.
+const CANDIDATES: usize = 10_000;
+
+/// Number of candidates where somebody waits for the plan: half as many take half as long, and the plan is hardly worse.
+pub const INTERACTIVE_CANDIDATES: usize = 5_000;
+
+/// How to plan. The defaults are those of every command and of the wizard.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanRequest {
-    /// When this is asked for (RFC 3339, UTC); empty by default.
+    /// Time of the request (RFC 3339, UTC); empty by default.
     pub created: String,
     /// Number of new poses to identify from; those of `included` come on top.
     pub poses: usize,
@@ -17,7 +23,7 @@ pub struct PlanRequest {
     pub verification: usize,
     /// Number of candidates to choose from.
     pub candidates: usize,
-    /// What to choose for.
+    /// The figure of merit.
     pub objective: Objective,
     /// Seed of every random decision: the same seed gives the same plan.
     pub seed: u64,
@@ -35,11 +41,11 @@ pub struct PlanRequest {
     pub clearance: f64,
     /// Expected deviation of every length (m) and angle (rad) of the links instead of the profile's.
     pub expected_deviation: Option<ExpectedDeviation>,
-    /// What will be identified.
+    /// The parameters to identify.
     pub level: Level,
     /// Standard deviation of a measured coordinate (m); `None`: that of the profile's instrument, if it has one.
     pub sigma: Option<f64>,
-    /// The first pose is measured again after so many poses; 0: never.
+    /// The first pose is measured again after this many poses; 0: never.
     pub drift_every: usize,
     /// How fast the program will be; the highest speeds of the joints are those of the profile.
     pub pace: Pace,
@@ -49,19 +55,20 @@ pub struct PlanRequest {
 
 impl Default for PlanRequest {
     fn default() -> Self {
+        let SearchSettings { poses, objective, seed, .. } = SearchSettings::default();
         Self {
             created: String::new(),
-            poses: 56,
+            poses,
             verification: 20,
-            candidates: 10_000,
-            objective: Objective::default(),
-            seed: 1,
+            candidates: CANDIDATES,
+            objective,
+            seed,
             limits: None,
             region: None,
             included: Vec::new(),
             numbered_after: 0,
             filters: true,
-            clearance: 10.0 * MILLIMETRE,
+            clearance: DEFAULT_CLEARANCE,
             expected_deviation: None,
             level: Level::default(),
             sigma: None,
@@ -72,14 +79,14 @@ impl Default for PlanRequest {
     }
 }
 
-/// What happens while a plan is made.
+/// Progress of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
     /// The candidates are known and a search begins.
     Searching,
     /// A sweep of the search is done.
     Sweep {
-        /// What it found.
+        /// Its result.
         found: planning::Progress,
         /// Sweeps of this stage that all starts together have done.
         done: usize,
@@ -88,9 +95,9 @@ pub enum Progress {
         /// Number of starts.
         starts: usize,
     },
-    /// So many poses cannot be reached without a collision: others are chosen in another search.
+    /// Some poses cannot be reached without a collision: another search replaces them.
     Unreachable {
-        /// How many.
+        /// Number of these poses.
         poses: usize,
     },
 }

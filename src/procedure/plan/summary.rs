@@ -1,4 +1,4 @@
-//! The numbers of a planned or checked set: its score, what it is compared with, what stays weak.
+//! The summary of a planned or checked set: its score, comparisons, and weak parameters.
 
 use super::super::{ProcedureError, provenance};
 use super::{Planner, RANDOM_SETS, SIZES};

@@ -162,6 +162,7 @@ fn identified() -> IdentifiedText {
             basis: "the first twelve".to_owned(),
             verification_mode: VerificationMode::Rest,
             layout: None,
+            socket_distance_mm: None,
         },
         &mut |_| ControlFlow::Continue(()),
     )
