@@ -297,7 +297,7 @@ fn a_tracker_that_moved_is_named_by_verify() {
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{text}");
     let words: Vec<&str> = text.split_whitespace().collect();
-    assert!(words.join(" ").contains("'--refit frame' fits the place of the tracker"), "{text}");
+    assert!(words.join(" ").contains("'--refit frame' fits the position of the tracker"), "{text}");
     let output = trupose(&[&verify[..], &["--refit", "frame"]].concat());
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success() && !text.contains("is not where it was"), "{text}");

@@ -168,7 +168,11 @@ fn scripts_with_defects_are_refused_with_their_place() {
     let script = "(title: \"x\", steps: [Do(MakePlan((poses: ${poses:20})))])";
     let (_folder, output) = run_script(script, &["--set", "poses=abc"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("hint: does a given value fit there? poses=abc"), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("hint: does the value given with '--set' fit here? poses=abc"),
+        "{}",
+        text(&output.stderr)
+    );
     let (_folder, output) = run_script(script, &["--set", "poses=20", "--set", "poses=30"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("'poses' is given twice"), "{}", text(&output.stderr));

@@ -190,7 +190,7 @@ pub struct Counts {
 pub enum Found {
     /// Well determined.
     Yes,
-    /// The data contribute less than the expected deviation.
+    /// The standard deviation is more than half of the expected deviation.
     Weakly,
     /// Only a combination with others.
     OnlyCombined,

@@ -15,7 +15,7 @@ pub(super) fn section(document: &Document) -> String {
     let mut html = String::from("<h2>Identified parameters</h2>\n");
     let rank = result.rank.map_or_else(|| "an unclear number".to_owned(), |rank| rank.to_string());
     html.push_str(&paragraph(&format!(
-        "{} parameters (level {}), of which the data determine {rank} independent combinations. Sigma is one standard deviation of the deviation. <b>Found:</b> <i>yes</i>; <i>weakly</i>: the data contribute less than the expected deviation; <i>only combined</i>: not on its own, see below.",
+        "{} parameters (level {}), of which the data determine {rank} independent combinations. Sigma is one standard deviation of the deviation. <b>Found:</b> <i>yes</i>; <i>weakly</i>: sigma is more than half of the expected deviation; <i>only combined</i>: not on its own, see below.",
         result.parameter_count,
         result.settings.level
     )));
