@@ -1,4 +1,4 @@
-//! What stands around the arm, and what encloses it. Metres and radians.
+//! Instrument, tracker and shapes of a cell. Metres and radians.
 
 use nalgebra::Point3;
 
@@ -7,7 +7,7 @@ use crate::units::{DEGREE, MICROMETRE};
 /// A measuring instrument: standard deviation of one reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instrument {
-    /// Maker and type.
+    /// Manufacturer and type.
     pub name: String,
     /// Constant part of the standard deviation per coordinate (m).
     pub sigma: f64,
@@ -16,19 +16,19 @@ pub struct Instrument {
 }
 
 impl Instrument {
-    /// Standard deviation (m) at a distance from the instrument (m); both parts are added, as makers state them
+    /// Standard deviation (m) at a distance from the instrument (m): the sum of both parts, as manufacturers state them
     /// (`15 µm + 6 µm/m`).
     pub const fn sigma_at(&self, distance: f64) -> f64 {
         self.sigma + self.sigma_per_metre * distance
     }
 
-    /// Both parts as makers write them.
+    /// Both parts as manufacturers state them.
     pub fn sigma_text(&self) -> String {
         format!("{:.1} um + {:.1} um/m", self.sigma / MICROMETRE, self.sigma_per_metre / MICROMETRE)
     }
 }
 
-/// A line with a thickness, fixed to a link: encloses a part of the arm.
+/// A capsule fixed to a link, which encloses a part of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     /// Link frame: 0 is the fixed base, i the frame after joint i (entry i of `ForwardKinematics::base_from_links`).
@@ -41,7 +41,7 @@ pub struct Capsule {
     pub radius: f64,
 }
 
-/// A box along the axes of the robot base that the arm must not enter.
+/// A box parallel to the axes of the robot base, which the arm must not enter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeepOut {
     /// Name in messages.
@@ -52,14 +52,14 @@ pub struct KeepOut {
     pub max: Point3<f64>,
 }
 
-/// Place of the tracker and what it can see.
+/// Position of the tracker and limits of its line of sight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracker {
-    /// Roughly where it stands, in the robot base (m): for planning only, never for identification.
+    /// Approximate position in the robot base (m), for planning only, never for identification.
     pub position_in_base: Point3<f64>,
     /// Largest angle between beam and SMR axis (rad).
     pub acceptance_angle: f64,
-    /// Nearest and farthest target (m).
+    /// Shortest and longest distance of a target (m).
     pub range: (f64, f64),
 }
 

@@ -1,10 +1,10 @@
-//! What a readable profile may still get wrong: parallel axes without β, β without parallel axes, missing limits.
+//! Warnings on a readable profile: parallel axes without β, β without parallel axes, missing limits.
 
 use super::diagnostic::{Findings, Span};
 use super::{PARALLEL_TOLERANCE, Profile};
 use crate::kinematics::{Convention, JointType, KinematicChain, LinkParameter, ParameterId};
 
-/// Warns; `joints` are the places of the joints.
+/// Adds the warnings; `joints` are the spans of the joints.
 pub(super) fn check(profile: &Profile, joints: &[Span], findings: &mut Findings<'_>) {
     let chain = &profile.chain;
     let parallel = chain.parallel_axes(PARALLEL_TOLERANCE);
@@ -23,7 +23,7 @@ pub(super) fn check(profile: &Profile, joints: &[Span], findings: &mut Findings<
             findings.warning(
                 *span,
                 format!("'{name}' has 'beta_deg', but its axis is not parallel to its neighbour's"),
-                "remove 'beta_deg': beside alpha, a, d and theta it cannot be told apart there".to_owned(),
+                "remove 'beta_deg': here it cannot be distinguished from alpha, a, d and theta".to_owned(),
             );
         }
     }
@@ -50,7 +50,7 @@ fn warn_missing_beta(profile: &Profile, first: usize, joint: usize, span: Span, 
         .map(|id| format!("'{id}'"))
         .collect();
     let mut hint = format!("add 'beta_deg: 0.0' to '{name}'");
-    // With one of the two fixed, the other one's sum is still found and nothing can run away.
+    // If one of the two offsets is fixed, only their sum is identified and none can diverge.
     if free_offsets.len() > 1 {
         let both = free_offsets.join(" and ");
         hint.push_str("; ");
@@ -71,8 +71,8 @@ fn joint_name(chain: &KinematicChain, joint: usize) -> Option<&str> {
     chain.joints().get(joint).map(|joint| joint.name.as_str())
 }
 
-/// Whether the β of this joint's link lies between two parallel axes. Here a sliding axis counts too: its direction is as
-/// ill-defined by α and θ alone as that of a turning one.
+/// Whether the β of this joint's link is between two parallel axes. A sliding axis counts too: α and θ alone determine its
+/// direction as poorly as that of a turning one.
 fn has_parallel_neighbour(chain: &KinematicChain, joint: usize) -> bool {
     let Some(own) = chain.joints().get(joint) else { return false };
     let neighbour = match chain.convention() {

@@ -1,14 +1,15 @@
-//! From tree to values: every function reports what is wrong, with its place, and answers `None`, so that one pass over the
-//! file finds all problems.
+//! Decodes the syntax tree into values. Every function reports problems with their location and returns `None`, so that one pass
+//! over the file finds all problems.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::diagnostic::{Findings, Span};
 use super::syntax::{Ast, Field, Node, shortened};
-use crate::text::is_printable;
+pub(super) use crate::text::near_miss as nearest;
+use crate::text::{is_printable, near_miss};
 use crate::units::Quantity;
 
-/// The fields of a struct, after unknown and repeated ones were reported.
+/// Fields of a struct. Unknown and repeated ones were reported already.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fields<'t> {
     pub(super) span: Span,
@@ -22,7 +23,7 @@ impl<'t> Fields<'t> {
         (!matches!(value.node, Node::Absent)).then_some(value)
     }
 
-    /// Decoded value of a field, or `default` if it is absent; `None` if it is there and bad.
+    /// Decoded value of a field, or `default` if it is absent; `None` if it is invalid.
     pub(super) fn get_or<T>(&self, name: &str, default: T, decode: impl FnOnce(&'t Ast) -> Option<T>) -> Option<T> {
         match self.get(name) {
             Some(ast) => decode(ast),
@@ -30,7 +31,7 @@ impl<'t> Fields<'t> {
         }
     }
 
-    /// Value of a field that must be there.
+    /// Value of a required field.
     pub(super) fn require(&self, name: &str, example: &str, findings: &mut Findings<'_>) -> Option<&'t Ast> {
         let value = self.get(name);
         if value.is_none() {
@@ -39,13 +40,13 @@ impl<'t> Fields<'t> {
         value
     }
 
-    /// The bracket that opens the struct: the place for what is missing inside.
+    /// The opening bracket of the struct, as the location of missing fields.
     pub(super) fn start(&self) -> Span {
         Span::new(self.span.start, self.span.start + 1)
     }
 }
 
-/// The fields of a struct; unknown and repeated ones are errors.
+/// Decodes a struct; unknown and repeated fields are errors.
 pub(super) fn fields<'t>(
     ast: &'t Ast,
     what: &str,
@@ -80,58 +81,26 @@ pub(super) fn fields<'t>(
     Some(Fields { span: ast.span, fields })
 }
 
-/// `did you mean 'x'? allowed: …`
+/// Hint `did you mean 'x'? allowed: …`.
 pub(super) fn unknown_hint(given: &str, allowed: &[&str]) -> String {
     let list = allowed.join(", ");
-    match nearest(given, allowed) {
+    match near_miss(given, allowed) {
         Some(name) => format!("did you mean '{name}'? allowed: {list}"),
         None => format!("allowed: {list}"),
     }
 }
 
-/// The allowed name that differs least, if it is near enough to be meant.
-pub(super) fn nearest<'n>(given: &str, allowed: &[&'n str]) -> Option<&'n str> {
-    let given = given.to_ascii_lowercase();
-    allowed
-        .iter()
-        .map(|name| (edit_distance(&given, &name.to_ascii_lowercase()), *name))
-        .min()
-        .filter(|(distance, name)| *distance * 2 <= name.chars().count())
-        .map(|(_, name)| name)
-}
-
-/// Levenshtein distance in characters.
-fn edit_distance(left: &str, right: &str) -> usize {
-    let right: Vec<char> = right.chars().collect();
-    let mut row: Vec<usize> = (0..=right.len()).collect();
-    // Names are short; a hostile one is not compared at length.
-    for (index, character) in left.chars().take(64).enumerate() {
-        let mut diagonal = index;
-        let mut last = index + 1;
-        if let Some(first) = row.first_mut() {
-            *first = last;
-        }
-        for (entry, other) in row.iter_mut().skip(1).zip(&right) {
-            let substituted = diagonal + usize::from(character != *other);
-            diagonal = *entry;
-            last = substituted.min(diagonal + 1).min(last + 1);
-            *entry = last;
-        }
-    }
-    row.last().copied().unwrap_or_default()
-}
-
-/// Larger numbers (mm, deg) describe no robot and would end as infinity.
+/// Largest number (mm or deg): larger ones cannot describe a robot and could become infinite.
 const LARGEST: f64 = 1e9;
 
-/// A number that is finite and not absurd.
+/// Decodes a number that is finite and at most [`LARGEST`].
 pub(super) fn number(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64> {
     match &ast.node {
         Node::Number(number) if number.abs() <= LARGEST => Some(*number),
         Node::Number(number) => {
             findings.error(
                 ast.span,
-                format!("{number:e} is not a finite number of a sensible size"),
+                format!("{number:e} is not a finite number of a plausible size"),
                 "write a plain number".to_owned(),
             );
             None
@@ -143,7 +112,7 @@ pub(super) fn number(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64> {
     }
 }
 
-/// A number above zero.
+/// Decodes a number above zero.
 pub(super) fn positive(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64> {
     let value = number(ast, findings)?;
     if value > 0.0 {
@@ -153,7 +122,7 @@ pub(super) fn positive(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64> {
     None
 }
 
-/// A number that is zero or above.
+/// Decodes a number that is at least zero.
 pub(super) fn not_negative(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64> {
     let value = number(ast, findings)?;
     if value >= 0.0 {
@@ -163,7 +132,7 @@ pub(super) fn not_negative(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64
     None
 }
 
-/// A text of one line without control characters, not empty.
+/// Decodes a text: one line, not empty, without control characters.
 pub(super) fn text(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
     let Node::Text(text) = &ast.node else {
         findings.error(ast.span, format!("expected a text in \"quotes\", found {}", ast.node.describe()), None);
@@ -181,7 +150,7 @@ pub(super) fn text(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
     Some(text.clone())
 }
 
-/// `true` or `false`.
+/// Decodes `true` or `false`.
 pub(super) fn flag(ast: &Ast, findings: &mut Findings<'_>) -> Option<bool> {
     if let Node::Flag(flag) = ast.node {
         return Some(flag);
@@ -190,7 +159,7 @@ pub(super) fn flag(ast: &Ast, findings: &mut Findings<'_>) -> Option<bool> {
     None
 }
 
-/// One of a few names.
+/// Decodes one of the given names.
 pub(super) fn choice<T: Copy>(ast: &Ast, choices: &[(&str, T)], findings: &mut Findings<'_>) -> Option<T> {
     let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
     if let Node::Name(name) = &ast.node {
@@ -205,7 +174,7 @@ pub(super) fn choice<T: Copy>(ast: &Ast, choices: &[(&str, T)], findings: &mut F
     None
 }
 
-/// `(…, …)` with as many numbers as asked for; all bad ones are reported.
+/// Decodes a tuple of `N` numbers; all invalid ones are reported.
 pub(super) fn numbers<const N: usize>(ast: &Ast, findings: &mut Findings<'_>) -> Option<[f64; N]> {
     let items = match &ast.node {
         Node::Tuple(items) | Node::List(items) if items.len() == N => items,
@@ -216,23 +185,23 @@ pub(super) fn numbers<const N: usize>(ast: &Ast, findings: &mut Findings<'_>) ->
         }
     };
     let mut values = [0.0; N];
-    let mut good = true;
+    let mut is_valid = true;
     for (value, item) in values.iter_mut().zip(items) {
         match number(item, findings) {
             Some(number) => *value = number,
-            None => good = false,
+            None => is_valid = false,
         }
     }
-    good.then_some(values)
+    is_valid.then_some(values)
 }
 
-/// A point given in millimetres, in metres.
+/// Decodes a point from millimetres to metres.
 pub(super) fn point(ast: &Ast, findings: &mut Findings<'_>) -> Option<Point3<f64>> {
     let coordinates: [f64; 3] = numbers(ast, findings)?;
     Some(Point3::from(coordinates.map(|coordinate| Quantity::Length.from_edge(coordinate))))
 }
 
-/// A direction of any length but zero, as a unit vector.
+/// Decodes a direction of any nonzero length into a unit vector.
 pub(super) fn direction(ast: &Ast, findings: &mut Findings<'_>) -> Option<Unit<Vector3<f64>>> {
     let coordinates: [f64; 3] = numbers(ast, findings)?;
     let direction = Unit::try_new(Vector3::from(coordinates), 1e-9);
@@ -242,7 +211,7 @@ pub(super) fn direction(ast: &Ast, findings: &mut Findings<'_>) -> Option<Unit<V
     direction
 }
 
-/// A range `(low, high)` in edge units, inside units out; crossed or empty ranges are errors.
+/// Decodes a range `(low, high)` from mm or degrees to SI units; reversed or empty ranges are errors.
 pub(super) fn range(ast: &Ast, quantity: Quantity, findings: &mut Findings<'_>) -> Option<(f64, f64)> {
     let [low, high] = numbers(ast, findings)?;
     if low < high {
@@ -257,7 +226,7 @@ pub(super) fn range(ast: &Ast, quantity: Quantity, findings: &mut Findings<'_>) 
     None
 }
 
-/// The entries of a list.
+/// Decodes a list into its entries.
 pub(super) fn list<'t>(ast: &'t Ast, what: &str, findings: &mut Findings<'_>) -> Option<&'t [Ast]> {
     if let Node::List(items) = &ast.node {
         return Some(items);
@@ -266,7 +235,7 @@ pub(super) fn list<'t>(ast: &'t Ast, what: &str, findings: &mut Findings<'_>) ->
     None
 }
 
-/// The entries of a map from text to number; repeated keys are errors. The span is that of the key.
+/// Decodes a map from names into its entries; repeated names are errors. The span is that of the name.
 pub(super) fn number_map<'t>(ast: &'t Ast, findings: &mut Findings<'_>) -> Option<Vec<(&'t str, Span, &'t Ast)>> {
     let Node::Map(entries) = &ast.node else {
         let hint = "write {\"name\": 1.0, ...}".to_owned();

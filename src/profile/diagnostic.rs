@@ -1,24 +1,24 @@
-//! Problems of a profile, each with its place: `file:line:column`, the source line, a caret and what is allowed.
+//! Problems of a profile, each with its location: `file:line:column`, the source line, a caret and the allowed values.
 //!
-//! Text that came from a file is shown without control characters and without marks that reorder the line.
+//! Text from the file is shown without control characters and without characters that reorder the line.
 
 use std::fmt;
 
 use thiserror::Error;
 
-use crate::text::printable;
+use crate::text::{printable, wrapped};
 
-/// Widest message line (characters).
+/// Width of a message (characters).
 const WIDTH: usize = 80;
-/// Characters of a source line that are shown.
+/// Longest shown part of a source line (characters).
 const EXCERPT: usize = 64;
-/// Problems of one file that are shown.
+/// Most problems shown for one file.
 const MOST: usize = 100;
 
-/// How bad a problem is.
+/// Severity of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// The profile can be used, but something is probably not meant so.
+    /// The profile can be used, but something is probably unintended.
     Warning,
     /// The profile cannot be used.
     Error,
@@ -33,26 +33,25 @@ impl Severity {
     }
 }
 
-/// One problem of a profile and its place. `Display` gives several lines, without a line break at the end.
+/// A problem of a profile with its location. `Display` writes several lines without a final line break.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// Error or warning.
     pub severity: Severity,
-    /// File name as it was given for messages.
+    /// File name for messages.
     pub file: String,
-    /// Line, from 1.
+    /// Line number, from 1.
     pub line: usize,
-    /// Column in characters, from 1.
+    /// Column number in characters, from 1.
     pub column: usize,
-    /// What is wrong, lower case, without a full stop.
+    /// Description, in lower case without a full stop.
     pub message: String,
-    /// What is allowed or what to do.
+    /// Allowed values or advice.
     pub hint: Option<String>,
-    /// The source line, printable, cut to the neighbourhood of the place.
+    /// Printable part of the source line around the location.
     excerpt: String,
-    /// Characters of the excerpt before the caret.
+    /// Number of characters of the excerpt before the caret.
     indent: usize,
-    /// Length of the caret.
+    /// Number of carets.
     carets: usize,
 }
 
@@ -74,27 +73,27 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// All problems of a profile that cannot be used, warnings included, in the order of the file.
+/// All problems of an unusable profile, including warnings, in the order of the file.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{}", joined(diagnostics))]
 pub struct ProfileErrors {
-    /// The problems; at least one is an error.
+    /// The problems, of which at least one is an error.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl ProfileErrors {
-    /// Number of problems that are errors.
+    /// Number of errors among the problems.
     pub fn error_count(&self) -> usize {
         self.diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Error).count()
     }
 }
 
-/// Several problems as one text, a blank line between them.
+/// Several problems as one text, separated by blank lines.
 pub(super) fn joined(diagnostics: &[Diagnostic]) -> String {
     diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n\n")
 }
 
-/// Bytes of a source text, end exclusive.
+/// A byte range of the source text, with an exclusive end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) start: usize,
@@ -107,7 +106,7 @@ impl Span {
     }
 }
 
-/// The text of a file and the problems found in it so far.
+/// The text of a file with the problems found so far.
 #[derive(Debug)]
 pub(super) struct Findings<'a> {
     text: &'a str,
@@ -132,22 +131,22 @@ impl<'a> Findings<'a> {
         self.found.iter().any(|(_, diagnostic)| diagnostic.severity == Severity::Error)
     }
 
-    /// Line of a place, from 1.
+    /// Line number of a location, from 1.
     pub(super) fn line_of(&self, span: Span) -> usize {
         self.text.get(..span.start).unwrap_or_default().matches('\n').count() + 1
     }
 
-    /// The problems in the order of the file.
+    /// All problems in the order of the file.
     pub(super) fn into_diagnostics(mut self) -> Vec<Diagnostic> {
         self.found.sort_by_key(|(start, _)| *start);
         self.found.into_iter().map(|(_, diagnostic)| diagnostic).collect()
     }
 
-    /// Notes a problem. After [`MOST`] of them only one more says so: the file is no profile, and the rest helps nobody.
+    /// Adds a problem. After [`MOST`] problems only a final one is added, because the file is probably not a profile.
     fn add(&mut self, severity: Severity, span: Span, message: &str, hint: Option<&str>) {
         let (severity, message, hint) = match self.found.len() {
             0..MOST => (severity, message, hint),
-            MOST => (Severity::Error, "too many problems: the rest is not shown", None),
+            MOST => (Severity::Error, "too many problems; the rest is not shown", None),
             _ => return,
         };
         let start = span.start.min(self.text.len());
@@ -155,7 +154,7 @@ impl<'a> Findings<'a> {
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
         let line_text = self.text.get(line_start..).unwrap_or_default().lines().next().unwrap_or_default();
         let indent = before.get(line_start..).unwrap_or_default().chars().count();
-        // A span over several lines is marked to the end of its first line.
+        // A span over several lines is marked up to the end of its first line.
         let span_text = self.text.get(start..span.end.min(self.text.len())).unwrap_or_default();
         let carets = span_text.lines().next().unwrap_or_default().chars().count().max(1);
         let (excerpt, indent_shown, carets_shown) = cut(line_text, indent, carets);
@@ -174,14 +173,14 @@ impl<'a> Findings<'a> {
     }
 }
 
-/// The part of a line around a place, its indent there and the length of the caret.
+/// The part of a line around a location, with its indent and the number of carets.
 fn cut(line: &str, indent: usize, carets: usize) -> (String, usize, usize) {
     let characters: Vec<char> = printable(line).chars().collect();
     if characters.len() <= EXCERPT {
         let room = characters.len().saturating_sub(indent).max(1);
         return (characters.into_iter().collect(), indent, carets.min(room));
     }
-    // The place goes to the middle at the latest; what is cut off is marked.
+    // Keep the location in the first half of the excerpt, and mark the cut-off parts.
     let first = indent.saturating_sub(EXCERPT / 2).min(characters.len() - EXCERPT);
     let last = first + EXCERPT;
     let mut shown: String = characters.iter().skip(first).take(EXCERPT).collect();
@@ -194,19 +193,4 @@ fn cut(line: &str, indent: usize, carets: usize) -> (String, usize, usize) {
         shown.push_str("...");
     }
     (shown, indent - first + shift, carets.min(last.saturating_sub(indent)).max(1))
-}
-
-/// Lines of at most `width` characters, broken at spaces.
-pub(super) fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
 }

@@ -1,22 +1,22 @@
-//! Reader of the RON subset that profiles are written in: a tree in which every value knows its place.
+//! Parser for the RON subset of profiles. Its syntax tree keeps the location of every value.
 //!
-//! The `ron` crate stops at the first problem and its values forget where they stood; a profile must show all its problems
-//! with line and caret. Read here: structs, tuples, lists, maps, texts, numbers, names, `Some(x)` (the same as `x`), `None`,
-//! trailing commas, line and nested block comments, `#![enable(…)]`. Raw texts and characters are not part of the subset.
+//! The `ron` crate stops at the first problem and does not keep locations, but all problems of a profile must be shown with line
+//! and caret. The subset has structs, tuples, lists, maps, texts, numbers, names, `Some(x)` (the same as `x`), `None`, trailing
+//! commas, line and nested block comments, and `#![enable(…)]`, but no raw texts and characters.
 
 mod lexer;
 mod parser;
 
 use super::diagnostic::{Findings, Span};
 
-/// A value and its place.
+/// A value with its location.
 #[derive(Clone, Debug)]
 pub(super) struct Ast {
     pub(super) span: Span,
     pub(super) node: Node,
 }
 
-/// A field of a struct: name and value.
+/// A field of a struct.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     pub(super) name: String,
@@ -24,12 +24,12 @@ pub(super) struct Field {
     pub(super) value: Ast,
 }
 
-/// What a value is.
+/// A value of the syntax tree.
 #[derive(Clone, Debug)]
 pub(super) enum Node {
-    /// `(name: value, …)`, with or without a name in front.
+    /// `(name: value, …)`, optionally after a name.
     Struct(Vec<Field>),
-    /// `(value, …)`, with or without a name in front.
+    /// `(value, …)`, optionally after a name.
     Tuple(Vec<Ast>),
     /// `[value, …]`.
     List(Vec<Ast>),
@@ -48,7 +48,7 @@ pub(super) enum Node {
 }
 
 impl Node {
-    /// What was found, for messages.
+    /// Description for messages.
     pub(super) fn describe(&self) -> String {
         match self {
             Self::Struct(_) => "named fields".to_owned(),
@@ -64,18 +64,13 @@ impl Node {
     }
 }
 
-/// The start of a text, for messages.
+/// The beginning of a text, for messages.
 pub(super) fn shortened(text: &str) -> String {
     const LONGEST: usize = 32;
-    if text.chars().count() <= LONGEST {
-        return text.to_owned();
-    }
-    let mut start: String = text.chars().take(LONGEST).collect();
-    start.push_str("...");
-    start
+    crate::text::shortened(text, LONGEST)
 }
 
-/// Reads a whole text. `None` when the rest cannot be read; the reason is then in `findings`.
+/// Parses a whole text. `None` after a fatal syntax error, which is in `findings`.
 pub(super) fn parse(text: &str, findings: &mut Findings<'_>) -> Option<Ast> {
     parser::parse(text, findings)
 }

@@ -1,11 +1,11 @@
-//! Profiles as text for people, at most 80 columns wide: what `profile list`, `profile show` and `profile check` print.
+//! Profiles as text of at most 80 columns, for `profile list`, `profile show` and `profile check`.
 //!
 //! Degrees and millimetres, as in the file. Every text ends with a line break.
 
-use super::diagnostic::{joined, wrapped};
+use super::diagnostic::joined;
 use super::{Diagnostic, JointRange, Level, PARALLEL_TOLERANCE, Profile, ProfileErrors};
 use crate::kinematics::{Convention, Joint, JointType};
-use crate::text::printable;
+use crate::text::{counted, counted_as, printable, shortened, wrapped};
 use crate::units::{Quantity, to_deg, to_mm};
 
 /// Widest line (characters).
@@ -23,7 +23,7 @@ pub fn list_text<'p>(profiles: impl IntoIterator<Item = &'p Profile>) -> String 
     finished(&lines)
 }
 
-/// Everything that identification and planning take from a profile.
+/// All values of a profile that identification and planning use.
 pub fn show_text(profile: &Profile) -> String {
     let mut lines = wrapped(&format!("{}: {}", profile.name(), profile.title()), WIDTH);
     lines.extend(wrapped(&format!("source: {}", profile.source()), WIDTH));
@@ -40,7 +40,7 @@ pub fn show_text(profile: &Profile) -> String {
     finished(&lines)
 }
 
-/// The outcome of reading a profile: its problems, then one line that counts them.
+/// The result of reading a profile: its problems, and a final line that counts them.
 pub fn check_text(file_name: &str, outcome: &Result<(Profile, Vec<Diagnostic>), ProfileErrors>) -> String {
     let (diagnostics, errors, verdict) = match outcome {
         Ok((profile, warnings)) => (warnings, 0, format!("profile '{}' can be used", profile.name())),
@@ -190,26 +190,26 @@ fn cell_lines(profile: &Profile) -> Vec<String> {
     ));
     if let Some(link) = profile.link() {
         let robot = link.robot.as_ref().map_or_else(String::new, |robot| format!(", robot at {robot}"));
-        let automatic = if link.is_automatic { ", measuring by itself" } else { "" };
+        let automatic = if link.is_automatic { ", measuring automatically" } else { "" };
         lines.extend(wrapped(&format!("link: {}{robot}{automatic}", link.address), WIDTH));
     }
     let floor =
         profile.floor().map_or_else(|| "no floor".to_owned(), |z| format!("floor at {} mm", fixed(to_mm(z), 0)));
     lines.push(format!(
         "collision shapes: {}, {floor}, keep-out boxes: {}",
-        counted(profile.bodies().len(), "body").replace("bodys", "bodies"),
+        counted_as(profile.bodies().len(), "body", "bodies"),
         profile.keep_out().len()
     ));
     lines
 }
 
-/// Width of the column of joint names: as wide as the longest one, as far as the table stays within [`WIDTH`].
+/// Width of the column of joint names: that of the longest one, limited so that the table stays within [`WIDTH`].
 fn name_column(profile: &Profile) -> usize {
     let longest = profile.chain().joints().iter().map(|joint| joint.name.chars().count()).max().unwrap_or(0);
     (longest + 1).clamp(8, 16)
 }
 
-/// A joint name that leaves one blank in its column.
+/// A joint name shortened to its column with one blank.
 fn name_in(joint: &Joint, column: usize) -> String {
     joint.name.chars().take(column - 1).collect()
 }
@@ -237,19 +237,9 @@ fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-fn counted(count: usize, what: &str) -> String {
-    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
-}
-
-/// A line of at most [`WIDTH`] characters; a cut is marked.
+/// A line of at most [`WIDTH`] columns.
 fn clipped(line: &str) -> String {
-    let line = line.trim_end();
-    if line.chars().count() <= WIDTH {
-        return line.to_owned();
-    }
-    let mut start: String = line.chars().take(WIDTH - 3).collect();
-    start.push_str("...");
-    start
+    shortened(line.trim_end(), WIDTH)
 }
 
 fn finished(lines: &[String]) -> String {

@@ -4,7 +4,7 @@
 //! emscon:192.168.0.2              protocol and host; the port is the protocol's own
 //! emscon:tcp:192.168.0.2:700      the same in full
 //! geocom:serial:/dev/ttyUSB0:9600 serial port and speed
-//! ascii:listen:0.0.0.0:5000       whoever connects here
+//! ascii:listen:0.0.0.0:5000       a client that connects here
 //! ascii:udp:0.0.0.0:5000          datagrams that arrive here
 //! rtde:192.168.1.10               a robot
 //! ```
@@ -33,10 +33,10 @@ pub enum WireProtocol {
 }
 
 impl WireProtocol {
-    /// All of them.
+    /// All protocols.
     pub const ALL: [Self; 5] = [Self::Emscon, Self::Ascii, Self::Geocom, Self::Ndi, Self::Rtde];
 
-    /// In addresses.
+    /// Name in addresses.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Emscon => "emscon",
@@ -47,7 +47,7 @@ impl WireProtocol {
         }
     }
 
-    /// TCP port where the other end usually listens.
+    /// Default TCP port of the other end.
     pub const fn usual_port(self) -> Option<u16> {
         match self {
             Self::Emscon => Some(700),
@@ -62,7 +62,7 @@ impl WireProtocol {
         self.usual_speed().is_some()
     }
 
-    /// Usual speed of a serial line (baud).
+    /// Default speed of a serial line (baud).
     const fn usual_speed(self) -> Option<u32> {
         match self {
             Self::Ascii | Self::Geocom | Self::Ndi => Some(9600),
@@ -89,14 +89,14 @@ impl FromStr for WireProtocol {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|one| one.name() == text).ok_or_else(|| {
-            let names: Vec<&str> = Self::ALL.iter().map(|one| one.name()).collect();
-            format!("'{}' is no protocol; there are {}", printable(text), names.join(", "))
+        Self::ALL.into_iter().find(|protocol| protocol.name() == text).ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|protocol| protocol.name()).collect();
+            format!("unknown protocol '{}'; protocols: {}", printable(text), names.join(", "))
         })
     }
 }
 
-/// How the other end is reached.
+/// Route to the other end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Route {
     /// A serial port, 8 data bits, no parity, one stop bit.
@@ -106,21 +106,21 @@ pub enum Route {
         /// Speed (baud).
         speed: u32,
     },
-    /// It listens, this program connects.
+    /// This program connects by TCP.
     Tcp {
         /// Host name or address.
         host: String,
         /// Port.
         port: u16,
     },
-    /// This program listens for one connection.
+    /// This program listens for one TCP connection.
     Listen {
         /// Address of this machine.
         host: String,
         /// Port.
         port: u16,
     },
-    /// Datagrams arrive here.
+    /// This program receives UDP datagrams.
     Udp {
         /// Address of this machine.
         host: String,
@@ -129,12 +129,10 @@ pub enum Route {
     },
 }
 
-/// An address.
+/// Address of an instrument or a robot's controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WireAddress {
-    /// What is spoken.
     pub protocol: WireProtocol,
-    /// How it is reached.
     pub route: Route,
 }
 
@@ -156,24 +154,24 @@ impl FromStr for WireAddress {
         let text = text.trim();
         let (protocol, rest) = text
             .split_once(':')
-            .ok_or_else(|| format!("'{}' is no address; it reads like 'emscon:192.168.0.2'", printable(text)))?;
+            .ok_or_else(|| format!("'{}' is not an address such as 'emscon:192.168.0.2'", printable(text)))?;
         let protocol: WireProtocol = protocol.parse()?;
         let route = match rest.split_once(':') {
             Some(("serial", device)) => serial(protocol, device)?,
-            Some(("tcp", place)) => {
-                let (host, port) = place_of(protocol, place)?;
+            Some(("tcp", endpoint)) => {
+                let (host, port) = host_and_port(protocol, endpoint)?;
                 Route::Tcp { host, port }
             }
-            Some(("listen", place)) => {
-                let (host, port) = place_of(protocol, place)?;
+            Some(("listen", endpoint)) => {
+                let (host, port) = host_and_port(protocol, endpoint)?;
                 Route::Listen { host, port }
             }
-            Some(("udp", place)) => {
-                let (host, port) = place_of(protocol, place)?;
+            Some(("udp", endpoint)) => {
+                let (host, port) = host_and_port(protocol, endpoint)?;
                 Route::Udp { host, port }
             }
             _ => {
-                let (host, port) = place_of(protocol, rest)?;
+                let (host, port) = host_and_port(protocol, rest)?;
                 Route::Tcp { host, port }
             }
         };
@@ -190,7 +188,7 @@ impl FromStr for WireAddress {
 }
 
 fn serial(protocol: WireProtocol, text: &str) -> Result<Route, String> {
-    // A device may have colons in its name, its speed is a number.
+    // The name of a device may contain colons, so only a number after the last one is the speed.
     let (device, speed) = match text.rsplit_once(':').and_then(|(device, speed)| Some((device, speed.parse().ok()?))) {
         Some((device, speed)) => (device, speed),
         None => (text, protocol.usual_speed().unwrap_or(9600)),
@@ -199,13 +197,13 @@ fn serial(protocol: WireProtocol, text: &str) -> Result<Route, String> {
         return Err("the serial port is missing, such as '/dev/ttyUSB0'".to_owned());
     }
     if !(110..=12_000_000).contains(&speed) {
-        return Err(format!("a serial line does not run at {speed} baud"));
+        return Err(format!("{speed} baud is not a valid speed"));
     }
     Ok(Route::Serial { device: device.to_owned(), speed })
 }
 
-/// Host and port; IPv6 hosts stand in square brackets.
-fn place_of(protocol: WireProtocol, text: &str) -> Result<(String, u16), String> {
+/// Splits host and port; an IPv6 host is in square brackets.
+fn host_and_port(protocol: WireProtocol, text: &str) -> Result<(String, u16), String> {
     let (host, port) = match text.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
         Some((host, rest)) => (host, rest.strip_prefix(':')),
         None => match text.rsplit_once(':') {
@@ -214,29 +212,30 @@ fn place_of(protocol: WireProtocol, text: &str) -> Result<(String, u16), String>
         },
     };
     if host.is_empty() || host.contains(char::is_whitespace) {
-        return Err(format!("'{}' names no host", printable(text)));
+        return Err(format!("'{}' contains no host", printable(text)));
     }
     let port = match port {
         Some(port) => {
-            port.parse().ok().ok_or_else(|| format!("'{}' is no port; ports are 1 to 65535", printable(port)))?
+            port.parse().ok().ok_or_else(|| format!("'{}' is not a port from 1 to 65535", printable(port)))?
         }
         None => protocol.usual_port().ok_or_else(|| {
-            format!("the port is missing, as in '{protocol}:tcp:{host}:5000': {protocol} has no usual one")
+            format!("the port is missing, as in '{protocol}:tcp:{host}:5000': {protocol} has no default port")
         })?,
     };
     Ok((host.to_owned(), port))
 }
 
-/// How the instrument of a cell is reached, as its profile says.
+/// Link to the instrument of a cell, from its profile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LinkSettings {
-    /// The instrument.
+    /// Address of the instrument.
     pub address: WireAddress,
-    /// Options of its protocol: the name of a preset, or a RON struct of what differs from the usual. Checked where it connects.
+    /// Options of its protocol: the name of a preset, or a RON struct of the options that differ from the defaults. Checked when
+    /// it connects.
     pub options: Option<String>,
-    /// The robot's controller, if it tells its joint angles.
+    /// Address of the robot's controller, if it reports joint angles.
     pub robot: Option<WireAddress>,
-    /// Measures by itself when the SMR rests near the predicted place.
+    /// Measure automatically when the SMR is at rest near the predicted position.
     pub is_automatic: bool,
 }
 
@@ -269,16 +268,16 @@ mod tests {
     #[test]
     fn what_is_no_address_is_refused_with_a_reason() {
         for (text, part) in [
-            ("", "is no address"),
-            ("192.168.0.2", "is no address"),
-            ("leica:192.168.0.2", "is no protocol"),
+            ("", "is not an address"),
+            ("192.168.0.2", "is not an address"),
+            ("leica:192.168.0.2", "unknown protocol"),
             ("emscon:serial:/dev/ttyUSB0", "does not use serial lines"),
             ("emscon:udp:0.0.0.0:1", "does not use UDP"),
             ("geocom:host", "the port is missing"),
-            ("emscon:host:70000", "ports are 1 to 65535"),
-            ("emscon:tcp::700", "names no host"),
+            ("emscon:host:70000", "is not a port from 1 to 65535"),
+            ("emscon:tcp::700", "contains no host"),
             ("geocom:serial:", "the serial port is missing"),
-            ("geocom:serial:/dev/ttyS0:7", "does not run at 7 baud"),
+            ("geocom:serial:/dev/ttyS0:7", "7 baud is not a valid speed"),
         ] {
             let error = full(text).unwrap_err();
             assert!(error.contains(part), "{text}: {error}");

@@ -14,7 +14,7 @@ pub struct LinkChoice {
     /// Options of its protocol: the name of a preset, or a RON struct of what differs from the usual.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub options: Option<String>,
-    /// Address of the robot, if it tells its joint angles.
+    /// Address of the robot's controller, if it reports joint angles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
     /// Measures by itself when the SMR rests near the predicted place.

@@ -1,4 +1,4 @@
-//! Instrument, acceptance limits, tracker, bodies and boxes of a profile.
+//! Instrument, link, acceptance limits, tracker, bodies and boxes of a profile.
 
 use nalgebra::Point3;
 
@@ -33,7 +33,7 @@ pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
     })
 }
 
-/// Problems are in `findings`; absent and bad both give `None`.
+/// Decodes the instrument; `None` if it is absent or invalid.
 pub(super) fn instrument(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Instrument> {
     let ast = top.get("instrument")?;
     let inside = fields(ast, "'instrument'", &["name", "sigma_um", "sigma_um_per_m"], findings)?;
@@ -43,7 +43,7 @@ pub(super) fn instrument(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
     Some(Instrument { name: name?, sigma: sigma? * MICROMETRE, sigma_per_metre: per_metre? * MICROMETRE })
 }
 
-/// How the instrument is reached. Problems are in `findings`; absent and bad both give `None`.
+/// Decodes the link; `None` if it is absent or invalid.
 pub(super) fn link(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<LinkSettings> {
     let ast = top.get("link")?;
     let inside = fields(ast, "'link'", &["address", "options", "robot", "automatic"], findings)?;
@@ -56,16 +56,16 @@ pub(super) fn link(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Link
     Some(LinkSettings { address: address?, options: options?, robot: robot?, is_automatic: automatic? })
 }
 
-/// The address of an instrument or of a robot.
+/// Decodes the address of an instrument or of a robot's controller.
 fn wire_address(ast: &Ast, is_robot: bool, findings: &mut Findings<'_>) -> Option<WireAddress> {
     let hint = if is_robot { "write \"rtde:192.168.0.10\"" } else { "write \"emscon:192.168.0.2\", see docs/links.md" };
-    let wrong = match text(ast, findings)?.parse::<WireAddress>() {
+    let problem = match text(ast, findings)?.parse::<WireAddress>() {
         Ok(address) if address.protocol.is_robot() == is_robot => return Some(address),
-        Ok(address) if is_robot => format!("{} is spoken by instruments, not by robots", address.protocol),
-        Ok(address) => format!("{} is spoken by robots: it belongs into 'robot'", address.protocol),
-        Err(wrong) => wrong,
+        Ok(address) if is_robot => format!("{} is a protocol of instruments, not of robots", address.protocol),
+        Ok(address) => format!("{} is a protocol of robots; it belongs in 'robot'", address.protocol),
+        Err(problem) => problem,
     };
-    findings.error(ast.span, wrong, hint.to_owned());
+    findings.error(ast.span, problem, hint.to_owned());
     None
 }
 
@@ -85,14 +85,14 @@ pub(super) fn tracker(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<T
     let range = inside.get_or("range_mm", default.range, |ast| {
         let range = range(ast, Quantity::Length, findings)?;
         if range.0 < 0.0 {
-            findings.error(ast.span, "a range cannot begin below zero", "write (nearest, farthest)".to_owned());
+            findings.error(ast.span, "a range cannot start below zero", "write (nearest, farthest)".to_owned());
         }
         Some(range)
     });
     Some(Tracker { position_in_base: position?, acceptance_angle: angle?, range: range? })
 }
 
-/// `joints`: number of joints, if it could be read.
+/// Decodes the bodies. `joints` is the number of joints, if it is known.
 pub(super) fn bodies(top: &Fields<'_>, joints: Option<usize>, findings: &mut Findings<'_>) -> Option<Vec<Capsule>> {
     let Some(ast) = top.get("bodies") else { return Some(Vec::new()) };
     let items = list(ast, "bodies", findings)?;
@@ -112,7 +112,7 @@ fn body(ast: &Ast, joints: Option<usize>, findings: &mut Findings<'_>) -> Option
 fn link_index(ast: &Ast, joints: Option<usize>, findings: &mut Findings<'_>) -> Option<usize> {
     let value = number(ast, findings)?;
     let last = joints.unwrap_or(usize::MAX);
-    // Counted up instead of converted: no rounding, no overflow, and arms are short.
+    // Comparing with each index avoids rounding and overflow of a conversion, and arms are short.
     let index = (0..=last.min(64)).find(|index| (*index as f64).to_bits() == (value + 0.0).to_bits());
     if index.is_none() {
         let allowed = joints.map_or_else(|| "a whole number from 0".to_owned(), |last| format!("0 (base) to {last}"));
@@ -139,7 +139,7 @@ fn keep_out_box(ast: &Ast, findings: &mut Findings<'_>) -> Option<KeepOut> {
         if low >= high
             && let Some(ast) = max_ast
         {
-            let message = format!("box '{name}' is crossed in {axis}: {low} mm is not below {high} mm");
+            let message = format!("box '{name}' is reversed in {axis}: {low} mm is not below {high} mm");
             findings.error(ast.span, message, "every coordinate of 'max_mm' must be above that of 'min_mm'".to_owned());
         }
     }

@@ -1,10 +1,11 @@
 //! Joints of a profile.
 
 use super::super::JointRange;
-use super::super::decode::{Fields, choice, fields, list, nearest, number, number_map, positive, range, text};
+use super::super::decode::{Fields, choice, fields, list, number, number_map, positive, range, text};
 use super::super::diagnostic::{Findings, Span};
 use super::super::syntax::{Ast, shortened};
 use crate::kinematics::{Joint, JointType, Link};
+use crate::text::near_miss;
 use crate::units::Quantity;
 
 const FIELDS: &[&str] = &[
@@ -26,25 +27,25 @@ const FIELDS: &[&str] = &[
     "pulses_per_degree",
 ];
 
-/// A joint without problems.
+/// A valid joint.
 pub(super) struct DecodedJoint {
     pub(super) joint: Joint,
     pub(super) range: JointRange,
     pub(super) has_beta: bool,
-    /// Its name: the place for what concerns the whole joint.
+    /// Span of its name, as the location of problems of the whole joint.
     pub(super) span: Span,
 }
 
-/// What other parts of the file need to know of a joint, even of a broken one.
+/// Properties of a joint that other parts of the file need, even if the joint is invalid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointShape {
     pub(super) has_beta: bool,
 }
 
-/// All joints of a file.
+/// All joints of a profile.
 pub(super) struct DecodedJoints {
     pub(super) shapes: Vec<JointShape>,
-    /// `None` if one of them has an error.
+    /// `None` if one of them is invalid.
     pub(super) complete: Option<Vec<DecodedJoint>>,
 }
 
@@ -54,7 +55,7 @@ pub(super) fn joints(ast: &Ast, findings: &mut Findings<'_>) -> Option<DecodedJo
         findings.error(ast.span, "an arm needs at least one joint", "add the joints from base to flange".to_owned());
         return None;
     }
-    // Names first: couplings refer to joints further down.
+    // Decode the names first, because couplings may refer to later joints.
     let opened: Vec<Option<Fields<'_>>> = items.iter().map(|item| fields(item, "a joint", FIELDS, findings)).collect();
     let names = joint_names(&opened, findings);
     let mut shapes = Vec::new();
@@ -140,19 +141,19 @@ fn direction(ast: &Ast, findings: &mut Findings<'_>) -> Option<f64> {
     None
 }
 
-/// One coefficient per joint of the arm.
+/// Decodes a coupling into one coefficient per joint of the arm.
 fn coupling(ast: &Ast, own: usize, names: &[Option<String>], findings: &mut Findings<'_>) -> Option<Vec<f64>> {
     let entries = number_map(ast, findings)?;
     let known: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
     let mut row = vec![0.0; names.len()];
-    let mut good = true;
+    let mut is_valid = true;
     for (name, span, value) in entries {
         let index = names.iter().position(|known| known.as_deref() == Some(name));
         match (index, number(value, findings)) {
             (Some(index), _) if index == own => {
-                let hint = "name another joint; for the sense of the joint itself use 'direction'".to_owned();
+                let hint = "name another joint; for the direction of the joint itself use 'direction'".to_owned();
                 findings.error(span, format!("joint '{}' is coupled to itself", shortened(name)), hint);
-                good = false;
+                is_valid = false;
             }
             (Some(index), Some(value)) => {
                 if let Some(entry) = row.get_mut(index) {
@@ -161,15 +162,15 @@ fn coupling(ast: &Ast, own: usize, names: &[Option<String>], findings: &mut Find
             }
             (None, _) => {
                 let suggestion =
-                    nearest(name, &known).map_or_else(String::new, |near| format!("did you mean '{near}'? "));
+                    near_miss(name, &known).map_or_else(String::new, |near| format!("did you mean '{near}'? "));
                 let hint = format!("{suggestion}joints: {}", known.join(", "));
                 findings.error(span, format!("the arm has no joint '{}'", shortened(name)), hint);
-                good = false;
+                is_valid = false;
             }
-            (Some(_), None) => good = false,
+            (Some(_), None) => is_valid = false,
         }
     }
-    good.then_some(row)
+    is_valid.then_some(row)
 }
 
 fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findings<'_>) -> Option<JointRange> {
@@ -178,13 +179,13 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
         JointType::Revolute => ("revolute", "deg", "mm"),
         JointType::Prismatic => ("prismatic", "mm", "deg"),
     };
-    let mut good = true;
+    let mut is_valid = true;
     for (field, suffix) in [("limits_", ""), ("planning_limits_", ""), ("max_speed_", "_s")] {
         let wrong = format!("{field}{other}{suffix}");
         if let Some(ast) = inside.get(&wrong) {
             let hint = format!("use '{field}{unit}{suffix}'");
             findings.error(ast.span, format!("a {kind} joint has no '{wrong}'"), hint);
-            good = false;
+            is_valid = false;
         }
     }
     let pulses = inside.get("pulses_per_degree");
@@ -217,7 +218,7 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
         );
     }
     let limits = limits?;
-    good.then_some(JointRange {
+    is_valid.then_some(JointRange {
         limits,
         planning_limits: planning?.or(limits),
         max_speed: max_speed?,
@@ -225,7 +226,7 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
     })
 }
 
-/// A limit as written: without the last bits of the conversion.
+/// A limit as it was written, without the rounding error of the conversion.
 fn tidy(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

@@ -1,17 +1,17 @@
-//! Words of a RON text.
+//! Splits a RON text into tokens.
 
 use super::super::diagnostic::{Findings, Span};
 
-/// A word and its place.
+/// A token with its location.
 #[derive(Clone, Debug)]
 pub(super) struct Token {
     pub(super) kind: TokenKind,
     pub(super) span: Span,
-    /// A text without an end: what follows on its line is lost.
+    /// Whether this is a text without an end, so that the rest of its line is lost.
     pub(super) is_torn: bool,
 }
 
-/// Kind of a word.
+/// Kind of a token.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum TokenKind {
     /// One of `( ) [ ] { } : , # !`.
@@ -27,7 +27,7 @@ pub(super) enum TokenKind {
 }
 
 impl TokenKind {
-    /// The word in a message.
+    /// Description for messages.
     pub(super) fn describe(&self) -> String {
         match self {
             Self::Mark(mark) => format!("'{mark}'"),
@@ -39,7 +39,7 @@ impl TokenKind {
     }
 }
 
-/// Cuts a text into words; problems go to `findings`. The last word is always [`TokenKind::End`].
+/// Splits a text into tokens; problems go to `findings`. The last token is always [`TokenKind::End`].
 pub(super) fn tokens(text: &str, findings: &mut Findings<'_>) -> Vec<Token> {
     let mut lexer = Lexer { text, at: 0, is_torn: false };
     let mut tokens = Vec::new();
@@ -104,8 +104,8 @@ impl Lexer<'_> {
                 }
                 _ => {
                     self.bump();
-                    let hint = "a profile is made of names, numbers, \"texts\" and ( ) [ ] { } : ,".to_owned();
-                    findings.error(Span::new(start, self.at), format!("character '{first}' has no place here"), hint);
+                    let hint = "a profile consists of names, numbers, \"texts\" and ( ) [ ] { } : ,".to_owned();
+                    findings.error(Span::new(start, self.at), format!("unexpected character '{first}'"), hint);
                     None
                 }
             };
@@ -116,9 +116,9 @@ impl Lexer<'_> {
         }
     }
 
-    /// White space and comments.
+    /// Skips white space and comments.
     fn skip_blank(&mut self, findings: &mut Findings<'_>) {
-        // A byte order mark is not a character of the text.
+        // Ignore a byte order mark.
         if self.at == 0 && self.peek() == Some('\u{feff}') {
             self.bump();
         }
@@ -159,16 +159,16 @@ impl Lexer<'_> {
         self.skip_while(|c| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.' | '_'));
         let written = self.slice_from(start);
         let plain = written.replace('_', "");
-        // `f64::from_str` also takes "infinity"; such words are left to the reader of values.
-        let known = plain.trim_start_matches(['+', '-']);
+        // `f64::from_str` also accepts "infinity", which is not a number here.
+        let unsigned = plain.trim_start_matches(['+', '-']);
         if let Ok(number) = plain.parse::<f64>()
-            && !known.eq_ignore_ascii_case("infinity")
+            && !unsigned.eq_ignore_ascii_case("infinity")
         {
             return TokenKind::Number(number);
         }
         let hint = "write it like 12, -0.5 or 1.5e-3, without a unit: the unit is in the name of the field".to_owned();
         findings.error(Span::new(start, self.at), format!("'{}' is not a number", super::shortened(written)), hint);
-        // Zero keeps the reader going; the error above keeps the profile from being used.
+        // With zero the parser can continue; the error makes the profile unusable.
         TokenKind::Number(0.0)
     }
 
@@ -176,7 +176,7 @@ impl Lexer<'_> {
         let start = self.at;
         self.bump();
         let mut text = String::new();
-        // Texts of profiles stay on one line, so that a forgotten quote does not swallow the rest of the file.
+        // A text ends with its line, so that a missing quote does not hide the rest of the file.
         while let Some(next) = self.peek().filter(|c| *c != '\n') {
             let escape_start = self.at;
             self.bump();

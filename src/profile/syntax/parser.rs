@@ -1,14 +1,14 @@
-//! Words to tree. A missing comma or colon is reported and passed over; any other syntax error ends the reading, because
-//! what follows would only be noise.
+//! Parses tokens into a tree. A missing comma or colon is reported and skipped; any other syntax error is fatal, because it would
+//! cause many follow-up errors.
 
 use super::super::diagnostic::{Findings, Span};
 use super::lexer::{Token, TokenKind, tokens};
 use super::{Ast, Field, Node};
 
-/// Deepest nesting: far above any profile, far below the end of the stack.
+/// Deepest nesting, which is far above that of any profile and far below the limit of the stack.
 const DEEPEST: usize = 32;
 
-/// Reads a whole text; `None` after a syntax error that cannot be passed over.
+/// Parses a whole text; `None` after a fatal syntax error.
 pub(super) fn parse(text: &str, findings: &mut Findings<'_>) -> Option<Ast> {
     let mut parser = Parser { tokens: tokens(text, findings), at: 0, depth: 0, findings };
     parser.skip_extensions()?;
@@ -29,7 +29,7 @@ struct Parser<'f, 'a> {
     findings: &'f mut Findings<'a>,
 }
 
-/// What stands at the end of the word list; also what a broken list would answer.
+/// The token beyond the end of the list.
 const END: Token = Token { kind: TokenKind::End, span: Span::new(0, 0), is_torn: false };
 
 impl Parser<'_, '_> {
@@ -52,11 +52,11 @@ impl Parser<'_, '_> {
     }
 
     fn take(&mut self, mark: char) -> bool {
-        let found = self.is_mark(mark);
-        if found {
+        let is_next = self.is_mark(mark);
+        if is_next {
             self.at += 1;
         }
-        found
+        is_next
     }
 
     fn fail<T>(&mut self, expected: &str) -> Option<T> {
@@ -73,7 +73,7 @@ impl Parser<'_, '_> {
         self.at.checked_sub(1).and_then(|previous| self.tokens.get(previous))
     }
 
-    /// `#![enable(implicit_some)]` and the like change nothing here.
+    /// Skips `#![enable(implicit_some)]` and similar lines, which have no effect here.
     fn skip_extensions(&mut self) -> Option<()> {
         while self.take('#') {
             if !(self.take('!') && self.take('[')) {
@@ -144,11 +144,11 @@ impl Parser<'_, '_> {
         Some(Ast { span: Span::new(start, end), node })
     }
 
-    /// `( … )`: a struct if a name and a colon come first.
+    /// Parses `( … )`, which is a struct if it starts with a name and a colon.
     fn round(&mut self) -> Option<Node> {
         let open = self.peek().span;
         self.take('(');
-        // A name with a value behind it is a field whose colon is missing.
+        // A name followed by a value is a field with a missing colon.
         let is_struct = matches!(self.peek().kind, TokenKind::Name(_))
             && !matches!(self.peek_second(), TokenKind::Mark(',' | ')' | '(') | TokenKind::End);
         if !is_struct {
@@ -193,16 +193,16 @@ impl Parser<'_, '_> {
             return Some(());
         }
         self.fail_with_hint::<()>("':'", hint.map(str::to_owned));
-        // A value where the colon should stand: only the colon is missing.
+        // If a value follows, only the colon is missing.
         self.begins_value().then_some(())
     }
 
-    /// The comma after an entry, unless the bracket that began at `open` ends here.
+    /// Expects the comma after an entry, unless the bracket opened at `open` ends here.
     fn comma(&mut self, close: char, open: Span) -> Option<()> {
         if self.take(',') || self.is_mark(close) {
             return Some(());
         }
-        // The comma may have been lost with the end of a text; that has been said.
+        // The comma may have been lost with the end of a text, which was reported already.
         if !self.previous().is_some_and(|token| token.is_torn) {
             let line = self.findings.line_of(open);
             let hint = (!self.begins_value()).then(|| format!("the bracket of line {line} is still open here"));
