@@ -1,10 +1,10 @@
-//! Robot profiles: one RON text describes arm, targets, instrument, acceptance limits and cell; checked values come out.
+//! Robot profiles: a RON text that describes arm, targets, instrument, acceptance limits and cell, as checked values.
 //!
-//! [`Profile::parse`] finds all problems of a text in one pass and shows each with line and caret; a [`Profile`] that exists
-//! is consistent. Inside are metre, radian and second; the text carries millimetre and degree in the names of its fields.
+//! [`Profile::parse`] finds all problems of a text in one pass and shows each with line and caret; a [`Profile`] is always
+//! consistent. Values are in metres, radians and seconds; the text uses millimetres and degrees, stated in the field names.
 //! Points are in the flange frame (targets), a link frame (bodies) or the robot base (floor, boxes, tracker), as documented.
 //!
-//! This module reads no files: text in, values and messages out.
+//! This module does not read files; it turns text into values and messages.
 
 mod builtin;
 mod cell;
@@ -34,10 +34,10 @@ use crate::text::{names_of_option, written_as_text};
 /// Angle below which neighbouring axes count as parallel (rad): 1°, far above any assembly error and far below any design angle.
 pub const PARALLEL_TOLERANCE: f64 = crate::units::DEGREE;
 
-/// Uncertainty of a target position that the profile leaves open (m): 50 mm, the size of a flange adapter.
+/// Default uncertainty of a target position (m): 50 mm, the size of a flange adapter.
 pub const FREE_TARGET_UNCERTAINTY: f64 = 50.0 * crate::units::MILLIMETRE;
 
-/// A robot in its cell, checked.
+/// A checked description of a robot in its cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     name: String,
@@ -58,7 +58,7 @@ pub struct Profile {
     tracker: Tracker,
 }
 
-/// What a joint can do, in pendant values: (rad) and (rad/s) for a revolute joint, (m) and (m/s) for a prismatic one.
+/// Limits of a joint in pendant values: (rad) and (rad/s) for a revolute joint, (m) and (m/s) for a prismatic one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointRange {
     /// Lowest and highest value; `None` if the profile gives none.
@@ -123,10 +123,10 @@ names_of_option!(Level);
 written_as_text!(Level);
 
 impl Profile {
-    /// Reads a profile. `file_name` stands in the messages only.
+    /// Reads a profile. `file_name` is used only in messages.
     ///
     /// # Errors
-    /// All problems of the text, warnings among them, if at least one makes the profile unusable; otherwise the warnings
+    /// All problems of the text, including warnings, if at least one makes the profile unusable; otherwise the warnings
     /// come with the profile.
     pub fn parse(text: &str, file_name: &str) -> Result<(Self, Vec<Diagnostic>), ProfileErrors> {
         schema::parse(text, file_name)
@@ -142,7 +142,7 @@ impl Profile {
         &self.title
     }
 
-    /// Where the numbers come from, one line.
+    /// Source of the values, in one line.
     pub fn source(&self) -> &str {
         &self.source
     }
@@ -193,7 +193,7 @@ impl Profile {
         self.instrument.as_ref()
     }
 
-    /// How the instrument is reached, if it is always the same.
+    /// Link to the instrument, if the profile states one.
     pub const fn link(&self) -> Option<&LinkSettings> {
         self.link.as_ref()
     }
@@ -213,12 +213,12 @@ impl Profile {
         &self.keep_out
     }
 
-    /// Where the tracker stands and what it can see.
+    /// Position of the tracker and limits of its line of sight.
     pub const fn tracker(&self) -> &Tracker {
         &self.tracker
     }
 
-    /// The same robot with another target in the place `index`; unchanged if there is none.
+    /// The robot with target `index` replaced; unchanged if there is none.
     #[must_use]
     pub fn with_target(&self, index: usize, target: Target) -> Self {
         let mut changed = self.clone();

@@ -5,7 +5,6 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::diagnostic::{Findings, Span};
 use super::syntax::{Ast, Field, Node, shortened};
-pub(super) use crate::text::near_miss as nearest;
 use crate::text::{is_printable, near_miss};
 use crate::units::Quantity;
 

@@ -1,4 +1,4 @@
-//! How large the deviations of an arm are expected to be: the prior, and the scale between metres and radians.
+//! Expected deviations of an arm: the prior, and the scale between metres and radians.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -18,7 +18,7 @@ pub struct ExpectedDeviations {
     pub joint_offset: f64,
     /// Joint offsets d of prismatic joints (m).
     pub prismatic_offset: f64,
-    /// Parameters with an own value; of targets too.
+    /// Parameters with their own value, including those of targets.
     pub overrides: BTreeMap<ParameterId, f64>,
 }
 
@@ -67,8 +67,8 @@ impl ExpectedDeviations {
     }
 }
 
-/// Expected deviation of all lengths (m) and all angles (rad) of the links, given by the operator instead of the profile's. Its
-/// text reads like `1mm,0.1deg`.
+/// Expected deviation of all lengths (m) and all angles (rad) of the links, given by the operator instead of the profile. As
+/// text, for example `1mm,0.1deg`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedDeviation {
     /// Of every length (m).

@@ -1,9 +1,9 @@
 //! Schema 1 of profile files: the top level. Names carry units (mm, deg, mrad, um); unknown fields are errors.
 //!
-//! Needed: `schema`, `name`, `title`, `source`, `convention`, `joints` with `name`, `type`, `alpha_deg`, `a_mm`, `d_mm`,
-//! `theta_deg`. All else may be left out:
+//! Required: `schema`, `name`, `title`, `source`, `convention`, `joints` with `name`, `type`, `alpha_deg`, `a_mm`, `d_mm`,
+//! `theta_deg`. All other fields are optional:
 //!
-//! | field | left out |
+//! | field | default |
 //! |---|---|
 //! | `base`, `flange`: `(xyz_mm, rpy_deg)` | identity; roll, pitch, yaw about fixed axes as in URDF |
 //! | joint `beta_deg` | the link has no β, and none is identified |
@@ -33,7 +33,7 @@ use crate::kinematics::{Convention, Joint, KinematicChain};
 use crate::units::{from_deg, from_mm};
 use joint::DecodedJoint;
 
-/// The schema that this program writes and reads.
+/// Schema version that this program reads and writes.
 const SCHEMA: f64 = 1.0;
 
 const FIELDS: &[&str] = &[
@@ -97,7 +97,7 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let fixed_parameters = parameters::fixed(&top, parameters.as_ref(), findings);
     let expected_deviations = parameters::expected_deviations(&top, parameters.as_ref(), findings);
 
-    // From here on everything is needed; what is missing was reported above.
+    // All values are required from here on; missing ones were reported above.
     let decoded = joints?;
     let joints = decoded.complete?;
     let spans: Vec<_> = joints.iter().map(|joint| joint.span).collect();
@@ -153,7 +153,7 @@ fn schema_number(top: &Fields<'_>, findings: &mut Findings<'_>) {
     }
 }
 
-/// A name that can be typed on a command line and used in a file name.
+/// Decodes a name that is suitable for command lines and file names.
 fn short_name(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
     let name = text(ast, findings)?;
     if name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '_' | '-')) {
@@ -164,7 +164,7 @@ fn short_name(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
     None
 }
 
-/// `(xyz_mm: (…), rpy_deg: (…))`: fixed-axis roll, pitch, yaw as in URDF.
+/// Decodes `(xyz_mm: (…), rpy_deg: (…))` with fixed-axis roll, pitch, yaw as in URDF.
 fn pose(ast: &Ast, what: &str, findings: &mut Findings<'_>) -> Option<Isometry3<f64>> {
     let inside = fields(ast, what, &["xyz_mm", "rpy_deg"], findings)?;
     let origin = inside.get_or("xyz_mm", Point3::origin(), |ast| point(ast, findings));

@@ -151,7 +151,7 @@ fn coupling(ast: &Ast, own: usize, names: &[Option<String>], findings: &mut Find
         let index = names.iter().position(|known| known.as_deref() == Some(name));
         match (index, number(value, findings)) {
             (Some(index), _) if index == own => {
-                let hint = "name another joint; for the direction of the joint itself use 'direction'".to_owned();
+                let hint = "name another joint; for the joint itself use 'direction'".to_owned();
                 findings.error(span, format!("joint '{}' is coupled to itself", shortened(name)), hint);
                 is_valid = false;
             }

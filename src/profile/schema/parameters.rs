@@ -1,11 +1,12 @@
 //! Parameters named in a profile: fixed ones and expected deviations.
 
-use super::super::decode::{Fields, fields, list, nearest, number_map, positive};
+use super::super::decode::{Fields, fields, list, number_map, positive};
 use super::super::diagnostic::{Findings, Span};
 use super::super::syntax::{Node, shortened};
 use super::super::{ExpectedDeviations, Target};
 use super::joint::JointShape;
 use crate::kinematics::{LinkParameter, ParameterId};
+use crate::text::near_miss;
 use crate::units::{MILLIMETRE, MILLIRADIAN};
 
 /// The parameters that an arm has.
@@ -28,7 +29,8 @@ impl Known {
         if id.is_none() {
             let names: Vec<String> = self.ids.iter().map(ToString::to_string).collect();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            let suggestion = nearest(name, &names).map_or_else(String::new, |near| format!("did you mean '{near}'? "));
+            let suggestion =
+                near_miss(name, &names).map_or_else(String::new, |near| format!("did you mean '{near}'? "));
             let hint = format!("{suggestion}allowed: {}", names.join(", "));
             findings.error(span, format!("the arm has no parameter '{}'", shortened(name)), hint);
         }
