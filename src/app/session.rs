@@ -12,6 +12,7 @@ use crate::report::identification_text;
 use crate::session::export;
 use crate::session::journal::{Journal, instrument_text, target_text};
 use crate::session::plan::PoseKind;
+use crate::session::set_up::Step;
 use crate::session::state::{SampleState, Session};
 use crate::store;
 use crate::store::session::{folders, read_journal};
@@ -96,7 +97,7 @@ fn show<O: Write, E: Write>(
     );
     line("instrument", session.instrument.as_ref().map_or_else(|| "-".to_owned(), instrument_text));
     line("SMR", session.target.as_ref().map_or_else(|| "-".to_owned(), target_text));
-    line("step", format!("{} of 8: {}", session.step.number(), session.step));
+    line("step", format!("{} of {}: {}", session.step.number(), Step::ALL.len(), session.step));
     let count = |kind| session.counted_of(kind).count();
     line(
         "samples",

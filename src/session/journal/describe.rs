@@ -2,7 +2,7 @@
 
 use super::entry::{Correction, Decision, Entry, MeasuredText, PlanText};
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{About, InstrumentChoice, TargetChoice};
+use crate::session::set_up::{About, InstrumentChoice, Step, TargetChoice};
 use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictStatus};
 use crate::session::wire::LinkChoice;
 
@@ -14,7 +14,7 @@ impl Entry {
             Self::Profile { source, sha256, .. } => {
                 format!("profile '{source}' (sha256 {}…)", sha256.chars().take(12).collect::<String>())
             }
-            Self::Step(step) => format!("step {} of 8: {step}", step.number()),
+            Self::Step(step) => format!("step {} of {}: {step}", step.number(), Step::ALL.len()),
             Self::Instrument(instrument) => format!("instrument: {}", instrument_text(instrument)),
             Self::Connected { identity } => format!("connected: {identity}"),
             Self::Target(target) => format!("SMR: {}", target_text(target)),
