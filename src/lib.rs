@@ -14,7 +14,7 @@
 //! - [`model`]: models of the arm in the formats of others, in and out.
 //! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
-//! - [`search`], [`error`]: a pose search on several threads; how a command ends and what the operator is told.
+//! - [`search`], [`error`]: a pose search on several threads; how a command ends and what its message says.
 //! - [`procedure`]: the calibration itself on data in memory, the same for commands and wizard. No files, no clock.
 //! - [`wizard`]: the guided calibration as a pure state machine.
 //! - [`runtime`]: turns its effects into work on threads, and answers into events.

@@ -16,7 +16,7 @@ pub fn available_threads() -> usize {
 /// Runs a search on up to `threads` threads named `search-0`, `search-1`, …; the calling thread waits.
 ///
 /// `keep_going` is asked before every exchange and may come from any thread; once it says no, the best set so far is returned.
-/// `progress` is told of every sweep, also from any thread.
+/// `progress` receives every sweep, from any thread.
 ///
 /// # Errors
 /// No start found a set that determines what the pool can.

@@ -53,7 +53,9 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
         choose(&loaded, &request, &keep_going, console)?
     };
     warnings.append(&mut summary.warnings);
-    warnings.iter_mut().for_each(|warning| warning.put_into_words(advice::words));
+    for warning in &mut warnings {
+        warning.put_into_words(advice::words);
+    }
     summary.warnings = warnings;
     summary.elapsed_s = clock.seconds();
     if let Some(file) = &args.out {

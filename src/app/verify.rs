@@ -95,7 +95,9 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     if args.refit == Refit::None {
         warnings.splice(0..0, moved_set_up(&verification.identified));
     }
-    warnings.iter_mut().for_each(|warning| warning.put_into_words(advice::words));
+    for warning in &mut warnings {
+        warning.put_into_words(advice::words);
+    }
     let inputs = vec![input_file(InputRole::Calibration, file, text.as_bytes()), measured.input];
     let report = VerificationReport {
         schema: SCHEMA,

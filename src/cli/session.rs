@@ -25,7 +25,7 @@ pub enum SessionCommand {
         #[arg(long, conflicts_with = "journal")]
         json: bool,
     },
-    /// Write the report of a session anew from its journal: report.html to read and print, report.json for programs
+    /// Write the report of a session again from its journal: report.html to read and print, report.json for programs
     Report {
         /// Folder of the session
         #[arg(value_name = "DIR")]

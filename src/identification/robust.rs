@@ -150,7 +150,7 @@ fn suspect_at(samples: usize) -> f64 {
 
 /// Leaves out, for a start, what the nominal arm already shows to be impossible: a mistyped joint puts a point metres off, and one
 /// such point can lead a least-squares fit astray for good. Trust 1 or 0 per place, from a robust registration of the nominal
-/// predictions; the deviations of a real arm stay far below the limit, and later rounds take back whoever fits.
+/// predictions; the deviations of a real arm stay far below the limit, and later rounds take back the samples that fit.
 pub(crate) fn gross_trust(problem: &Problem<'_>, predicted: &[Point3<f64>]) -> Vec<f64> {
     let all = Weights::uniform(problem, MILLIMETRE);
     let places = problem.observations.points.len();

@@ -1,7 +1,7 @@
 //! Accuracy on samples that the identification did not see.
 //!
 //! Errors are measured − predicted. Position errors need the registration of the instrument, which comes from the identification
-//! set (or, for another set-up, is fitted anew and said so); distance errors need none.
+//! set (or, for another set-up, is fitted again, which the result says); distance errors need none.
 
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 

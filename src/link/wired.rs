@@ -479,10 +479,13 @@ impl Wired {
         let reflector = identity.reflector.map_or_else(String::new, |reflector| {
             format!(", reflector {} (offset {:.3} mm)", reflector.name, reflector.offset * 1e3)
         });
-        let remarks = identity.warnings.iter().chain(&identity.notes);
-        let remarks: String = remarks.map(|remark| format!("; {remark}")).collect();
         let robot = if self.robot.is_some() { "; the robot reports its joint angles" } else { "" };
-        Ok(format!("{}{reflector}{robot}{remarks}", identity.name))
+        let mut description = format!("{}{reflector}{robot}", identity.name);
+        for remark in identity.warnings.iter().chain(&identity.notes) {
+            description.push_str("; ");
+            description.push_str(remark);
+        }
+        Ok(description)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The cell as planning sees it: plain values, filled by whoever knows the robot profile.
+//! The cell as planning sees it: plain values, filled in from the robot profile.
 
 use nalgebra::{Point3, Unit, Vector3};
 use thiserror::Error;

@@ -59,7 +59,7 @@ mod tests {
     fn parts_of_an_earlier_version_are_removed_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["recording.part-001.rrd", ".recording-x.tmp", "recording.part-of-mine.txt", FILE_NAME] {
-            fs::write(folder.path().join(name), "").unwrap();
+            store::replace(&folder.path().join(name), "").unwrap();
         }
         assert_eq!(remove_old_parts(folder.path()), 2);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);

@@ -105,6 +105,7 @@ pub struct Details {
 }
 
 /// Writes a plan without its rows, but with its search even if that is empty.
+#[expect(clippy::ref_option, reason = "the signature that serde asks for")]
 fn plan<S: Serializer>(plan: &Option<PlanText>, serializer: S) -> Result<S::Ok, S::Error> {
     let Some(PlanText { origin, condition_number, predicted_error_sigma, minutes, search, rows: _ }) = plan else {
         return serializer.serialize_none();

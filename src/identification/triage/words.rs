@@ -149,7 +149,7 @@ fn advice(cause: &Cause, names: &Names<'_>) -> String {
         Cause::WrongPose { .. } | Cause::StayedAtPrevious => "move to the pose shown and measure again".to_owned(),
         Cause::SwappedRows { .. } => "exchange the two points".to_owned(),
         Cause::TargetMoved { since, .. } => format!(
-            "check the seat of the SMR; if it has moved, measure again from {} on, or begin anew",
+            "check the seat of the SMR; if it has moved, measure again from {} on, or start again",
             (names.sample)(*since)
         ),
         Cause::InstrumentMoved { since } => {

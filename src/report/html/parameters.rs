@@ -68,7 +68,7 @@ fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> Stri
 /// Number, from 1, of the group of parameters that are only known together.
 fn group_of(document: &Document, id: ParameterId) -> Option<usize> {
     let groups = &document.result.as_ref()?.blind_groups;
-    groups.iter().position(|group| group.parameters.iter().any(|parameter| *parameter == id)).map(|index| index + 1)
+    groups.iter().position(|group| group.parameters.contains(&id)).map(|index| index + 1)
 }
 
 fn blind(result: &IdentificationSummary) -> String {

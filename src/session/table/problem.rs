@@ -31,9 +31,9 @@ pub enum Defect {
         /// Why.
         reason: String,
     },
-    /// A cell in quotation marks that goes on over the end of its line.
+    /// A cell in quotation marks that continues past the end of its line.
     #[error(
-        "a quotation mark opens a cell that goes on to line {last_line}, so none of these lines can be read; \
+        "a quotation mark opens a cell that continues to line {last_line}, so none of these lines can be read; \
          close it on its own line"
     )]
     OpenQuote {

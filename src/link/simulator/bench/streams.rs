@@ -104,6 +104,9 @@ fn replay<P: Protocol>(mut protocol: P, tape: &Tape, cuts: impl Fn(usize) -> Vec
 
 /// Asserts that a conversation gives the same results when it is split in two at every byte, into single bytes, at random offsets
 /// and into random pieces. Returns its events.
+///
+/// # Panics
+/// A split changes a result.
 pub fn assert_splits_change_nothing<P: Protocol>(make: impl Fn() -> P, tape: &Tape) -> Vec<ProtocolEvent> {
     let whole = replay(make(), tape, |_| Vec::new());
     // All feeds are split at the same offset at once, which covers every offset of every feed.
