@@ -291,7 +291,7 @@ fn where_the_robot_fails_the_instrument_is_not_blamed_for_it() {
 fn a_simulator_that_cannot_tell_shots_from_looks_does_not_go_on_by_itself() {
     let refused = trupose(&["simulate", "ndi", "--listen", "127.0.0.1:0", "--shots", "3"]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(text(&refused.stderr).contains("give 'next'"), "{}", text(&refused.stderr));
+    assert!(text(&refused.stderr).contains("type 'next'"), "{}", text(&refused.stderr));
 }
 
 #[test]

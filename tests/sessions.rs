@@ -462,7 +462,7 @@ fn a_journal_that_cannot_grow_stops_the_run_and_goes_on_later() {
     for blocks in (1..full / 512).step_by(3) {
         let place = Place::new();
         let script = place.write_steps("run.script.ron", &whole());
-        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{}' --script {script} --json", PROGRAM);
+        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' --script {script} --json");
         let output = Command::new("sh").args(["-c", &limited]).current_dir(place.0.path()).output().unwrap();
         says_what_is_safe(&place, &output, "File too large");
         stopped += 1;

@@ -46,7 +46,8 @@ pub(crate) fn trupose_in(folder: &Path, arguments: &[&str]) -> Output {
 pub(crate) fn skip(reason: &str) {
     // The harness names the thread of a test after it.
     let thread = thread::current();
-    writeln!(io::stderr(), "SKIPPED {}: {reason}", thread.name().unwrap_or("a test")).unwrap();
+    let line = format!("SKIPPED {}: {reason}\n", thread.name().unwrap_or("a test"));
+    io::stderr().write_all(line.as_bytes()).unwrap();
 }
 
 /// A file or folder of the measured data, in `TRUPOSE_MEASURED_DATA` or beside the project; where it is missing the test is skipped.

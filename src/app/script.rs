@@ -219,13 +219,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_may_not_write_a_session_is_told_what_to_do() {
+    fn a_session_that_may_not_be_written_says_what_to_do() {
         let failure = |kind: io::ErrorKind| {
             session_failure(&StoreError::Write { path: "s/.lock".into(), source: kind.into() }.into())
         };
         for kind in [io::ErrorKind::PermissionDenied, io::ErrorKind::ReadOnlyFilesystem] {
             let hints = failure(kind).hints;
-            assert!(hints.iter().any(|hint| hint.contains("write-protected")), "{hints:?}");
+            assert!(hints.iter().any(|hint| hint.contains("read-only")), "{hints:?}");
         }
         assert!(failure(io::ErrorKind::StorageFull).hints.is_empty());
     }
