@@ -3,7 +3,7 @@
 //! A recording is a function of the journal: `renderer` turns journal lines into rows, `rrd` encodes them, and [`rebuild`] replaces
 //! the whole file. While a session is measured, a thread ([`Recorder`]) does that every few seconds and at the end. A recording
 //! that is lost or lacks the last lines can be made again at any time. It carries the text of the journal as well, so a recording
-//! that was sent by mail can be replayed in a terminal ([`read`]).
+//! that was sent by mail can be replayed in a terminal ([`read()`]).
 //!
 //! Positions and transforms in a recording are 32-bit floats, as the viewer wants them: exact to 0.25 µm at 3 m. Numbers that
 //! are plotted, and the journal's text, are exact.
