@@ -132,7 +132,7 @@ fn separate(text: &str) -> Result<Vec<String>, &'static str> {
             (false, false) => Ok(words(&text.replace(',', "."))),
         };
     }
-    // `1.5,2.5,3.5`: separators, if every part can be a number by itself.
+    // `1.5,2.5,3.5`: separators, if every part is a number on its own.
     let parts: Vec<&str> = text.split(',').collect();
     let is_clear = parts.len() == 3 && (text.contains('.') || parts.iter().all(|part| part.trim().len() > 3));
     if is_clear { Ok(words(&text.replace(',', " "))) } else { Err(SEPARATE) }
