@@ -35,6 +35,7 @@ mod arm;
 mod chain;
 mod forward;
 mod jacobian;
+mod joint_error;
 mod parameters;
 
 use thiserror::Error;
@@ -43,6 +44,9 @@ pub use arm::{Arm, Place, PreparedArm};
 pub use chain::{Convention, Joint, JointType, KinematicChain, Link};
 pub use forward::ForwardKinematics;
 pub use jacobian::{ConfigurationJacobian, IdentificationJacobian};
+pub use joint_error::{
+    GRAVITY, JointError, JointTerm, LinkMass, Loads, MAX_ORDER, SMOOTH_ORDERS, TiltAxis, curve_share,
+};
 pub use parameters::{Axis, FreeParameter, LinkParameter, ParameterId, ParameterUnit};
 
 /// A geometry that cannot be built, or a parameter that does not exist.

@@ -15,6 +15,8 @@ pub const INCH: f64 = 25.4e-3;
 pub const DEGREE: f64 = PI / 180.0;
 /// One milliradian (rad).
 pub const MILLIRADIAN: f64 = 1e-3;
+/// A microradian in rad.
+pub const MICRORADIAN: f64 = 1e-6;
 
 /// Metres of a length in millimetres.
 pub const fn from_mm(length_mm: f64) -> f64 {

@@ -239,7 +239,9 @@ fn lone_parameter(id: ParameterId, name: &str) -> String {
         ParameterId::Link { joint: 0, .. } => {
             format!("{name}: cannot be found from distances, it only moves the robot's base frame")
         }
-        ParameterId::Link { .. } | ParameterId::Target { .. } => format!("{name}: has no effect on these measurements"),
+        ParameterId::Link { .. } | ParameterId::Joint { .. } | ParameterId::Target { .. } => {
+            format!("{name}: has no effect on these measurements")
+        }
     }
 }
 

@@ -34,6 +34,10 @@ impl Arm {
     pub fn value(&self, id: ParameterId) -> Option<f64> {
         match id {
             ParameterId::Link { joint, parameter } => Some(self.chain.joints().get(joint)?.link.value(parameter)),
+            ParameterId::Joint { joint, term } => {
+                let has_term = self.chain.has_term(joint, term);
+                self.chain.errors().get(joint).filter(|_| has_term).map(|error| error.value(term))
+            }
             ParameterId::Target { target, axis } => Some(self.targets.get(target)?[axis.index()]),
         }
     }
@@ -55,6 +59,10 @@ impl Arm {
     fn value_mut(&mut self, id: ParameterId) -> Option<&mut f64> {
         match id {
             ParameterId::Link { joint, parameter } => Some(self.chain.link_mut(joint)?.value_mut(parameter)),
+            ParameterId::Joint { joint, term } if self.chain.has_term(joint, term) => {
+                self.chain.error_mut(joint)?.value_mut(term)
+            }
+            ParameterId::Joint { .. } => None,
             ParameterId::Target { target, axis } => Some(&mut self.targets.get_mut(target)?[axis.index()]),
         }
     }

@@ -1,9 +1,11 @@
 //! The geometry of a serial arm: links, joints, couplings and the two fixed frames around them.
 
+use std::sync::Arc;
+
 use clap::ValueEnum;
 use nalgebra::Isometry3;
 
-use super::KinematicsError;
+use super::{JointError, KinematicsError, Loads};
 use crate::units::Quantity;
 
 /// Order of the elementary transforms of a link, with β as Hayati added it. The comments on the values are the help of
@@ -91,6 +93,9 @@ pub struct KinematicChain {
     base: Isometry3<f64>,
     joints: Vec<Joint>,
     flange: Isometry3<f64>,
+    /// One per joint.
+    errors: Vec<JointError>,
+    loads: Option<Arc<Loads>>,
 }
 
 impl KinematicChain {
@@ -126,7 +131,8 @@ impl KinematicChain {
                 });
             }
         }
-        Ok(Self { convention, base, joints, flange })
+        let errors = vec![JointError::default(); n];
+        Ok(Self { convention, base, joints, flange, errors, loads: None })
     }
 
     /// Order of the elementary transforms.
@@ -157,6 +163,30 @@ impl KinematicChain {
     /// Length of the arm stretched out (m): no point of it is much farther from its base.
     pub fn length(&self) -> f64 {
         self.joints.iter().map(|joint| joint.link.a.abs() + joint.link.d.abs()).sum()
+    }
+
+    /// What each joint does besides turning by its value.
+    pub fn errors(&self) -> &[JointError] {
+        &self.errors
+    }
+
+    /// Gravity on the joints, where the masses of the links are known.
+    pub fn loads(&self) -> Option<&Loads> {
+        self.loads.as_deref()
+    }
+
+    /// The geometry alone.
+    #[must_use]
+    pub fn without_errors(&self) -> Self {
+        Self { errors: vec![JointError::default(); self.dof()], loads: None, ..self.clone() }
+    }
+
+    pub(super) fn loaded(self, loads: Option<Arc<Loads>>) -> Self {
+        Self { loads, ..self }
+    }
+
+    pub(super) fn error_mut(&mut self, joint: usize) -> Option<&mut JointError> {
+        self.errors.get_mut(joint)
     }
 
     /// The link driven by a joint, to change its constants.

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::{Convention, Joint, JointType, KinematicChain, Link};
+use super::joint_error::RelativeLoad;
+use super::{Convention, Joint, JointError, JointType, KinematicChain, Link};
 
 /// A chain prepared for many configurations: sines and cosines of the constant angles are computed once.
 #[derive(Clone, Debug)]
@@ -13,7 +14,18 @@ pub struct ForwardKinematics<'a> {
     flange_rotation: Matrix3<f64>,
     flange_translation: Vector3<f64>,
     flange_is_identity: bool,
+    disturbance: Disturbance,
 }
+
+/// What moves the joints besides their values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Disturbance {
+    None,
+    Curves,
+    Loads,
+}
+
+const UNLOADED: RelativeLoad = RelativeLoad { torque: 0.0, moment: [0.0; 2] };
 
 /// Link constants with the sine and cosine of the fixed angles.
 #[derive(Clone, Copy, Debug)]
@@ -87,6 +99,8 @@ pub(super) struct LinkAxes {
     pub(super) z: Vector3<f64>,
     /// A point on the axis of θ.
     pub(super) z_origin: Vector3<f64>,
+    /// Axes of a tilt of the joint's bearing, through the same point.
+    pub(super) tilt: [Vector3<f64>; 2],
     /// Axis of β.
     pub(super) y: Vector3<f64>,
     /// A point on the axis of β.
@@ -105,14 +119,27 @@ impl PreparedLink {
 
     /// Moves `frame` over this link at kinematic joint variable `variable` and returns the link's axes on the way.
     #[inline]
-    pub(super) fn advance(&self, convention: Convention, variable: f64, frame: &mut Frame) -> LinkAxes {
+    fn advance(&self, convention: Convention, variable: f64, error: &Vector3<f64>, frame: &mut Frame) -> LinkAxes {
         let (theta, d) = match self.joint_type {
             JointType::Revolute => (self.link.theta + variable, self.link.d),
             JointType::Prismatic => (self.link.theta, self.link.d + variable),
         };
+        let theta = theta + error.z;
         let mut axes = LinkAxes::default();
+        let tilt = |frame: &mut Frame| {
+            let x = frame.x;
+            if error.x != 0.0 {
+                frame.rotate_x(error.x.sin_cos());
+            }
+            let y = frame.y;
+            if error.y != 0.0 {
+                frame.rotate_y(error.y.sin_cos());
+            }
+            [x, y]
+        };
         match convention {
             Convention::Standard => {
+                axes.tilt = tilt(frame);
                 axes.z = frame.z;
                 axes.z_origin = frame.origin;
                 frame.rotate_z(theta.sin_cos());
@@ -132,6 +159,7 @@ impl PreparedLink {
                 axes.y = frame.y;
                 axes.y_origin = frame.origin;
                 frame.rotate_y(self.beta);
+                axes.tilt = tilt(frame);
                 axes.z = frame.z;
                 axes.z_origin = frame.origin;
                 frame.rotate_z(theta.sin_cos());
@@ -153,6 +181,13 @@ impl<'a> ForwardKinematics<'a> {
             flange_rotation: *flange.rotation.to_rotation_matrix().matrix(),
             flange_translation: flange.translation.vector,
             flange_is_identity: *flange == Isometry3::identity(),
+            disturbance: if chain.errors().iter().any(JointError::is_loaded) {
+                Disturbance::Loads
+            } else if chain.errors().iter().any(|error| *error != JointError::default()) {
+                Disturbance::Curves
+            } else {
+                Disturbance::None
+            },
         }
     }
 
@@ -178,12 +213,48 @@ impl<'a> ForwardKinematics<'a> {
         let mut poses = Vec::with_capacity(self.links.len() + 2);
         poses.push(self.base.to_isometry());
         let mut frame = self.base;
+        let errors = self.errors(q);
         for (index, (prepared, joint)) in self.links.iter().zip(self.chain.joints()).enumerate() {
-            prepared.advance(self.chain.convention(), joint.variable(index, q), &mut frame);
+            let error = errors.get(index).copied().unwrap_or_default();
+            prepared.advance(self.chain.convention(), joint.variable(index, q), &error, &mut frame);
             poses.push(frame.to_isometry());
         }
         poses.push(self.base_from_flange(q));
         poses
+    }
+
+    /// Small rotations of the joints about x, y and z (rad); empty where there are none.
+    fn errors(&self, q: &[f64]) -> Vec<Vector3<f64>> {
+        match self.disturbance {
+            Disturbance::None => Vec::new(),
+            Disturbance::Curves | Disturbance::Loads => {
+                let of_joints = self.chain.errors().iter().enumerate();
+                let loads = if self.disturbance == Disturbance::Loads { self.relative_loads(q) } else { Vec::new() };
+                of_joints
+                    .map(|(joint, error)| {
+                        error.rotation(q.get(joint).copied().unwrap_or(0.0), loads.get(joint).unwrap_or(&UNLOADED))
+                    })
+                    .collect()
+            }
+        }
+    }
+
+    /// Gravity on each joint relative to the largest; empty without masses.
+    pub(super) fn relative_loads(&self, q: &[f64]) -> Vec<RelativeLoad> {
+        self.chain.loads().map_or_else(Vec::new, |loads| loads.relative(&loads.forward(), q))
+    }
+
+    /// Frames of the joints before their own rotation, frames at the ends of the links, and the flange.
+    pub(super) fn frames(&self, q: &[f64]) -> (Vec<Frame>, Vec<Frame>, Frame) {
+        let (mut joints, mut ends) = (Vec::with_capacity(self.links.len()), Vec::with_capacity(self.links.len()));
+        let mut frame = self.base;
+        for (index, (prepared, joint)) in self.links.iter().zip(self.chain.joints()).enumerate() {
+            let variable = joint.variable(index, q);
+            let axes = prepared.advance(self.chain.convention(), variable, &Vector3::zeros(), &mut frame);
+            joints.push(Frame { x: axes.tilt[0], y: axes.tilt[1], z: axes.z, origin: axes.z_origin });
+            ends.push(frame);
+        }
+        (joints, ends, self.flange_of(frame))
     }
 
     /// Moves a frame from the base to the flange; `visit` receives the axes of each link on the way.
@@ -191,10 +262,16 @@ impl<'a> ForwardKinematics<'a> {
     pub(super) fn flange_frame(&self, q: &[f64], mut visit: impl FnMut(usize, &LinkAxes)) -> Frame {
         let mut frame = self.base;
         let convention = self.chain.convention();
+        let errors = self.errors(q);
         for (index, (prepared, joint)) in self.links.iter().zip(self.chain.joints()).enumerate() {
-            let axes = prepared.advance(convention, joint.variable(index, q), &mut frame);
+            let error = errors.get(index).copied().unwrap_or_default();
+            let axes = prepared.advance(convention, joint.variable(index, q), &error, &mut frame);
             visit(index, &axes);
         }
+        self.flange_of(frame)
+    }
+
+    fn flange_of(&self, mut frame: Frame) -> Frame {
         if !self.flange_is_identity {
             let axes = frame.axes();
             frame.origin += axes * self.flange_translation;

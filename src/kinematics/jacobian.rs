@@ -3,7 +3,8 @@
 use nalgebra::{Matrix6xX, Point3, Vector3};
 
 use super::forward::LinkAxes;
-use super::{ForwardKinematics, JointType, LinkParameter, ParameterId, Place, PreparedArm};
+use super::joint_error::harmonics;
+use super::{ForwardKinematics, JointTerm, JointType, LinkParameter, ParameterId, Place, PreparedArm};
 
 /// Evaluates `B = ∂p/∂(parameters)`, equations (17)–(20) of the method paper, for a fixed list of parameters.
 ///
@@ -13,12 +14,35 @@ use super::{ForwardKinematics, JointType, LinkParameter, ParameterId, Place, Pre
 pub struct IdentificationJacobian {
     parameters: Vec<ParameterId>,
     links: Vec<LinkAxes>,
+    /// Highest order of a harmonic of each joint.
+    orders: Vec<usize>,
+    /// `sin(h q)` and `cos(h q)` of each joint at the configuration, h from 1.
+    harmonics: Vec<Vec<(f64, f64)>>,
+    needs_loads: bool,
 }
 
 impl IdentificationJacobian {
     /// Prepares the derivatives by these parameters, in this order.
     pub fn new(parameters: &[ParameterId]) -> Self {
-        Self { parameters: parameters.to_vec(), links: Vec::new() }
+        let mut orders = Vec::new();
+        let mut needs_loads = false;
+        for id in parameters {
+            if let ParameterId::Joint { joint, term } = *id {
+                let order = match term {
+                    JointTerm::Sine(order) | JointTerm::Cosine(order) => usize::from(order),
+                    JointTerm::Compliance | JointTerm::Tilt(_) => {
+                        needs_loads = true;
+                        0
+                    }
+                };
+                if orders.len() <= joint {
+                    orders.resize(joint + 1, 0);
+                }
+                orders[joint] = orders[joint].max(order);
+            }
+        }
+        let harmonics = vec![Vec::new(); orders.len()];
+        Self { parameters: parameters.to_vec(), links: Vec::new(), orders, harmonics, needs_loads }
     }
 
     /// Number of parameters `n`.
@@ -54,6 +78,11 @@ impl IdentificationJacobian {
         let links = &mut self.links;
         links.resize(arm.chain().dof(), LinkAxes::default());
         let flange = arm.flange_frame(q, |index, axes| links[index] = *axes);
+        for (joint, (orders, values)) in self.orders.iter().zip(&mut self.harmonics).enumerate() {
+            values.clear();
+            values.extend(harmonics(q.get(joint).copied().unwrap_or(0.0), *orders));
+        }
+        let loads = if self.needs_loads { arm.relative_loads(q) } else { Vec::new() };
         let axes = flange.axes();
         let point = flange.origin + axes * target_in_flange.coords;
         let (x_row, rest) = rows.split_at_mut(n);
@@ -69,6 +98,20 @@ impl IdentificationJacobian {
                         LinkParameter::Theta => link.z.cross(&(point - link.z_origin)),
                         LinkParameter::Beta => link.y.cross(&(point - link.y_origin)),
                     }
+                }
+                ParameterId::Joint { joint, term } => {
+                    let link = &links[joint];
+                    let harmonic = |order: u8| self.harmonics[joint].get(usize::from(order).wrapping_sub(1));
+                    let load = loads.get(joint);
+                    let (axis, part) = match term {
+                        JointTerm::Compliance => (&link.z, load.map_or(0.0, |load| load.torque)),
+                        JointTerm::Tilt(axis) => {
+                            (&link.tilt[axis.index()], load.map_or(0.0, |load| load.moment[axis.index()]))
+                        }
+                        JointTerm::Sine(order) => (&link.z, harmonic(order).map_or(0.0, |(sine, _)| *sine)),
+                        JointTerm::Cosine(order) => (&link.z, harmonic(order).map_or(0.0, |(_, cosine)| *cosine)),
+                    };
+                    axis.cross(&(point - link.z_origin)) * part
                 }
                 ParameterId::Target { target: of, axis } if of == target => axes.column(axis.index()).into(),
                 ParameterId::Target { .. } => Vector3::zeros(),

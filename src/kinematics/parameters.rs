@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Convention, JointType, KinematicChain, KinematicsError, Link};
+use super::{Convention, JointTerm, JointType, KinematicChain, KinematicsError, Link};
 use crate::text::{self, names, written_as_text};
-use crate::units::{DEGREE, MILLIMETRE, Quantity};
+use crate::units::{DEGREE, MICRORADIAN, MILLIMETRE, Quantity};
 
 /// A wrong name in a message is cut at this many columns.
 const LONGEST_NAME: usize = 40;
@@ -112,6 +112,13 @@ pub enum ParameterId {
         /// Which constant.
         parameter: LinkParameter,
     },
+    /// A term of the error of joint `joint`.
+    Joint {
+        /// Index of the joint, from 0.
+        joint: usize,
+        /// Which term.
+        term: JointTerm,
+    },
     /// A coordinate of target `target` in the flange frame.
     Target {
         /// Index of the target, from 0.
@@ -144,6 +151,7 @@ impl ParameterId {
                 Quantity::Length => ParameterUnit::Millimetre,
                 Quantity::Angle => ParameterUnit::Degree,
             },
+            Self::Joint { .. } => ParameterUnit::Microradian,
             Self::Target { .. } => ParameterUnit::Millimetre,
         }
     }
@@ -151,7 +159,7 @@ impl ParameterId {
     /// Index of the joint whose link it shapes; `None` for what sits on the flange.
     pub const fn joint(self) -> Option<usize> {
         match self {
-            Self::Link { joint, .. } => Some(joint),
+            Self::Link { joint, .. } | Self::Joint { joint, .. } => Some(joint),
             Self::Target { .. } => None,
         }
     }
@@ -159,7 +167,7 @@ impl ParameterId {
     /// Index of the target that it places; `None` for what belongs to the arm itself.
     pub const fn target(self) -> Option<usize> {
         match self {
-            Self::Link { .. } => None,
+            Self::Link { .. } | Self::Joint { .. } => None,
             Self::Target { target, .. } => Some(target),
         }
     }
@@ -174,16 +182,24 @@ impl ParameterId {
                     None => format!("link {}: {what}", joint + 1),
                 }
             }
+            Self::Joint { joint, term } => {
+                let what = term.meaning();
+                match chain.joints().get(joint) {
+                    Some(joint) => format!("{}: {what}", joint.name),
+                    None => format!("joint {}: {what}", joint + 1),
+                }
+            }
             Self::Target { target, axis } => format!("SMR {} on the flange, {}", target + 1, axis.name()),
         }
     }
 }
 
-/// `alpha1`, `d2`, `beta2`, `target1.x`.
+/// `alpha1`, `d2`, `beta2`, `joint2.compliance`, `joint1.tilt_x`, `joint6.sin3`, `target1.x`.
 impl fmt::Display for ParameterId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = match self {
             Self::Link { joint, parameter } => format!("{}{}", parameter.name(), joint + 1),
+            Self::Joint { joint, term } => format!("joint{}.{term}", joint + 1),
             Self::Target { target, axis } => format!("target{}.{}", target + 1, axis.name()),
         };
         f.pad(&name)
@@ -194,6 +210,9 @@ impl FromStr for ParameterId {
     type Err = KinematicsError;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
+        if let Some(id) = joint_term(name) {
+            return Ok(id);
+        }
         let number: String = name.chars().filter(char::is_ascii_digit).collect();
         let index = number.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         let mut candidates = index.into_iter().flat_map(|index| Self::of_joint(index).chain(Self::of_target(index)));
@@ -203,6 +222,14 @@ impl FromStr for ParameterId {
     }
 }
 
+/// The term of a joint with this name, such as `joint6.sin3`.
+fn joint_term(name: &str) -> Option<ParameterId> {
+    let (number, term) = name.strip_prefix("joint")?.split_once('.')?;
+    let joint = number.parse::<usize>().ok()?.checked_sub(1)?;
+    let term = JointTerm::all().find(|known| known.to_string() == term)?;
+    Some(ParameterId::Joint { joint, term }).filter(|id| id.to_string() == name)
+}
+
 /// The unit that people read a parameter in. Inside, lengths are in metres and angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ParameterUnit {
@@ -210,9 +237,11 @@ pub enum ParameterUnit {
     Millimetre,
     /// Of an angle.
     Degree,
+    /// Of a small angle.
+    Microradian,
 }
 
-names!(ParameterUnit { Millimetre = "mm", Degree = "deg", });
+names!(ParameterUnit { Millimetre = "mm", Degree = "deg", Microradian = "urad", });
 written_as_text!(ParameterId, ParameterUnit);
 
 impl ParameterUnit {
@@ -221,6 +250,7 @@ impl ParameterUnit {
         match self {
             Self::Millimetre => MILLIMETRE,
             Self::Degree => DEGREE,
+            Self::Microradian => MICRORADIAN,
         }
     }
 
@@ -228,7 +258,7 @@ impl ParameterUnit {
     pub const fn of_the_paper(self) -> f64 {
         match self {
             Self::Millimetre => MILLIMETRE,
-            Self::Degree => 1.0,
+            Self::Degree | Self::Microradian => 1.0,
         }
     }
 

@@ -43,7 +43,7 @@ impl ExpectedDeviations {
     pub const fn field_of(id: ParameterId) -> &'static str {
         match id.unit() {
             ParameterUnit::Millimetre => "parameters_mm",
-            ParameterUnit::Degree => "parameters_mrad",
+            ParameterUnit::Degree | ParameterUnit::Microradian => "parameters_mrad",
         }
     }
 
@@ -54,6 +54,7 @@ impl ExpectedDeviations {
         }
         match id {
             ParameterId::Target { target, .. } => targets.get(target).map_or(self.length, |target| target.uncertainty),
+            ParameterId::Joint { term, .. } => term.expected(),
             ParameterId::Link { joint, parameter } => {
                 let joint_type = chain.joints().get(joint).map(|joint| joint.joint_type);
                 match (parameter, joint_type) {
@@ -78,7 +79,7 @@ pub struct ExpectedDeviation {
 }
 
 impl ExpectedDeviation {
-    /// Replaces the expected deviations of the link constants among `parameters`; targets keep theirs.
+    /// Replaces the expected deviations of the link constants among `parameters`; errors of joints and targets keep theirs.
     pub fn replace_in(self, parameters: &mut [FreeParameter]) {
         for free in parameters {
             match free.id {
@@ -88,7 +89,7 @@ impl ExpectedDeviation {
                         Quantity::Angle => self.angle,
                     };
                 }
-                ParameterId::Target { .. } => {}
+                ParameterId::Joint { .. } | ParameterId::Target { .. } => {}
             }
         }
     }
