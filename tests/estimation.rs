@@ -10,7 +10,7 @@ use trupose::identification::predicted::position_covariances;
 use trupose::identification::verification::{DirectErrors, ModelErrors};
 use trupose::identification::{
     Estimator, Identification, IdentificationError, Length, LengthEnd, Observations, PointSample, Rejected,
-    RejectionReason, SampleIndex, Settings, SharedPoint, SigmaSource, Weighting, identify,
+    RejectionReason, SampleIndex, Settings, SharedPoint, SigmaSource, TerminationReason, Weighting, identify,
 };
 use trupose::kinematics::{Arm, Axis, FreeParameter, LinkParameter, ParameterId, Place};
 use trupose::units::{MICROMETRE, MILLIMETRE};
@@ -34,15 +34,22 @@ fn drawn_deviations(parameters: &[FreeParameter], rng: &mut rand_chacha::ChaCha8
 /// result itself states. The combinations are the principal axes of the stated covariance (in expected deviations) within
 /// the directions that are not blind.
 fn normalised_errors(settings: &Settings, noise: f64) -> Vec<f64> {
-    const TRIALS: usize = 1000;
+    normalised_errors_of(settings, 1000, &|truth, rng| PaperCase::simulated(truth, 56, noise, rng))
+}
+
+fn normalised_errors_of(
+    settings: &Settings,
+    trials: usize,
+    simulated: &dyn Fn(&DVector<f64>, &mut rand_chacha::ChaCha8Rng) -> PaperCase,
+) -> Vec<f64> {
     let parameters = paper_parameters();
     let scale = DVector::from_iterator(parameters.len(), parameters.iter().map(|p| 1.0 / p.expected));
     let scale = DMatrix::from_diagonal(&scale);
     let mut squares: Vec<f64> = Vec::new();
-    for trial in 0..TRIALS {
+    for trial in 0..trials {
         let mut rng = seeded(1000 + trial as u64);
         let truth = drawn_deviations(&parameters, &mut rng);
-        let case = PaperCase::simulated(&truth, 56, noise, &mut rng);
+        let case = simulated(&truth, &mut rng);
         let found = run(&case, settings);
         let error = DVector::from_iterator(parameters.len(), found.estimates.iter().map(|e| e.deviation)) - &truth;
         let blind = &found.observability.blind;
@@ -61,7 +68,7 @@ fn normalised_errors(settings: &Settings, noise: f64) -> Vec<f64> {
         combinations.sort_by(|a, b| a.0.total_cmp(&b.0));
         squares.resize(combinations.len(), 0.0);
         for (sum, (_, z)) in squares.iter_mut().zip(&combinations) {
-            *sum += z * z / TRIALS as f64;
+            *sum += z * z / trials as f64;
         }
     }
     squares.into_iter().map(f64::sqrt).collect()
@@ -93,6 +100,72 @@ fn stated_standard_deviations_are_true() {
         assert!(deviations.iter().all(|value| (value - 1.0).abs() < tolerance), "{name}: {deviations:.3?}");
         let all = root_mean_square(&deviations);
         assert!((0.9..1.1).contains(&all), "{name}: {all}");
+    }
+}
+
+/// Every pose of a simulated set read several times: `shots` in turn, with an error of the pose and one of each reading (m).
+fn with_shots(case: &mut PaperCase, shots: &[usize], pose: f64, reading: f64, rng: &mut rand_chacha::ChaCha8Rng) {
+    let poses = std::mem::take(&mut case.observations.points);
+    for (mut sample, count) in poses.into_iter().zip(shots.iter().cycle()) {
+        for axis in 0..3 {
+            sample.point[axis] += pose * normal(rng);
+        }
+        for _ in 0..*count {
+            let mut shot = sample.clone();
+            for axis in 0..3 {
+                shot.point[axis] += reading * normal(rng);
+            }
+            case.observations.points.push(shot);
+        }
+    }
+}
+
+#[test]
+fn readings_of_one_pose_share_its_error() {
+    for shots in [&[1][..], &[3], &[5], &[1, 3, 5]] {
+        for (pose, reading) in [(0.0, 30.0), (20.0, 20.0), (100.0, 10.0)] {
+            for stated in [None, Some((reading * MICROMETRE, SigmaSource::Instrument))] {
+                let settings = Settings { sigma: stated, ..Settings::default() };
+                let deviations = normalised_errors_of(&settings, 100, &|truth, rng| {
+                    let mut case = PaperCase::simulated(truth, 56, 0.0, rng);
+                    with_shots(&mut case, shots, pose * MICROMETRE, reading * MICROMETRE, rng);
+                    case
+                });
+                let all = root_mean_square(&deviations);
+                println!("{shots:?} {pose} {reading} {stated:?}: {all:.3}");
+                assert!((0.9..1.1).contains(&all), "{shots:?} {pose} {reading} {stated:?}: {deviations:.3?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn good_data_converge_in_a_few_steps() {
+    for poses in [56, 600, 1500, 12_000] {
+        for (stated, pose) in [(None, 0.0), (Some(20.0), 6.0), (Some(10.0), 300.0), (None, 300.0)] {
+            for shots in if poses == 56 { &[1, 3, 12][..] } else { &[1] } {
+                let mut rng = seeded(5);
+                let mut case = PaperCase::simulated(&paper_deviations(), poses, 0.0, &mut rng);
+                with_shots(&mut case, &[*shots], pose * MICROMETRE, stated.unwrap_or(20.0) * MICROMETRE, &mut rng);
+                let sigma = stated.map(|stated| (stated * MICROMETRE, SigmaSource::Instrument));
+                let found = run(&case, &Settings { sigma, ..Settings::default() });
+                assert_eq!(found.termination, TerminationReason::Converged, "{poses} {stated:?} {pose} {shots}");
+                assert!(found.iterations.len() <= 20, "{poses} {stated:?} {pose} {shots}: {}", found.iterations.len());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_stated_sigma_below_what_is_found_changes_nothing() {
+    let mut rng = seeded(8);
+    let mut case = PaperCase::simulated(&paper_deviations(), 56, 0.0, &mut rng);
+    with_shots(&mut case, &[1], 200.0 * MICROMETRE, 10.0 * MICROMETRE, &mut rng);
+    let unstated = run(&case, &Settings::default());
+    let stated = run(&case, &settings());
+    for (with, without) in stated.estimates.iter().zip(&unstated.estimates) {
+        assert!((with.deviation - without.deviation).abs() < 0.01 * without.sigma, "{}", with.id);
+        assert!((with.sigma / without.sigma - 1.0).abs() < 0.01, "{}", with.id);
     }
 }
 

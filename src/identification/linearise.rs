@@ -5,6 +5,7 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, SymmetricEigen, Vector3};
 
+use super::noise::{Groups, Noise, place_weights};
 use super::problem::{LengthEnd, Problem};
 use crate::geometry::register;
 use crate::kinematics::{Arm, IdentificationJacobian};
@@ -52,15 +53,53 @@ impl Evaluation {
     }
 }
 
-/// How much each observation counts.
+/// Which observations count.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Trust {
+    /// Factor per point and per seat of a shared point in 0 … 1: below one for a suspicious sample, zero for a rejected one.
+    pub(crate) places: Vec<f64>,
+    /// The same per measured length.
+    pub(crate) lengths: Vec<f64>,
+}
+
+impl Trust {
+    /// Every observation counts.
+    pub(crate) fn full(problem: &Problem<'_>) -> Self {
+        let observations = problem.observations;
+        Self { places: vec![1.0; judged_places(problem)], lengths: vec![1.0; observations.lengths.len()] }
+    }
+
+    /// Trust of a sample, counted over places with a residual of their own and then lengths.
+    pub(crate) fn of_sample(&self, sample: usize) -> f64 {
+        self.places.iter().chain(&self.lengths).nth(sample).copied().unwrap_or(0.0)
+    }
+
+    /// Sets the trust of a sample, counted as in [`Self::of_sample`].
+    pub(crate) fn set_sample(&mut self, sample: usize, value: f64) {
+        if let Some(trust) = self.places.iter_mut().chain(&mut self.lengths).nth(sample) {
+            *trust = value;
+        }
+    }
+
+    /// Number of samples, and of those with trust.
+    pub(crate) fn samples(&self) -> (usize, usize) {
+        let all = self.places.iter().chain(&self.lengths);
+        (all.clone().count(), all.filter(|trust| **trust > 0.0).count())
+    }
+}
+
+/// Places with a residual vector of their own: points and seats of shared points.
+pub(crate) fn judged_places(problem: &Problem<'_>) -> usize {
+    problem.observations.points.len() + problem.observations.shared.iter().map(|shared| shared.at.len()).sum::<usize>()
+}
+
+/// How much each observation weighs: trust over variance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Weights {
-    /// Standard deviation of a coordinate (m) where the reading has none.
-    pub(crate) sigma: f64,
-    /// Factor per place in 0 … 1: below one for a suspicious sample, zero for a rejected one.
-    pub(crate) trust: Vec<f64>,
-    /// The same per measured length.
-    pub(crate) length_trust: Vec<f64>,
+    /// Inverse variance of each coordinate of a point or seat (1/m²), zero for one that does not count.
+    places: Vec<f64>,
+    /// Variance of each measured length without that of shared points at its ends (m²), and its trust.
+    lengths: Vec<(f64, f64)>,
 }
 
 /// No instrument is better than this (m). Smaller values, a σ typed in the wrong unit, would drown the expected deviations in
@@ -68,46 +107,46 @@ pub(crate) struct Weights {
 pub(crate) const SMALLEST_SIGMA: f64 = 0.1 * MICROMETRE;
 
 impl Weights {
+    /// All alike, with the standard deviation `sigma` (m).
     pub(crate) fn uniform(problem: &Problem<'_>, sigma: f64) -> Self {
-        let observations = problem.observations;
+        Self::trusting(problem, &Trust::full(problem), sigma)
+    }
+
+    /// All that are trusted alike, with the standard deviation `sigma` (m).
+    pub(crate) fn trusting(problem: &Problem<'_>, trust: &Trust, sigma: f64) -> Self {
+        let of_length = |length: &super::Length| length.sigma.unwrap_or(sigma).max(SMALLEST_SIGMA).powi(2);
+        let lengths = problem.observations.lengths.iter().zip(&trust.lengths);
         Self {
-            sigma,
-            trust: vec![1.0; observations.places().count()],
-            length_trust: vec![1.0; observations.lengths.len()],
+            places: trust.places.iter().map(|trust| trust / (sigma * sigma)).collect(),
+            lengths: lengths.map(|(length, trust)| (of_length(length), *trust)).collect(),
         }
     }
 
-    /// Standard deviation of a coordinate of place `index` (m): of its reading, else the common one.
-    pub(crate) fn sigma_of(&self, problem: &Problem<'_>, index: usize) -> f64 {
-        let reading = problem.observations.points.get(index).and_then(|sample| sample.sigma);
-        reading.map_or(self.sigma, |sigma| sigma.max(SMALLEST_SIGMA))
-    }
-
-    /// Trust of a sample, counted over places with a residual of their own and then lengths.
-    pub(crate) fn of_sample(&self, sample: usize, places: usize) -> f64 {
-        let trust = if sample < places { self.trust.get(sample) } else { self.length_trust.get(sample - places) };
-        trust.copied().unwrap_or(0.0)
-    }
-
-    /// Sets the trust of a sample, counted as in [`Self::of_sample`].
-    pub(crate) fn set_sample(&mut self, sample: usize, places: usize, value: f64) {
-        let trust =
-            if sample < places { self.trust.get_mut(sample) } else { self.length_trust.get_mut(sample - places) };
-        if let Some(trust) = trust {
-            *trust = value;
+    /// As their noise and trust have it.
+    pub(crate) fn new(problem: &Problem<'_>, groups: &Groups, noise: &Noise, trust: &Trust) -> Self {
+        let lengths = trust.lengths.iter().enumerate();
+        Self {
+            places: place_weights(problem, groups, noise, trust),
+            lengths: lengths.map(|(index, trust)| (noise.of_length(problem, index), *trust)).collect(),
         }
     }
 
-    /// Number of samples with trust, counted as in [`Self::of_sample`].
-    pub(crate) fn accepted(&self, places: usize) -> usize {
-        self.trust.iter().take(places).chain(&self.length_trust).filter(|trust| **trust > 0.0).count()
+    /// Inverse variance of each coordinate of place `index` (1/m²).
+    pub(crate) fn of_place(&self, index: usize) -> f64 {
+        self.places[index]
     }
 
-    /// Inverse variance of each coordinate of place `index`.
-    fn of_place(&self, problem: &Problem<'_>, index: usize) -> f64 {
-        self.trust[index] / self.sigma_of(problem, index).powi(2)
+    /// The factor by which `other` weighs every place more; `None` if it is not the same for all.
+    pub(crate) fn proportion_of(&self, other: &Self) -> Option<f64> {
+        let weighed = other.places.iter().zip(&self.places).filter(|(a, b)| **a > 0.0 || **b > 0.0);
+        let mut ratios = weighed.map(|(a, b)| a / b);
+        let first = ratios.next().filter(|first| first.is_finite() && *first > 0.0)?;
+        ratios.all(|ratio| (ratio / first - 1.0).abs() < PROPORTIONAL).then_some(first)
     }
 }
+
+/// Weights that differ by less than this have the same frames.
+const PROPORTIONAL: f64 = 1e-9;
 
 /// Normal equations of the linearised problem, without prior: `gram · δ = gradient`.
 #[derive(Clone, Debug)]
@@ -126,10 +165,17 @@ impl NormalEquations {
     fn zeros(n: usize) -> Self {
         Self { gram: DMatrix::zeros(n, n), gradient: DVector::zeros(n), cost: 0.0, gradient_covariance: None }
     }
+
+    /// The same with every weight multiplied by `factor`.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        self.gram *= factor;
+        self.gradient *= factor;
+        self.cost *= factor;
+    }
 }
 
 /// Frames and residuals of the measured points at an estimate.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct PointResiduals {
     /// Pose of each station in the robot base; identity where a station has no point.
     pub(crate) base_from_station: Vec<Isometry3<f64>>,
@@ -137,6 +183,13 @@ pub(crate) struct PointResiduals {
     pub(crate) of_places: Vec<Vector3<f64>>,
     /// Weighted centroid of the predicted points of each station (m).
     centroids: Vec<Point3<f64>>,
+}
+
+impl PointResiduals {
+    /// Weighted centroid of the predicted points of a station (m).
+    pub(crate) fn centroid(&self, station: usize) -> Point3<f64> {
+        self.centroids.get(station).copied().unwrap_or_else(Point3::origin)
+    }
 }
 
 /// Registers every station and takes every shared point at its weighted mean: what the distances leave open.
@@ -148,8 +201,7 @@ pub(crate) fn point_residuals(problem: &Problem<'_>, points: &[Point3<f64>], wei
     let mut centroids = vec![Point3::origin(); stations];
     for station in 0..stations {
         let members = samples.iter().enumerate().filter(|(_, sample)| sample.station == station);
-        let pairs =
-            members.clone().map(|(index, sample)| (weights.of_place(problem, index), points[index], sample.point));
+        let pairs = members.clone().map(|(index, sample)| (weights.of_place(index), points[index], sample.point));
         let Some(registration) = register(pairs) else { continue };
         centroids[station] = registration.centroid_from;
         let base_from = registration.to_from_from.inverse();
@@ -159,7 +211,7 @@ pub(crate) fn point_residuals(problem: &Problem<'_>, points: &[Point3<f64>], wei
         }
     }
     for range in shared_ranges(problem) {
-        let mean = weighted_mean(problem, weights, range.clone(), |index| points[index].coords);
+        let mean = weighted_mean(weights, range.clone(), |index| points[index].coords);
         for index in range {
             of_places[index] = mean - points[index].coords;
         }
@@ -177,29 +229,32 @@ fn shared_ranges(problem: &Problem<'_>) -> impl Iterator<Item = std::ops::Range<
 }
 
 fn weighted_mean(
-    problem: &Problem<'_>,
     weights: &Weights,
     range: std::ops::Range<usize>,
     value: impl Fn(usize) -> Vector3<f64>,
 ) -> Vector3<f64> {
     let (mut total, mut sum) = (0.0, Vector3::zeros());
     for index in range {
-        let weight = weights.of_place(problem, index);
+        let weight = weights.of_place(index);
         total += weight;
         sum += value(index) * weight;
     }
     if total > 0.0 { sum / total } else { sum }
 }
 
-/// Weighted rows `√w · r` with their residuals `√w · (measured − predicted)`, free of every frame.
+/// Rows of the Jacobian with their residuals, free of every frame, and what each weighs.
 #[derive(Clone, Debug)]
 pub(crate) struct ProjectedRows {
     /// Number of parameters.
     pub(crate) n: usize,
-    /// `n` numbers per row.
+    /// `n` numbers per row: three rows per point or seat, then one per length.
     pub(crate) rows: Vec<f64>,
-    /// One residual per row.
+    /// Measured − predicted (m), one per row.
     pub(crate) residuals: Vec<f64>,
+    /// Inverse variance (1/m²), one per row; zero where a sample does not count.
+    pub(crate) weights: Vec<f64>,
+    /// Variance of each length (m²), whether it counts or not.
+    pub(crate) length_variances: Vec<f64>,
 }
 
 /// The position problem with the rigid motion of every station, every shared point, and the turn of the base under shared
@@ -209,75 +264,110 @@ pub(crate) struct ProjectedRows {
 /// About the centroid the columns of a shift and of a turn are orthogonal, so the projection needs no decomposition:
 /// `B − mean(B)`, then `− (I⁻¹ Σ w r×B) × r` with the inertia I. Shared points do not see a turn of the base either; their
 /// rows would show one of the size of the residuals, `ω × (p − mean)`, which means nothing.
-///
-/// What is projected out is fitted with `weights`; the rows themselves are multiplied by the weights of `scale`, which is the
-/// same except where samples that do not count are to be judged.
 pub(crate) fn project(
     problem: &Problem<'_>,
-    mut evaluation: Evaluation,
+    evaluation: Evaluation,
     residuals: &PointResiduals,
     weights: &Weights,
-    scale: &Weights,
 ) -> ProjectedRows {
     let n = evaluation.n;
-    let lengths = length_rows(problem, &evaluation, weights, scale);
-    let samples = &problem.observations.points;
-    for (station, centroid) in residuals.centroids.iter().enumerate() {
-        let members: Vec<usize> = (0..samples.len()).filter(|&index| samples[index].station == station).collect();
-        let arms: Vec<Vector3<f64>> = members.iter().map(|&index| evaluation.points[index] - centroid).collect();
-        remove_mean(problem, &mut evaluation, &members, weights);
-        remove_turn(problem, &mut evaluation, &members, &arms, weights);
-    }
-    let mut seats = Vec::new();
-    for range in shared_ranges(problem) {
-        let members: Vec<usize> = range.collect();
-        remove_mean(problem, &mut evaluation, &members, weights);
-        seats.extend(members);
-    }
-    let arms: Vec<Vector3<f64>> = seats.iter().map(|&index| -residuals.of_places[index]).collect();
-    remove_turn(problem, &mut evaluation, &seats, &arms, weights);
-    let independent = samples.len() + seats.len();
-    let Evaluation { mut rows, .. } = evaluation;
-    rows.truncate(3 * n * independent);
-    let mut values = Vec::with_capacity(3 * independent + lengths.residuals.len());
-    for index in 0..independent {
-        let root = scale.of_place(problem, index).sqrt();
-        for value in &mut rows[3 * n * index..3 * n * (index + 1)] {
-            *value *= root;
+    let (length_rows, length_residuals) = length_rows(problem, &evaluation, weights);
+    let Evaluation { mut rows, points, .. } = evaluation;
+    let places = judged_places(problem);
+    rows.truncate(3 * n * places);
+    rows.extend(length_rows);
+    let mut projected =
+        ProjectedRows { n, rows, residuals: length_residuals, weights: Vec::new(), length_variances: Vec::new() };
+    projected.project(problem, &points, residuals, weights);
+    projected
+}
+
+impl ProjectedRows {
+    /// Takes what the frames explain from the rows, for these weights; rows that were projected with others have lost nothing else,
+    /// so they can be projected again.
+    pub(crate) fn project(
+        &mut self,
+        problem: &Problem<'_>,
+        points: &[Point3<f64>],
+        residuals: &PointResiduals,
+        weights: &Weights,
+    ) {
+        let n = self.n;
+        let samples = &problem.observations.points;
+        for (station, centroid) in residuals.centroids.iter().enumerate() {
+            let members: Vec<usize> = (0..samples.len()).filter(|&index| samples[index].station == station).collect();
+            let arms: Vec<Vector3<f64>> = members.iter().map(|&index| points[index] - centroid).collect();
+            remove_mean(n, &mut self.rows, &members, weights);
+            remove_turn(n, &mut self.rows, &members, &arms, weights);
         }
-        values.extend(residuals.of_places[index].iter().map(|value| value * root));
+        let mut seats = Vec::new();
+        for range in shared_ranges(problem) {
+            let members: Vec<usize> = range.collect();
+            remove_mean(n, &mut self.rows, &members, weights);
+            seats.extend(members);
+        }
+        let arms: Vec<Vector3<f64>> = seats.iter().map(|&index| -residuals.of_places[index]).collect();
+        remove_turn(n, &mut self.rows, &seats, &arms, weights);
+        let places = judged_places(problem);
+        let of_lengths = self.residuals.split_off(self.residuals.len() - problem.observations.lengths.len());
+        self.residuals = residuals.of_places[..places].iter().flat_map(|residual| residual.iter().copied()).collect();
+        self.residuals.extend(of_lengths);
+        self.weigh(problem, weights);
     }
-    rows.extend(lengths.rows);
-    values.extend(lengths.residuals);
-    ProjectedRows { n, rows, residuals: values }
+
+    /// Gives the rows other weights in the same proportion.
+    pub(crate) fn weigh(&mut self, problem: &Problem<'_>, weights: &Weights) {
+        self.weights.clear();
+        self.length_variances.clear();
+        self.weights.extend(weights.places.iter().flat_map(|weight| [*weight; 3]));
+        let ranges: Vec<_> = shared_ranges(problem).collect();
+        for (length, (variance, trust)) in problem.observations.lengths.iter().zip(&weights.lengths) {
+            // A shared point is known only as the mean of its seats.
+            let of_end = |end: &LengthEnd| match end {
+                LengthEnd::Target(_) => 0.0,
+                LengthEnd::SharedPoint(shared) => {
+                    let information: f64 = ranges[*shared].clone().map(|index| weights.of_place(index)).sum();
+                    if information > 0.0 { 1.0 / information } else { 0.0 }
+                }
+            };
+            let variance = (variance + of_end(&length.from) + of_end(&length.to)).max(f64::MIN_POSITIVE);
+            self.length_variances.push(variance);
+            self.weights.push(trust / variance);
+        }
+    }
+
+    /// Residual vectors of points and seats (m), and residuals of lengths (m), after a change `delta` of the parameters.
+    pub(crate) fn residuals_after(&self, lengths: usize, delta: &DVector<f64>) -> (Vec<Vector3<f64>>, Vec<f64>) {
+        let after: Vec<f64> = if self.n == 0 {
+            self.residuals.clone()
+        } else {
+            let rows = self.rows.chunks_exact(self.n);
+            let change = |row: &[f64]| row.iter().zip(delta.iter()).map(|(row, delta)| row * delta).sum::<f64>();
+            rows.zip(&self.residuals).map(|(row, residual)| residual - change(row)).collect()
+        };
+        let (places, of_lengths) = after.split_at(after.len() - lengths);
+        (places.chunks_exact(3).map(Vector3::from_column_slice).collect(), of_lengths.to_vec())
+    }
 }
 
 /// Takes the weighted mean of the Jacobians from each: a shift of all members.
-fn remove_mean(problem: &Problem<'_>, evaluation: &mut Evaluation, members: &[usize], weights: &Weights) {
-    let n = evaluation.n;
-    let mean = mean_rows(problem, evaluation, members.iter().copied(), weights);
+fn remove_mean(n: usize, rows: &mut [f64], members: &[usize], weights: &Weights) {
+    let mean = mean_rows(n, rows, members.iter().copied(), weights);
     for &index in members {
-        for (value, mean) in evaluation.rows[3 * n * index..3 * n * (index + 1)].iter_mut().zip(&mean) {
+        for (value, mean) in rows[3 * n * index..3 * n * (index + 1)].iter_mut().zip(&mean) {
             *value -= mean;
         }
     }
 }
 
 /// Takes from the Jacobians what a common turn of all members about the origin of `arms` (m) explains.
-fn remove_turn(
-    problem: &Problem<'_>,
-    evaluation: &mut Evaluation,
-    members: &[usize],
-    arms: &[Vector3<f64>],
-    weights: &Weights,
-) {
-    let n = evaluation.n;
+fn remove_turn(n: usize, rows: &mut [f64], members: &[usize], arms: &[Vector3<f64>], weights: &Weights) {
     let mut inertia = Matrix3::zeros();
     let mut turn = vec![0.0; 3 * n];
     for (&index, r) in members.iter().zip(arms) {
-        let weight = weights.of_place(problem, index);
+        let weight = weights.of_place(index);
         inertia += (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * weight;
-        let (bx, by, bz) = split_rows(evaluation.place(index), n);
+        let (bx, by, bz) = split_rows(&rows[3 * n * index..3 * n * (index + 1)], n);
         for c in 0..n {
             turn[c] += weight * (r.y * bz[c] - r.z * by[c]);
             turn[n + c] += weight * (r.z * bx[c] - r.x * bz[c]);
@@ -293,7 +383,7 @@ fn remove_turn(
     }
     let (tx, ty, tz) = split_rows(&turn, n);
     for (&index, r) in members.iter().zip(arms) {
-        let rows = &mut evaluation.rows[3 * n * index..3 * n * (index + 1)];
+        let rows = &mut rows[3 * n * index..3 * n * (index + 1)];
         let (bx, rest) = rows.split_at_mut(n);
         let (by, bz) = rest.split_at_mut(n);
         for c in 0..n {
@@ -304,18 +394,13 @@ fn remove_turn(
     }
 }
 
-fn mean_rows(
-    problem: &Problem<'_>,
-    evaluation: &Evaluation,
-    members: impl Iterator<Item = usize>,
-    weights: &Weights,
-) -> Vec<f64> {
-    let mut mean = vec![0.0; 3 * evaluation.n];
+fn mean_rows(n: usize, rows: &[f64], members: impl Iterator<Item = usize>, weights: &Weights) -> Vec<f64> {
+    let mut mean = vec![0.0; 3 * n];
     let mut total = 0.0;
     for index in members {
-        let weight = weights.of_place(problem, index);
+        let weight = weights.of_place(index);
         total += weight;
-        for (sum, value) in mean.iter_mut().zip(evaluation.place(index)) {
+        for (sum, value) in mean.iter_mut().zip(&rows[3 * n * index..3 * n * (index + 1)]) {
             *sum += weight * value;
         }
     }
@@ -341,88 +426,85 @@ fn pseudo_inverse(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     eigen.eigenvectors * Matrix3::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
 }
 
-/// Rows of the measured lengths: `u · (B_to − B_from)`, equations (16) and (21) with a measured length.
-pub(crate) fn length_rows(
-    problem: &Problem<'_>,
-    evaluation: &Evaluation,
-    weights: &Weights,
-    scale: &Weights,
-) -> ProjectedRows {
+/// Rows of the measured lengths, `u · (B_to − B_from)`, equations (16) and (21) with a measured length, and their residuals (m).
+fn length_rows(problem: &Problem<'_>, evaluation: &Evaluation, weights: &Weights) -> (Vec<f64>, Vec<f64>) {
     let n = evaluation.n;
     let observations = problem.observations;
     let ranges: Vec<_> = shared_ranges(problem).collect();
-    let mut next_place =
-        observations.points.len() + observations.shared.iter().map(|shared| shared.at.len()).sum::<usize>();
-    let mut system = ProjectedRows { n, rows: Vec::new(), residuals: Vec::new() };
-    for (index, length) in observations.lengths.iter().enumerate() {
+    let mut next_place = judged_places(problem);
+    let (mut rows, mut residuals) = (Vec::new(), Vec::new());
+    for length in &observations.lengths {
         let mut end = |end: &LengthEnd| match end {
             LengthEnd::Target(_) => {
                 let index = next_place;
                 next_place += 1;
-                (evaluation.points[index].coords, evaluation.place(index).to_vec(), 0.0)
+                (evaluation.points[index].coords, evaluation.place(index).to_vec())
             }
             LengthEnd::SharedPoint(shared) => {
                 let range = ranges[*shared].clone();
-                let point = weighted_mean(problem, weights, range.clone(), |index| evaluation.points[index].coords);
-                let information: f64 = range.clone().map(|index| weights.of_place(problem, index)).sum();
-                let variance = if information > 0.0 { 1.0 / information } else { 0.0 };
-                (point, mean_rows(problem, evaluation, range, weights), variance)
+                let point = weighted_mean(weights, range.clone(), |index| evaluation.points[index].coords);
+                (point, mean_rows(n, &evaluation.rows, range, weights))
             }
         };
-        let (from, from_rows, from_variance) = end(&length.from);
-        let (to, to_rows, to_variance) = end(&length.to);
+        let (from, from_rows) = end(&length.from);
+        let (to, to_rows) = end(&length.to);
         let difference = to - from;
         let predicted = difference.norm();
         // Two points on top of each other have no direction to differentiate along.
         let u = if predicted > f64::EPSILON { difference / predicted } else { Vector3::zeros() };
-        // A shared point is known only as the mean of its seats.
-        let sigma = length.sigma.unwrap_or(weights.sigma);
-        let sigma = sigma.max(SMALLEST_SIGMA);
-        let root = (scale.length_trust[index] / (sigma * sigma + from_variance + to_variance)).sqrt();
         let (fx, fy, fz) = split_rows(&from_rows, n);
         let (tx, ty, tz) = split_rows(&to_rows, n);
-        for c in 0..n {
-            let row = u.x * (tx[c] - fx[c]) + u.y * (ty[c] - fy[c]) + u.z * (tz[c] - fz[c]);
-            system.rows.push(root * row);
-        }
-        system.residuals.push(root * (length.length - predicted));
+        rows.extend((0..n).map(|c| u.x * (tx[c] - fx[c]) + u.y * (ty[c] - fy[c]) + u.z * (tz[c] - fz[c])));
+        residuals.push(length.length - predicted);
     }
-    system
+    (rows, residuals)
 }
 
 impl ProjectedRows {
     /// Their normal equations, in blocks so that the transposed copy stays in cache.
     pub(crate) fn normal_equations(&self) -> NormalEquations {
+        self.normal_equations_of(0..self.residuals.len())
+    }
+
+    /// Normal equations of some of the rows.
+    pub(crate) fn normal_equations_of(&self, range: std::ops::Range<usize>) -> NormalEquations {
         const BLOCK: usize = 256;
-        let mut normal = NormalEquations::zeros(self.n);
-        if self.n == 0 {
-            normal.cost = self.residuals.iter().map(|value| value * value).sum();
-            return normal;
-        }
-        for (rows, residuals) in self.rows.chunks(BLOCK * self.n).zip(self.residuals.chunks(BLOCK)) {
-            let transposed = DMatrix::from_column_slice(self.n, residuals.len(), rows);
-            let residual = DVector::from_column_slice(residuals);
-            normal.gram.gemm(1.0, &transposed, &transposed.transpose(), 1.0);
-            normal.gradient.gemv(1.0, &transposed, &residual, 1.0);
+        let n = self.n;
+        let mut normal = NormalEquations::zeros(n);
+        let mut start = range.start;
+        while start < range.end {
+            let end = range.end.min(start + BLOCK);
+            let mut transposed = DMatrix::from_column_slice(n, end - start, &self.rows[n * start..n * end]);
+            let mut residual = DVector::from_column_slice(&self.residuals[start..end]);
+            for (index, weight) in self.weights[start..end].iter().enumerate() {
+                let root = weight.sqrt();
+                transposed.column_mut(index).scale_mut(root);
+                residual[index] *= root;
+            }
+            if n > 0 {
+                normal.gram.gemm(1.0, &transposed, &transposed.transpose(), 1.0);
+                normal.gradient.gemv(1.0, &transposed, &residual, 1.0);
+            }
             normal.cost += residual.norm_squared();
+            start = end;
         }
         normal
     }
 
-    /// The triangular factor R of the rows with every column scaled by `scale` (n × n), by blocked Householder QR: same
+    /// The triangular factor R of the weighted rows with every column scaled by `scale` (n × n), by blocked Householder QR: same
     /// singular values as the rows, without squaring them.
     pub(crate) fn triangular_factor(&self, scale: &[f64]) -> DMatrix<f64> {
         const BLOCK: usize = 512;
         let n = self.n;
         let mut factor = DMatrix::zeros(0, n);
-        for rows in self.rows.chunks(BLOCK * n) {
-            let count = rows.len() / n;
+        for (rows, weights) in self.rows.chunks(BLOCK * n.max(1)).zip(self.weights.chunks(BLOCK)) {
             let above = factor.nrows();
-            let mut stacked = DMatrix::zeros(above + count, n);
+            let mut stacked = DMatrix::zeros(above + weights.len(), n);
             stacked.rows_mut(0, above).copy_from(&factor);
-            for (index, row) in rows.chunks(n).enumerate() {
+            for (index, (row, weight)) in rows.chunks(n.max(1)).zip(weights).enumerate() {
+                let root = weight.sqrt();
                 for (column, (value, scale)) in row.iter().zip(scale).enumerate() {
-                    stacked[(above + index, column)] = value * scale;
+                    stacked[(above + index, column)] = value * scale * root;
                 }
             }
             factor = stacked.qr().unpack_r();

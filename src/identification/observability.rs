@@ -61,15 +61,16 @@ impl Observability {
     /// Analyses `problem` at its nominal model.
     pub fn new(problem: &Problem<'_>) -> Self {
         let evaluation = Evaluation::new(problem, problem.arm);
-        Self::of_evaluation(problem, evaluation, &Weights::uniform(problem, 1.0))
+        Self::of_evaluation(problem, evaluation)
     }
 
-    pub(crate) fn of_evaluation(problem: &Problem<'_>, evaluation: Evaluation, weights: &Weights) -> Self {
+    fn of_evaluation(problem: &Problem<'_>, evaluation: Evaluation) -> Self {
+        let weights = &Weights::uniform(problem, 1.0);
         let scale: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.expected).collect();
-        let (pair_gram, scored_points) = scored_pair_gram(problem, &evaluation, weights);
+        let (pair_gram, scored_points) = scored_pair_gram(problem, &evaluation);
         let residuals = point_residuals(problem, &evaluation.points, weights);
         let size = evaluation.largest_column(&scale);
-        let rows = project(problem, evaluation, &residuals, weights, weights);
+        let rows = project(problem, evaluation, &residuals, weights);
         let n = scale.len();
         let svd = rows.triangular_factor(&scale).svd(false, true);
         let mut order: Vec<usize> = (0..n).collect();
@@ -101,7 +102,7 @@ impl Observability {
 
     /// Whether the parameter at `index` can be found on its own.
     pub fn is_identifiable(&self, index: usize) -> bool {
-        self.rank.is_some() && self.blind.row(index).norm_squared() < BLIND_SHARE
+        self.rank.is_some() && (index >= self.blind.nrows() || self.blind.row(index).norm_squared() < BLIND_SHARE)
     }
 }
 
@@ -126,19 +127,14 @@ fn rank_by_gap(values: &[f64], noise: f64) -> (Option<usize>, f64) {
 }
 
 /// Gram matrix of the unweighted pair rows of (at most [`SCORED_POINTS`]) points, and how many were used.
-fn scored_pair_gram(
-    problem: &Problem<'_>,
-    evaluation: &Evaluation,
-    weights: &Weights,
-) -> (Option<DMatrix<f64>>, usize) {
+fn scored_pair_gram(problem: &Problem<'_>, evaluation: &Evaluation) -> (Option<DMatrix<f64>>, usize) {
     let n = evaluation.n;
     let samples = &problem.observations.points;
-    let trusted: Vec<usize> = (0..samples.len()).filter(|&index| weights.trust[index] > 0.0).collect();
-    if trusted.len() < 2 {
+    if samples.len() < 2 {
         return (None, 0);
     }
-    let used = trusted.len().min(SCORED_POINTS);
-    let picked: Vec<usize> = (0..used).map(|i| trusted[i * trusted.len() / used]).collect();
+    let used = samples.len().min(SCORED_POINTS);
+    let picked: Vec<usize> = (0..used).map(|i| i * samples.len() / used).collect();
     let stations = picked.iter().map(|&index| samples[index].station + 1).max().unwrap_or(0);
     let mut gram = DMatrix::zeros(n, n);
     for station in 0..stations {
@@ -150,10 +146,11 @@ fn scored_pair_gram(
                 measured: samples[index].point,
                 rows: &evaluation.rows[3 * n * index..3 * n * (index + 1)],
                 trust: 1.0,
-                sigma: 1.0,
+                group: index,
+                variance: 1.0,
             })
             .collect();
-        gram += pair_sums(&points, n, 1.0).gram;
+        gram += pair_sums(&points, n, 1.0, 0.0).gram;
     }
     (Some(gram), used)
 }

@@ -5,6 +5,8 @@
 //! `Σ_k B_kᵀ C_k`, and the covariance of the gradient for independent *points* (not pairs) is `Σ_k σ_k² C_kᵀ C_k`: memory
 //! grows with the points, not with the pairs.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
 /// Points closer than this (m) have no usable direction between them.
@@ -21,8 +23,10 @@ pub(crate) struct PairPoint<'a> {
     pub(crate) rows: &'a [f64],
     /// Factor of this point in the weight of its pairs.
     pub(crate) trust: f64,
-    /// Standard deviation of a coordinate (m).
-    pub(crate) sigma: f64,
+    /// Points of one group share what their pose has in common.
+    pub(crate) group: usize,
+    /// Variance of a coordinate (m²), beside what the group has in common.
+    pub(crate) variance: f64,
 }
 
 /// Sums over all pairs of one station.
@@ -34,12 +38,13 @@ pub(crate) struct PairSums {
     pub(crate) gradient: DVector<f64>,
     /// `Σ w Δl²`.
     pub(crate) cost: f64,
-    /// Covariance of `gradient` for independent points.
+    /// Covariance of `gradient` for independent poses.
     pub(crate) gradient_covariance: DMatrix<f64>,
 }
 
-/// Sums over all pairs `j < k`, each with weight `weight · trust_j · trust_k`.
-pub(crate) fn pair_sums(points: &[PairPoint<'_>], n: usize, weight: f64) -> PairSums {
+/// Sums over all pairs `j < k`, each with weight `weight · trust_j · trust_k`. `common` is the variance of what the points of a
+/// group have in common (m²).
+pub(crate) fn pair_sums(points: &[PairPoint<'_>], n: usize, weight: f64, common: f64) -> PairSums {
     let mut combined = vec![0.0; 3 * n * points.len()];
     let mut pull = vec![Vector3::zeros(); points.len()];
     let mut row = vec![0.0; n];
@@ -69,12 +74,19 @@ pub(crate) fn pair_sums(points: &[PairPoint<'_>], n: usize, weight: f64) -> Pair
         cost,
         gradient_covariance: DMatrix::zeros(n, n),
     };
+    let mut of_groups = BTreeMap::new();
     for (index, point) in points.iter().enumerate() {
         let combined = DMatrix::from_column_slice(n, 3, &combined[3 * n * index..3 * n * (index + 1)]);
         let jacobian = DMatrix::from_column_slice(n, 3, point.rows);
         sums.gram.gemm(1.0, &jacobian, &combined.transpose(), 1.0);
         sums.gradient.gemv(1.0, &jacobian, &pull[index], 1.0);
-        sums.gradient_covariance.gemm(point.sigma * point.sigma, &combined, &combined.transpose(), 1.0);
+        sums.gradient_covariance.gemm(point.variance, &combined, &combined.transpose(), 1.0);
+        if common > 0.0 {
+            *of_groups.entry(point.group).or_insert_with(|| DMatrix::zeros(n, 3)) += combined;
+        }
+    }
+    for combined in of_groups.values() {
+        sums.gradient_covariance.gemm(common, combined, &combined.transpose(), 1.0);
     }
     sums
 }

@@ -146,7 +146,7 @@ fn expected_residual(problem: &Problem<'_>) -> f64 {
     let evaluation = Evaluation::new(problem, problem.arm);
     let weights = Weights::uniform(problem, 1.0);
     let residuals = point_residuals(problem, &evaluation.points, &weights);
-    let gram = project(problem, evaluation, &residuals, &weights, &weights).normal_equations().gram;
+    let gram = project(problem, evaluation, &residuals, &weights).normal_equations().gram;
     let of_links = problem.parameters.iter().enumerate().filter(|(_, p)| p.id.target().is_none());
     let variance: f64 = of_links.map(|(index, p)| gram[(index, index)] * p.expected * p.expected).sum();
     (variance / problem.observations.points.len().max(1) as f64).sqrt()
@@ -181,7 +181,7 @@ impl<'a, 'p> Trial<'a, 'p> {
             }
         }
         let trust = gross_trust(&problem, &predicted);
-        let weights = Weights { trust, ..Weights::uniform(&problem, MILLIMETRE) };
+        let weights = Weights::trusting(&problem, &trust, MILLIMETRE);
         let mut norms: Vec<f64> =
             point_residuals(&problem, &predicted, &weights).of_places.iter().map(nalgebra::Matrix::norm).collect();
         norms.sort_by(f64::total_cmp);

@@ -167,6 +167,14 @@ pub struct Problem<'a> {
 }
 
 impl Problem<'_> {
+    /// The same problem with other parameters.
+    pub(crate) const fn of_geometry<'b>(&self, parameters: &'b [FreeParameter]) -> Problem<'b>
+    where
+        Self: 'b,
+    {
+        Problem { arm: self.arm, parameters, observations: self.observations }
+    }
+
     /// The ids of the parameters, in order.
     pub fn parameter_ids(&self) -> Vec<ParameterId> {
         self.parameters.iter().map(|parameter| parameter.id).collect()

@@ -6,24 +6,32 @@ use super::observability::Observability;
 use super::settings::{Iteration, SigmaSource, TerminationReason};
 use crate::kinematics::{Arm, ParameterId};
 
-/// The measurement σ of a fit.
+/// How much a coordinate of a reading scatters (standard deviations), and what of: the instrument, readings of one pose among each
+/// other, and what a pose has in common. The latter, repeatability and what the model lacks, is always estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sigma {
-    /// What balanced data and prior (m); with own σ per reading their root mean square.
+    /// All parts together (m): what balanced data and prior.
     pub used: f64,
-    /// Where it comes from.
+    /// Where the part of the instrument comes from; how the whole was found where nothing is stated.
     pub source: SigmaSource,
     /// What the residuals say (m): root mean square per coordinate, corrected for the parameters fitted; `None` without
     /// enough data.
     pub from_residuals: Option<f64>,
-    /// Root mean square of the residuals in units of the σ of each reading, corrected likewise; 1 where σ is right.
+    /// Root mean square of the residuals in units of what the readings of a pose promise, corrected likewise; `None` where nothing
+    /// is stated.
     pub normalised: Option<f64>,
+    /// Part of the instrument as stated (m); with own σ per reading their root mean square.
+    pub instrument: Option<f64>,
+    /// Part of readings of one pose among each other, beyond the instrument (m); zero without repetitions.
+    pub shots: f64,
+    /// Part of what a pose has in common (m).
+    pub poses: f64,
 }
 
 impl Sigma {
-    /// How much larger the residuals are than σ promised; 1 where they fit.
+    /// How much larger the residuals are than the instrument promised; 1 where they fit, or where nothing is stated.
     pub fn excess(&self) -> f64 {
-        self.normalised.map_or(1.0, |normalised| normalised.max(1.0))
+        self.normalised.filter(|_| self.instrument.is_some()).map_or(1.0, |normalised| normalised.max(1.0))
     }
 }
 

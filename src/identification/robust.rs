@@ -5,15 +5,18 @@
 //! outliers, which are then removed for real and the rest is fitted with full weights.
 //!
 //! Samples are judged by their *studentised* residual: the residual in units of what it should scatter by once the fit has
-//! followed it, `√(eᵀ (I − h)⁻¹ e)` with the leverage h, and for a sample left out `√(eᵀ (I + h)⁻¹ e)`. A mistyped joint that
+//! followed it, `√(eᵀ (I − h)⁻¹ e)` with the leverage h, and for a sample left out `√(eᵀ (I + h)⁻¹ e)`; of several readings of one
+//! pose each is judged by a fit without that pose. A mistyped joint that
 //! otherwise hardly moves has all the say about its own parameters: its plain residual is zero, its studentised one is not,
 //! because the expected deviations disagree.
 
 use std::ops::ControlFlow;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, SymmetricEigen, Vector3};
 
-use super::linearise::{Evaluation, Weights, point_residuals, project};
+use super::factor::Factor;
+use super::linearise::{Trust, Weights, point_residuals};
+use super::noise::{GroupMeans, Noise};
 use super::problem::Problem;
 use super::solver::{Linearised, Solve};
 use crate::units::MILLIMETRE;
@@ -42,22 +45,20 @@ const WORST_FIRST: f64 = 0.3;
 const SUSPECT_OF_NOMINAL: f64 = 3.0;
 /// Parameters this many expected deviations from nominal deserve a search for a sample that bent them.
 const RAN_AWAY: f64 = 5.0;
+/// Samples are judged by no smaller scatter than this, in units of what the noise promises.
+const SMALLEST_SCATTER: f64 = 1e-3;
+/// Groups whose predictions are worked out in one product.
+const GROUPS_AT_ONCE: usize = 128;
 /// `1 − h` is not taken below this: beyond, a residual is rounding noise.
 const FULL_LEVERAGE: f64 = 1e-9;
 
-/// Trust and studentised residual of every sample: places with a residual of their own first (points, seats of shared points),
-/// then lengths.
+/// Studentised residual of every sample: places with a residual of their own first (points, seats of shared points), then lengths.
 #[derive(Clone, Debug)]
 pub(crate) struct Judgement {
     /// In units of the robust scatter of the accepted samples of its kind.
     pub(crate) ratios: Vec<f64>,
-    /// That scatter for places, in units of what the weights promise.
+    /// That scatter for places, in units of what the noise promises.
     scatter: f64,
-}
-
-/// Places with a residual vector of their own: points and seats of shared points.
-fn judged_places(problem: &Problem<'_>) -> usize {
-    problem.observations.points.len() + problem.observations.shared.iter().map(|shared| shared.at.len()).sum::<usize>()
 }
 
 /// Standard deviation behind the median of some norms, with the median of the standard distribution.
@@ -69,56 +70,47 @@ fn robust_scale(mut norms: Vec<f64>, median_of_standard: f64) -> Option<f64> {
     })
 }
 
-/// Judges every sample at a fit made with `weights`. `floor` is the smallest scatter, in units of the σ of the weights, that
-/// samples are judged by.
-pub(crate) fn judge(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, floor: f64) -> Judgement {
-    judge_with(solve, at, weights, weights, floor)
+/// What the parameters are known from when samples are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    /// From the trusted samples.
+    FromSamples,
+    /// From their expected deviations alone.
+    FromPrior,
 }
 
-/// As [`judge`], with the frames fitted to the samples that `weights` trusts and the parameters known from those of `counting`.
-fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, counting: &Weights, floor: f64) -> Judgement {
+/// Judges every sample at a fit made with the trust of `solve`.
+pub(crate) fn judge(solve: &Solve<'_, '_>, at: &Linearised) -> Judgement {
+    judge_with(solve, at, Known::FromSamples)
+}
+
+fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, known: Known) -> Judgement {
+    let floor = smallest_scatter(solve, at);
     let problem = solve.problem;
-    let evaluation = Evaluation::new(problem, &at.arm);
-    let residuals = point_residuals(problem, &evaluation.points, weights);
-    let full = Weights::uniform(problem, weights.sigma);
-    let rows = project(problem, evaluation, &residuals, weights, &full);
-    let places = judged_places(problem);
-    let trusted = |sample: usize| counting.of_sample(sample, places) > 0.0;
-    let t = &solve.basis.transform;
-    let row_count = rows.residuals.len();
-    let reduced = t.transpose() * DMatrix::from_column_slice(rows.n, row_count, &rows.rows);
-    let sample_of = |row: usize| if row < 3 * places { row / 3 } else { places + row - 3 * places };
-    let mut counted = reduced.clone();
-    for (row, mut column) in counted.column_iter_mut().enumerate() {
-        if !trusted(sample_of(row)) {
-            column.fill(0.0);
-        }
-    }
-    let mut information = &counted * counted.transpose();
-    for index in 0..information.nrows() {
-        information[(index, index)] += solve.basis.prior_weight;
-    }
-    let samples = places + problem.observations.lengths.len();
-    let whitened = Cholesky::<f64, Dyn>::new(information)
-        .and_then(|factor| factor.l().solve_lower_triangular(&reduced))
-        .unwrap_or_else(|| DMatrix::zeros(reduced.nrows(), row_count));
-    let studentised: Vec<f64> = (0..samples)
-        .map(|sample| {
-            let sign = if trusted(sample) { -1.0 } else { 1.0 };
-            if sample < places {
-                let block = whitened.columns(3 * sample, 3);
-                let leverage = Matrix3::from_fn(|i, j| block.column(i).dot(&block.column(j)));
-                let residual = Vector3::from_column_slice(&rows.residuals[3 * sample..3 * sample + 3]);
-                studentised_norm(&(Matrix3::identity() + leverage * sign), &residual)
-            } else {
-                let row = 3 * places + sample - places;
-                let leverage = whitened.column(row).norm_squared();
-                rows.residuals[row].abs() / (1.0 + sign * leverage).max(FULL_LEVERAGE).sqrt()
-            }
+    let trust = solve.trust;
+    let places = trust.places.len();
+    let samples = places + trust.lengths.len();
+    let counts = |sample: usize| known == Known::FromPrior || trust.of_sample(sample) > 0.0;
+    let predictions = Predictions::new(solve, at, known);
+    let means = GroupMeans::new(problem, solve.groups, &at.noise, trust, &at.points.of_places);
+    let mut studentised: Vec<f64> = (0..places)
+        .map(|place| {
+            let group = solve.groups.of(place);
+            let weight = if known == Known::FromPrior { 0.0 } else { predictions.weights[group] };
+            let variance = at.noise.pose + at.noise.of_reading(Noise::own_sigma(problem, place));
+            let (own, mean) = (&at.points.of_places[place], &means.residual[group]);
+            predicted_without(&predictions.covariances[group], weight, variance, own, mean)
         })
         .collect();
+    studentised.extend((0..trust.lengths.len()).map(|length| {
+        let variance = at.rows.length_variances[length];
+        let leverage = predictions.of_lengths[length] / variance;
+        let sign = if counts(places + length) && known == Known::FromSamples { -1.0 } else { 1.0 };
+        let residual = at.rows.residuals[3 * places + length];
+        residual.abs() / (variance * (1.0 + sign * leverage).max(FULL_LEVERAGE)).sqrt()
+    }));
     let scale = |range: std::ops::Range<usize>, median: f64| {
-        let accepted = range.filter(|sample| trusted(*sample)).map(|sample| studentised[sample]).collect();
+        let accepted = range.filter(|sample| counts(*sample)).map(|sample| studentised[sample]).collect();
         robust_scale(accepted, median).unwrap_or(floor).max(floor)
     };
     let (of_places, of_lengths) = (scale(0..places, MEDIAN_CHI_3), scale(places..samples, MEDIAN_CHI_1));
@@ -130,16 +122,91 @@ fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, weights: &Weights, countin
     Judgement { ratios, scatter: of_places }
 }
 
-/// `√(eᵀ V⁻¹ e)`, with the eigenvalues of V not taken below [`FULL_LEVERAGE`].
-fn studentised_norm(variance: &Matrix3<f64>, residual: &Vector3<f64>) -> f64 {
-    if let Some(factor) = variance.cholesky()
-        && factor.l_dirty().diagonal().min() > FULL_LEVERAGE.sqrt()
-    {
-        return residual.dot(&factor.solve(residual)).max(0.0).sqrt();
+/// The smallest scatter, in units of what the noise promises, that samples are judged by: one within the stated σ is never an
+/// outlier, however good the others are.
+fn smallest_scatter(solve: &Solve<'_, '_>, at: &Linearised) -> f64 {
+    let stated = Noise { shot: 0.0, ..at.noise };
+    let variances =
+        (0..solve.trust.places.len()).map(|place| stated.of_reading(Noise::own_sigma(solve.problem, place)));
+    let mean = variances.sum::<f64>() / solve.trust.places.len().max(1) as f64;
+    (mean / (mean + at.noise.shot + at.noise.pose).max(f64::MIN_POSITIVE)).sqrt().max(SMALLEST_SCATTER)
+}
+
+/// What the fit knows about the places.
+struct Predictions {
+    /// Covariance of the predicted position of each group (m²).
+    covariances: Vec<Matrix3<f64>>,
+    /// Weight of each group in the fit (1/m²).
+    weights: Vec<f64>,
+    /// Variance of each predicted length (m²).
+    of_lengths: Vec<f64>,
+}
+
+impl Predictions {
+    fn new(solve: &Solve<'_, '_>, at: &Linearised, known: Known) -> Self {
+        let places = solve.trust.places.len();
+        let n = at.rows.n;
+        let mut weights = vec![0.0; solve.groups.len()];
+        let mut first = vec![None; solve.groups.len()];
+        for (place, &group) in solve.groups.of_places().iter().enumerate() {
+            weights[group] += at.rows.weights[3 * place];
+            first[group].get_or_insert(place);
+        }
+        let transform = &solve.basis.transform;
+        let mut information = match known {
+            Known::FromSamples => solve.basis.reduce(&at.rows.normal_equations().gram),
+            Known::FromPrior => DMatrix::zeros(transform.ncols(), transform.ncols()),
+        };
+        for index in 0..information.nrows() {
+            information[(index, index)] += solve.basis.prior_weight;
+        }
+        let factor = Factor::new(information);
+        let whitened = |rows: &[f64]| {
+            let reduced = transform.transpose() * DMatrix::from_column_slice(n, rows.len() / n.max(1), rows);
+            factor
+                .as_ref()
+                .map_or_else(|| DMatrix::zeros(reduced.nrows(), reduced.ncols()), |factor| factor.whiten(&reduced))
+        };
+        let mut covariances = Vec::with_capacity(first.len());
+        for groups in first.chunks(GROUPS_AT_ONCE) {
+            let places = groups.iter().map(|place| place.unwrap_or(0));
+            let rows: Vec<f64> =
+                places.flat_map(|place| &at.rows.rows[3 * n * place..3 * n * (place + 1)]).copied().collect();
+            let known = whitened(&rows);
+            covariances.extend((0..groups.len()).map(|group| {
+                let column = |axis: usize| known.column(3 * group + axis);
+                if n == 0 { Matrix3::zeros() } else { Matrix3::from_fn(|i, j| column(i).dot(&column(j))) }
+            }));
+        }
+        let lengths = whitened(&at.rows.rows[3 * n * places..]);
+        let of_lengths = 0..solve.trust.lengths.len();
+        let of_lengths = of_lengths.map(|length| if n == 0 { 0.0 } else { lengths.column(length).norm_squared() });
+        Self { covariances, weights, of_lengths: of_lengths.collect() }
     }
-    let spread = SymmetricEigen::new(*variance);
-    let along = spread.eigenvectors.transpose() * residual;
-    along.component_div(&spread.eigenvalues.map(|value| value.max(FULL_LEVERAGE).sqrt())).norm()
+}
+
+/// Size of the residual `own` of a reading in standard deviations, as seen by a fit without its group. `covariance` is that of the
+/// prediction with the group (m²), `weight` the group's share in it (1/m²), `mean` the group's residual (m) and `variance` that of a
+/// reading (m²). For a single reading this is `√(eᵀ (I − h)⁻¹ e)` with the leverage h.
+fn predicted_without(
+    covariance: &Matrix3<f64>,
+    weight: f64,
+    variance: f64,
+    own: &Vector3<f64>,
+    mean: &Vector3<f64>,
+) -> f64 {
+    let spread = SymmetricEigen::new(*covariance);
+    let own = spread.eigenvectors.transpose() * own;
+    let mean = spread.eigenvectors.transpose() * mean;
+    let square: f64 = (0..3)
+        .map(|axis| {
+            let known = spread.eigenvalues[axis].max(0.0);
+            let left = (1.0 - weight * known).max(FULL_LEVERAGE);
+            let residual = own[axis] + mean[axis] * (1.0 / left - 1.0);
+            residual * residual / (variance + known / left).max(f64::MIN_POSITIVE)
+        })
+        .sum();
+    square.sqrt()
 }
 
 /// More than this many robust standard deviations is what Gaussian noise of so many samples shows in one set of a hundred (chi
@@ -149,36 +216,37 @@ fn suspect_at(samples: usize) -> f64 {
 }
 
 /// Leaves out, for a start, what the nominal arm already shows to be impossible: a mistyped joint puts a point metres off, and one
-/// such point can lead a least-squares fit astray for good. Trust 1 or 0 per place, from a robust registration of the nominal
-/// predictions; the deviations of a real arm stay far below the limit, and later rounds take back the samples that fit.
-pub(crate) fn gross_trust(problem: &Problem<'_>, predicted: &[Point3<f64>]) -> Vec<f64> {
-    let all = Weights::uniform(problem, MILLIMETRE);
+/// such point can lead a least-squares fit astray for good. Trust is 1 or 0, from a robust registration of the nominal
+/// predictions; the deviations of a real arm stay far below the limit, and later rounds take back whatever fits.
+pub(crate) fn gross_trust(problem: &Problem<'_>, predicted: &[Point3<f64>]) -> Trust {
+    let mut trust = Trust::full(problem);
     let places = problem.observations.points.len();
     let spread = |residuals: &[Vector3<f64>]| {
         robust_scale(residuals.iter().take(places).map(Vector3::norm).collect(), MEDIAN_CHI_3).unwrap_or(0.0)
     };
-    let mut residuals = point_residuals(problem, predicted, &all).of_places;
+    let residuals_with =
+        |trust: &Trust| point_residuals(problem, predicted, &Weights::trusting(problem, trust, MILLIMETRE)).of_places;
+    let mut residuals = residuals_with(&trust);
     let sigma = spread(&residuals);
     if residuals.iter().take(places).all(|residual| residual.norm() <= GROSS / 2.0 * sigma) {
-        return all.trust;
+        return trust;
     }
     let mut convexity = f64::INFINITY;
     for _ in 0..GROSS_STEPS {
         let scale = (REJECT_AT * spread(&residuals) / 2.0).powi(2).max(f64::MIN_POSITIVE);
         let largest = residuals.iter().map(Vector3::norm_squared).fold(0.0, f64::max);
         convexity = (convexity / GRADUATION).min(2.0 * largest / scale).max(1.0);
-        let mut weights = all.clone();
-        for (trust, residual) in weights.trust.iter_mut().zip(&residuals).take(places) {
+        let mut weighted = trust.clone();
+        for (trust, residual) in weighted.places.iter_mut().zip(&residuals).take(places) {
             *trust = geman_mcclure(residual.norm_squared(), convexity * scale);
         }
-        residuals = point_residuals(problem, predicted, &weights).of_places;
+        residuals = residuals_with(&weighted);
         if convexity <= 1.0 {
             break;
         }
     }
     let limit = GROSS * spread(&residuals);
-    let mut trust = all.trust;
-    for (trust, residual) in trust.iter_mut().zip(&residuals).take(places) {
+    for (trust, residual) in trust.places.iter_mut().zip(&residuals).take(places) {
         if residual.norm() > limit {
             *trust = 0.0;
         }
@@ -192,15 +260,15 @@ fn geman_mcclure(square: f64, width: f64) -> f64 {
 }
 
 /// Decides which samples to trust, beginning with a fit made with the trust of `solve`. Trust is 1 or 0.
-pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised, floor: f64) -> Weights {
-    let problem = solve.problem;
-    let places = judged_places(problem);
-    let start = solve.weights.clone();
-    let judged = judge(solve, first, &start, floor);
+pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Trust {
+    let start = solve.trust.clone();
+    let judged = judge(solve, first);
     let suspect = suspect_at(judged.ratios.len());
-    let settled = judged.ratios.iter().enumerate().all(|(sample, ratio)| {
-        if start.of_sample(sample, places) > 0.0 { *ratio <= suspect } else { *ratio > REJECT_AT }
-    });
+    let settled = judged
+        .ratios
+        .iter()
+        .enumerate()
+        .all(|(sample, ratio)| if start.of_sample(sample) > 0.0 { *ratio <= suspect } else { *ratio > REJECT_AT });
     // One sample can also bend parameters so far that everything fits: they then leave what is expected of them.
     let ran_away = solve.basis.prior_weight > 0.0 && first.z.amax() > RAN_AWAY;
     if settled && !ran_away {
@@ -208,133 +276,132 @@ pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised, floor: f6
     }
     // Several outliers, or one with all the say about some parameter, can bend a fit so that it accepts them. So the decision
     // is made from three starts that go wrong in different ways, and the cheapest explanation counts.
-    let nominal = suspects_of_nominal(solve, floor);
+    let nominal = suspects_of_nominal(solve, first.noise);
     let searched = graduated_search(solve, first);
     let candidates = [
-        peel(solve, first.clone(), start, floor, false),
-        peel(solve, nominal.0, nominal.1, floor, true),
-        peel(solve, searched.0, searched.1, floor, false),
+        peel(solve, first.clone(), start, false),
+        peel(solve, nominal.0, nominal.1, true),
+        peel(solve, searched.0, searched.1, false),
     ];
-    let scatter = candidates.iter().map(|candidate| candidate.scatter).fold(floor, f64::max);
-    let all = places + problem.observations.lengths.len();
+    let scatter = candidates.iter().map(|candidate| candidate.scatter).fold(SMALLEST_SCATTER, f64::max);
+    let noise = candidates.iter().map(|candidate| candidate.at.noise).max_by(|a, b| a.pose.total_cmp(&b.pose));
+    let noise = noise.unwrap_or(first.noise);
     let price = |candidate: &Candidate| {
-        let rejected = all - candidate.weights.accepted(places);
-        candidate.cost + rejected as f64 * (REJECT_AT * scatter).powi(2)
+        let (all, accepted) = candidate.trust.samples();
+        let solve = Solve { trust: &candidate.trust, ..*solve };
+        solve.linearise(candidate.at.z.clone(), noise).cost + (all - accepted) as f64 * (REJECT_AT * scatter).powi(2)
     };
-    let [first, others @ ..] = candidates;
-    others.into_iter().fold(first, |best, other| if price(&other) < price(&best) { other } else { best }).weights
+    let priced = candidates.iter().map(|candidate| (price(candidate), candidate));
+    let best = priced.min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or_else(|| solve.trust.clone(), |(_, candidate)| candidate.trust.clone())
 }
 
-/// A decision with what it costs.
+/// A decision with the fit that it leads to.
 struct Candidate {
-    weights: Weights,
-    /// Square sum of the accepted residuals in units of σ, plus the prior's share.
-    cost: f64,
+    trust: Trust,
+    at: Linearised,
     /// Robust scatter of the accepted places.
     scatter: f64,
 }
 
 /// The nominal arm without the samples that stand out from it, given what its parameters may deviate. Good samples among them come
 /// back as soon as the arm is fitted to the rest.
-fn suspects_of_nominal(solve: &Solve<'_, '_>, floor: f64) -> (Linearised, Weights) {
-    let places = judged_places(solve.problem);
-    let mut weights = solve.weights.clone();
-    let at = solve.linearise(DVector::zeros(solve.basis.transform.ncols()));
-    let mut nobody = weights.clone();
-    nobody.trust.fill(0.0);
-    nobody.length_trust.fill(0.0);
-    // Registered with everyone, judged by what the prior alone allows.
-    let judged = judge_with(solve, &at, &weights, &nobody, floor);
+fn suspects_of_nominal(solve: &Solve<'_, '_>, noise: Noise) -> (Linearised, Trust) {
+    let mut trust = solve.trust.clone();
+    let at = solve.linearise(DVector::zeros(solve.basis.transform.ncols()), noise);
+    // Registered with all of them, judged by what the prior alone allows.
+    let judged = judge_with(solve, &at, Known::FromPrior);
     let typical = robust_scale(judged.ratios.clone(), 1.0).unwrap_or(1.0);
     for (sample, ratio) in judged.ratios.iter().enumerate() {
         if *ratio > SUSPECT_OF_NOMINAL * typical {
-            weights.set_sample(sample, places, 0.0);
+            trust.set_sample(sample, 0.0);
         }
     }
-    (at, weights)
+    (at, trust)
 }
 
 /// Lets samples change sides, the worst first, until the decision agrees with the fit that it leads to. With `refit` the
 /// parameters of `from` are not yet those of a fit.
-fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Weights, floor: f64, refit: bool) -> Candidate {
-    let problem = solve.problem;
-    let places = judged_places(problem);
-    let mut weights = start;
+fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Trust, refit: bool) -> Candidate {
+    let mut trust = start;
     let mut at = from;
-    let mut seen: Vec<Weights> = Vec::new();
-    let mut scatter = floor;
-    let fit = |weights: &Weights, z| {
-        Solve { weights, ..*solve }.run(z, SEARCH_STEPS, &mut |_, _| ControlFlow::Continue(())).0
+    let mut seen: Vec<Trust> = Vec::new();
+    let mut scatter = SMALLEST_SCATTER;
+    let fit = |trust: &Trust, at: &Linearised| {
+        let solve = Solve { trust, ..*solve };
+        solve.run(at.z.clone(), at.noise, SEARCH_STEPS, &mut |_, _| ControlFlow::Continue(())).at
     };
     for round in 0..ROUNDS {
         if round > 0 || refit {
-            at = fit(&weights, at.z);
+            at = fit(&trust, &at);
         }
-        let judged = judge(solve, &at, &weights, floor);
+        let judged = judge(&Solve { trust: &trust, ..*solve }, &at);
         scatter = judged.scatter;
-        let accepted = |sample: usize| weights.of_sample(sample, places) > 0.0;
+        let accepted = |sample: usize| trust.of_sample(sample) > 0.0;
         let accepted_ratios = judged.ratios.iter().enumerate().filter(|(sample, _)| accepted(*sample));
         let worst = accepted_ratios.map(|(_, ratio)| *ratio).fold(0.0, f64::max);
-        let mut decided = weights.clone();
+        let mut decided = trust.clone();
         for (sample, ratio) in judged.ratios.iter().enumerate() {
             let is_bad =
                 if accepted(sample) { *ratio > REJECT_AT && *ratio >= WORST_FIRST * worst } else { *ratio > REJECT_AT };
-            decided.set_sample(sample, places, if is_bad { 0.0 } else { 1.0 });
+            decided.set_sample(sample, if is_bad { 0.0 } else { 1.0 });
         }
-        if decided == weights {
+        if decided == trust {
             break;
         }
-        if seen.contains(&decided) || decided.accepted(places) < 4 {
+        let count = |trust: &Trust| trust.samples().1;
+        if seen.contains(&decided) || count(&decided) < 4 {
             // Samples go back and forth: a sample that half of the time belongs is not rejected.
-            if decided.accepted(places) > weights.accepted(places) {
-                weights = decided;
+            if count(&decided) > count(&trust) {
+                trust = decided;
             }
             break;
         }
-        seen.push(std::mem::replace(&mut weights, decided));
+        seen.push(std::mem::replace(&mut trust, decided));
     }
-    let cost = fit(&weights, at.z).cost;
-    Candidate { weights, cost, scatter }
+    let at = fit(&trust, &at);
+    Candidate { trust, at, scatter }
 }
 
 /// Geman–McClure loss on the residuals, from convex to redescending, one step of the solver per degree; the samples without
 /// trust in `solve` stay out.
-fn graduated_search(solve: &Solve<'_, '_>, first: &Linearised) -> (Linearised, Weights) {
+fn graduated_search(solve: &Solve<'_, '_>, first: &Linearised) -> (Linearised, Trust) {
     let problem = solve.problem;
-    let places = judged_places(problem);
-    let squares = |at: &Linearised, weights: &Weights| -> Vec<f64> {
-        let sigma = |place: usize| weights.sigma_of(problem, place);
-        at.points.of_places.iter().take(places).enumerate().map(|(p, e)| e.norm_squared() / sigma(p).powi(2)).collect()
+    let squares = |at: &Linearised| -> Vec<f64> {
+        let variance = |place: usize| first.noise.pose + first.noise.of_reading(Noise::own_sigma(problem, place));
+        let residuals = at.points.of_places.iter().take(solve.trust.places.len()).enumerate();
+        residuals.map(|(place, residual)| residual.norm_squared() / variance(place)).collect()
     };
     let spread = |squares: &[f64]| -> f64 {
-        let trusted = squares.iter().zip(&solve.weights.trust).filter(|(_, trust)| **trust > 0.0);
+        let trusted = squares.iter().zip(&solve.trust.places).filter(|(_, trust)| **trust > 0.0);
         let scale = robust_scale(trusted.map(|(square, _)| square.sqrt()).collect(), MEDIAN_CHI_3).unwrap_or(1.0);
         (REJECT_AT * scale / 2.0).powi(2).max(f64::MIN_POSITIVE)
     };
     let mut at = first.clone();
-    let mut now = squares(&at, solve.weights);
+    let mut now = squares(&at);
     let mut convexity = (2.0 * now.iter().copied().fold(0.0, f64::max) / spread(&now)).max(1.0);
     loop {
-        let mut weights = solve.weights.clone();
+        let mut weighted = solve.trust.clone();
         let width = convexity * spread(&now);
-        for (trust, square) in weights.trust.iter_mut().zip(&now) {
+        for (trust, square) in weighted.places.iter_mut().zip(&now) {
             *trust *= geman_mcclure(*square, width);
         }
-        let step = Solve { weights: &weights, ..*solve };
-        let here = step.linearise(at.z.clone());
-        at = step.step(&here).map_or(here, |(next, _)| next);
-        now = squares(&at, solve.weights);
+        let step = Solve { trust: &weighted, ..*solve };
+        let here = step.linearise(at.z, first.noise);
+        at = step.step(&here).unwrap_or(here);
+        now = squares(&at);
         if convexity <= 1.0 {
             break;
         }
         convexity = (convexity / GRADUATION).max(1.0);
     }
     let limit = 4.0 * spread(&now);
-    let mut weights = solve.weights.clone();
-    for (trust, square) in weights.trust.iter_mut().zip(&now) {
+    let mut trust = solve.trust.clone();
+    for (trust, square) in trust.places.iter_mut().zip(&now) {
         if *square > limit {
             *trust = 0.0;
         }
     }
-    (at, weights)
+    let solve = Solve { trust: &trust, ..*solve };
+    (solve.linearise(at.z, first.noise), trust)
 }

@@ -93,17 +93,17 @@ pub struct Iteration {
     pub cost: f64,
     /// Largest change of a parameter, in expected deviations.
     pub step: f64,
-    /// Damping that was needed, relative to the diagonal of the normal matrix.
-    pub damping: f64,
-    /// The step could not be expected to lower the cost any more.
-    pub negligible: bool,
+    /// Part of the step that was taken: 1 unless a whole one would have made things worse.
+    pub part: f64,
+    /// How far the step moves a prediction at most, in standard deviations of that prediction.
+    pub decrement: f64,
 }
 
 /// Why the solver stopped. In every case but [`Self::NonFinite`] the parameters are the best found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TerminationReason {
-    /// The step or the expected decrease of the cost became negligible.
+    /// What is left of the step moves no prediction by more than a hundredth of its standard deviation.
     Converged,
     /// The allowed number of steps was taken; parameters are those after the last one.
     IterationLimit,

@@ -1,4 +1,4 @@
-//! The estimate itself: Gauss–Newton steps with a safeguard, for given weights.
+//! The estimate itself: Gauss–Newton steps with a safeguard. The noise is estimated along with the parameters, before each step.
 //!
 //! Deviations are written `x = T z`. With the prior, `T = S` (expected deviations) and `z` is drawn to zero with unit weight:
 //! the maximum a posteriori estimate. Without it, `T` spans the directions that the nominal model can see, in rad and mm, so
@@ -6,24 +6,31 @@
 
 use std::ops::ControlFlow;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Point3, SymmetricEigen};
 
-use super::linearise::length_rows;
-use super::linearise::{Evaluation, NormalEquations, PointResiduals, Weights, point_residuals, project};
+use super::factor::Factor;
+use super::linearise::{
+    Evaluation, NormalEquations, PointResiduals, ProjectedRows, Trust, Weights, point_residuals, project,
+};
+use super::noise::{Estimation, Groups, Noise, Scatter, shot_variance};
 use super::observability::Observability;
 use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
 use super::{IdentificationError, Iteration, Prior, TerminationReason, Weighting};
 use crate::kinematics::Arm;
 
-/// What is left to go, in expected deviations, that ends the iteration.
-const STEP_TOLERANCE: f64 = 1e-7;
-/// An expected relative decrease of the cost below this ends the iteration.
+/// Converged: what is left of a step moves no prediction by more than this many of its standard deviations, wherever it is. That is
+/// what the Newton decrement `√(δᵀHδ)` says, because `|J δ| ≤ √(J H⁻¹ Jᵀ) √(δᵀHδ)`.
+pub(crate) const CONVERGED: f64 = 1e-2;
+/// A step as small as this is the last one: what is left after it is far smaller.
+const LAST_STEP: f64 = 1e-3;
+/// An expected relative decrease of the cost below this is rounding noise.
 const COST_TOLERANCE: f64 = 1e-13;
-/// First damping after a step that made things worse, relative to the diagonal.
-const FIRST_DAMPING: f64 = 1e-3;
-/// Damping beyond which no step helps.
-const LAST_DAMPING: f64 = 1e12;
+/// Part of a step below which no part of it helps.
+const SMALLEST_PART: f64 = 1e-9;
+/// Rounds of noise and step before a step is taken, and the relative change of σ that ends them.
+const NOISE_ROUNDS: usize = 12;
+const NOISE_TOLERANCE: f64 = 1e-5;
 
 /// The parametrisation `x = T z` and the prior on `z`.
 #[derive(Clone, Debug)]
@@ -43,6 +50,15 @@ impl Basis {
             return DMatrix::from_fn(t.nrows(), t.ncols(), |i, j| t[(i, i)] * matrix[(i, j)] * t[(j, j)]);
         }
         t.transpose() * (matrix * t)
+    }
+
+    /// `T M Tᵀ`.
+    pub(crate) fn spread(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let t = &self.transform;
+        if self.prior_weight > 0.0 {
+            return DMatrix::from_fn(t.nrows(), t.nrows(), |i, j| t[(i, i)] * matrix[(i, j)] * t[(j, j)]);
+        }
+        t * matrix * t.transpose()
     }
 
     pub(crate) fn new(
@@ -78,16 +94,34 @@ impl Basis {
     }
 }
 
-/// The problem linearised at one estimate.
+/// The problem linearised at one estimate, with the weights of some noise.
 #[derive(Clone, Debug)]
 pub(crate) struct Linearised {
     pub(crate) z: DVector<f64>,
     pub(crate) x: DVector<f64>,
     pub(crate) arm: Arm,
+    pub(crate) noise: Noise,
+    weights: Weights,
+    /// Predicted positions in the base (m).
+    predicted: Vec<Point3<f64>>,
     pub(crate) points: PointResiduals,
+    pub(crate) rows: ProjectedRows,
     pub(crate) normal: NormalEquations,
     /// `normal.cost` plus the prior's share.
     pub(crate) cost: f64,
+}
+
+/// The step that a linearised problem asks for.
+struct Newton {
+    delta: DVector<f64>,
+    /// How far it moves a prediction at most, in standard deviations of that prediction.
+    decrement: f64,
+}
+
+/// How a solve ended.
+pub(crate) struct Solution {
+    pub(crate) at: Linearised,
+    pub(crate) termination: TerminationReason,
 }
 
 /// Everything a solve needs that stays the same over its steps.
@@ -96,49 +130,85 @@ pub(crate) struct Solve<'a, 'p> {
     pub(crate) problem: &'a Problem<'p>,
     pub(crate) weighting: Weighting,
     pub(crate) basis: &'a Basis,
-    pub(crate) weights: &'a Weights,
+    pub(crate) groups: &'a Groups,
+    /// Which samples count.
+    pub(crate) trust: &'a Trust,
+    /// How the noise is estimated on the way.
+    pub(crate) estimation: Estimation,
 }
 
 impl Solve<'_, '_> {
-    /// Linearises at `z`.
-    pub(crate) fn linearise(&self, z: DVector<f64>) -> Linearised {
+    /// Linearises at `z`, with the weights of `noise`.
+    pub(crate) fn linearise(&self, z: DVector<f64>, noise: Noise) -> Linearised {
+        let problem = self.problem;
+        let weights = Weights::new(problem, self.groups, &noise, self.trust);
         let x = &self.basis.transform * &z;
-        let arm = self.problem.arm_with(&x);
-        let evaluation = Evaluation::new(self.problem, &arm);
-        let points = point_residuals(self.problem, &evaluation.points, self.weights);
-        let normal = match self.weighting {
-            Weighting::Covariance => {
-                project(self.problem, evaluation, &points, self.weights, self.weights).normal_equations()
-            }
-            Weighting::Uniform => self.uniform_pairs(&evaluation),
-        };
+        let arm = problem.arm_with(&x);
+        let evaluation = Evaluation::new(problem, &arm);
+        let predicted = evaluation.points.clone();
+        let points = point_residuals(problem, &predicted, &weights);
+        let rows = project(problem, evaluation, &points, &weights);
+        let normal = self.normal_equations(&rows, &predicted, &noise);
         let cost = normal.cost + self.basis.prior_weight * z.norm_squared();
-        Linearised { z, x, arm, points, normal, cost }
+        Linearised { z, x, arm, noise, weights, predicted, points, rows, normal, cost }
+    }
+
+    /// The same estimate with the weights of another noise.
+    fn reweigh(&self, at: &mut Linearised, noise: Noise) {
+        let problem = self.problem;
+        let weights = Weights::new(problem, self.groups, &noise, self.trust);
+        let proportion = at.weights.proportion_of(&weights).filter(|_| self.weighting == Weighting::Covariance);
+        at.weights = weights;
+        at.noise = noise;
+        if let Some(factor) = proportion.filter(|_| problem.observations.lengths.is_empty()) {
+            at.rows.weigh(problem, &at.weights);
+            at.normal.scale(factor);
+        } else {
+            at.points = point_residuals(problem, &at.predicted, &at.weights);
+            at.rows.project(problem, &at.predicted, &at.points, &at.weights);
+            at.normal = self.normal_equations(&at.rows, &at.predicted, &noise);
+        }
+        at.cost = at.normal.cost + self.basis.prior_weight * at.z.norm_squared();
+    }
+
+    fn normal_equations(&self, rows: &ProjectedRows, predicted: &[Point3<f64>], noise: &Noise) -> NormalEquations {
+        match self.weighting {
+            Weighting::Covariance => rows.normal_equations(),
+            Weighting::Uniform => self.uniform_pairs(rows, predicted, noise),
+        }
     }
 
     /// All pairs of each station alike. Each pair weighs `3 / (M σ²)`, so that the pairs together carry as much information
-    /// as the 3M coordinates they come from and the prior keeps its meaning.
-    fn uniform_pairs(&self, evaluation: &Evaluation) -> NormalEquations {
-        let n = evaluation.n;
-        let mut normal = length_rows(self.problem, evaluation, self.weights, self.weights).normal_equations();
-        let mut covariance = normal.gram.clone();
+    /// as the 3M coordinates they come from and the prior keeps its meaning. Readings of one pose share its weight.
+    fn uniform_pairs(&self, rows: &ProjectedRows, predicted: &[Point3<f64>], noise: &Noise) -> NormalEquations {
+        let n = rows.n;
         let samples = &self.problem.observations.points;
+        let mut normal = rows.normal_equations_of(3 * samples.len()..rows.residuals.len());
+        let mut covariance = normal.gram.clone();
         let stations = samples.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
+        let mut readings = vec![0.0; self.groups.len()];
+        for (index, _) in samples.iter().enumerate().filter(|(index, _)| self.trust.places[*index] > 0.0) {
+            readings[self.groups.of(index)] += 1.0;
+        }
         for station in 0..stations {
             let points: Vec<PairPoint<'_>> = samples
                 .iter()
                 .enumerate()
-                .filter(|(index, sample)| sample.station == station && self.weights.trust[*index] > 0.0)
+                .filter(|(index, sample)| sample.station == station && self.trust.places[*index] > 0.0)
                 .map(|(index, sample)| PairPoint {
-                    predicted: evaluation.points[index],
+                    predicted: predicted[index],
                     measured: sample.point,
-                    rows: &evaluation.rows[3 * n * index..3 * n * (index + 1)],
-                    trust: self.weights.trust[index],
-                    sigma: sample.sigma.unwrap_or(self.weights.sigma),
+                    rows: &rows.rows[3 * n * index..3 * n * (index + 1)],
+                    trust: self.trust.places[index] / readings[self.groups.of(index)],
+                    group: self.groups.of(index),
+                    variance: noise.of_reading(sample.sigma),
                 })
                 .collect();
-            let weight = 3.0 / (points.len().max(1) as f64 * self.weights.sigma.powi(2));
-            let sums = pair_sums(&points, n, weight);
+            let poses: f64 = points.iter().map(|point| 1.0 / readings[point.group]).sum();
+            let variance = points.iter().map(|point| point.variance / readings[point.group].powi(2)).sum::<f64>();
+            let variance = noise.pose + variance / poses.max(1.0);
+            let weight = 3.0 / (poses.max(1.0) * variance.max(f64::MIN_POSITIVE));
+            let sums = pair_sums(&points, n, weight, noise.pose);
             normal.gram += sums.gram;
             normal.gradient += sums.gradient;
             normal.cost += sums.cost;
@@ -157,40 +227,66 @@ impl Solve<'_, '_> {
         hessian
     }
 
-    /// One step from `at`, damped until it does not make things worse.
-    ///
-    /// Returns the new point with its record, or the reason why there is none.
-    pub(crate) fn step(&self, at: &Linearised) -> Result<(Linearised, Iteration), TerminationReason> {
-        let hessian = self.hessian(at);
-        let rhs = self.basis.transform.transpose() * &at.normal.gradient - &at.z * self.basis.prior_weight;
-        let mut damping = 0.0;
-        while damping <= LAST_DAMPING {
-            let mut damped = hessian.clone();
-            for index in 0..damped.nrows() {
-                damped[(index, index)] += damping * hessian[(index, index)].max(f64::MIN_POSITIVE);
+    /// Residuals of the linear problem after a change of the parameters, with what they took of the values.
+    pub(crate) fn scatter(&self, at: &Linearised, change: &DVector<f64>) -> Scatter {
+        let lengths = self.problem.observations.lengths.len();
+        let (places, lengths) = at.rows.residuals_after(lengths, change);
+        Scatter::new(self.problem, self.groups, &at.noise, self.trust, &places, &lengths)
+    }
+
+    /// How many values the data, not the prior, determine of the parameters. `None` where the normal matrix is singular.
+    pub(crate) fn determined(&self, at: &Linearised) -> Option<f64> {
+        Factor::new(self.hessian(at)).map(|factor| self.determined_by(&factor))
+    }
+
+    /// With `H = TᵀGT + Λ` that is the trace of `H⁻¹TᵀGT`.
+    fn determined_by(&self, factor: &Factor) -> f64 {
+        self.basis.transform.ncols() as f64 - self.basis.prior_weight * factor.inverse_trace()
+    }
+
+    /// The step from `at`, with the noise that its residuals show: both are found together, on the linear problem.
+    fn newton(&self, at: &mut Linearised) -> Option<Newton> {
+        for round in 0.. {
+            let factor = Factor::new(self.hessian(at))?;
+            let gradient = self.basis.transform.transpose() * &at.normal.gradient - &at.z * self.basis.prior_weight;
+            let delta = factor.solve(&gradient);
+            let found = Newton { decrement: delta.dot(&gradient).max(0.0).sqrt(), delta };
+            if round == NOISE_ROUNDS {
+                return Some(found);
             }
-            if let Some(factor) = Cholesky::<f64, Dyn>::new(damped) {
-                let delta = factor.solve(&rhs);
-                let next = self.linearise(&at.z + &delta);
-                let expected = delta.dot(&rhs);
-                let negligible = expected <= COST_TOLERANCE * at.cost;
-                if next.cost.is_finite() && (next.cost <= at.cost || negligible) {
-                    let change = &next.x - &at.x;
-                    let relative = change
-                        .iter()
-                        .zip(self.problem.parameters)
-                        .map(|(change, parameter)| (change / parameter.expected).abs())
-                        .fold(0.0, f64::max);
-                    let record = Iteration { cost: next.cost, step: relative, damping, negligible };
-                    return Ok((next, record));
-                }
-                if negligible {
-                    return Err(TerminationReason::Converged);
-                }
+            let determined = self.determined_by(&factor);
+            let scatter = self.scatter(at, &(&self.basis.transform * &found.delta));
+            let pose = scatter.pose_variance(determined, self.estimation);
+            let change = scatter.of_reading(pose) / scatter.of_reading(at.noise.pose) - 1.0;
+            if change.abs() <= NOISE_TOLERANCE {
+                return Some(found);
             }
-            damping = if damping == 0.0 { FIRST_DAMPING } else { damping * 10.0 };
+            self.reweigh(at, Noise { pose, ..at.noise });
         }
-        Err(if at.cost.is_finite() { TerminationReason::NoImprovement } else { TerminationReason::NonFinite })
+        None
+    }
+
+    /// One step of fixed noise from `at`, halved until it does not make things worse; `None` if no part of it helps.
+    fn advance(&self, at: &Linearised, newton: &Newton, first: f64) -> Option<(Linearised, f64)> {
+        let negligible = newton.decrement.powi(2) <= COST_TOLERANCE * at.cost || newton.decrement <= LAST_STEP;
+        let mut part = first;
+        while part >= SMALLEST_PART {
+            let next = self.linearise(&at.z + &newton.delta * part, at.noise);
+            if next.cost.is_finite() && (next.cost <= at.cost || negligible) {
+                return Some((next, part));
+            }
+            part /= 2.0;
+        }
+        None
+    }
+
+    /// One step without a new estimate of the noise.
+    pub(crate) fn step(&self, at: &Linearised) -> Option<Linearised> {
+        let factor = Factor::new(self.hessian(at))?;
+        let gradient = self.basis.transform.transpose() * &at.normal.gradient - &at.z * self.basis.prior_weight;
+        let delta = factor.solve(&gradient);
+        let newton = Newton { decrement: delta.dot(&gradient).max(0.0).sqrt(), delta };
+        self.advance(at, &newton, 1.0).map(|(next, _)| next)
     }
 
     /// Steps until converged or `limit` steps were taken; `record` sees each with the deviations it leads to ((m) and (rad)) and
@@ -198,30 +294,43 @@ impl Solve<'_, '_> {
     pub(crate) fn run(
         &self,
         start: DVector<f64>,
+        noise: Noise,
         limit: usize,
         record: &mut dyn FnMut(Iteration, &DVector<f64>) -> ControlFlow<()>,
-    ) -> (Linearised, TerminationReason) {
-        let mut at = self.linearise(start);
-        let mut last_step = 0.0;
-        for _ in 0..limit {
-            match self.step(&at) {
-                Ok((next, step)) => {
-                    at = next;
-                    // Steps shrink by about the same factor each time: what is left is the next one of the series.
-                    let left = step.step * (step.step / last_step).min(1.0);
-                    let converged = step.damping == 0.0 && left <= STEP_TOLERANCE || step.negligible;
-                    last_step = step.step;
-                    let flow = record(step, &at.x);
-                    if converged {
-                        return (at, TerminationReason::Converged);
-                    }
-                    if flow.is_break() {
-                        break;
-                    }
-                }
-                Err(reason) => return (at, reason),
+    ) -> Solution {
+        let shot = shot_variance(self.problem, self.groups, noise.stated, self.trust);
+        let mut at = self.linearise(start, Noise { shot, ..noise });
+        let mut part = 1.0;
+        let mut steps = 0;
+        let mut is_last = false;
+        let termination = loop {
+            let Some(newton) = self.newton(&mut at) else { break TerminationReason::NonFinite };
+            if is_last {
+                break TerminationReason::Converged;
             }
-        }
-        (at, TerminationReason::IterationLimit)
+            let is_small = newton.decrement <= CONVERGED;
+            if steps == limit {
+                break if is_small { TerminationReason::Converged } else { TerminationReason::IterationLimit };
+            }
+            let Some((next, taken)) = self.advance(&at, &newton, f64::min(1.0, 2.0 * part)) else {
+                break if is_small { TerminationReason::Converged } else { TerminationReason::NoImprovement };
+            };
+            is_last = newton.decrement <= LAST_STEP && taken >= 1.0;
+            let change = (&next.x - &at.x).component_div(&self.expected());
+            at = next;
+            part = taken;
+            steps += 1;
+            let step = change.amax();
+            let flow = record(Iteration { cost: at.cost, step, part, decrement: newton.decrement }, &at.x);
+            if flow.is_break() {
+                break TerminationReason::IterationLimit;
+            }
+        };
+        Solution { at, termination }
+    }
+
+    fn expected(&self) -> DVector<f64> {
+        let parameters = self.problem.parameters;
+        DVector::from_iterator(parameters.len(), parameters.iter().map(|parameter| parameter.expected))
     }
 }

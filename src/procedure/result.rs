@@ -64,12 +64,12 @@ pub(crate) fn result_warnings(
         warnings.push(Warning::new("does_not_fit", message, true));
     }
     warnings.extend(run_away(found, settings));
-    if found.sigma.excess() > SIGMA_EXCESS {
+    if let Some(stated) = found.sigma.instrument.filter(|_| found.sigma.excess() > SIGMA_EXCESS) {
         let message = format!(
-            "the residuals ({} mm per coordinate) are {} times the stated sigma ({} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below are widened by that factor",
+            "the residuals ({} mm per coordinate) are {} times the stated sigma ({} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below include it",
             number(to_mm(residual), 4),
             number(found.sigma.excess(), 1),
-            number(to_mm(found.sigma.used), if found.sigma.used < 10.0 * MICROMETRE { 6 } else { 4 })
+            number(to_mm(stated), if stated < 10.0 * MICROMETRE { 6 } else { 4 })
         );
         warnings.push(Warning::new("sigma_excess", message, false));
     }

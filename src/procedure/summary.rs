@@ -95,8 +95,15 @@ fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
 }
 
 fn sigma_summary(found: &Identification) -> SigmaSummary {
-    let Sigma { used, source, from_residuals, normalised: _ } = found.sigma;
-    SigmaSummary { used_mm: to_mm(used), source, from_residuals_mm: from_residuals.map(to_mm) }
+    let Sigma { used, source, from_residuals, normalised: _, instrument, shots, poses } = found.sigma;
+    SigmaSummary {
+        used_mm: to_mm(used),
+        source,
+        from_residuals_mm: from_residuals.map(to_mm),
+        instrument_mm: instrument.map(to_mm),
+        shots_mm: (shots > 0.0).then(|| to_mm(shots)),
+        poses_mm: Some(to_mm(poses)),
+    }
 }
 
 /// The record of the settings.

@@ -174,7 +174,7 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
         }
         _ => String::new(),
     };
-    push_line(&mut text, &format!("  sigma {} mm, {source}{residual}", fixed(sigma.used_mm, 4)));
+    push_line(&mut text, &format!("  sigma {} mm, {source}{residual}", fixed(sigma.stated_mm(), 4)));
     let rank = summary.rank.map_or_else(
         || "rank not clear".to_owned(),
         |rank| format!("rank {rank} of {} ({})", summary.parameter_count, gap(summary.singular_value_gap)),

@@ -118,12 +118,28 @@ pub enum VerdictStatus {
 /// Measurement σ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SigmaSummary {
-    /// Value that balanced data and prior, per coordinate.
+    /// Value that balanced data and prior, per coordinate: all parts together.
     pub used_mm: f64,
-    /// Origin of the value.
+    /// Where the part of the instrument comes from; how the whole was found where nothing is stated.
     pub source: SigmaSource,
     /// Estimate from the residuals.
     pub from_residuals_mm: Option<f64>,
+    /// Part of the instrument, as stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instrument_mm: Option<f64>,
+    /// Part of readings of one pose among each other, beyond the instrument.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shots_mm: Option<f64>,
+    /// Part of what a pose has in common: repeatability, and what the model lacks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poses_mm: Option<f64>,
+}
+
+impl SigmaSummary {
+    /// What [`Self::source`] tells the origin of: the part of the instrument, or the whole where nothing is stated.
+    pub fn stated_mm(&self) -> f64 {
+        self.instrument_mm.unwrap_or(self.used_mm)
+    }
 }
 
 /// One identified parameter. Numbers are in `unit`.

@@ -146,7 +146,7 @@ fn gross(triage: &Triage<'_>, earlier: &[Item], left_out: &[usize]) -> Vec<usize
     let predicted = arm.points_in_base(kept.iter().map(|item| &item.at));
     let trust = gross_trust(&problem, &predicted);
     let impossible: Vec<usize> =
-        kept.iter().zip(trust).filter(|(_, trust)| *trust <= 0.0).map(|(item, _)| item.sample).collect();
+        kept.iter().zip(trust.places).filter(|(_, trust)| *trust <= 0.0).map(|(item, _)| item.sample).collect();
     if impossible.len() <= SET_ASIDE && kept.len() >= impossible.len() + FEWEST { impossible } else { Vec::new() }
 }
 

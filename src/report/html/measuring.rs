@@ -66,7 +66,7 @@ fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
         ("Identification samples", format!("{}, {} of them rejected", result.samples, result.rejected.len())),
         (
             "Standard deviation used",
-            format!("{} mm per coordinate, {}", number(result.sigma.used_mm, 4), sigma_origin(result.sigma.source)),
+            format!("{} mm per coordinate, {}", number(result.sigma.stated_mm(), 4), sigma_origin(result.sigma.source)),
         ),
         ("Residuals of the fit", residuals),
         ("Weighting, prior", format!("{}, {}", settings.weighting, settings.prior)),

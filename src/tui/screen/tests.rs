@@ -260,7 +260,14 @@ fn summary(is_good: bool) -> IdentificationSummary {
         condition_number: Some(167.8),
         condition_number_mm_rad: Some(1433.0),
         condition_number_points: 56,
-        sigma: SigmaSummary { used_mm: 0.00577, source: SigmaSource::Readings, from_residuals_mm: Some(0.00592) },
+        sigma: SigmaSummary {
+            used_mm: 0.00577,
+            source: SigmaSource::Readings,
+            from_residuals_mm: Some(0.00592),
+            instrument_mm: None,
+            shots_mm: None,
+            poses_mm: None,
+        },
         parameters: (1..=6)
             .flat_map(|n| {
                 [

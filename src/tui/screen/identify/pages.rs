@@ -90,7 +90,7 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
         SigmaSource::Residuals => "estimated from the residuals",
         SigmaSource::Assumed => "ASSUMED, too few data to estimate it",
     };
-    page.pair("sigma", &format!("{} mm per coordinate, {source}", fixed(summary.sigma.used_mm, 4)));
+    page.pair("sigma", &format!("{} mm per coordinate, {source}", fixed(summary.sigma.stated_mm(), 4)));
     if let Some(said) = summary.sigma.from_residuals_mm.filter(|_| summary.sigma.source != SigmaSource::Residuals) {
         page.pair("", &format!("{} mm from the residuals", fixed(said, 4)));
     }

@@ -1,0 +1,387 @@
+//! How much measured points scatter, in three parts: the instrument (stated), the readings of one pose among each other, and
+//! what a pose has in common (repeatability, and what the model lacks), which is estimated and *added* to the others.
+//!
+//! Readings of one pose are not independent: what moved the arm moved it for all of them. So the mean of the k readings of a
+//! group has the variance `σ_pose² + v/k`, and the prior is balanced against the sum, never against the instrument alone: with
+//! the instrument alone, badly determined parameters follow what the model lacks.
+
+use nalgebra::Vector3;
+
+use super::Places;
+use super::linearise::{SMALLEST_SIGMA, Trust};
+use super::problem::{LengthEnd, Problem};
+use crate::kinematics::Place;
+use crate::units::MICROMETRE;
+
+/// An estimate from no data counts as much as this many values.
+const PRIOR_VALUES: f64 = 6.0;
+/// Expected scatter of an arm and an instrument about which nothing is stated (m).
+const EXPECTED: f64 = 20.0 * MICROMETRE;
+/// No arm repeats better than this (m), however good the instrument is.
+const REPEATABILITY: f64 = 10.0 * MICROMETRE;
+/// Median of the square norm of three standard normal numbers.
+const MEDIAN_SQUARE_3: f64 = 2.365_973_884_375_338;
+/// Median of the square of a standard normal number.
+const MEDIAN_SQUARE_1: f64 = 0.454_936_423_119_572_7;
+
+/// Which places are readings of one pose.
+#[derive(Clone, Debug)]
+pub(crate) struct Groups {
+    /// Group of each place that is a point or a seat.
+    of_place: Vec<usize>,
+    /// Pose of each group: groups of one configuration share what the arm does.
+    pose: Vec<usize>,
+    /// Station of the points of a group, or shared point after the stations.
+    owner: Vec<usize>,
+    stations: usize,
+}
+
+impl Groups {
+    pub(crate) fn new(problem: &Problem<'_>) -> Self {
+        let observations = problem.observations;
+        let joints = problem.arm.chain.joints();
+        let stations = observations.points.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
+        let points = observations.points.iter().map(|sample| (&sample.at, sample.station));
+        let seats = observations.shared.iter().enumerate();
+        let seats = seats.flat_map(|(index, shared)| shared.at.iter().map(move |at| (at, stations + index)));
+        let places: Vec<(&Place, usize)> = points.chain(seats).collect();
+        let same_target = Places::new(joints, places.iter().map(|(at, _)| *at)).first_of_each();
+        let without_target: Vec<Place> =
+            places.iter().map(|(at, _)| Place { configuration: at.configuration.clone(), target: 0 }).collect();
+        let same_pose = Places::new(joints, &without_target).first_of_each();
+        let mut groups =
+            Self { of_place: Vec::with_capacity(places.len()), pose: Vec::new(), owner: Vec::new(), stations };
+        let mut known = std::collections::BTreeMap::new();
+        for (place, (_, owner)) in places.iter().enumerate() {
+            let group = *known.entry((same_target[place], *owner)).or_insert_with(|| {
+                groups.pose.push(same_pose[place]);
+                groups.owner.push(*owner);
+                groups.owner.len() - 1
+            });
+            groups.of_place.push(group);
+        }
+        groups
+    }
+
+    /// Number of groups.
+    pub(crate) fn len(&self) -> usize {
+        self.owner.len()
+    }
+
+    /// Group of a place.
+    pub(crate) fn of(&self, place: usize) -> usize {
+        self.of_place[place]
+    }
+
+    /// Station of the points of a group, or its shared point, counted after the stations.
+    pub(crate) fn owner(&self, group: usize) -> usize {
+        self.owner[group]
+    }
+
+    /// The groups of each place that is a point or a seat.
+    pub(crate) fn of_places(&self) -> &[usize] {
+        &self.of_place
+    }
+
+    /// Which pose a group belongs to: the same number for all targets and stations of one configuration.
+    pub(crate) fn pose(&self, group: usize) -> usize {
+        self.pose[group]
+    }
+}
+
+/// The variances (m²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Noise {
+    /// Of the instrument where a reading has none of its own; zero if nothing is stated.
+    pub(crate) stated: f64,
+    /// Of readings of one pose among each other, beyond what is stated.
+    pub(crate) shot: f64,
+    /// Of what a pose has in common.
+    pub(crate) pose: f64,
+}
+
+impl Noise {
+    /// Variance of a reading about its pose.
+    pub(crate) fn of_reading(&self, own_sigma: Option<f64>) -> f64 {
+        own_sigma.map_or(self.stated, |sigma| sigma.max(SMALLEST_SIGMA).powi(2)) + self.shot
+    }
+
+    /// Own σ of a place, where its reading has one.
+    pub(crate) fn own_sigma(problem: &Problem<'_>, place: usize) -> Option<f64> {
+        problem.observations.points.get(place).and_then(|sample| sample.sigma)
+    }
+
+    /// Variance of a length measured between two points, without that of shared points.
+    pub(crate) fn of_length(&self, problem: &Problem<'_>, length: usize) -> f64 {
+        let observations = problem.observations;
+        let length = &observations.lengths[length];
+        self.of_reading(length.sigma) + ends_that_move(problem, length) * self.pose
+    }
+}
+
+/// How often the variance of a pose is in a length: the arm stands at one or both of its ends. A length without a σ, where nothing
+/// else is measured, scatters as a whole.
+fn ends_that_move(problem: &Problem<'_>, length: &super::Length) -> f64 {
+    let ends = [&length.from, &length.to].into_iter().filter(|end| matches!(end, LengthEnd::Target(_))).count() as f64;
+    let observations = problem.observations;
+    let alone = observations.points.is_empty() && observations.shared.is_empty();
+    if alone || (length.sigma.is_none() && ends == 0.0) { 1.0 } else { ends }
+}
+
+/// How the variance of poses is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Estimation {
+    /// From the squares of the residuals.
+    Efficient,
+    /// From their median, while there may be outliers among them.
+    Robust,
+}
+
+/// A residual of known size: of the mean of a group, or of a length.
+#[derive(Clone, Copy, Debug)]
+struct Residual {
+    square: f64,
+    values: f64,
+    /// Variance beside that of the pose (m²).
+    variance: f64,
+    /// How often the variance of a pose is in it.
+    poses: f64,
+}
+
+/// Trusted residuals, ready to estimate the variance of poses.
+#[derive(Clone, Debug)]
+pub(crate) struct Scatter {
+    residuals: Vec<Residual>,
+    /// Independent values among them: less those that the frames took.
+    pub(crate) values: f64,
+    /// Mean variance of a reading beside that of the pose.
+    reading: f64,
+    expected: f64,
+}
+
+impl Scatter {
+    /// Of `of_places` (m, measured − predicted) and `of_lengths` (m).
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        groups: &Groups,
+        noise: &Noise,
+        trust: &Trust,
+        of_places: &[Vector3<f64>],
+        of_lengths: &[f64],
+    ) -> Self {
+        let means = GroupMeans::new(problem, groups, noise, trust, of_places);
+        let mut frames = vec![0.0; groups.owner.iter().map(|owner| owner + 1).max().unwrap_or(0)];
+        let mut residuals = Vec::with_capacity(groups.len());
+        for group in (0..groups.len()).filter(|&group| means.count[group] > 0.0) {
+            let square = means.residual[group].norm_squared();
+            residuals.push(Residual { square, values: 3.0, variance: means.variance[group], poses: 1.0 });
+            frames[groups.owner[group]] += 3.0;
+        }
+        let mut values = 0.0;
+        for (owner, seen) in frames.iter().enumerate() {
+            let taken: f64 = if owner < groups.stations { 6.0 } else { 3.0 };
+            values += (seen - taken).max(0.0);
+        }
+        for (index, (length, residual)) in problem.observations.lengths.iter().zip(of_lengths).enumerate() {
+            let poses = ends_that_move(problem, length);
+            if trust.lengths[index] > 0.0 && poses > 0.0 {
+                let variance = noise.of_reading(length.sigma);
+                residuals.push(Residual { square: residual * residual, values: 1.0, variance, poses });
+                values += 1.0;
+            }
+        }
+        let total: f64 = residuals.iter().map(|residual| residual.variance).sum();
+        let reading = means.mean_reading.max(total / residuals.len().max(1) as f64);
+        let is_stated = noise.stated > 0.0 || problem.observations.points.iter().any(|sample| sample.sigma.is_some());
+        let expected = if is_stated { reading.max(REPEATABILITY.powi(2)) } else { EXPECTED.powi(2) };
+        Self { residuals, values, reading, expected }
+    }
+
+    /// Root mean square per value (m), with `determined` of the values taken by the parameters; `None` without a value left.
+    pub(crate) fn root_mean_square(&self, determined: f64) -> Option<f64> {
+        let freedom = self.values - determined;
+        let square: f64 = self.residuals.iter().map(|residual| residual.square).sum();
+        (freedom >= 1.0).then(|| (square / freedom).sqrt())
+    }
+
+    /// Root mean square in units of what is stated and what readings of one pose show, with `determined` of the values taken by the
+    /// parameters; `None` without a value left, or where nothing is stated.
+    pub(crate) fn normalised(&self, determined: f64) -> Option<f64> {
+        let freedom = self.values - determined;
+        let is_stated = self.residuals.iter().all(|residual| residual.variance > 0.0);
+        (freedom >= 1.0 && is_stated).then(|| (self.chi_square(0.0, Estimation::Efficient) / freedom).sqrt())
+    }
+
+    /// Standard deviation of one reading with the variance `pose` of its pose (m).
+    pub(crate) fn of_reading(&self, pose: f64) -> f64 {
+        (pose + self.reading).sqrt()
+    }
+
+    /// The variance of poses (m²), where the parameters took `determined` of the values: the one at which the residuals are as
+    /// large as they should be, with a few values of the expected size beside them so that it cannot collapse.
+    pub(crate) fn pose_variance(&self, determined: f64, estimation: Estimation) -> f64 {
+        let target = (self.values - determined).max(0.0) + PRIOR_VALUES;
+        let excess = |pose: f64| self.chi_square(pose, estimation) + self.prior(pose) - target;
+        // Far below what any instrument sees.
+        let smallest = SMALLEST_SIGMA.powi(2) * 1e-6;
+        if excess(smallest) <= 0.0 {
+            return 0.0;
+        }
+        let largest = self.residuals.iter().map(|residual| residual.square).fold(self.expected, f64::max);
+        let (mut low, mut high) = (smallest, largest * PRIOR_VALUES * self.values.max(1.0));
+        while high / low > 1.0 + 1e-9 {
+            let middle = (low * high).sqrt();
+            *(if excess(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+        }
+        (low * high).sqrt()
+    }
+
+    fn prior(&self, pose: f64) -> f64 {
+        PRIOR_VALUES * self.expected / (pose + self.reading)
+    }
+
+    fn chi_square(&self, pose: f64, estimation: Estimation) -> f64 {
+        let normalised =
+            |residual: &Residual| residual.square / (residual.poses * pose + residual.variance).max(f64::MIN_POSITIVE);
+        match estimation {
+            Estimation::Efficient => self.residuals.iter().map(normalised).sum(),
+            Estimation::Robust => {
+                let points = self.residuals.iter().filter(|residual| residual.values > 1.0);
+                let mut squares: Vec<f64> = points.map(normalised).collect();
+                let mut median_of_standard = MEDIAN_SQUARE_3 / 3.0;
+                if squares.is_empty() {
+                    squares = self.residuals.iter().map(normalised).collect();
+                    median_of_standard = MEDIAN_SQUARE_1;
+                }
+                if squares.is_empty() {
+                    return 0.0;
+                }
+                let middle = squares.len() / 2;
+                let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
+                *median / median_of_standard * self.values
+            }
+        }
+    }
+}
+
+/// Means over the trusted readings of each group.
+pub(crate) struct GroupMeans {
+    /// Trusted readings.
+    count: Vec<f64>,
+    /// Measured − predicted (m); zero without a trusted reading.
+    pub(crate) residual: Vec<Vector3<f64>>,
+    /// Variance of the mean, beside that of the pose.
+    variance: Vec<f64>,
+    /// Mean variance of one reading.
+    mean_reading: f64,
+}
+
+impl GroupMeans {
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        groups: &Groups,
+        noise: &Noise,
+        trust: &Trust,
+        of_places: &[Vector3<f64>],
+    ) -> Self {
+        let n = groups.len();
+        let (mut count, mut residual, mut information) = (vec![0.0; n], vec![Vector3::zeros(); n], vec![0.0; n]);
+        let mut weights = vec![0.0; n];
+        let (mut sum, mut readings) = (0.0, 0.0);
+        for (place, &group) in groups.of_places().iter().enumerate() {
+            if trust.places[place] <= 0.0 {
+                continue;
+            }
+            let variance = noise.of_reading(Noise::own_sigma(problem, place));
+            // Without any scatter about the pose, readings count alike.
+            let weight = if variance > 0.0 { 1.0 / variance } else { 1.0 };
+            count[group] += 1.0;
+            weights[group] += weight;
+            residual[group] += of_places[place] * weight;
+            information[group] += if variance > 0.0 { 1.0 / variance } else { f64::INFINITY };
+            sum += variance;
+            readings += 1.0;
+        }
+        for (residual, weight) in residual.iter_mut().zip(&weights).filter(|(_, weight)| **weight > 0.0) {
+            *residual /= *weight;
+        }
+        let variance = information.iter().map(|information| 1.0 / information).collect();
+        Self { count, residual, variance, mean_reading: sum / f64::max(readings, 1.0) }
+    }
+}
+
+/// Variance of the readings of one pose among each other beyond what is stated (m²); zero without repetitions.
+pub(crate) fn shot_variance(problem: &Problem<'_>, groups: &Groups, stated: f64, trust: &Trust) -> f64 {
+    let points = &problem.observations.points;
+    let trusted = |place: &usize| trust.places[*place] > 0.0;
+    let mut mean = vec![(0.0, Vector3::zeros()); groups.len()];
+    for place in (0..points.len()).filter(trusted) {
+        let (count, sum) = &mut mean[groups.of(place)];
+        *count += 1.0;
+        *sum += points[place].point.coords;
+    }
+    let mut squares = Vec::new();
+    let mut values = 0.0;
+    for place in (0..points.len()).filter(trusted) {
+        let (count, sum) = mean[groups.of(place)];
+        if count > 1.0 {
+            let own = points[place].sigma.map_or(stated, |sigma| sigma.max(SMALLEST_SIGMA).powi(2));
+            squares.push(((points[place].point.coords - sum / count).norm_squared(), own));
+            values += 3.0 * (count - 1.0) / count;
+        }
+    }
+    if squares.is_empty() {
+        return 0.0;
+    }
+    let own = squares.iter().map(|(_, own)| own).sum::<f64>() / squares.len() as f64;
+    let expected = own.max(REPEATABILITY.powi(2));
+    let excess = |shot: f64| {
+        let chi: f64 = squares.iter().map(|(square, own)| square / (own + shot)).sum();
+        chi + PRIOR_VALUES * expected / (own + shot) - values - PRIOR_VALUES
+    };
+    let smallest = SMALLEST_SIGMA.powi(2) * 1e-6;
+    if excess(smallest) <= 0.0 {
+        return 0.0;
+    }
+    let total: f64 = squares.iter().map(|(square, _)| square).sum();
+    let (mut low, mut high) = (smallest, total + PRIOR_VALUES * expected);
+    while high / low > 1.0 + 1e-9 {
+        let middle = (low * high).sqrt();
+        *(if excess(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+    }
+    (low * high).sqrt()
+}
+
+/// Trust over variance of each place, so that the rows of a group together weigh as much as their mean.
+pub(crate) fn place_weights(problem: &Problem<'_>, groups: &Groups, noise: &Noise, trust: &Trust) -> Vec<f64> {
+    let n = groups.len();
+    let (mut count, mut information) = (vec![0.0; n], vec![0.0; n]);
+    let of_place: Vec<f64> =
+        (0..groups.of_places().len()).map(|place| noise.of_reading(Noise::own_sigma(problem, place))).collect();
+    let inverse = |variance: f64| if variance > 0.0 { 1.0 / variance } else { 1.0 };
+    for (place, &group) in groups.of_places().iter().enumerate() {
+        if trust.places[place] > 0.0 {
+            count[group] += 1.0;
+            information[group] += inverse(of_place[place]);
+        }
+    }
+    // Groups of one pose share the arm's error: each gets its part of what that pose tells.
+    let mut sharing = vec![0.0; groups.of_places().len()];
+    for group in (0..n).filter(|&group| count[group] > 0.0) {
+        sharing[groups.pose(group)] += 1.0;
+    }
+    groups
+        .of_places()
+        .iter()
+        .enumerate()
+        .map(|(place, &group)| {
+            let variance = of_place[place];
+            if trust.places[place] <= 0.0 {
+                return 0.0;
+            }
+            let of_mean = if variance > 0.0 { 1.0 / information[group] } else { 0.0 };
+            let share = inverse(variance) / information[group];
+            trust.places[place] * share / (noise.pose * sharing[groups.pose(group)] + of_mean).max(f64::MIN_POSITIVE)
+        })
+        .collect()
+}
