@@ -32,6 +32,7 @@ mod problem;
 mod repetitions;
 mod result;
 mod robust;
+mod selection;
 mod settings;
 mod solver;
 pub mod triage;
@@ -47,6 +48,7 @@ pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint};
 pub use repetitions::Places;
 pub use result::{Estimate, Identification, Rejected, RejectionReason, SampleIndex, Sigma};
+pub use selection::{Scored, Selection, Terms, identify_with_terms};
 pub use settings::{Estimator, Iteration, Prior, Settings, SigmaSource, TerminationReason, Weighting};
 
 use crate::geometry::{principal_spread, register};
