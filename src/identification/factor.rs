@@ -69,7 +69,7 @@ impl Factor {
 
     /// `M⁻¹`.
     pub(crate) fn inverse(&self) -> DMatrix<f64> {
-        self.inverse.tr_mul(&self.inverse)
+        self.inverse.transpose() * &self.inverse
     }
 }
 

@@ -210,12 +210,10 @@ struct Shared<'a, 'p> {
     used: Vec<usize>,
     /// Scaled by the expected deviations: one column per row of the Jacobian, free of frames.
     rows: DMatrix<f64>,
-    /// Measured − predicted with the deviations of `start` (m).
+    /// Measured − predicted by the nominal arm, in the linear model (m): the priors are about it.
     residuals: DVector<f64>,
     /// Places of the groups (for the leverage of the frames).
     frames: Vec<Frame>,
-    /// Deviations of the shared estimate, in expected deviations.
-    start: DVector<f64>,
     /// `rows · diag(weights) · rowsᵀ` for the weights at the shared estimate.
     gram: DMatrix<f64>,
     weights: DVector<f64>,
@@ -252,7 +250,7 @@ impl<'a, 'p> Shared<'a, 'p> {
         let expected: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.expected).collect();
         let deviation = |id: ParameterId| found.estimates.iter().find(|estimate| estimate.id == id);
         let deviations = problem.parameters.iter().map(|p| deviation(p.id).map_or(0.0, |e| e.deviation) / p.expected);
-        let start = DVector::from_iterator(n, deviations);
+        let deviations = DVector::from_iterator(n, deviations);
         let means = GroupMeans::new(problem, &groups, &noise, &trust, &points.of_places);
         let mut first = vec![None; groups.len()];
         let mut sum = vec![0.0; groups.len()];
@@ -303,8 +301,9 @@ impl<'a, 'p> Shared<'a, 'p> {
             }
         }
         drop(projected);
+        residuals += rows.tr_mul(&deviations);
         let gram = weighted_gram(&rows, &row_weights);
-        Self { problem, groups, trust, noise, used, rows, residuals, frames, start, gram, weights: row_weights }
+        Self { problem, groups, trust, noise, used, rows, residuals, frames, gram, weights: row_weights }
     }
 
     fn scatter(&self, residuals: &DVector<f64>, noise: &Noise) -> Scatter {
@@ -344,25 +343,24 @@ impl<'a, 'p> Shared<'a, 'p> {
             })
             .filter(|(_, scale)| *scale > 0.0)
             .collect();
-        let start =
-            DVector::from_iterator(scales.len(), scales.iter().map(|(index, scale)| self.start[*index] / scale));
         let few_rows = self.rows.ncols() < scales.len();
-        let columns = if few_rows { Some(self.columns(&scales, 0..self.rows.ncols())) } else { None };
+        let columns = few_rows.then(|| self.columns(&scales));
+        let kernel = columns.as_ref().map(|columns| columns.transpose() * columns);
         let mut noise = self.noise;
         let mut weights = self.weights.clone();
         let mut result = None;
         for _ in 0..NOISE_ROUNDS {
-            let (fit, determined) = if let Some(columns) = &columns {
-                let fit = FewRows::new(columns, &self.residuals, &weights, &start)?;
+            let (fit, determined) = if let Some(kernel) = &kernel {
+                let fit = FewRows::new(kernel, &self.residuals, &weights)?;
                 let determined = fit.determined();
                 (Fit::FewRows(fit), determined)
             } else {
                 let factor = weights.component_div(&self.weights.map(|weight| weight.max(f64::MIN_POSITIVE)));
                 let is_uniform = factor.iter().all(|value| (value / factor[0] - 1.0).abs() < 1e-6);
                 let fit = if is_uniform {
-                    ManyRows::new(self, &self.gram, factor[0], &scales, &weights, &start)?
+                    ManyRows::new(self, &self.gram, factor[0], &scales, &weights)?
                 } else {
-                    ManyRows::new(self, &weighted_gram(&self.rows, &weights), 1.0, &scales, &weights, &start)?
+                    ManyRows::new(self, &weighted_gram(&self.rows, &weights), 1.0, &scales, &weights)?
                 };
                 let determined = fit.determined();
                 (Fit::ManyRows(fit), determined)
@@ -387,10 +385,10 @@ impl<'a, 'p> Shared<'a, 'p> {
     }
 
     /// Columns of a candidate: parameters × rows.
-    fn columns(&self, scales: &[(usize, f64)], range: std::ops::Range<usize>) -> DMatrix<f64> {
-        DMatrix::from_fn(scales.len(), range.len(), |i, j| {
+    fn columns(&self, scales: &[(usize, f64)]) -> DMatrix<f64> {
+        DMatrix::from_fn(scales.len(), self.rows.ncols(), |i, j| {
             let (index, scale) = scales[i];
-            self.rows[(index, range.start + j)] * scale
+            self.rows[(index, j)] * scale
         })
     }
 
@@ -511,7 +509,6 @@ impl ManyRows {
         factor: f64,
         scales: &[(usize, f64)],
         weights: &DVector<f64>,
-        start: &DVector<f64>,
     ) -> Option<Self> {
         let p = scales.len();
         let mut hessian =
@@ -520,7 +517,7 @@ impl ManyRows {
             hessian[(index, index)] += 1.0;
         }
         let all = &shared.rows * weights.component_mul(&shared.residuals);
-        let gradient = DVector::from_fn(p, |i, _| all[scales[i].0] * scales[i].1) - start;
+        let gradient = DVector::from_fn(p, |i, _| all[scales[i].0] * scales[i].1);
         let factor = Factor::new(hessian)?;
         let delta = factor.solve(&gradient);
         let mut change = DVector::zeros(shared.rows.nrows());
@@ -544,24 +541,15 @@ struct FewRows {
 }
 
 impl FewRows {
-    fn new(
-        columns: &DMatrix<f64>,
-        residuals: &DVector<f64>,
-        weights: &DVector<f64>,
-        start: &DVector<f64>,
-    ) -> Option<Self> {
+    /// `kernel` is that of the rows before they are weighted.
+    fn new(kernel: &DMatrix<f64>, residuals: &DVector<f64>, weights: &DVector<f64>) -> Option<Self> {
         let roots = weights.map(f64::sqrt);
-        let mut kernel = columns.tr_mul(columns);
-        for j in 0..kernel.ncols() {
-            for i in 0..kernel.nrows() {
-                kernel[(i, j)] *= roots[i] * roots[j];
-            }
-            kernel[(j, j)] += 1.0;
+        let mut kernel = kernel.component_mul(&(&roots * roots.transpose()));
+        for index in 0..kernel.nrows() {
+            kernel[(index, index)] += 1.0;
         }
         let inverse = Factor::new(kernel)?.inverse();
-        // Residuals of the nominal arm: the prior is about it.
-        let from_nominal = (residuals + columns.tr_mul(start)).component_mul(&roots);
-        let whitened = &inverse * from_nominal;
+        let whitened = &inverse * residuals.component_mul(&roots);
         let safe = |root: f64| if root > 0.0 { 1.0 / root } else { 0.0 };
         Some(Self { residuals: whitened.component_mul(&roots.map(safe)), inverse })
     }

@@ -116,6 +116,8 @@ struct Newton {
     delta: DVector<f64>,
     /// How far it moves a prediction at most, in standard deviations of that prediction.
     decrement: f64,
+    /// How many values the data determine of the parameters.
+    determined: f64,
 }
 
 /// How a solve ended.
@@ -244,19 +246,50 @@ impl Solve<'_, '_> {
         self.basis.transform.ncols() as f64 - self.basis.prior_weight * factor.inverse_trace()
     }
 
+    /// The step from `at` at its noise.
+    fn newton_at(&self, at: &Linearised) -> Option<Newton> {
+        let has_few_rows = at.rows.residuals.len() < self.basis.transform.ncols();
+        if has_few_rows && self.basis.prior_weight > 0.0 && self.weighting == Weighting::Covariance {
+            return self.newton_by_rows(at);
+        }
+        let factor = Factor::new(self.hessian(at))?;
+        let gradient = self.basis.transform.transpose() * &at.normal.gradient - &at.z * self.basis.prior_weight;
+        let delta = factor.solve(&gradient);
+        Some(Newton { decrement: delta.dot(&gradient).max(0.0).sqrt(), determined: self.determined_by(&factor), delta })
+    }
+
+    /// The same step by the covariance of the rows, `I + B Bᵀ` with the weighted rows B: joint curves have more parameters than a
+    /// few poses have rows.
+    fn newton_by_rows(&self, at: &Linearised) -> Option<Newton> {
+        let ProjectedRows { n, rows, residuals, weights, .. } = &at.rows;
+        let transform = &self.basis.transform;
+        let weighted =
+            DMatrix::from_fn(*n, residuals.len(), |i, j| rows[n * j + i] * transform[(i, i)] * weights[j].sqrt());
+        let residuals = DVector::from_fn(residuals.len(), |j, _| residuals[j] * weights[j].sqrt());
+        let mut kernel = weighted.transpose() * &weighted;
+        for index in 0..kernel.nrows() {
+            kernel[(index, index)] += 1.0;
+        }
+        let factor = Factor::new(kernel)?;
+        let from_nominal = &residuals + weighted.tr_mul(&at.z);
+        let delta = &weighted * factor.solve(&from_nominal) - &at.z;
+        let gradient = &weighted * &residuals - &at.z;
+        Some(Newton {
+            decrement: delta.dot(&gradient).max(0.0).sqrt(),
+            determined: residuals.len() as f64 - factor.inverse_trace(),
+            delta,
+        })
+    }
+
     /// The step from `at`, with the noise that its residuals show: both are found together, on the linear problem.
     fn newton(&self, at: &mut Linearised) -> Option<Newton> {
         for round in 0.. {
-            let factor = Factor::new(self.hessian(at))?;
-            let gradient = self.basis.transform.transpose() * &at.normal.gradient - &at.z * self.basis.prior_weight;
-            let delta = factor.solve(&gradient);
-            let found = Newton { decrement: delta.dot(&gradient).max(0.0).sqrt(), delta };
+            let found = self.newton_at(at)?;
             if round == NOISE_ROUNDS {
                 return Some(found);
             }
-            let determined = self.determined_by(&factor);
             let scatter = self.scatter(at, &(&self.basis.transform * &found.delta));
-            let pose = scatter.pose_variance(determined, self.estimation);
+            let pose = scatter.pose_variance(found.determined, self.estimation);
             let change = scatter.of_reading(pose) / scatter.of_reading(at.noise.pose) - 1.0;
             if change.abs() <= NOISE_TOLERANCE {
                 return Some(found);
@@ -282,10 +315,7 @@ impl Solve<'_, '_> {
 
     /// One step without a new estimate of the noise.
     pub(crate) fn step(&self, at: &Linearised) -> Option<Linearised> {
-        let factor = Factor::new(self.hessian(at))?;
-        let gradient = self.basis.transform.transpose() * &at.normal.gradient - &at.z * self.basis.prior_weight;
-        let delta = factor.solve(&gradient);
-        let newton = Newton { decrement: delta.dot(&gradient).max(0.0).sqrt(), delta };
+        let newton = self.newton_at(at)?;
         self.advance(at, &newton, 1.0).map(|(next, _)| next)
     }
 
