@@ -48,7 +48,7 @@ pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint};
 pub use repetitions::Places;
 pub use result::{Estimate, Identification, Rejected, RejectionReason, SampleIndex, Sigma};
-pub use selection::{Scored, Selection, Terms, identify_with_terms};
+pub use selection::{Scored, Selection, Stage, Terms, WithTerms, identify_with_terms};
 pub use settings::{Estimator, Iteration, Prior, Settings, SigmaSource, TerminationReason, Weighting};
 
 use crate::geometry::{principal_spread, register};
@@ -91,47 +91,109 @@ pub fn identify_while(
     settings: &Settings,
     progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Identification, IdentificationError> {
-    problem.check()?;
-    if problem.parameters.is_empty() {
-        return Err(IdentificationError::NoParameters);
-    }
-    let observability = Observability::new(&problem.of_geometry(&geometry(problem)));
-    let nominal = problem.arm;
-    check_chirality(problem, nominal, None)?;
-    let basis = Basis::new(problem, settings.prior, &observability)?;
-    let groups = Groups::new(problem);
-    let zero = DVector::zeros(basis.transform.ncols());
-    let stated = settings.sigma.map_or(0.0, |(sigma, _)| sigma.max(SMALLEST_SIGMA).powi(2));
-    let first = Noise { stated, shot: 0.0, pose: FIRST_SIGMA * FIRST_SIGMA };
-    let mut fit = Fit { iterations: Vec::new(), path: Vec::new(), progress };
+    let prepared = Prepared::new(problem, settings)?;
     let everything = Trust::full(problem);
-    let solve = Solve {
-        problem,
-        weighting: settings.weighting,
-        basis: &basis,
-        groups: &groups,
-        trust: &everything,
-        estimation: Estimation::Efficient,
-    };
+    let solve = prepared.solve(&everything);
+    let zero = DVector::zeros(prepared.basis.transform.ncols());
+    let stated = settings.sigma.map_or(0.0, |(sigma, _)| sigma.max(SMALLEST_SIGMA).powi(2));
+    let noise = Noise { stated, shot: 0.0, pose: FIRST_SIGMA * FIRST_SIGMA };
+    let mut fit = Fit { iterations: Vec::new(), path: Vec::new(), progress };
     let mut trust = everything.clone();
     if settings.estimator == Estimator::Robust {
-        let predicted = nominal.points_in_base(problem.observations.places());
+        let predicted = problem.arm.points_in_base(problem.observations.places());
         let plausible = robust::gross_trust(problem, &predicted);
         let search = Solve { trust: &plausible, estimation: Estimation::Robust, ..solve };
-        let searched = fit.solve(&search, zero.clone(), first, settings.iterations)?;
+        let searched = fit.solve(&search, zero.clone(), noise, settings.iterations)?;
         trust = robust::find_outliers(&search, &searched.at);
         // The steps on record are those that lead to the result.
         fit.iterations.clear();
         fit.path.clear();
     }
-    let solve = Solve { trust: &trust, ..solve };
-    let Solution { at, termination } = fit.solve(&solve, zero, first, settings.iterations)?;
-    if termination == TerminationReason::NonFinite || !at.x.iter().all(|value| value.is_finite()) {
-        return Err(IdentificationError::Diverged);
+    let solution = fit.solve(&Solve { trust: &trust, ..solve }, zero, noise, settings.iterations)?;
+    prepared.finish(settings, fit, &trust, solution)
+}
+
+/// Where a fit with more parameters begins: at what one with fewer found.
+struct Start<'a> {
+    /// The other fit.
+    found: &'a Identification,
+    /// First guess of the deviations, in expected deviations.
+    deviations: DVector<f64>,
+    /// First guess of the noise.
+    noise: Noise,
+    /// Samples that the other fit accepted.
+    trust: Trust,
+}
+
+/// As [`identify_while`] from `start`: samples change sides only where this fit disagrees about them.
+fn identify_from(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    start: Start<'_>,
+    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+) -> Result<Identification, IdentificationError> {
+    let Start { found, deviations, noise, mut trust } = start;
+    let prepared = Prepared::new(problem, settings)?;
+    let n = problem.parameters.len();
+    let mut fit = Fit {
+        iterations: found.iterations.clone(),
+        path: found.path.iter().map(|step| step.clone().resize_vertically(n, 0.0)).collect(),
+        progress,
+    };
+    let mut solution = fit.solve(&prepared.solve(&trust), deviations, noise, settings.iterations)?;
+    if settings.estimator == Estimator::Robust {
+        let settled = robust::settle(&prepared.solve(&trust), solution.at.clone());
+        if settled.trust != trust {
+            trust = settled.trust;
+            let Linearised { z, noise, .. } = settled.at;
+            solution = fit.solve(&prepared.solve(&trust), z, noise, settings.iterations)?;
+        }
     }
-    check_chirality(problem, &at.arm, Some(&trust))?;
-    let Fit { iterations, path, .. } = fit;
-    Ok(summarise(&solve, settings, Solved { iterations, path, termination, at, observability }))
+    prepared.finish(settings, fit, &trust, solution)
+}
+
+/// A problem that was found to be well posed, with what every fit of it needs.
+struct Prepared<'a, 'p> {
+    problem: &'a Problem<'p>,
+    weighting: Weighting,
+    observability: Observability,
+    basis: Basis,
+    groups: Groups,
+}
+
+impl<'a, 'p> Prepared<'a, 'p> {
+    fn new(problem: &'a Problem<'p>, settings: &Settings) -> Result<Self, IdentificationError> {
+        problem.check()?;
+        if problem.parameters.is_empty() {
+            return Err(IdentificationError::NoParameters);
+        }
+        let observability = Observability::new(&problem.of_geometry(&geometry(problem)));
+        check_chirality(problem, problem.arm, None)?;
+        let basis = Basis::new(problem, settings.prior, &observability)?;
+        Ok(Self { problem, weighting: settings.weighting, observability, basis, groups: Groups::new(problem) })
+    }
+
+    fn solve<'s>(&'s self, trust: &'s Trust) -> Solve<'s, 'p> {
+        let Self { problem, weighting, basis, groups, .. } = self;
+        Solve { problem, weighting: *weighting, basis, groups, trust, estimation: Estimation::Efficient }
+    }
+
+    fn finish(
+        &self,
+        settings: &Settings,
+        fit: Fit<'_>,
+        trust: &Trust,
+        solution: Solution,
+    ) -> Result<Identification, IdentificationError> {
+        let Solution { at, termination } = solution;
+        if termination == TerminationReason::NonFinite || !at.x.iter().all(|value| value.is_finite()) {
+            return Err(IdentificationError::Diverged);
+        }
+        check_chirality(self.problem, &at.arm, Some(trust))?;
+        let Fit { iterations, path, .. } = fit;
+        let observability = self.observability.clone();
+        Ok(summarise(&self.solve(trust), settings, Solved { iterations, path, termination, at, observability }))
+    }
 }
 
 /// The parameters that are no errors of joints: the data alone need not determine those, so that they have no part in the rank.

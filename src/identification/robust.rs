@@ -296,10 +296,15 @@ pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Trust 
     best.map_or_else(|| solve.trust.clone(), |(_, candidate)| candidate.trust.clone())
 }
 
+/// Lets samples change sides, beginning with a fit `at` that was made with the trust of `solve`.
+pub(crate) fn settle(solve: &Solve<'_, '_>, at: Linearised) -> Candidate {
+    peel(solve, at, solve.trust.clone(), false)
+}
+
 /// A decision with the fit that it leads to.
-struct Candidate {
-    trust: Trust,
-    at: Linearised,
+pub(crate) struct Candidate {
+    pub(crate) trust: Trust,
+    pub(crate) at: Linearised,
     /// Robust scatter of the accepted places.
     scatter: f64,
 }
@@ -331,10 +336,12 @@ fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Trust, refit: bool) -> C
         let solve = Solve { trust, ..*solve };
         solve.run(at.z.clone(), at.noise, SEARCH_STEPS, &mut |_, _| ControlFlow::Continue(())).at
     };
-    for round in 0..ROUNDS {
-        if round > 0 || refit {
+    let mut is_fitted = !refit;
+    for _ in 0..ROUNDS {
+        if !is_fitted {
             at = fit(&trust, &at);
         }
+        is_fitted = true;
         let judged = judge(&Solve { trust: &trust, ..*solve }, &at);
         scatter = judged.scatter;
         let accepted = |sample: usize| trust.of_sample(sample) > 0.0;
@@ -354,12 +361,14 @@ fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Trust, refit: bool) -> C
             // Samples go back and forth: a sample that half of the time belongs is not rejected.
             if count(&decided) > count(&trust) {
                 trust = decided;
+                is_fitted = false;
             }
             break;
         }
         seen.push(std::mem::replace(&mut trust, decided));
+        is_fitted = false;
     }
-    let at = fit(&trust, &at);
+    let at = if is_fitted { at } else { fit(&trust, &at) };
     Candidate { trust, at, scatter }
 }
 

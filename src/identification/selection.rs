@@ -11,7 +11,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3};
 use super::factor::Factor;
 use super::linearise::{Evaluation, Trust, Weights, judged_places, point_residuals, project};
 use super::noise::{Estimation, GroupMeans, Groups, Noise, Scatter, place_weights};
-use super::{Identification, IdentificationError, Iteration, Problem, SampleIndex, Settings, identify_while};
+use super::{
+    Identification, IdentificationError, Iteration, Problem, SampleIndex, Settings, identify_from, identify_while,
+};
 use crate::kinematics::{FreeParameter, JointTerm, KinematicChain, MAX_ORDER, ParameterId, SMOOTH_ORDERS, TiltAxis};
 
 /// A group of terms must lower the score by this part of it.
@@ -23,6 +25,8 @@ const TURNS: usize = 4;
 /// Rounds of noise and solution per candidate, and the relative change of σ that ends them.
 const NOISE_ROUNDS: usize = 20;
 const NOISE_TOLERANCE: f64 = 1e-4;
+/// Weights in this proportion at most may share a normal matrix: candidates are compared, not used.
+const SAME_FACTOR: f64 = 1.02;
 /// Rows that are multiplied at once.
 const BLOCK: usize = 384;
 
@@ -115,23 +119,55 @@ pub struct Scored {
 }
 
 /// Which candidate was kept, and against what.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
     /// All that were tried, from simple to rich.
     pub candidates: Vec<Scored>,
-    /// Index of the one that was kept.
-    pub kept: usize,
+    /// Index of the one that was kept; `None` if no pose can be left out, so that the geometry stays alone.
+    pub kept: Option<usize>,
 }
 
 impl Selection {
+    /// The kept candidate.
+    pub fn kept(&self) -> Option<&Scored> {
+        self.candidates.get(self.kept?)
+    }
+
     /// The kept terms.
     pub fn terms(&self) -> Terms {
-        self.candidates.get(self.kept).map_or_else(Terms::default, |kept| kept.terms)
+        self.kept().map_or_else(Terms::default, |kept| kept.terms)
     }
 }
 
+/// What an identification is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stage {
+    /// The solver has taken a step.
+    Step(Iteration),
+    /// A candidate is being scored.
+    Candidate {
+        /// Its number, from 1.
+        number: usize,
+        /// How many there are.
+        of: usize,
+        /// Its terms.
+        terms: Terms,
+    },
+}
+
+/// An identified arm with the terms that its data can tell.
+#[derive(Clone, Debug)]
+pub struct WithTerms {
+    /// The arm with all kept terms.
+    pub found: Identification,
+    /// The arm identified as geometry alone, for everything that has no other terms.
+    pub geometric: Identification,
+    /// What was kept, and against what.
+    pub selection: Selection,
+}
+
 /// Identifies the parameters of `problem` (geometry and targets) with those terms among `candidates` that the data can tell.
-/// `progress` sees every step of the solver and may ask to stop there.
+/// `progress` may ask to stop at any stage.
 ///
 /// # Errors
 /// As [`identify_while`].
@@ -139,27 +175,44 @@ pub fn identify_with_terms(
     problem: &Problem<'_>,
     settings: &Settings,
     candidates: &[Vec<Terms>],
-    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
-) -> Result<(Identification, Selection), IdentificationError> {
-    let mut found = identify_while(problem, settings, progress)?;
-    let mut before = None;
+    progress: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+) -> Result<WithTerms, IdentificationError> {
+    let geometric = identify_while(problem, settings, &mut |step| progress(Stage::Step(*step)))?;
+    let mut found = geometric.clone();
+    let mut selection = Selection::default();
     for _ in 0..TURNS {
-        let selection = select(problem, settings, candidates, &found);
-        let terms = selection.terms();
-        let rejected: Vec<SampleIndex> = found.rejected.iter().map(|rejected| rejected.sample).collect();
-        if before.as_ref() == Some(&(terms, rejected.clone())) {
-            return Ok((found, selection));
-        }
-        before = Some((terms, rejected));
+        let rejected = rejected(&found);
+        let (selected, start) = select(problem, settings, candidates, &found, progress)?;
+        let terms = selected.terms();
+        selection = selected;
+        let Some(Start { deviations, noise }) = start else { break };
         let parameters = with_terms(problem, &terms);
-        found = identify_while(&Problem { parameters: &parameters, ..*problem }, settings, progress)?;
-        let now: Vec<SampleIndex> = found.rejected.iter().map(|rejected| rejected.sample).collect();
-        if before.as_ref().is_some_and(|(_, rejected)| *rejected == now) {
-            return Ok((found, selection));
+        let trust = accepted(problem, &found);
+        let start = super::Start { found: &geometric, deviations, noise, trust };
+        let complete = Problem { parameters: &parameters, ..*problem };
+        found = identify_from(&complete, settings, start, &mut |step| progress(Stage::Step(*step)))?;
+        if self::rejected(&found) == rejected {
+            break;
         }
     }
-    let selection = select(problem, settings, candidates, &found);
-    Ok((found, selection))
+    Ok(WithTerms { found, geometric, selection })
+}
+
+fn rejected(found: &Identification) -> Vec<SampleIndex> {
+    found.rejected.iter().map(|rejected| rejected.sample).collect()
+}
+
+/// Trust in the samples that `found` accepted.
+fn accepted(problem: &Problem<'_>, found: &Identification) -> Trust {
+    let mut trust = Trust::full(problem);
+    let places = judged_places(problem);
+    for rejected in &found.rejected {
+        match rejected.sample {
+            SampleIndex::Place(place) => trust.set_sample(place, 0.0),
+            SampleIndex::Length(length) => trust.set_sample(places + length, 0.0),
+        }
+    }
+    trust
 }
 
 /// The parameters of a problem, then those of the terms.
@@ -167,37 +220,59 @@ fn with_terms(problem: &Problem<'_>, terms: &Terms) -> Vec<FreeParameter> {
     problem.parameters.iter().copied().chain(terms.parameters(&problem.arm.chain)).collect()
 }
 
+/// Where the fit of a candidate begins: its linear solution.
+struct Start {
+    /// In expected deviations.
+    deviations: DVector<f64>,
+    noise: Noise,
+}
+
 /// Scores the candidates on the accepted samples of `found` and keeps the richest one that its gain justifies.
-fn select(problem: &Problem<'_>, settings: &Settings, candidates: &[Vec<Terms>], found: &Identification) -> Selection {
+fn select(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    candidates: &[Vec<Terms>],
+    found: &Identification,
+    progress: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+) -> Result<(Selection, Option<Start>), IdentificationError> {
     let parameters = with_terms(problem, &Terms::all(1.0));
     let complete = Problem { parameters: &parameters, ..*problem };
     let shared = Shared::new(&complete, settings, found);
-    let mut scored: Vec<Scored> = Vec::new();
-    let mut kept: Option<usize> = None;
+    let mut selection = Selection::default();
+    let mut starts: Vec<Start> = Vec::new();
     let mut known: Vec<Vec<FreeParameter>> = Vec::new();
+    let of = candidates.iter().map(Vec::len).sum();
+    let mut number = 0;
     for group in candidates {
         let mut best: Option<usize> = None;
         for terms in group {
+            number += 1;
             // An arm without masses has no compliance: the candidate is one that was tried.
             let own = terms.parameters(&problem.arm.chain);
             if known.contains(&own) {
                 continue;
             }
             known.push(own);
-            let Some(result) = shared.score(terms) else { continue };
-            scored.push(result);
-            let index = scored.len() - 1;
-            if best.is_none_or(|best| result.score < scored[best].score) {
+            if progress(Stage::Candidate { number, of, terms: *terms }).is_break() {
+                return Err(IdentificationError::Cancelled);
+            }
+            let Some((scored, start)) = shared.score(terms) else { continue };
+            let index = selection.candidates.len();
+            selection.candidates.push(scored);
+            starts.push(start);
+            if best.is_none_or(|best| scored.score < selection.candidates[best].score) {
                 best = Some(index);
             }
         }
+        let score = |index: usize| selection.candidates[index].score;
         if let Some(best) = best
-            && kept.is_none_or(|kept| scored[best].score < (1.0 - CLEAR_GAIN) * scored[kept].score)
+            && selection.kept.is_none_or(|kept| score(best) < (1.0 - CLEAR_GAIN) * score(kept))
         {
-            kept = Some(best);
+            selection.kept = Some(best);
         }
     }
-    Selection { candidates: scored, kept: kept.unwrap_or(0) }
+    let start = selection.kept.map(|kept| starts.swap_remove(kept));
+    Ok((selection, start))
 }
 
 /// The linear problem with the columns of all candidates; one block of rows per trusted group, weighted as its mean.
@@ -231,14 +306,8 @@ enum Frame {
 impl<'a, 'p> Shared<'a, 'p> {
     fn new(problem: &'a Problem<'p>, settings: &Settings, found: &Identification) -> Self {
         let groups = Groups::new(problem);
-        let mut trust = Trust::full(problem);
+        let trust = accepted(problem, found);
         let places = judged_places(problem);
-        for rejected in &found.rejected {
-            match rejected.sample {
-                SampleIndex::Place(place) => trust.set_sample(place, 0.0),
-                SampleIndex::Length(length) => trust.set_sample(places + length, 0.0),
-            }
-        }
         let stated = settings.sigma.map_or(0.0, |(sigma, _)| sigma * sigma);
         let noise = Noise { stated, shot: found.sigma.shots.powi(2), pose: found.sigma.poses.powi(2) };
         let weights = Weights::new(problem, &groups, &noise, &trust);
@@ -331,7 +400,7 @@ impl<'a, 'p> Shared<'a, 'p> {
     }
 
     /// Leave-one-pose-out score of a candidate; `None` where a pose left out cannot be predicted.
-    fn score(&self, terms: &Terms) -> Option<Scored> {
+    fn score(&self, terms: &Terms) -> Option<(Scored, Start)> {
         let scales: Vec<(usize, f64)> = self
             .problem
             .parameters
@@ -348,40 +417,33 @@ impl<'a, 'p> Shared<'a, 'p> {
         let kernel = columns.as_ref().map(|columns| columns.transpose() * columns);
         let mut noise = self.noise;
         let mut weights = self.weights.clone();
+        let mut gram = std::borrow::Cow::Borrowed(&self.gram);
+        let mut gram_weights = self.weights.clone();
         let mut result = None;
         for _ in 0..NOISE_ROUNDS {
-            let (fit, determined) = if let Some(kernel) = &kernel {
-                let fit = FewRows::new(kernel, &self.residuals, &weights)?;
-                let determined = fit.determined();
-                (Fit::FewRows(fit), determined)
+            let fit = if let (Some(columns), Some(kernel)) = (&columns, &kernel) {
+                Fit::FewRows(FewRows::new(columns, kernel, &self.residuals, &weights)?)
             } else {
-                let factor = weights.component_div(&self.weights.map(|weight| weight.max(f64::MIN_POSITIVE)));
-                let is_uniform = factor.iter().all(|value| (value / factor[0] - 1.0).abs() < 1e-6);
-                let fit = if is_uniform {
-                    ManyRows::new(self, &self.gram, factor[0], &scales, &weights)?
-                } else {
-                    ManyRows::new(self, &weighted_gram(&self.rows, &weights), 1.0, &scales, &weights)?
-                };
-                let determined = fit.determined();
-                (Fit::ManyRows(fit), determined)
+                let factor = common_factor(&gram_weights, &weights).unwrap_or_else(|| {
+                    gram = std::borrow::Cow::Owned(weighted_gram(&self.rows, &weights));
+                    gram_weights.clone_from(&weights);
+                    1.0
+                });
+                Fit::ManyRows(ManyRows::new(self, &gram, factor, &scales, &weights)?)
             };
-            let residuals = match &fit {
-                Fit::FewRows(fit) => fit.residuals.clone(),
-                Fit::ManyRows(fit) => fit.residuals.clone(),
-            };
-            let scatter = self.scatter(&residuals, &noise);
-            let pose = scatter.pose_variance(determined, Estimation::Efficient);
+            let scatter = self.scatter(&fit.solution().residuals, &noise);
+            let pose = scatter.pose_variance(fit.determined(), Estimation::Efficient);
             let change = scatter.of_reading(pose) / scatter.of_reading(noise.pose) - 1.0;
             noise.pose = pose;
-            result = Some((fit, weights.clone(), residuals, scatter.of_reading(pose)));
+            result = Some((fit, weights.clone(), scatter.of_reading(pose)));
             if change.abs() <= NOISE_TOLERANCE {
                 break;
             }
             weights = self.weights_of(&noise);
         }
-        let (fit, weights, residuals, sigma) = result?;
-        let score = self.leave_one_out(&fit, &scales, &weights, &residuals)?;
-        Some(Scored { terms: *terms, score, sigma })
+        let (fit, weights, sigma) = result?;
+        let score = self.leave_one_out(&fit, &scales, &weights)?;
+        Some((Scored { terms: *terms, score, sigma }, Start { deviations: fit.into_deviations(), noise }))
     }
 
     /// Columns of a candidate: parameters × rows.
@@ -392,13 +454,8 @@ impl<'a, 'p> Shared<'a, 'p> {
         })
     }
 
-    fn leave_one_out(
-        &self,
-        fit: &Fit,
-        scales: &[(usize, f64)],
-        weights: &DVector<f64>,
-        residuals: &DVector<f64>,
-    ) -> Option<f64> {
+    fn leave_one_out(&self, fit: &Fit, scales: &[(usize, f64)], weights: &DVector<f64>) -> Option<f64> {
+        let residuals = &fit.solution().residuals;
         let frames = FrameLeverage::new(&self.frames, weights);
         let mut poses: std::collections::BTreeMap<usize, Vec<usize>> = std::collections::BTreeMap::new();
         for (position, &group) in self.used.iter().enumerate() {
@@ -431,6 +488,17 @@ impl<'a, 'p> Shared<'a, 'p> {
     }
 }
 
+/// The factor by which `weights` exceed `others`; `None` if it is not nearly the same for all.
+fn common_factor(others: &DVector<f64>, weights: &DVector<f64>) -> Option<f64> {
+    let weighed = weights.iter().zip(others.iter()).filter(|(_, other)| **other > 0.0);
+    let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+    for (weight, other) in weighed {
+        let factor = weight / other;
+        (low, high) = (low.min(factor), high.max(factor));
+    }
+    (high <= low * SAME_FACTOR).then(|| (low * high).sqrt())
+}
+
 /// `rows · diag(weights) · rowsᵀ`, in blocks.
 fn weighted_gram(rows: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f64> {
     let n = rows.nrows();
@@ -446,6 +514,14 @@ fn weighted_gram(rows: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f64> {
         start += count;
     }
     gram
+}
+
+/// What a linear fit found.
+struct LinearSolution {
+    /// In expected deviations.
+    deviations: DVector<f64>,
+    /// Measured − predicted (m).
+    residuals: DVector<f64>,
 }
 
 /// A linear fit of one candidate.
@@ -472,6 +548,28 @@ impl Hat {
 }
 
 impl Fit {
+    const fn solution(&self) -> &LinearSolution {
+        match self {
+            Self::FewRows(fit) => &fit.solution,
+            Self::ManyRows(fit) => &fit.solution,
+        }
+    }
+
+    fn into_deviations(self) -> DVector<f64> {
+        match self {
+            Self::FewRows(fit) => fit.solution.deviations,
+            Self::ManyRows(fit) => fit.solution.deviations,
+        }
+    }
+
+    /// How many values the data determine of the parameters.
+    fn determined(&self) -> f64 {
+        match self {
+            Self::FewRows(fit) => fit.inverse.nrows() as f64 - fit.inverse.trace(),
+            Self::ManyRows(fit) => fit.factor.size() as f64 - fit.factor.inverse_trace(),
+        }
+    }
+
     /// Hat matrix among the rows of the groups at `positions`.
     fn hat(
         &self,
@@ -499,7 +597,7 @@ impl Fit {
 
 struct ManyRows {
     factor: Factor,
-    residuals: DVector<f64>,
+    solution: LinearSolution,
 }
 
 impl ManyRows {
@@ -519,30 +617,30 @@ impl ManyRows {
         let all = &shared.rows * weights.component_mul(&shared.residuals);
         let gradient = DVector::from_fn(p, |i, _| all[scales[i].0] * scales[i].1);
         let factor = Factor::new(hessian)?;
-        let delta = factor.solve(&gradient);
+        let deviations = factor.solve(&gradient);
         let mut change = DVector::zeros(shared.rows.nrows());
-        for ((index, scale), delta) in scales.iter().zip(delta.iter()) {
-            change[*index] = scale * delta;
+        for ((index, scale), deviation) in scales.iter().zip(deviations.iter()) {
+            change[*index] = scale * deviation;
         }
         let residuals = &shared.residuals - shared.rows.tr_mul(&change);
-        Some(Self { factor, residuals })
-    }
-
-    fn determined(&self) -> f64 {
-        let inverse = self.factor.inverse_trace();
-        self.factor.size() as f64 - inverse
+        Some(Self { factor, solution: LinearSolution { deviations, residuals } })
     }
 }
 
 struct FewRows {
     /// `(I + B Bᵀ)⁻¹` of the weighted rows B.
     inverse: DMatrix<f64>,
-    residuals: DVector<f64>,
+    solution: LinearSolution,
 }
 
 impl FewRows {
-    /// `kernel` is that of the rows before they are weighted.
-    fn new(kernel: &DMatrix<f64>, residuals: &DVector<f64>, weights: &DVector<f64>) -> Option<Self> {
+    /// `kernel` is `columnsᵀ columns`, of the rows before they are weighted.
+    fn new(
+        columns: &DMatrix<f64>,
+        kernel: &DMatrix<f64>,
+        residuals: &DVector<f64>,
+        weights: &DVector<f64>,
+    ) -> Option<Self> {
         let roots = weights.map(f64::sqrt);
         let mut kernel = kernel.component_mul(&(&roots * roots.transpose()));
         for index in 0..kernel.nrows() {
@@ -551,11 +649,9 @@ impl FewRows {
         let inverse = Factor::new(kernel)?.inverse();
         let whitened = &inverse * residuals.component_mul(&roots);
         let safe = |root: f64| if root > 0.0 { 1.0 / root } else { 0.0 };
-        Some(Self { residuals: whitened.component_mul(&roots.map(safe)), inverse })
-    }
-
-    fn determined(&self) -> f64 {
-        self.inverse.nrows() as f64 - self.inverse.trace()
+        let deviations = columns * whitened.component_mul(&roots);
+        let residuals = whitened.component_mul(&roots.map(safe));
+        Some(Self { inverse, solution: LinearSolution { deviations, residuals } })
     }
 }
 
