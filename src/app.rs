@@ -111,6 +111,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
 fn estimation_settings(args: &EstimationArgs, weighting: Weighting) -> EstimationSettings {
     EstimationSettings {
         level: args.level,
+        terms: args.terms.clone(),
         weighting,
         prior: args.prior,
         estimator: args.estimator,

@@ -15,7 +15,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use nalgebra::Point3;
 
-use crate::identification::{Estimator, Prior, Settings, Weighting};
+use crate::identification::{Estimator, Prior, Settings, TermGroup, Weighting};
 use crate::planning::order::Pace;
 use crate::planning::{BoxInBase, Objective};
 use crate::procedure::plan::PlanRequest;
@@ -243,9 +243,12 @@ pub struct EstimationArgs {
     /// What is assumed about deviations: those the profile expects, or nothing (the paper's minimum-norm solution)
     #[arg(long, value_enum, default_value_t)]
     pub prior: Prior,
-    /// What is identified: joint offsets only, or all geometric parameters
+    /// What is identified
     #[arg(long, value_enum, default_value_t)]
     pub level: Level,
+    /// Errors of the joints to identify, whatever the data support, such as 'compliance,curves' [default: as '--level' says]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "GROUP,…", conflicts_with = "level")]
+    pub terms: Option<Vec<TermGroup>>,
     /// Largest number of solver steps; 1 is the paper's single linear step
     #[arg(long, value_name = "N", default_value_t = Settings::default().iterations, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=100_000))]
     pub iterations: usize,

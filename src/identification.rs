@@ -35,6 +35,7 @@ mod robust;
 mod selection;
 mod settings;
 mod solver;
+mod terms;
 pub mod triage;
 pub mod verification;
 
@@ -48,11 +49,12 @@ pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint};
 pub use repetitions::Places;
 pub use result::{Estimate, Identification, Rejected, RejectionReason, SampleIndex, Sigma};
-pub use selection::{Scored, Selection, Stage, Terms, WithTerms, identify_with_terms};
+pub use selection::{Scored, Selection, Stage, WithTerms, identify_with_terms};
 pub use settings::{Estimator, Iteration, Prior, Settings, SigmaSource, TerminationReason, Weighting};
+pub use terms::{TermGroup, Terms};
 
 use crate::geometry::{principal_spread, register};
-use crate::kinematics::{Arm, FreeParameter, ParameterId};
+use crate::kinematics::{Arm, FreeParameter};
 use crate::units::MICROMETRE;
 use factor::Factor;
 use linearise::{SMALLEST_SIGMA, Trust};
@@ -198,8 +200,7 @@ impl<'a, 'p> Prepared<'a, 'p> {
 
 /// The parameters that are no errors of joints: the data alone need not determine those, so that they have no part in the rank.
 fn geometry(problem: &Problem<'_>) -> Vec<FreeParameter> {
-    let is_geometry = |id: ParameterId| !matches!(id, ParameterId::Joint { .. });
-    problem.parameters.iter().copied().filter(|parameter| is_geometry(parameter.id)).collect()
+    problem.parameters.iter().copied().filter(|parameter| !parameter.id.is_joint_error()).collect()
 }
 
 /// The record of an identification.

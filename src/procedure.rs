@@ -13,6 +13,7 @@ pub mod circles;
 pub mod deliver;
 mod error;
 pub mod identify;
+mod joint_errors;
 pub mod models;
 pub mod plan;
 pub mod points;
@@ -20,6 +21,7 @@ mod provenance;
 mod result;
 mod settings;
 mod summary;
+mod workspace;
 
 pub use error::{ErrorKind, ProcedureError};
 pub use provenance::input_file;

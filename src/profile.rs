@@ -108,15 +108,19 @@ pub struct Acceptance {
     pub distance_max: Option<f64>,
 }
 
-/// Which parameters are identified: θ of revolute and d of prismatic joints alone, or all link constants, with β where the profile
-/// has it. The comments on the values are the help of `--level`.
+/// Which parameters are identified: θ of revolute and d of prismatic joints alone, all link constants, with β where the profile
+/// has it, or the errors of the joints as well. The comments on the values are the help of `--level`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
 pub enum Level {
+    /// Level 3 as far as the data support it: all link constants, and those errors of the joints that predict better
+    #[default]
+    Auto,
     /// Level 1: joint offsets
     Offsets,
     /// Level 2: all link constants
-    #[default]
     Geometric,
+    /// Level 3: all link constants and all errors of the joints, whatever the data support
+    Full,
 }
 
 names_of_option!(Level);
@@ -239,7 +243,8 @@ impl Profile {
                     parameter: LinkParameter::joint_offset(joint.joint_type),
                 })
                 .collect(),
-            Level::Geometric => {
+            // The errors of the joints are selected from the data.
+            Level::Auto | Level::Geometric | Level::Full => {
                 let constants = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
                 let links = joints().flat_map(|(joint, _)| constants.map(|parameter| (joint, parameter)));
                 let betas = self.beta_joints.iter().map(|joint| (*joint, LinkParameter::Beta));

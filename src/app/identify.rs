@@ -85,8 +85,8 @@ pub(super) fn run_request<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let mut progress = Progress::new(&mut console.err);
-    let mut identified = identify(request, &mut |iteration| {
-        progress.step(iteration);
+    let mut identified = identify(request, &mut |stage| {
+        progress.identifying(stage);
         ControlFlow::Continue(())
     })?;
     identified.put_into_words(advice::words);

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-use crate::identification::Iteration;
+use crate::identification::{Iteration, Stage};
 
 /// Least time before the first line, and between two lines.
 const INTERVAL: Duration = Duration::from_millis(500);
@@ -39,14 +39,20 @@ impl<'a, W: Write> Progress<'a, W> {
         Self { out, last: Stopwatch::new(), steps: 0 }
     }
 
-    /// Counts a solver step and prints a line about it.
-    pub(super) fn step(&mut self, iteration: &Iteration) {
-        self.steps += 1;
-        let Iteration { cost, step, .. } = iteration;
-        let steps = self.steps;
-        self.say(|| {
-            format!("identifying: step {steps}, cost {cost:.6e}, largest change {step:.1e} expected deviations")
-        });
+    /// Prints a line about what an identification is doing.
+    pub(super) fn identifying(&mut self, stage: Stage) {
+        match stage {
+            Stage::Step(Iteration { cost, step, .. }) => {
+                self.steps += 1;
+                let steps = self.steps;
+                self.say(|| {
+                    format!("identifying: step {steps}, cost {cost:.6e}, largest change {step:.1e} expected deviations")
+                });
+            }
+            Stage::Candidate { number, of, terms } => {
+                self.say(|| format!("identifying: model {number} of {of}: {terms}"));
+            }
+        }
     }
 
     /// Prints a line if the last one was long enough ago.

@@ -113,7 +113,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
 
 /// Looks for mistakes in the whole table, as `identify` does.
 fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) -> Result<Option<Warning>, Failure> {
-    let mut parameters = profile.parameters(Level::default());
+    let mut parameters = profile.parameters(Level::Geometric);
     if args.refit == Refit::FrameAndTarget {
         parameters.retain(|parameter| parameter.id.target().is_none());
         parameters.extend(remounted_targets(profile, samples));

@@ -11,15 +11,14 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3};
 use super::factor::Factor;
 use super::linearise::{Evaluation, Trust, Weights, judged_places, point_residuals, project};
 use super::noise::{Estimation, GroupMeans, Groups, Noise, Scatter, place_weights};
+use super::terms::Terms;
 use super::{
     Identification, IdentificationError, Iteration, Problem, SampleIndex, Settings, identify_from, identify_while,
 };
-use crate::kinematics::{FreeParameter, JointTerm, KinematicChain, MAX_ORDER, ParameterId, SMOOTH_ORDERS, TiltAxis};
+use crate::kinematics::{FreeParameter, ParameterId};
 
 /// A group of terms must lower the score by this part of it.
 const CLEAR_GAIN: f64 = 0.02;
-/// The sizes of joint curves that are tried (rad, rms).
-const CURVES: [f64; 5] = [50e-6, 100e-6, 150e-6, 250e-6, 400e-6];
 /// Selection and rejection take turns until both stay, at most this often.
 const TURNS: usize = 4;
 /// Rounds of noise and solution per candidate, and the relative change of σ that ends them.
@@ -29,83 +28,6 @@ const NOISE_TOLERANCE: f64 = 1e-4;
 const SAME_FACTOR: f64 = 1.02;
 /// Rows that are multiplied at once.
 const BLOCK: usize = 384;
-
-/// Which groups of terms the joints have beside the geometry.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Terms {
-    /// Turning in proportion to the gravity torque.
-    pub compliance: bool,
-    /// Bearings that tilt under the gravity moment.
-    pub tilt: bool,
-    /// The first two harmonics of each joint.
-    pub harmonics: bool,
-    /// Curves of each joint, of this size (rad, rms).
-    pub curves: Option<f64>,
-}
-
-impl Terms {
-    /// Everything, with curves of the size `curves` (rad, rms).
-    pub const fn all(curves: f64) -> Self {
-        Self { compliance: true, tilt: true, harmonics: true, curves: Some(curves) }
-    }
-
-    /// The candidates from simple to rich; between curves of different size the score alone decides.
-    pub fn candidates() -> Vec<Vec<Self>> {
-        let none = Self::default();
-        let compliance = Self { compliance: true, ..none };
-        let smooth = Self { tilt: true, harmonics: true, ..compliance };
-        vec![
-            vec![none],
-            vec![compliance],
-            vec![Self { tilt: true, ..compliance }],
-            vec![Self { harmonics: true, ..compliance }],
-            vec![smooth],
-            CURVES.map(|size| Self { curves: Some(size), ..smooth }).to_vec(),
-        ]
-    }
-
-    /// The parameters of these terms that the arm can have, with their expected deviations.
-    pub fn parameters(&self, chain: &KinematicChain) -> Vec<FreeParameter> {
-        let mut terms = Vec::new();
-        if self.compliance {
-            terms.push(JointTerm::Compliance);
-        }
-        if self.tilt {
-            terms.extend(TiltAxis::ALL.map(JointTerm::Tilt));
-        }
-        let first = if self.harmonics { 1 } else { SMOOTH_ORDERS + 1 };
-        let last = if self.curves.is_some() { MAX_ORDER } else { SMOOTH_ORDERS };
-        terms.extend((first..=last).flat_map(|order| [JointTerm::Sine(order), JointTerm::Cosine(order)]));
-        let size = |term: JointTerm| if is_curve(term) { self.curves.unwrap_or(0.0) } else { 1.0 };
-        let sized: Vec<(JointTerm, f64)> = terms.into_iter().map(|term| (term, term.expected() * size(term))).collect();
-        let of_joint = |joint: usize| {
-            let known = sized.iter().filter(move |(term, _)| chain.has_term(joint, *term));
-            known.map(move |(term, expected)| FreeParameter {
-                id: ParameterId::Joint { joint, term: *term },
-                expected: *expected,
-            })
-        };
-        (0..chain.dof()).flat_map(of_joint).collect()
-    }
-
-    /// Factor of a term's prior against that of [`Self::all`] with curves of one radian; zero for one that is not there.
-    fn scale(&self, term: JointTerm) -> f64 {
-        let is_there = match term {
-            JointTerm::Compliance => self.compliance,
-            JointTerm::Tilt(_) => self.tilt,
-            JointTerm::Sine(_) | JointTerm::Cosine(_) if is_curve(term) => return self.curves.unwrap_or(0.0),
-            JointTerm::Sine(_) | JointTerm::Cosine(_) => self.harmonics,
-        };
-        if is_there { 1.0 } else { 0.0 }
-    }
-}
-
-const fn is_curve(term: JointTerm) -> bool {
-    match term {
-        JointTerm::Compliance | JointTerm::Tilt(_) => false,
-        JointTerm::Sine(order) | JointTerm::Cosine(order) => order > SMOOTH_ORDERS,
-    }
-}
 
 /// A candidate with its score.
 #[derive(Clone, Copy, Debug, PartialEq)]

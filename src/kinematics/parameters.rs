@@ -129,6 +129,14 @@ pub enum ParameterId {
 }
 
 impl ParameterId {
+    /// Whether it belongs to the error of a joint, not to the geometry.
+    pub const fn is_joint_error(self) -> bool {
+        match self {
+            Self::Joint { .. } => true,
+            Self::Link { .. } | Self::Target { .. } => false,
+        }
+    }
+
     /// All parameters of an arm with this number of joints and targets.
     pub fn all(joints: usize, targets: usize) -> impl Iterator<Item = Self> {
         (0..joints).flat_map(Self::of_joint).chain((0..targets).flat_map(Self::of_target))

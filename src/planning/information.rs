@@ -263,7 +263,7 @@ pub(super) mod tests {
     fn soochow() -> (Arm, Vec<FreeParameter>, JointBox) {
         let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "").unwrap();
         let joint_box = JointBox::new(profile.joints().iter().map(|j| j.planning_limits.unwrap()).collect()).unwrap();
-        (profile.arm(), profile.parameters(Level::default()), joint_box)
+        (profile.arm(), profile.parameters(Level::Geometric), joint_box)
     }
 
     fn places(joint_box: &JointBox, count: usize, seed: u64) -> Vec<Place> {

@@ -5,9 +5,12 @@ use std::ops::ControlFlow;
 use super::assess::{direct_verification, point_verification};
 use super::result::{self, Context};
 use super::summary::{Finished, SampleName};
-use super::{EstimationSettings, ProcedureError, checks, target_parameters};
+use super::workspace::Workspace;
+use super::{EstimationSettings, ProcedureError, checks, joint_errors, target_parameters};
 use crate::identification::verification::{DirectErrors, FittedSetup, ModelErrors, fit_setup};
-use crate::identification::{Identification, Iteration, Observations, PointSample, Problem, Settings, identify_while};
+use crate::identification::{
+    Identification, Observations, PointSample, Problem, Settings, Stage, Terms, WithTerms, identify_with_terms,
+};
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
 use crate::session::advice::Advice;
@@ -128,13 +131,14 @@ impl Identified {
     }
 }
 
-/// Identifies the arm and verifies it. `progress` sees every step of the solver and may ask to stop there.
+/// Identifies the arm and verifies it. `progress` sees every step of the solver and every model that is tried, and may ask to stop
+/// there.
 ///
 /// # Errors
 /// The samples do not fit this robot, nothing can be identified from them, or `progress` has asked to stop.
 pub fn identify(
     request: &IdentifyRequest,
-    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Stage) -> ControlFlow<()>,
 ) -> Result<Identified, ProcedureError> {
     let IdentifyRequest { identification, mounted, .. } = request;
     let profile = &mounted.map_or_else(|| request.profile.clone(), |mounted| mounted.on(&request.profile));
@@ -142,7 +146,7 @@ pub fn identify(
     let arm = profile.arm();
     let observations = identification.observations();
     let problem = Problem { arm: &arm, parameters: &parameters, observations: &observations };
-    let all_constants = request.settings.parameters_of(Level::default(), profile);
+    let all_constants = request.settings.parameters_of(Level::Geometric, profile);
     let plausible = Problem { parameters: &all_constants, ..problem };
 
     let mut warnings = set_warnings(identification, &observations, profile);
@@ -156,28 +160,40 @@ pub fn identify(
         warnings.push(Warning::new("no_scale", message, true).with_advice(Advice::StateSocketDistance));
     }
     let settings = request.settings.solver(profile, typical_distance(&observations));
-    let found = identify_while(&problem, &settings, progress)?;
+    let candidates = request.settings.candidates();
+    let with_terms = identify_with_terms(&problem, &settings, &candidates, progress)?;
+    let found = &with_terms.found;
     let context = Context { level: request.settings.level, expected };
-    warnings.extend(result::result_warnings(&problem, &found, &settings, context));
-    let nominal = nominal_setup(&problem, &found)?;
+    warnings.extend(result::result_warnings(&problem, found, &settings, context));
+    warnings.extend(joint_errors::warnings(&problem, found));
+    let nominal = nominal_setup(&problem, found)?;
+    let nominal_rms = joint_errors::nominal_rms(&problem, found, &nominal);
+    let workspace = Workspace::new(profile, &problem, &with_terms, nominal_rms);
     let of_identification = warnings.clone();
 
     let Verified { verification, warnings: doubts } = match request.verification_mode {
         VerificationMode::LeaveOneOut => {
-            leave_one_out(&problem, &settings, &identification.distances.positions, progress)?
+            leave_one_out(&problem, &settings, &candidates, &identification.distances.positions, progress)?
         }
-        _ => verify(request, &plausible, &nominal, &found)?,
+        _ => verify(request, &plausible, &nominal, found)?,
     };
     warnings.extend(doubts);
+    warnings.extend(workspace.as_ref().and_then(|workspace| workspace.warning(profile, verification.as_ref())));
     warnings.sort_by_key(|warning| !warning.blocks_acceptance);
-    let is_usable = !result::is_unusable(&warnings, &found, &settings);
+    let is_usable = !result::is_unusable(&warnings, found, &settings);
     let names = identification.names();
-    let summary = Finished { profile, request, found: &found, names: &names, warnings, verification }.summary();
+    let mut summary = Finished { profile, request, found, names: &names, warnings, verification }.summary();
+    if !candidates.is_empty() {
+        summary.selection = joint_errors::selection(&problem, &with_terms, &nominal);
+    }
+    summary.joint_errors = joint_errors::summaries(profile, &problem, found);
+    summary.workspace = workspace.map(|workspace| workspace.summary);
     let calibration = is_usable.then(|| Calibration {
         mounted: *mounted,
-        ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, &found)
+        geometric: joint_errors::geometric(&with_terms, &settings),
+        ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, found)
     });
-    Ok(Identified { summary, calibration, found, nominal })
+    Ok(Identified { summary, calibration, found: with_terms.found, nominal })
 }
 
 /// Warnings about a set of samples as such.
@@ -256,8 +272,9 @@ fn verify(
 fn leave_one_out(
     problem: &Problem<'_>,
     settings: &Settings,
+    candidates: &[Vec<Terms>],
     positions: &[String],
-    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Stage) -> ControlFlow<()>,
 ) -> Result<Verified, ProcedureError> {
     let mut distinct: Vec<&String> = Vec::new();
     for position in positions {
@@ -274,7 +291,7 @@ fn leave_one_out(
         let kept = problem.observations.of_shared(|index| positions.get(index) != Some(*position));
         let left_out = problem.observations.of_shared(|index| positions.get(index) == Some(*position));
         let without = Problem { observations: &kept, ..*problem };
-        let found = identify_while(&without, settings, progress)?;
+        let WithTerms { found, .. } = identify_with_terms(&without, settings, candidates, progress)?;
         let of_nominal = nominal_setup(&without, &found)?;
         nominal = nominal.pooled_with(&DirectErrors::new(&of_nominal.arm, &left_out));
         identified = identified.pooled_with(&DirectErrors::new(&found.arm, &left_out));
@@ -321,6 +338,10 @@ fn calibration(
             .collect(),
         samples: problem.observations.places().map(sample).collect(),
         mounted: None,
+        geometric: Vec::new(),
+        selection: summary.selection.clone(),
+        joint_errors: summary.joint_errors.clone(),
+        workspace: summary.workspace.clone(),
         profile: profile_text.to_owned(),
     }
 }

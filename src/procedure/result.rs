@@ -104,6 +104,7 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
     let listed: Vec<String> = found
         .estimates
         .iter()
+        .filter(|estimate| !estimate.id.is_joint_error())
         .filter(|estimate| estimate.deviation.abs() > RAN_AWAY * estimate.expected)
         .map(|estimate| {
             let unit = estimate.id.unit();
@@ -121,7 +122,8 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
         return None;
     }
     let list = listed.join(", ");
-    let far = found.estimates.iter().any(|estimate| estimate.deviation.abs() > FAR_AWAY * estimate.expected);
+    let of_geometry = found.estimates.iter().filter(|estimate| !estimate.id.is_joint_error());
+    let far = of_geometry.into_iter().any(|estimate| estimate.deviation.abs() > FAR_AWAY * estimate.expected);
     Some(match settings.prior {
         Prior::None => Warning::new(
             "ran_away",

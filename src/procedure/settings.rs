@@ -1,6 +1,6 @@
 //! The settings of an identification, and the solver settings that follow from them.
 
-use crate::identification::{Estimator, Prior, Settings, SigmaSource, Weighting};
+use crate::identification::{Estimator, Prior, Settings, SigmaSource, TermGroup, Terms, Weighting};
 use crate::kinematics::FreeParameter;
 use crate::profile::{ExpectedDeviation, Level, Profile};
 use crate::session::summary::{IdentificationSettings, VerificationMode};
@@ -11,6 +11,8 @@ use crate::units::{to_deg, to_mm};
 pub struct EstimationSettings {
     /// The parameters to identify.
     pub level: Level,
+    /// Errors of the joints to identify instead of those that the level says.
+    pub terms: Option<Vec<TermGroup>>,
     /// How distances are weighted.
     pub weighting: Weighting,
     /// The assumption about deviations.
@@ -33,6 +35,7 @@ impl Default for EstimationSettings {
         let Settings { weighting, prior, estimator, iterations, .. } = Settings::default();
         Self {
             level: Level::default(),
+            terms: None,
             weighting,
             prior,
             estimator,
@@ -63,7 +66,24 @@ impl EstimationSettings {
         }
     }
 
-    /// The free parameters of the chosen level.
+    /// The errors of joints to choose from, in groups from simple to rich; none where the geometry stays alone. They need the prior,
+    /// weights with the covariance, and more than the paper's single step.
+    pub(crate) fn candidates(&self) -> Vec<Vec<Terms>> {
+        let has_candidates =
+            self.prior == Prior::Expected && self.weighting == Weighting::Covariance && self.iterations > 1;
+        match (&self.terms, self.level) {
+            _ if !has_candidates => Vec::new(),
+            (Some(groups), _) => vec![Terms::of_groups(groups)],
+            (None, Level::Offsets | Level::Geometric) => Vec::new(),
+            (None, Level::Auto) => Terms::candidates(),
+            (None, Level::Full) => {
+                let all = [TermGroup::Compliance, TermGroup::Tilt, TermGroup::Harmonics, TermGroup::Curves];
+                vec![Terms::of_groups(&all)]
+            }
+        }
+    }
+
+    /// The free parameters of the geometry at the chosen level.
     pub(crate) fn parameters(&self, profile: &Profile) -> Vec<FreeParameter> {
         self.parameters_of(self.level, profile)
     }

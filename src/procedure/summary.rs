@@ -55,7 +55,7 @@ fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary
 }
 
 /// The identified parameters in edge units.
-fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSummary> {
+pub(super) fn parameter_summaries(found: &Identification, prior: Prior) -> Vec<ParameterSummary> {
     found
         .estimates
         .iter()
@@ -83,8 +83,10 @@ fn deviations(found: &Identification, step: usize) -> Vec<f64> {
 
 fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
     let mut strong = Vec::new();
-    for (i, first) in found.estimates.iter().enumerate() {
-        for (j, second) in found.estimates.iter().enumerate().skip(i + 1) {
+    // The errors of joints come last, and their terms are no findings of their own.
+    let constants = found.estimates.iter().take_while(|estimate| !estimate.id.is_joint_error()).count();
+    for (i, first) in found.estimates.iter().take(constants).enumerate() {
+        for (j, second) in found.estimates.iter().take(constants).enumerate().skip(i + 1) {
             let correlation = found.correlation(i, j);
             if first.identifiable && second.identifiable && correlation.abs() > STRONG_CORRELATION {
                 strong.push(CorrelationSummary { parameters: [first.id, second.id], correlation });
@@ -176,6 +178,9 @@ impl Finished<'_> {
                 })
                 .collect(),
             written: Vec::new(),
+            selection: None,
+            joint_errors: Vec::new(),
+            workspace: None,
         }
     }
 }

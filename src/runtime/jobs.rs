@@ -82,8 +82,8 @@ impl Job {
     }
 
     fn identify(&self, request: &procedure::identify::IdentifyRequest) -> Result<Answer, Problem> {
-        let identified = procedure::identify::identify(request, &mut |iteration| {
-            self.events.offer(Event::Progress { id: self.id, progress: RequestProgress::Solver(*iteration) });
+        let identified = procedure::identify::identify(request, &mut |stage| {
+            self.events.offer(Event::Progress { id: self.id, progress: RequestProgress::Identify(stage) });
             if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         Ok(Answer::Identified(Box::new(identified.map_err(Problem::from)?)))

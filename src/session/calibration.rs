@@ -6,7 +6,10 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::summary::{IdentificationSettings, ParameterSummary, Provenance, SigmaSummary, Verdict, Warning};
+use super::summary::{
+    IdentificationSettings, JointErrorSummary, ParameterSummary, Provenance, SelectionSummary, SigmaSummary, Verdict,
+    Warning, WorkspaceSummary,
+};
 use crate::kinematics::{Arm, KinematicsError, ParameterId, ParameterUnit};
 use crate::profile::{Profile, Target};
 use crate::units::{from_mm, to_mm};
@@ -127,6 +130,19 @@ pub struct Calibration {
     /// Where the first target was said to be mounted, if not where the profile has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mounted: Option<MountedText>,
+    /// The geometry identified alone from the same samples, where the parameters contain errors of joints: what formats that know
+    /// only geometry get, because the geometry of the joint fit is wrong without the rest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub geometric: Vec<ParameterSummary>,
+    /// Which errors of the joints were kept, and against what.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<SelectionSummary>,
+    /// The error of each joint where it was measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint_errors: Vec<JointErrorSummary>,
+    /// The error predicted over the workspace.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub workspace: Option<WorkspaceSummary>,
     /// The profile, as it was read.
     pub profile: String,
 }
@@ -253,6 +269,16 @@ impl Calibration {
         self.identified_with(profile, self.parameters.iter().map(|parameter| parameter.deviation))
     }
 
+    /// The arm of the robot of `profile` with the best geometry and no errors of joints.
+    ///
+    /// # Errors
+    /// A parameter that this robot does not have.
+    pub fn identified_geometry(&self, profile: &Profile) -> Result<Arm, KinematicsError> {
+        let parameters = if self.geometric.is_empty() { &self.parameters } else { &self.geometric };
+        let inside = |parameter: &ParameterSummary| (parameter.id, parameter.unit.from_edge(parameter.deviation));
+        self.mounted_on(profile).arm().with(parameters.iter().map(inside))
+    }
+
     /// The arm with other deviations than the identified ones, in the order and the units of [`Self::parameters`].
     ///
     /// # Errors
@@ -294,7 +320,7 @@ impl Calibration {
             column: error.span.start.col,
             message: error.code.to_string(),
         })?;
-        for parameter in &calibration.parameters {
+        for parameter in calibration.parameters.iter().chain(&calibration.geometric) {
             check_parameter(parameter)?;
         }
         let stations = [

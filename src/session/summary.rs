@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::advice::Advice;
 use super::measurements::Layout;
-use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Weighting};
+use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Terms, Weighting};
 use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::Level;
 use crate::text::{names, names_of_option, written_as_text};
@@ -394,6 +394,96 @@ pub struct IterationSummary {
     pub deviations: Vec<f64>,
 }
 
+/// A model that was tried: the geometry with some errors of the joints.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CandidateSummary {
+    pub terms: Terms,
+    /// Root mean square error at poses that were left out in turn.
+    pub left_out_rms_mm: f64,
+    /// What is left per coordinate with all poses; no accuracy.
+    pub residual_mm: f64,
+}
+
+/// What explains a part of the nominal arm's error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// Lengths and angles of the links, zeros of the joints.
+    Geometry,
+    /// Joints and bearings that give under the arm's weight.
+    Gravity,
+    /// Angle errors that follow the value of a joint.
+    JointCurves,
+}
+
+names!(Cause {
+    Geometry = "geometry",
+    Gravity = "gravity",
+    JointCurves = "joint curves",
+});
+written_as_text!(Cause);
+
+/// Part of the nominal arm's error that a cause explains.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShareSummary {
+    pub cause: Cause,
+    pub percent: f64,
+}
+
+/// Which errors of the joints were kept, and against what.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SelectionSummary {
+    /// All models that were tried, from simple to rich.
+    pub candidates: Vec<CandidateSummary>,
+    /// The one that was kept.
+    pub kept: Terms,
+    /// Why.
+    pub reason: String,
+    /// Root mean square error of the nominal arm at the same poses.
+    pub nominal_rms_mm: f64,
+    /// What explains it.
+    pub shares: Vec<ShareSummary>,
+    /// Root mean square error that is left at poses that were left out in turn.
+    pub left_rms_mm: f64,
+}
+
+/// The position error predicted over the range of the joints in which the arm has to be accurate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WorkspaceSummary {
+    /// Random configurations that it was predicted at.
+    pub configurations: usize,
+    /// Root mean square.
+    pub rms_mm: f64,
+    /// 95 % of the configurations have less.
+    pub p95_mm: f64,
+    pub max_mm: f64,
+    /// Root mean square distance between this model and the best one of geometry alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beside_geometry_rms_mm: Option<f64>,
+}
+
+/// The angle error of one joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointErrorSummary {
+    pub joint: String,
+    /// Smallest and largest value that was measured (deg).
+    pub measured_deg: (f64, f64),
+    /// Turn at the largest gravity torque, with its standard deviation (µrad).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compliance_urad: Option<(f64, f64)>,
+    /// Largest gravity torque (N·m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_nm: Option<f64>,
+    /// Root mean square of the curve where it was measured (µrad).
+    pub curve_rms_urad: f64,
+    /// Value of the joint (deg), its error and the error's standard deviation (µrad), over the joint's range.
+    pub curve: Vec<(f64, f64, f64)>,
+}
+
 /// Everything about an identification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentificationSummary {
@@ -430,6 +520,15 @@ pub struct IdentificationSummary {
     pub termination: TerminationReason,
     pub iterations: Vec<IterationSummary>,
     pub written: Vec<String>,
+    /// Which errors of the joints were kept; none where only the geometry was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<SelectionSummary>,
+    /// The error of each joint, where joints have any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint_errors: Vec<JointErrorSummary>,
+    /// The error predicted over the workspace; none for data without points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub workspace: Option<WorkspaceSummary>,
 }
 
 /// The verification of a calibration on other data.

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::intent::Intent;
 use super::notice::{Notice, Problem};
-use crate::identification::Iteration;
+use crate::identification::Stage;
 use crate::procedure;
 use crate::procedure::identify::{Identified, IdentifyRequest};
 use crate::procedure::models::{Models, ModelsRequest};
@@ -126,7 +126,7 @@ pub enum RequestProgress {
     /// Progress of a pose search.
     Search(procedure::plan::Progress),
     /// Progress of an identification.
-    Solver(Iteration),
+    Identify(Stage),
 }
 
 /// Work for the outside world.

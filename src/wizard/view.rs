@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::intent::{IntentInfo, PlanSettings};
 use super::notice::{Notice, Severity};
 use super::{RequestProgress, Wizard};
+use crate::identification::{self, Iteration};
 use crate::planning::{Figures, Stage};
 use crate::procedure::plan;
 use crate::profile::{Level, Profile};
@@ -171,7 +172,7 @@ impl ProfileCard {
             title: profile.title().to_owned(),
             source: profile.source().to_owned(),
             joints: profile.chain().joints().iter().map(|joint| joint.name.clone()).collect(),
-            free_parameters: profile.parameters(Level::default()).len(),
+            free_parameters: profile.parameters(Level::Geometric).len(),
             instrument: profile.instrument().map(|instrument| instrument.name.clone()),
             target_mm: profile.targets().first().map(|target| {
                 let point = target.position_in_flange;
@@ -554,8 +555,11 @@ fn progress_text(progress: &RequestProgress) -> String {
                 found.figures.predicted_error
             )
         }
-        RequestProgress::Solver(iteration) => {
-            format!("cost {:.6e}, largest change {:.1e} expected deviations", iteration.cost, iteration.step)
+        RequestProgress::Identify(identification::Stage::Step(Iteration { cost, step, .. })) => {
+            format!("cost {cost:.6e}, largest change {step:.1e} expected deviations")
+        }
+        RequestProgress::Identify(identification::Stage::Candidate { number, of, terms }) => {
+            format!("model {number} of {of}: {terms}")
         }
     }
 }
@@ -564,7 +568,7 @@ fn progress_text(progress: &RequestProgress) -> String {
 const fn figures(progress: &RequestProgress) -> Option<Figures> {
     match progress {
         RequestProgress::Search(plan::Progress::Sweep { found, .. }) => Some(found.figures),
-        RequestProgress::Search(_) | RequestProgress::Solver(_) => None,
+        RequestProgress::Search(_) | RequestProgress::Identify(_) => None,
     }
 }
 
@@ -575,7 +579,7 @@ fn part_done(progress: &RequestProgress) -> Option<f64> {
             Some((*done as f64 / (*sweeps).max(1) as f64).min(1.0))
         }
         RequestProgress::Search(plan::Progress::Searching | plan::Progress::Unreachable { .. })
-        | RequestProgress::Solver(_) => None,
+        | RequestProgress::Identify(_) => None,
     }
 }
 

@@ -32,7 +32,7 @@ impl Robot {
         Self {
             name,
             arm: profile.arm(),
-            parameters: profile.parameters(Level::default()),
+            parameters: profile.parameters(Level::Geometric),
             ranges: profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect(),
         }
     }

@@ -136,7 +136,7 @@ fn drawn_deviations_are_of_the_expected_size_and_targets_near_their_place() {
     let (mut square, mut count) = (0.0, 0.0);
     for seed in 0..200 {
         for (id, deviation) in truth::deviations(&profile, Truth::Drawn, seed).unwrap() {
-            let free = profile.parameters(Level::default());
+            let free = profile.parameters(Level::Geometric);
             let expected = free.iter().find(|free| free.id == id).unwrap().expected;
             if matches!(id, ParameterId::Target { .. }) {
                 assert!(deviation.abs() < from_mm(10.0) && expected > from_mm(10.0));

@@ -61,7 +61,7 @@ pub(super) fn deviations(profile: &Profile, truth: Truth, seed: u64) -> Result<V
                 Some(_) => free.expected.min(TARGET_SPREAD),
                 None => free.expected,
             };
-            let free = profile.parameters(Level::default());
+            let free = profile.parameters(Level::Geometric);
             Ok(free.iter().map(|free| (free.id, spread(free) * random.normal())).collect())
         }
         Truth::Paper => {

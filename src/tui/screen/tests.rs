@@ -296,6 +296,9 @@ fn summary(is_good: bool) -> IdentificationSummary {
         },
         termination: TerminationReason::Converged,
         iterations: Vec::new(),
+        selection: None,
+        joint_errors: Vec::new(),
+        workspace: None,
         written: Vec::new(),
     }
 }

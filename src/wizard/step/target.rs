@@ -131,7 +131,7 @@ fn locate(session: &Session) -> Option<Result<TargetLocation, CirclePointError>>
         &first.series(),
         &second.series(),
         sigma,
-        &profile.parameters(Level::default()),
+        &profile.parameters(Level::Geometric),
     ))
 }
 

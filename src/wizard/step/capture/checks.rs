@@ -92,7 +92,7 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<D
         rows.iter().filter_map(|row| session.rows.get(*row)).map(|row| row.planned.configuration.clone()).collect();
     let found = triage(&Triage {
         arm: &profile.arm(),
-        parameters: &profile.parameters(Level::default()),
+        parameters: &profile.parameters(Level::Geometric),
         sigma: stated_sigma(profile),
         planned: &planned,
         samples: &samples,

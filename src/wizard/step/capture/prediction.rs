@@ -38,7 +38,7 @@ impl Prediction {
             .filter(|row| row.planned.kind == PoseKind::Identification)
             .map(|row| at(row.planned.configuration.clone()));
         let pool: Vec<Place> = measured.iter().cloned().chain(open).collect();
-        let parameters = profile.parameters(Level::default());
+        let parameters = profile.parameters(Level::Geometric);
         let information = Information::new(&profile.arm(), &parameters, &pool, &fresh(profile)?).ok()?;
         let of_first = |count: usize| information.predicted_error(&(0..count).collect::<Vec<_>>());
         let curve = (information.fewest_poses()..=measured.len()).filter_map(|n| Some((n, of_first(n)?))).collect();
@@ -63,7 +63,7 @@ impl Prediction {
 /// unclear, all free parameters count.
 pub(in crate::wizard::step) fn fewest_samples(session: &Session) -> Option<usize> {
     let profile = &session.mounted_profile()?;
-    let parameters = profile.parameters(Level::default());
+    let parameters = profile.parameters(Level::Geometric);
     let rank = fresh(profile).and_then(|fresh| findable(&profile.arm(), &parameters, &fresh));
     Some(fewest_poses(rank.unwrap_or(parameters.len())))
 }

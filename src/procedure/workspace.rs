@@ -1,0 +1,209 @@
+//! The error that is predicted where nothing was measured: over the range of the joints in which the arm has to be accurate.
+
+use nalgebra::Matrix3;
+
+use crate::geometry::register;
+use crate::identification::predicted::Predictor;
+use crate::identification::verification::ErrorStatistics;
+use crate::identification::{Identification, Problem, WithTerms};
+use crate::kinematics::{Arm, Place};
+use crate::planning::{JointBox, random};
+use crate::profile::{Acceptance, Profile};
+use crate::report::number;
+use crate::session::summary::{VerificationSummary, Warning, WorkspaceSummary};
+use crate::units::to_mm;
+
+/// Code of the warning that the arm is not known where it has to be accurate.
+const CODE: &str = "workspace";
+/// Configurations that the error is predicted at.
+const CONFIGURATIONS: usize = 400;
+/// Their seed: the same for every arm, so that figures can be compared.
+const SEED: u64 = 0x5eed;
+/// Measured poses from which a joint is taken over its range, and the values that it takes.
+const POSES_OF_A_JOINT: usize = 10;
+const VALUES_OF_A_JOINT: usize = 16;
+/// Mean of the norm of three normal numbers per root mean square.
+const MEAN_PER_RMS: f64 = 0.921;
+
+/// The prediction over the workspace.
+#[derive(Clone, Debug)]
+pub(super) struct Workspace {
+    pub(super) summary: WorkspaceSummary,
+    worst: Option<WorstJoint>,
+    /// Root mean square error of the nominal arm where it was measured (m).
+    nominal: Option<f64>,
+}
+
+/// The joint whose range the samples leave open most.
+#[derive(Clone, Debug)]
+struct WorstJoint {
+    joint: usize,
+    /// Where it was measured ((rad) or (m)).
+    measured: (f64, f64),
+    /// Largest error predicted where it alone leaves the measured poses (m).
+    largest: f64,
+    /// Its value there ((rad) or (m)).
+    at: f64,
+}
+
+/// The ranges of the pendant joints in which the arm has to be accurate ((rad) or (m)): what is planned, but not more than a turn.
+pub(super) fn ranges(profile: &Profile) -> Option<Vec<(f64, f64)>> {
+    use std::f64::consts::PI;
+    let joints = profile.chain().joints().iter().zip(profile.joints());
+    joints
+        .map(|(joint, range)| {
+            let stated = range.planning_limits.or(range.limits);
+            match joint.joint_type {
+                crate::kinematics::JointType::Prismatic => stated,
+                crate::kinematics::JointType::Revolute => {
+                    let (low, high) = stated.unwrap_or((-PI, PI));
+                    Some(if high - low > 2.0 * PI { (-PI, PI) } else { (low, high) })
+                }
+            }
+        })
+        .collect()
+}
+
+impl Workspace {
+    /// Predicts from the samples of `problem` that `with_terms` accepted; `None` where they define no frame or the profile no range.
+    pub(super) fn new(
+        profile: &Profile,
+        problem: &Problem<'_>,
+        with_terms: &WithTerms,
+        nominal: Option<f64>,
+    ) -> Option<Self> {
+        let found = &with_terms.found;
+        let measured = frame_places(problem, found);
+        let predictor = Predictor::new(found, &measured)?;
+        let ranges = ranges(profile)?;
+        let targets = problem.arm.targets.len().max(1);
+        let joint_box = JointBox::new(ranges.clone()).ok()?;
+        let places: Vec<Place> = random(&joint_box, SEED)
+            .take(CONFIGURATIONS)
+            .enumerate()
+            .map(|(index, configuration)| Place { configuration, target: index % targets })
+            .collect();
+        let places: Vec<&Place> = places.iter().collect();
+        let errors = predicted(&predictor, found, &places);
+        let statistics = ErrorStatistics::new(errors)?;
+        let beside_geometry = (!with_terms.selection.terms().is_geometry())
+            .then(|| difference(&with_terms.geometric.arm, &found.arm, &measured, &places))
+            .flatten();
+        let summary = WorkspaceSummary {
+            configurations: places.len(),
+            rms_mm: to_mm(statistics.rms),
+            p95_mm: to_mm(statistics.p95),
+            max_mm: to_mm(statistics.max),
+            beside_geometry_rms_mm: beside_geometry.map(to_mm),
+        };
+        let worst = worst_joint(&predictor, found, &measured, &ranges);
+        Some(Self { summary, worst, nominal })
+    }
+
+    /// A warning that blocks acceptance where the prediction is beyond a limit, or beyond the nominal arm's own error.
+    pub(super) fn warning(&self, profile: &Profile, verification: Option<&VerificationSummary>) -> Option<Warning> {
+        let nominal = verification.and_then(|verification| Some(verification.nominal.position_mm?.rms));
+        let beyond = self.beyond(profile.acceptance(), nominal.or(self.nominal.map(to_mm)))?;
+        let WorkspaceSummary { rms_mm, p95_mm, .. } = self.summary;
+        let joint = self.worst.as_ref().map_or_else(String::new, |worst| worst.words(profile));
+        let message = format!(
+            "over the whole range of the joints the predicted error is {} mm rms and {} mm at 95 % of the configurations, more than {beyond}: where the samples do not take the arm, nothing is known about it.{joint} Add poses there, or narrow the planning limits to where the arm works",
+            number(rms_mm, 2),
+            number(p95_mm, 2),
+        );
+        Some(Warning::new(CODE, message, true))
+    }
+
+    /// The limit that the prediction exceeds, in words.
+    fn beyond(&self, acceptance: &Acceptance, nominal_mm: Option<f64>) -> Option<String> {
+        let WorkspaceSummary { rms_mm, p95_mm, .. } = self.summary;
+        let limits = [
+            (acceptance.position_mean, MEAN_PER_RMS * rms_mm, "mean"),
+            (acceptance.position_rms, rms_mm, "rms"),
+            (acceptance.position_max, p95_mm, "largest"),
+        ];
+        let limit = limits.into_iter().find_map(|(limit, value, name)| {
+            let limit = to_mm(limit?);
+            (value > limit).then(|| format!("the limit of {} mm ({name})", number(limit, 3)))
+        });
+        limit.or_else(|| {
+            let nominal = nominal_mm.filter(|nominal| rms_mm > *nominal)?;
+            Some(format!("the {} mm of the nominal arm where it was measured", number(nominal, 2)))
+        })
+    }
+}
+
+impl WorstJoint {
+    fn words(&self, profile: &Profile) -> String {
+        let joint = &profile.chain().joints()[self.joint];
+        let quantity = joint.joint_type.quantity();
+        let edge = |value: f64| number(quantity.to_edge(value), 0);
+        format!(
+            " Joint {} matters most: it was measured from {} to {} {unit}, and at {} {unit} the prediction is {} mm.",
+            joint.name,
+            edge(self.measured.0),
+            edge(self.measured.1),
+            edge(self.at),
+            number(to_mm(self.largest), 2),
+            unit = quantity.unit()
+        )
+    }
+}
+
+/// The accepted places that define the frame: the points of the first station, or all seats of shared points.
+fn frame_places<'p>(problem: &Problem<'p>, found: &Identification) -> Vec<&'p Place> {
+    let observations = problem.observations;
+    let points = observations.points.iter().enumerate().filter(|(_, sample)| sample.station == 0);
+    let of_points: Vec<&Place> =
+        points.filter(|(index, _)| !found.is_rejected(*index)).map(|(_, sample)| &sample.at).collect();
+    if of_points.is_empty() { observations.shared.iter().flat_map(|shared| &shared.at).collect() } else { of_points }
+}
+
+/// Root mean square errors predicted at places (m): what the parameters leave open, and what a pose scatters by.
+fn predicted(predictor: &Predictor<'_>, found: &Identification, places: &[&Place]) -> Vec<f64> {
+    let own = 3.0 * found.sigma.poses.powi(2);
+    let size = |covariance: &Matrix3<f64>| (covariance.trace().max(0.0) + own).sqrt();
+    predictor.covariances(places).iter().map(size).collect()
+}
+
+fn worst_joint(
+    predictor: &Predictor<'_>,
+    found: &Identification,
+    measured: &[&Place],
+    ranges: &[(f64, f64)],
+) -> Option<WorstJoint> {
+    let poses = measured.len().min(POSES_OF_A_JOINT);
+    let picked: Vec<&Place> = (0..poses).map(|index| measured[index * measured.len() / poses]).collect();
+    (0..ranges.len())
+        .filter_map(|joint| {
+            let (low, high) = ranges[joint];
+            let value = |index: usize| low + (high - low) * index as f64 / (VALUES_OF_A_JOINT - 1) as f64;
+            let places: Vec<Place> = (0..VALUES_OF_A_JOINT)
+                .flat_map(|index| picked.iter().map(move |place| (index, place)))
+                .map(|(index, place)| {
+                    let mut moved = (*place).clone();
+                    moved.configuration[joint] = value(index);
+                    moved
+                })
+                .collect();
+            let errors = predicted(predictor, found, &places.iter().collect::<Vec<_>>());
+            let (largest, index) = errors
+                .iter()
+                .zip(0..)
+                .fold((0.0, 0), |best, (error, index)| if *error > best.0 { (*error, index) } else { best });
+            let values = measured.iter().map(|place| place.configuration[joint]);
+            let range = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
+            let at = value(index / poses.max(1));
+            Some(WorstJoint { joint, measured: range, largest, at })
+        })
+        .max_by(|a, b| a.largest.total_cmp(&b.largest))
+}
+
+/// Root mean square distance (m) at `places` between two arms whose bases are registered at the measured places.
+fn difference(one: &Arm, other: &Arm, measured: &[&Place], places: &[&Place]) -> Option<f64> {
+    let of = |arm: &Arm, places: &[&Place]| arm.points_in_base(places.iter().copied());
+    let pairs = of(one, measured).into_iter().zip(of(other, measured)).map(|(from, to)| (1.0, from, to));
+    let moved = register(pairs)?.to_from_from;
+    let errors = of(one, places).iter().zip(of(other, places)).map(|(from, to)| (moved * from - to).norm()).collect();
+    ErrorStatistics::new(errors).map(|statistics| statistics.rms)
+}
