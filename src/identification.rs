@@ -98,7 +98,7 @@ pub fn identify_while(
     let solve = prepared.solve(&everything);
     let zero = DVector::zeros(prepared.basis.transform.ncols());
     let stated = settings.sigma.map_or(0.0, |(sigma, _)| sigma.max(SMALLEST_SIGMA).powi(2));
-    let noise = Noise { stated, shot: 0.0, pose: FIRST_SIGMA * FIRST_SIGMA };
+    let noise = Noise { stated, shot: 0.0, pose: FIRST_SIGMA * FIRST_SIGMA, confirmed: 1.0 };
     let mut fit = Fit { iterations: Vec::new(), path: Vec::new(), progress };
     let mut trust = everything.clone();
     if settings.estimator == Estimator::Robust {
@@ -296,7 +296,8 @@ fn sigma(solve: &Solve<'_, '_>, settings: &Settings, at: &Linearised) -> Sigma {
         (None, None) => (None, SigmaSource::Assumed),
     };
     Sigma {
-        used: scatter.of_reading(at.noise.pose),
+        used: scatter.of_reading(&at.noise),
+        confirmed: at.noise.confirmed,
         source,
         from_residuals,
         normalised,

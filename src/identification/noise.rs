@@ -19,6 +19,8 @@ const PRIOR_VALUES: f64 = 6.0;
 const EXPECTED: f64 = 20.0 * MICROMETRE;
 /// No arm repeats better than this (m), however good the instrument is.
 const REPEATABILITY: f64 = 10.0 * MICROMETRE;
+/// Residuals never confirm less than this part of a promised variance.
+const LEAST_CONFIRMED: f64 = 1e-4;
 /// Median of the square norm of three standard normal numbers.
 const MEDIAN_SQUARE_3: f64 = 2.365_973_884_375_338;
 /// Median of the square of a standard normal number.
@@ -98,11 +100,18 @@ pub(crate) struct Noise {
     pub(crate) shot: f64,
     /// Of what a pose has in common.
     pub(crate) pose: f64,
+    /// Part of the variance of readings that the residuals confirm, at most 1: an instrument that is better than stated.
+    pub(crate) confirmed: f64,
 }
 
 impl Noise {
     /// Variance of a reading about its pose.
     pub(crate) fn of_reading(&self, own_sigma: Option<f64>) -> f64 {
+        self.confirmed * self.promised(own_sigma)
+    }
+
+    /// Variance of a reading about its pose, as stated and as the readings of a pose show.
+    pub(crate) fn promised(&self, own_sigma: Option<f64>) -> f64 {
         own_sigma.map_or(self.stated, |sigma| sigma.max(SMALLEST_SIGMA).powi(2)) + self.shot
     }
 
@@ -142,7 +151,7 @@ pub(crate) enum Estimation {
 struct Residual {
     square: f64,
     values: f64,
-    /// Variance beside that of the pose (m²).
+    /// Promised variance beside that of the pose (m²).
     variance: f64,
     /// How often the variance of a pose is in it.
     poses: f64,
@@ -154,7 +163,7 @@ pub(crate) struct Scatter {
     residuals: Vec<Residual>,
     /// Independent values among them: less those that the frames took.
     pub(crate) values: f64,
-    /// Mean variance of a reading beside that of the pose.
+    /// Mean promised variance of a reading beside that of the pose.
     reading: f64,
     expected: f64,
 }
@@ -169,6 +178,7 @@ impl Scatter {
         of_places: &[Vector3<f64>],
         of_lengths: &[f64],
     ) -> Self {
+        let noise = &Noise { confirmed: 1.0, ..*noise };
         let means = GroupMeans::new(problem, groups, noise, trust, of_places);
         let mut frames = vec![0.0; groups.owner.iter().map(|owner| owner + 1).max().unwrap_or(0)];
         let mut residuals = Vec::with_capacity(groups.len());
@@ -209,40 +219,44 @@ impl Scatter {
     pub(crate) fn normalised(&self, determined: f64) -> Option<f64> {
         let freedom = self.values - determined;
         let is_stated = self.residuals.iter().all(|residual| residual.variance > 0.0);
-        (freedom >= 1.0 && is_stated).then(|| (self.chi_square(0.0, Estimation::Efficient) / freedom).sqrt())
+        (freedom >= 1.0 && is_stated).then(|| (self.chi_square(0.0, 1.0, Estimation::Efficient) / freedom).sqrt())
     }
 
-    /// Standard deviation of one reading with the variance `pose` of its pose (m).
-    pub(crate) fn of_reading(&self, pose: f64) -> f64 {
-        (pose + self.reading).sqrt()
+    /// Standard deviation of one reading (m) at some noise.
+    pub(crate) fn of_reading(&self, noise: &Noise) -> f64 {
+        (noise.pose + noise.confirmed * self.reading).sqrt()
     }
 
-    /// The variance of poses (m²), where the parameters took `determined` of the values: the one at which the residuals are as
-    /// large as they should be, with a few values of the expected size beside them so that it cannot collapse.
-    pub(crate) fn pose_variance(&self, determined: f64, estimation: Estimation) -> f64 {
+    /// The noise at which the residuals are as large as they should be, where the parameters took `determined` of the values, with
+    /// a few values of the expected size beside them so that it cannot collapse: more than promised is the variance of poses (m²),
+    /// and if there is less, only a part of the promised one is confirmed.
+    pub(crate) fn noise(&self, at: &Noise, determined: f64, estimation: Estimation) -> Noise {
         let target = (self.values - determined).max(0.0) + PRIOR_VALUES;
-        let excess = |pose: f64| self.chi_square(pose, estimation) + self.prior(pose) - target;
+        let sum = |pose: f64| self.chi_square(pose, 1.0, estimation) + self.prior(pose);
         // Far below what any instrument sees.
         let smallest = SMALLEST_SIGMA.powi(2) * 1e-6;
-        if excess(smallest) <= 0.0 {
-            return 0.0;
+        let as_promised = sum(smallest);
+        if as_promised <= target {
+            let confirmed = if self.reading > 0.0 { (as_promised / target).max(LEAST_CONFIRMED) } else { 1.0 };
+            return Noise { pose: 0.0, confirmed, ..*at };
         }
         let largest = self.residuals.iter().map(|residual| residual.square).fold(self.expected, f64::max);
         let (mut low, mut high) = (smallest, largest * PRIOR_VALUES * self.values.max(1.0));
         while high / low > 1.0 + 1e-9 {
             let middle = (low * high).sqrt();
-            *(if excess(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+            *(if sum(middle) > target { &mut low } else { &mut high }) = middle;
         }
-        (low * high).sqrt()
+        Noise { pose: (low * high).sqrt(), confirmed: 1.0, ..*at }
     }
 
     fn prior(&self, pose: f64) -> f64 {
         PRIOR_VALUES * self.expected / (pose + self.reading)
     }
 
-    fn chi_square(&self, pose: f64, estimation: Estimation) -> f64 {
-        let normalised =
-            |residual: &Residual| residual.square / (residual.poses * pose + residual.variance).max(f64::MIN_POSITIVE);
+    fn chi_square(&self, pose: f64, confirmed: f64, estimation: Estimation) -> f64 {
+        let normalised = |residual: &Residual| {
+            residual.square / (residual.poses * pose + confirmed * residual.variance).max(f64::MIN_POSITIVE)
+        };
         match estimation {
             Estimation::Efficient => self.residuals.iter().map(normalised).sum(),
             Estimation::Robust => {

@@ -26,6 +26,8 @@ pub struct Sigma {
     pub shots: f64,
     /// Part of what a pose has in common (m).
     pub poses: f64,
+    /// Part of the variance of instrument and readings that the residuals confirm, at most 1: instruments can be better than stated.
+    pub confirmed: f64,
 }
 
 impl Sigma {

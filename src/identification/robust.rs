@@ -125,7 +125,7 @@ fn judge_with(solve: &Solve<'_, '_>, at: &Linearised, known: Known) -> Judgement
 /// The smallest scatter, in units of what the noise promises, that samples are judged by: one within the stated σ is never an
 /// outlier, however good the others are.
 fn smallest_scatter(solve: &Solve<'_, '_>, at: &Linearised) -> f64 {
-    let stated = Noise { shot: 0.0, ..at.noise };
+    let stated = Noise { shot: 0.0, confirmed: 1.0, ..at.noise };
     let variances =
         (0..solve.trust.places.len()).map(|place| stated.of_reading(Noise::own_sigma(solve.problem, place)));
     let mean = variances.sum::<f64>() / solve.trust.places.len().max(1) as f64;

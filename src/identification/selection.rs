@@ -231,7 +231,12 @@ impl<'a, 'p> Shared<'a, 'p> {
         let trust = accepted(problem, found);
         let places = judged_places(problem);
         let stated = settings.sigma.map_or(0.0, |(sigma, _)| sigma * sigma);
-        let noise = Noise { stated, shot: found.sigma.shots.powi(2), pose: found.sigma.poses.powi(2) };
+        let noise = Noise {
+            stated,
+            shot: found.sigma.shots.powi(2),
+            pose: found.sigma.poses.powi(2),
+            confirmed: found.sigma.confirmed,
+        };
         let weights = Weights::new(problem, &groups, &noise, &trust);
         let evaluation = Evaluation::new(problem, &found.arm);
         let predicted = evaluation.points.clone();
@@ -354,10 +359,11 @@ impl<'a, 'p> Shared<'a, 'p> {
                 Fit::ManyRows(ManyRows::new(self, &gram, factor, &scales, &weights)?)
             };
             let scatter = self.scatter(&fit.solution().residuals, &noise);
-            let pose = scatter.pose_variance(fit.determined(), Estimation::Efficient);
-            let change = scatter.of_reading(pose) / scatter.of_reading(noise.pose) - 1.0;
-            noise.pose = pose;
-            result = Some((fit, weights.clone(), scatter.of_reading(pose)));
+            let now = scatter.noise(&noise, fit.determined(), Estimation::Efficient);
+            let sigma = scatter.of_reading(&now);
+            let change = sigma / scatter.of_reading(&noise) - 1.0;
+            noise = now;
+            result = Some((fit, weights.clone(), sigma));
             if change.abs() <= NOISE_TOLERANCE {
                 break;
             }

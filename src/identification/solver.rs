@@ -289,12 +289,12 @@ impl Solve<'_, '_> {
                 return Some(found);
             }
             let scatter = self.scatter(at, &(&self.basis.transform * &found.delta));
-            let pose = scatter.pose_variance(found.determined, self.estimation);
-            let change = scatter.of_reading(pose) / scatter.of_reading(at.noise.pose) - 1.0;
+            let noise = scatter.noise(&at.noise, found.determined, self.estimation);
+            let change = scatter.of_reading(&noise) / scatter.of_reading(&at.noise) - 1.0;
             if change.abs() <= NOISE_TOLERANCE {
                 return Some(found);
             }
-            self.reweigh(at, Noise { pose, ..at.noise });
+            self.reweigh(at, noise);
         }
         None
     }

@@ -97,7 +97,7 @@ fn correlations(found: &Identification) -> Vec<CorrelationSummary> {
 }
 
 fn sigma_summary(found: &Identification) -> SigmaSummary {
-    let Sigma { used, source, from_residuals, normalised: _, instrument, shots, poses } = found.sigma;
+    let Sigma { used, source, from_residuals, normalised: _, instrument, shots, poses, confirmed: _ } = found.sigma;
     SigmaSummary {
         used_mm: to_mm(used),
         source,

@@ -27,9 +27,14 @@ const MEAN_PER_RMS: f64 = 0.921;
 
 /// The prediction over the workspace.
 #[derive(Clone, Debug)]
-pub(super) struct Workspace {
+pub(super) struct Workspace<'a> {
     pub(super) summary: WorkspaceSummary,
-    worst: Option<WorstJoint>,
+    predictor: Predictor<'a>,
+    found: &'a Identification,
+    /// Places that define the frame.
+    measured: Vec<&'a Place>,
+    /// Ranges of the joints ((rad) or (m)).
+    ranges: Vec<(f64, f64)>,
     /// Root mean square error of the nominal arm where it was measured (m).
     nominal: Option<f64>,
 }
@@ -64,12 +69,12 @@ pub(super) fn ranges(profile: &Profile) -> Option<Vec<(f64, f64)>> {
         .collect()
 }
 
-impl Workspace {
+impl<'a> Workspace<'a> {
     /// Predicts from the samples of `problem` that `with_terms` accepted; `None` where they define no frame or the profile no range.
     pub(super) fn new(
         profile: &Profile,
-        problem: &Problem<'_>,
-        with_terms: &WithTerms,
+        problem: &Problem<'a>,
+        with_terms: &'a WithTerms,
         nominal: Option<f64>,
     ) -> Option<Self> {
         let found = &with_terms.found;
@@ -96,8 +101,7 @@ impl Workspace {
             max_mm: to_mm(statistics.max),
             beside_geometry_rms_mm: beside_geometry.map(to_mm),
         };
-        let worst = worst_joint(&predictor, found, &measured, &ranges);
-        Some(Self { summary, worst, nominal })
+        Some(Self { summary, predictor, found, measured, ranges, nominal })
     }
 
     /// A warning that blocks acceptance where the prediction is beyond a limit, or beyond the nominal arm's own error.
@@ -105,7 +109,7 @@ impl Workspace {
         let nominal = verification.and_then(|verification| Some(verification.nominal.position_mm?.rms));
         let beyond = self.beyond(profile.acceptance(), nominal.or(self.nominal.map(to_mm)))?;
         let WorkspaceSummary { rms_mm, p95_mm, .. } = self.summary;
-        let joint = self.worst.as_ref().map_or_else(String::new, |worst| worst.words(profile));
+        let joint = self.worst_joint().map_or_else(String::new, |worst| worst.words(profile));
         let message = format!(
             "over the whole range of the joints the predicted error is {} mm rms and {} mm at 95 % of the configurations, more than {beyond}: where the samples do not take the arm, nothing is known about it.{joint} Add poses there, or narrow the planning limits to where the arm works",
             number(rms_mm, 2),
@@ -130,6 +134,37 @@ impl Workspace {
             let nominal = nominal_mm.filter(|nominal| rms_mm > *nominal)?;
             Some(format!("the {} mm of the nominal arm where it was measured", number(nominal, 2)))
         })
+    }
+
+    /// The joint that leaves the measured poses with the largest predicted error.
+    fn worst_joint(&self) -> Option<WorstJoint> {
+        let measured = &self.measured;
+        let poses = measured.len().min(POSES_OF_A_JOINT);
+        let picked: Vec<&Place> = (0..poses).map(|index| measured[index * measured.len() / poses]).collect();
+        (0..self.ranges.len())
+            .filter_map(|joint| {
+                let (low, high) = self.ranges[joint];
+                let value = |index: usize| low + (high - low) * index as f64 / (VALUES_OF_A_JOINT - 1) as f64;
+                let places: Vec<Place> = (0..VALUES_OF_A_JOINT)
+                    .flat_map(|index| picked.iter().map(move |place| (index, place)))
+                    .map(|(index, place)| {
+                        let mut moved = (*place).clone();
+                        moved.configuration[joint] = value(index);
+                        moved
+                    })
+                    .collect();
+                let errors = predicted(&self.predictor, self.found, &places.iter().collect::<Vec<_>>());
+                let (largest, index) = errors
+                    .iter()
+                    .zip(0..)
+                    .fold((0.0, 0), |best, (error, index)| if *error > best.0 { (*error, index) } else { best });
+                let values = measured.iter().map(|place| place.configuration[joint]);
+                let range =
+                    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
+                let at = value(index / poses.max(1));
+                Some(WorstJoint { joint, measured: range, largest, at })
+            })
+            .max_by(|a, b| a.largest.total_cmp(&b.largest))
     }
 }
 
@@ -164,39 +199,6 @@ fn predicted(predictor: &Predictor<'_>, found: &Identification, places: &[&Place
     let own = 3.0 * found.sigma.poses.powi(2);
     let size = |covariance: &Matrix3<f64>| (covariance.trace().max(0.0) + own).sqrt();
     predictor.covariances(places).iter().map(size).collect()
-}
-
-fn worst_joint(
-    predictor: &Predictor<'_>,
-    found: &Identification,
-    measured: &[&Place],
-    ranges: &[(f64, f64)],
-) -> Option<WorstJoint> {
-    let poses = measured.len().min(POSES_OF_A_JOINT);
-    let picked: Vec<&Place> = (0..poses).map(|index| measured[index * measured.len() / poses]).collect();
-    (0..ranges.len())
-        .filter_map(|joint| {
-            let (low, high) = ranges[joint];
-            let value = |index: usize| low + (high - low) * index as f64 / (VALUES_OF_A_JOINT - 1) as f64;
-            let places: Vec<Place> = (0..VALUES_OF_A_JOINT)
-                .flat_map(|index| picked.iter().map(move |place| (index, place)))
-                .map(|(index, place)| {
-                    let mut moved = (*place).clone();
-                    moved.configuration[joint] = value(index);
-                    moved
-                })
-                .collect();
-            let errors = predicted(predictor, found, &places.iter().collect::<Vec<_>>());
-            let (largest, index) = errors
-                .iter()
-                .zip(0..)
-                .fold((0.0, 0), |best, (error, index)| if *error > best.0 { (*error, index) } else { best });
-            let values = measured.iter().map(|place| place.configuration[joint]);
-            let range = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
-            let at = value(index / poses.max(1));
-            Some(WorstJoint { joint, measured: range, largest, at })
-        })
-        .max_by(|a, b| a.largest.total_cmp(&b.largest))
 }
 
 /// Root mean square distance (m) at `places` between two arms whose bases are registered at the measured places.
