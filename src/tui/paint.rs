@@ -50,23 +50,62 @@ pub fn rule(buf: &mut Buffer, area: Rect, row: u16, sign: &str, style: Style) {
     text(buf, area, (0, row), &sign.repeat(usize::from(area.width)), style);
 }
 
-/// A buffer as text for snapshots: its characters, then the number of cells of each style.
+/// A buffer as text for snapshots: its characters, then its styles, with the words that a colour marks.
 #[cfg(test)]
 pub(crate) fn snapshot(buf: &Buffer) -> String {
-    let mut styles = std::collections::BTreeMap::<String, usize>::new();
+    use ratatui::style::{Color, Modifier};
+    let mut styles = std::collections::BTreeMap::<String, Vec<String>>::new();
     let mut lines = Vec::new();
     for y in buf.area.y..buf.area.bottom() {
-        let mut line = String::new();
-        for x in buf.area.x..buf.area.right() {
-            let Some(cell) = buf.cell((x, y)) else { continue };
-            line.push_str(cell.symbol());
-            if cell.symbol() != " " || cell.modifier.contains(ratatui::style::Modifier::REVERSED) {
-                let style = format!("{} {:?}", cell.fg, cell.modifier).replace("Modifier", "");
-                *styles.entry(style).or_default() += 1;
+        let cells: Vec<_> = (buf.area.x..buf.area.right()).filter_map(|x| buf.cell((x, y))).collect();
+        let line: String = cells.iter().map(|cell| cell.symbol()).collect();
+        lines.push(line.trim_end().to_owned());
+        for run in cells.chunk_by(|a, b| (a.fg, a.modifier) == (b.fg, b.modifier)) {
+            let (fg, modifier) = (run[0].fg, run[0].modifier);
+            let text: String = run.iter().map(|cell| cell.symbol()).collect();
+            let text = text.trim().to_owned();
+            if text.is_empty() && !modifier.contains(Modifier::REVERSED) {
+                continue;
+            }
+            let marked = styles.entry(format!("{fg} {modifier:?}").replace("Modifier", "")).or_default();
+            if fg != Color::Reset && text.contains(char::is_alphabetic) && !marked.contains(&text) {
+                marked.push(text);
             }
         }
-        lines.push(line.trim_end().to_owned());
     }
-    let styles: Vec<String> = styles.iter().map(|(style, count)| format!("{style} {count}")).collect();
-    lines.join("\n") + "\nstyles: " + &styles.join("; ")
+    for (style, marked) in styles {
+        let marked: String = marked.iter().map(|text| format!(" '{text}'")).collect();
+        lines.push(format!("style {style}:{marked}").trim_end_matches(':').to_owned());
+    }
+    lines.join("\n")
+}
+
+/// The lines in which a screen differs from the usual one: `-` gone, `+` new.
+#[cfg(test)]
+pub(crate) fn differences(usual: &str, shown: &str) -> String {
+    let (old, new): (Vec<&str>, Vec<&str>) = (usual.lines().collect(), shown.lines().collect());
+    // How many lines the rests of both have in common.
+    let mut common = vec![vec![0_usize; new.len() + 1]; old.len() + 1];
+    for i in (0..old.len()).rev() {
+        for j in (0..new.len()).rev() {
+            common[i][j] =
+                if old[i] == new[j] { common[i + 1][j + 1] + 1 } else { common[i + 1][j].max(common[i][j + 1]) };
+        }
+    }
+    let (mut i, mut j, mut lines) = (0, 0, Vec::new());
+    while i < old.len() || j < new.len() {
+        if i < old.len() && j < new.len() && old[i] == new[j] {
+            (i, j) = (i + 1, j + 1);
+            if lines.last().is_some_and(|line| line != "...") {
+                lines.push("...".to_owned());
+            }
+        } else if j == new.len() || (i < old.len() && common[i + 1][j] >= common[i][j + 1]) {
+            lines.push(format!("- {}", old[i]));
+            i += 1;
+        } else {
+            lines.push(format!("+ {}", new[j]));
+            j += 1;
+        }
+    }
+    lines.join("\n").trim_end_matches("\n...").to_owned()
 }

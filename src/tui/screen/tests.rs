@@ -409,60 +409,58 @@ fn failed(mut view: ViewModel) -> ViewModel {
     view
 }
 
+/// How the whole terminal differs from the usual one of the step after some keys; [`steps`] has the usual ones whole.
+fn changed(usual: &ViewModel, view: &ViewModel, keys: &[Key]) -> String {
+    paint::differences(&whole(usual, &[], SMALL), &whole(view, keys, SMALL))
+}
+
 #[test]
 fn before_measuring_at_80x24() {
-    insta::assert_snapshot!("profile_first", whole(&profile(false), &[], SMALL));
-    insta::assert_snapshot!("profile_chosen", whole(&profile(true), &[], SMALL));
+    let chosen = profile(true);
+    insta::assert_snapshot!("profile_first", changed(&chosen, &profile(false), &[]));
     let search = [Key::char('c'), Key::char('u'), Key::char('r'), Key::plain_code(KeyCode::Down)];
-    insta::assert_snapshot!("profile_search_error", whole(&failed(profile(true)), &search, SMALL));
-    insta::assert_snapshot!("instrument_first", whole(&instrument(None, None), &[], SMALL));
+    insta::assert_snapshot!("profile_search_error", changed(&chosen, &failed(profile(true)), &search));
     let answers = instrument(Some("simulated cell, seed 1"), Some("simulated tracker, seed 1"));
-    insta::assert_snapshot!("instrument_answers", whole(&answers, &[], SMALL));
+    insta::assert_snapshot!("instrument_first", changed(&answers, &instrument(None, None), &[]));
     let silent = failed(instrument(Some("recorded measurements: x.csv"), None));
-    insta::assert_snapshot!("instrument_silent", whole(&silent, &[], SMALL));
+    insta::assert_snapshot!("instrument_silent", changed(&answers, &silent, &[]));
     let down = |times| vec![Key::plain_code(KeyCode::Down); times];
     let enter = Key::plain_code(KeyCode::Enter);
-    insta::assert_snapshot!("instrument_simulated", whole(&answers, &[down(3), vec![enter]].concat(), SMALL));
+    insta::assert_snapshot!("instrument_simulated", changed(&answers, &answers, &[down(3), vec![enter]].concat()));
     let wrong = [down(4), vec![enter, Key::char('a'), Key::plain_code(KeyCode::Down), Key::char('%'), enter]].concat();
-    insta::assert_snapshot!("instrument_recorded_wrong", whole(&answers, &wrong, SMALL));
-    insta::assert_snapshot!("target_first", whole(&target(None, None), &[], SMALL));
-    insta::assert_snapshot!(
-        "target_known",
-        whole(&target(Some("as the profile says"), None), &[Key::char('k')], SMALL)
-    );
-    insta::assert_snapshot!("target_circles", whole(&target(None, Some(circles(false))), &[], SMALL));
-    insta::assert_snapshot!("target_result", whole(&target(None, Some(circles(true))), &[], SMALL));
+    insta::assert_snapshot!("instrument_recorded_wrong", changed(&answers, &answers, &wrong));
+    let known = target(Some("as the profile says"), None);
+    insta::assert_snapshot!("target_first", changed(&known, &target(None, None), &[]));
+    insta::assert_snapshot!("target_known", changed(&known, &known, &[Key::char('k')]));
+    insta::assert_snapshot!("target_circles", changed(&known, &target(None, Some(circles(false))), &[]));
+    let result = target(None, Some(circles(true)));
+    insta::assert_snapshot!("target_result", changed(&known, &result, &[]));
     let problem = CirclesView { problem: Some("the axes are parallel".to_owned()), ..circles(true) };
-    insta::assert_snapshot!("target_problem", whole(&failed(target(None, Some(problem))), &[], SMALL));
+    insta::assert_snapshot!("target_problem", changed(&result, &failed(target(None, Some(problem))), &[]));
 }
 
 #[test]
 fn the_identification() {
-    insta::assert_snapshot!("identify_before", whole(&identify(None, false), &[], SMALL));
     let good = identify(Some(summary(true)), true);
-    insta::assert_snapshot!("identify_result", whole(&good, &[], SMALL));
-    insta::assert_snapshot!("identify_parameters", whole(&good, &tabs(1), SMALL));
+    insta::assert_snapshot!("identify_before", changed(&good, &identify(None, false), &[]));
+    insta::assert_snapshot!("identify_parameters", changed(&good, &good, &tabs(1)));
     let bad = failed(identify(Some(summary(false)), false));
-    insta::assert_snapshot!("identify_bad", whole(&bad, &[], SMALL));
-    insta::assert_snapshot!("identify_limits", whole(&bad, &tabs(2), SMALL));
+    insta::assert_snapshot!("identify_bad", changed(&good, &bad, &[]));
+    insta::assert_snapshot!("identify_limits", changed(&bad, &bad, &tabs(2)));
     insta::assert_snapshot!("identify_large", whole(&good, &tabs(1), LARGE));
 }
 
 #[test]
 fn the_verification() {
     let accepted = verify(Some(verdict(VerdictStatus::Accepted)));
-    insta::assert_snapshot!("verify_accepted", whole(&accepted, &[], SMALL));
-    insta::assert_snapshot!("verify_joints", whole(&accepted, &tabs(2), SMALL));
-    insta::assert_snapshot!("verify_refused", whole(&verify(Some(verdict(VerdictStatus::NotAccepted))), &[], SMALL));
-    insta::assert_snapshot!("verify_none", whole(&failed(verify(None)), &[], SMALL));
+    insta::assert_snapshot!("verify_joints", changed(&accepted, &accepted, &tabs(2)));
+    insta::assert_snapshot!("verify_none", changed(&accepted, &failed(verify(None)), &[]));
     let scene = checked();
-    let page = |tab: usize, size: (u16, u16), is_ascii| {
-        paint::snapshot(&drawn(&accepted, Some(&scene), &tabs(tab), theme(is_ascii), size))
-    };
-    insta::assert_snapshot!("verify_poses", page(1, (78, 15), false));
-    insta::assert_snapshot!("verify_poses_ascii", page(1, (78, 15), true));
-    insta::assert_snapshot!("verify_picture", page(3, (78, 15), false));
-    insta::assert_snapshot!("verify_large", page(0, (118, 32), false));
+    let page =
+        |tab: usize, is_ascii| paint::snapshot(&drawn(&accepted, Some(&scene), &tabs(tab), theme(is_ascii), (78, 15)));
+    insta::assert_snapshot!("verify_poses", page(1, false));
+    insta::assert_snapshot!("verify_poses_ascii", paint::differences(&page(1, false), &page(1, true)));
+    insta::assert_snapshot!("verify_picture", page(3, false));
     let before = [tabs(3), vec![Key::char('m')]].concat();
     let buffer = drawn(&accepted, Some(&scene), &before, theme(false), (78, 15));
     assert!(paint::snapshot(&buffer).contains("BEFORE: nominal arm's errors (m: identified)"));
@@ -470,17 +468,17 @@ fn the_verification() {
 
 #[test]
 fn the_delivery() {
-    insta::assert_snapshot!("deliver_before", whole(&deliver(&[]), &[], SMALL));
-    insta::assert_snapshot!("deliver_written", whole(&deliver(&FILES), &[], SMALL));
-    insta::assert_snapshot!("deliver_error", whole(&failed(deliver(&[])), &[], SMALL));
+    let written = deliver(&FILES);
+    insta::assert_snapshot!("deliver_before", changed(&written, &deliver(&[]), &[]));
+    insta::assert_snapshot!("deliver_error", changed(&deliver(&[]), &failed(deliver(&[])), &[]));
     let mut refused = deliver(&FILES);
     if let Content::Deliver(content) = &mut refused.content {
         let mut verdict = verdict(VerdictStatus::NotAccepted);
         verdict.reasons = ["poor_data", "few_data"].map(|code| format!("see the warning '{code}'")).to_vec();
         content.verdict = Some(Box::new(verdict));
     }
-    insta::assert_snapshot!("deliver_refused", whole(&refused, &[], SMALL));
-    insta::assert_snapshot!("deliver_quit", whole(&deliver(&FILES), &[Key::plain_code(KeyCode::Enter)], SMALL));
+    insta::assert_snapshot!("deliver_refused", changed(&written, &refused, &[]));
+    insta::assert_snapshot!("deliver_quit", changed(&written, &written, &[Key::plain_code(KeyCode::Enter)]));
 }
 
 /// What the last of some keys is worth.

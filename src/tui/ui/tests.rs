@@ -102,17 +102,19 @@ fn the_bell_rings_once_for_what_needs_attention() {
 fn the_skeleton_at_80x24() {
     let [unicode, ascii] = themes();
     insta::assert_snapshot!("first", paint::snapshot(&drawn(&view(), unicode, &[], 80, 24)));
-    insta::assert_snapshot!("crowded", paint::snapshot(&drawn(&crowded(), unicode, &[], 80, 24)));
-    insta::assert_snapshot!("crowded_ascii", paint::snapshot(&drawn(&crowded(), ascii, &[], 80, 24)));
+    let [usual, in_ascii] = [unicode, ascii].map(|theme| paint::snapshot(&drawn(&crowded(), theme, &[], 80, 24)));
+    insta::assert_snapshot!("crowded", usual);
+    insta::assert_snapshot!("crowded_ascii", paint::differences(&usual, &in_ascii));
     insta::assert_snapshot!("smallest", paint::snapshot(&drawn(&crowded(), unicode, &[], 60, 18)));
 }
 
 #[test]
 fn questions_and_help() {
     let [unicode, _] = themes();
-    insta::assert_snapshot!("choose", paint::snapshot(&drawn(&view(), unicode, &[Key::char('c')], 80, 24)));
-    insta::assert_snapshot!("quit", paint::snapshot(&drawn(&view(), unicode, &[Key::char('q')], 80, 24)));
-    insta::assert_snapshot!("help", paint::snapshot(&drawn(&view(), unicode, &[Key::char('?')], 80, 24)));
+    let after = |keys: &[Key]| paint::snapshot(&drawn(&view(), unicode, keys, 80, 24));
+    for (name, key) in [("choose", 'c'), ("quit", 'q'), ("help", '?')] {
+        insta::assert_snapshot!(name, paint::differences(&after(&[]), &after(&[Key::char(key)])));
+    }
 }
 
 #[test]

@@ -174,16 +174,16 @@ fn on(tab: Tab) -> CaptureScreen {
 fn states_at_80x24() {
     let [unicode, ascii] = themes();
     let go_to = on(Tab::GoTo);
-    for (name, view) in [
-        ("normal", of(normal())),
-        ("in_question", in_question()),
-        ("held", held()),
-        ("all_measured", all_measured()),
-        ("manual", manual()),
-    ] {
-        insta::assert_snapshot!(name, shown(&drawn(&go_to, &view, unicode, (80, 24))));
+    let usual = shown(&drawn(&go_to, &usual(), unicode, (80, 24)));
+    insta::assert_snapshot!("normal", usual);
+    for (name, view) in
+        [("in_question", in_question()), ("held", held()), ("all_measured", all_measured()), ("manual", manual())]
+    {
+        let shown = shown(&drawn(&go_to, &view, unicode, (80, 24)));
+        insta::assert_snapshot!(name, paint::differences(&usual, &shown));
     }
-    insta::assert_snapshot!("normal_ascii", shown(&drawn(&go_to, &of(normal()), ascii, (80, 24))));
+    let in_ascii = shown(&drawn(&go_to, &of(normal()), ascii, (80, 24)));
+    insta::assert_snapshot!("normal_ascii", paint::differences(&usual, &in_ascii));
     insta::assert_snapshot!("smallest", shown(&drawn(&go_to, &in_question(), unicode, (60, 18))));
 }
 
@@ -195,8 +195,8 @@ fn other_views() {
     {
         insta::assert_snapshot!(name, shown(&drawn(&on(tab), &of(normal()), unicode, (80, 24))));
     }
-    insta::assert_snapshot!("large", shown(&drawn(&on(Tab::GoTo), &of(normal()), unicode, (120, 40))));
-    insta::assert_snapshot!("large_question", shown(&drawn(&on(Tab::GoTo), &in_question(), unicode, (120, 40))));
+    let large = |view: &ViewModel| shown(&drawn(&on(Tab::GoTo), view, unicode, (120, 40)));
+    insta::assert_snapshot!("large_question", paint::differences(&large(&usual()), &large(&in_question())));
     insta::assert_snapshot!("at_100x24", shown(&drawn(&on(Tab::GoTo), &of(normal()), unicode, (100, 24))));
 }
 
@@ -225,16 +225,18 @@ fn live() -> ViewModel {
 #[test]
 fn what_the_instrument_sees_is_shown() {
     let [unicode, ascii] = themes();
-    insta::assert_snapshot!("live", shown(&drawn(&on(Tab::Live), &live(), unicode, (80, 24))));
+    let page = |tab: Tab, view: &ViewModel| shown(&drawn(&on(tab), view, unicode, (80, 24)));
+    let usual_live = page(Tab::Live, &live());
+    insta::assert_snapshot!("live", usual_live);
     insta::assert_snapshot!("live_ascii", shown(&drawn(&on(Tab::Live), &live(), ascii, (60, 20))));
-    insta::assert_snapshot!("live_go_to", shown(&drawn(&on(Tab::GoTo), &live(), unicode, (80, 24))));
+    insta::assert_snapshot!("live_go_to", paint::differences(&page(Tab::GoTo, &usual()), &page(Tab::GoTo, &live())));
     let mut lost = live();
     if let Some(live) = &mut lost.live {
         (live.point_mm, live.down) = (None, Some("the other end has closed the connection".to_owned()));
         live.track.clear();
     }
-    insta::assert_snapshot!("live_lost", shown(&drawn(&on(Tab::Live), &lost, unicode, (80, 24))));
-    insta::assert_snapshot!("live_none", shown(&drawn(&on(Tab::Live), &of(normal()), unicode, (80, 24))));
+    insta::assert_snapshot!("live_lost", paint::differences(&usual_live, &page(Tab::Live, &lost)));
+    insta::assert_snapshot!("live_none", paint::differences(&usual_live, &page(Tab::Live, &usual())));
 }
 
 /// A metre taken for a millimetre: the columns stay apart.
@@ -262,7 +264,7 @@ fn digits_and_paste_open_the_question_for_coordinates() {
     let ScreenOutcome::Open(mut dialog) = paste(&mut screen, &view, " 1.5\t2\t3\n") else { panic!("no question") };
     let answer = dialog.on_key(Key::plain_code(KeyCode::Enter));
     assert_eq!(answer, DialogOutcome::Submitted(Intent::TypeReading("1.5 2 3".to_owned())));
-    // An instrument that measures by itself takes no numbers.
+    // An instrument that measures automatically takes no numbers.
     assert!(matches!(press(&mut screen, &of(normal()), Key::char('1')), ScreenOutcome::Ignored));
     assert!(matches!(paste(&mut screen, &of(normal()), "1 2 3"), ScreenOutcome::Ignored));
 }

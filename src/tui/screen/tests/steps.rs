@@ -125,13 +125,11 @@ fn terminal(view: &ViewModel, keys: &[Key], size: (u16, u16), theme: Theme) -> S
 #[test]
 fn every_step_in_every_state_at_80x24() {
     for step in Step::ALL {
-        let shown: Vec<String> = states(step)
-            .iter()
-            .map(|(name, view, keys)| format!("== {name}\n{}", terminal(view, keys, SMALL, theme(false))))
-            .collect();
+        let [normal, busy, error] = states(step).map(|(_, view, keys)| terminal(&view, &keys, SMALL, theme(false)));
+        let (busy, error) = (paint::differences(&normal, &busy), paint::differences(&normal, &error));
         insta::assert_snapshot!(
             format!("step_{}_{}", step.number(), step.to_string().to_lowercase()),
-            shown.join("\n")
+            format!("{normal}\n== busy\n{busy}\n== error\n{error}")
         );
     }
 }
@@ -140,11 +138,16 @@ fn every_step_in_every_state_at_80x24() {
 fn key_screens_at_other_sizes() {
     for step in [Step::Plan, Step::Capture, Step::Identify, Step::Verify, Step::Deliver] {
         let [(_, view, _), ..] = states(step);
-        let shown: Vec<String> = [(60, 20), (120, 40), (200, 50)]
-            .into_iter()
-            .map(|size| format!("== {}x{}\n{}", size.0, size.1, terminal(&view, &[], size, theme(false))))
-            .collect();
-        insta::assert_snapshot!(format!("sizes_{}", step.to_string().to_lowercase()), shown.join("\n"));
+        let [small, large, huge] =
+            [(60, 20), (120, 40), (200, 50)].map(|size| terminal(&view, &[], size, theme(false)));
+        insta::assert_snapshot!(
+            format!("sizes_{}", step.to_string().to_lowercase()),
+            format!("== 60x20\n{small}\n== 120x40\n{large}")
+        );
+        // More room leaves nothing out.
+        for word in large.split_whitespace().filter(|word| word.chars().all(char::is_alphanumeric)) {
+            assert!(huge.contains(word), "{step}: '{word}' is missing:\n{huge}");
+        }
     }
 }
 
