@@ -9,7 +9,7 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Output, Stdio};
 
-use crate::support::place::Place;
+use crate::support::place::{Place, script_of};
 use crate::support::small_disk::SmallDisk;
 use crate::support::{PROGRAM, text};
 use rand::{RngExt as _, SeedableRng as _};
@@ -33,10 +33,6 @@ const STEPS: [(Step, &[&str]); 8] = [
 ];
 const NAME: &str = "Do(NameSession(\"s\"))";
 const POSES: usize = 18;
-
-fn script_of(clock: Option<&str>, steps: &[String]) -> String {
-    format!("(title: \"test\", clock: {clock:?}, steps: [{}])", steps.join(", "))
-}
 
 /// The script from a step of the wizard on.
 fn from_step(first: Step) -> Vec<String> {
@@ -69,20 +65,15 @@ fn long_say() -> String {
 }
 
 impl Place {
-    fn write_steps(&self, name: &str, steps: &[String]) -> String {
-        fs::write(self.path(name), script_of(Some("2026-01-05T08:00:00Z"), steps)).unwrap();
-        name.to_owned()
-    }
-
     /// Runs a script to its end.
     fn run_steps(&self, steps: &[String]) -> Output {
-        let script = self.write_steps("run.script.ron", steps);
+        let script = self.write_script("run.script.ron", &steps.join(", "));
         self.run(&["--script", &script, "--json", "--no-recording"])
     }
 
     /// Goes on with a session by a script.
     fn resume(&self, folder: &str, steps: &[String]) -> Output {
-        let script = self.write_steps("rest.script.ron", steps);
+        let script = self.write_script("rest.script.ron", &steps.join(", "));
         self.run(&["resume", folder, "--script", &script, "--json", "--no-recording"])
     }
 
@@ -101,7 +92,7 @@ impl Place {
     /// A run that is paused behind `before`, with what it has written until then.
     fn pause(&self, before: &[&str]) -> Paused {
         let say = long_say();
-        let script = self.write_steps("run.script.ron", &paused(&[before, &[&say]].concat()));
+        let script = self.write_script("run.script.ron", &paused(&[before, &[&say]].concat()).join(", "));
         Paused::start(self.command(&["--script", &script, "--json", "--no-recording"]))
     }
 }
@@ -222,12 +213,12 @@ fn kill_at_random(seed: u64, kills: usize, expected: &str) -> (usize, BTreeSet<u
             let step = journal.as_ref().map_or(Step::Profile, |journal| Session::of(journal).unwrap().step);
             let before = journal.as_ref().map_or(0, |journal| journal.lines.len());
             let command = if journal.is_some() {
-                let script = place.write_steps("rest.script.ron", &from_step(step));
+                let script = place.write_script("rest.script.ron", &from_step(step).join(", "));
                 place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"])
             } else {
                 // Killed before anything was saved: there is nothing to go on with.
                 drop(fs::remove_dir_all(place.session()));
-                let script = place.write_steps("run.script.ron", &whole());
+                let script = place.write_script("run.script.ron", &whole().join(", "));
                 place.command(&["--script", &script, "--json", "--no-recording"])
             };
             let mut running = Paused::start(command);
@@ -338,7 +329,7 @@ fn a_session_that_is_open_in_another_process_is_refused_with_its_number() {
 fn many_processes_at_once_work_on_a_session_one_after_the_other() {
     let place = Place::new();
     place.pause(&["Capture(2, Fail)"]).until_measured(2).kill();
-    let script = place.write_steps("rest.script.ron", &["Capture(1, Fail)".to_owned()]);
+    let script = place.write_script("rest.script.ron", "Capture(1, Fail)");
     let run =
         || Paused::start(place.command(&["resume", "sessions/s", "--script", &script, "--json", "--no-recording"]));
     let running: Vec<Paused> = (0..8).map(|_| run()).collect();
@@ -359,7 +350,7 @@ fn many_processes_at_once_work_on_a_session_one_after_the_other() {
 #[test]
 fn many_new_sessions_of_one_name_get_a_folder_each() {
     let place = Place::new();
-    let script = place.write_steps("run.script.ron", &whole()[..3]);
+    let script = place.write_script("run.script.ron", &whole()[..3].join(", "));
     let running: Vec<Paused> =
         (0..6).map(|_| Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]))).collect();
     for program in running {
@@ -406,7 +397,7 @@ fn a_signal_at_any_moment_leaves_a_session_that_goes_on() {
     let expected = finished().measurements("sessions/s");
     for (index, (name, number, _)) in (0..24).zip(SIGNALS.into_iter().cycle()) {
         let place = Place::new();
-        let script = place.write_steps("run.script.ron", &whole());
+        let script = place.write_script("run.script.ron", &whole().join(", "));
         let mut running = Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]));
         // The first line comes when signals are watched.
         running.read_lines(1 + index * 2);
@@ -461,7 +452,7 @@ fn a_journal_that_cannot_grow_stops_the_run_and_goes_on_later() {
     // In blocks of 512 bytes. The files of a result are smaller than the journal.
     for blocks in (1..full / 512).step_by(3) {
         let place = Place::new();
-        let script = place.write_steps("run.script.ron", &whole());
+        let script = place.write_script("run.script.ron", &whole().join(", "));
         let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' --script {script} --json");
         let output = Command::new("sh").args(["-c", &limited]).current_dir(place.0.path()).output().unwrap();
         says_what_is_safe(&place, &output, "File too large");
@@ -479,7 +470,7 @@ fn a_reader_that_goes_away_costs_nothing_that_was_saved() {
     let expected = finished().measurements("sessions/s");
     for lines in [1, 12, 20, 30] {
         let place = Place::new();
-        let script = place.write_steps("run.script.ron", &whole());
+        let script = place.write_script("run.script.ron", &whole().join(", "));
         let mut running = Paused::start(place.command(&["--script", &script, "--json", "--no-recording"]));
         assert!(running.read_lines(lines));
         let Paused { mut child, out, seen, .. } = running;
@@ -546,7 +537,7 @@ fn a_clock_that_jumps_back_holds_nothing_up() {
         let expect = format!("Expect(\"capture.minutes_left\", {left})");
         let steps: Vec<String> = std::iter::once(expect).chain(from_step(Step::Capture)).collect();
         // By the clock of the system, which is neither.
-        fs::write(place.path("now.script.ron"), script_of(None, &steps)).unwrap();
+        fs::write(place.path("now.script.ron"), script_of(None, &steps.join(", "))).unwrap();
         let output = place.run(&["resume", name, "--script", "now.script.ron", "--json"]);
         assert_eq!(output.status.code(), Some(0), "{name}: {}", text(&output.stderr));
         let (journal, session) = checked(&place.path(name));
@@ -627,7 +618,7 @@ fn a_damaged_session_does_not_hide_the_others() {
         ("missing", "it has no journal.ron"),
     ] {
         let folder = format!("sessions/{name}");
-        let script = place.write_steps("rest.script.ron", &[]);
+        let script = place.write_script("rest.script.ron", "");
         for arguments in [
             &["session", "show", &folder][..],
             &["session", "show", &folder, "--json"],

@@ -1,6 +1,5 @@
 //! Sessions that are run and recorded.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
@@ -15,12 +14,6 @@ use crate::support::place::Place;
 impl Place {
     pub(super) fn recording(&self) -> PathBuf {
         self.session().join(recording::FILE_NAME)
-    }
-
-    pub(super) fn write_script(&self, name: &str, steps: &str) -> String {
-        let script = format!("(title: \"test\", clock: Some(\"2026-01-05T08:00:00Z\"), steps: [{steps}])");
-        fs::write(self.path(name), script).unwrap();
-        name.to_owned()
     }
 
     /// Runs a script to its end.
@@ -50,7 +43,7 @@ pub(super) fn plain() -> String {
     format!("{} CaptureAll(Fail), {RESULT}", begun(""))
 }
 
-/// A session in which something was measured again, left out, corrected, undone and skipped, and identified twice.
+/// A session in which something was remeasured, excluded, corrected, undone and skipped, and identified twice.
 pub(super) fn eventful() -> String {
     format!(
         "{} CaptureAll(Stop), Do(LeaveOut), CaptureAll(Stop), Do(MeasureAgain), CaptureAll(Stop), Do(ApplyRemedy),

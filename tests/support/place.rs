@@ -6,6 +6,11 @@ use std::process::{Command, Output, Stdio};
 
 use super::command;
 
+/// A script with these steps, which are separated by commas.
+pub(crate) fn script_of(clock: Option<&str>, steps: &str) -> String {
+    format!("(title: \"test\", clock: {clock:?}, steps: [{steps}])")
+}
+
 /// A folder in which the program runs; `plan.csv` is in it.
 pub(crate) struct Place(pub(crate) tempfile::TempDir);
 
@@ -23,6 +28,12 @@ impl Place {
     /// Where the session `s` is.
     pub(crate) fn session(&self) -> PathBuf {
         self.path("sessions/s")
+    }
+
+    /// Writes a script with a virtual clock and returns its name.
+    pub(crate) fn write_script(&self, name: &str, steps: &str) -> String {
+        fs::write(self.path(name), script_of(Some("2026-01-05T08:00:00Z"), steps)).unwrap();
+        name.to_owned()
     }
 
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
