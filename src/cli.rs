@@ -1,4 +1,4 @@
-//! The command line: what was typed. The only reader of the environment is clap, but for what concerns the terminal.
+//! Arguments of the command line.
 
 mod link;
 mod recording;
@@ -54,16 +54,16 @@ pub struct Cli {
 /// Arguments of `wizard`.
 #[derive(Args, Clone, Debug)]
 pub struct WizardArgs {
-    /// Robot profile to begin with: a file, or the name of a shipped one ('trupose profile list')
+    /// Robot profile to start with: a file, or the name of a shipped one ('trupose profile list')
     #[arg(long, value_name = "NAME|FILE")]
     pub profile: Option<String>,
-    /// Folder in which sessions are made
+    /// Folder for new sessions
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
-    /// Write what was done as a script
+    /// Write the actions of the session as a script
     #[arg(long, value_name = "FILE")]
     pub record_script: Option<PathBuf>,
-    /// Write every byte of instruments on a wire to this file
+    /// Log every byte to and from instruments on a wire to this file
     #[arg(long, value_name = "FILE")]
     pub raw_log: Option<PathBuf>,
     /// Options of recordings.
@@ -80,16 +80,16 @@ pub struct ScriptArgs {
     /// Value of a placeholder '${name}' of the script; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = name_and_value)]
     pub values: Vec<(String, String)>,
-    /// Folder in which sessions are made
+    /// Folder for new sessions
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
     /// Print one JSON object per line
     #[arg(long)]
     pub json: bool,
-    /// Write what was done as a script
+    /// Write the actions of the session as a script
     #[arg(long, value_name = "FILE")]
     pub record_script: Option<PathBuf>,
-    /// Write every byte of instruments on a wire to this file
+    /// Log every byte to and from instruments on a wire to this file
     #[arg(long, value_name = "FILE")]
     pub raw_log: Option<PathBuf>,
     /// Options of recordings.
@@ -103,7 +103,7 @@ pub struct DemoArgs {
     /// Seed of the simulated cell: the same seed gives the same transcript
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Speak to the simulated cell over wires: 'emscon', 'ascii', 'geocom', 'ndi', each also as 'serial:…' where it is spoken on serial lines; with ',rtde' the robot tells its joints
+    /// Connect to the simulated cell over wires: 'emscon', 'ascii', 'geocom' or 'ndi', with 'serial:' in front for a serial line where the protocol allows it; with ',rtde' the robot reports its joints
     #[arg(long, value_name = "PROTOCOL", value_parser = wires)]
     pub over: Option<Wires>,
     /// Options of scripts.
@@ -117,7 +117,7 @@ pub struct ResumeArgs {
     /// Folder of the session
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Continue by a script, without a terminal
+    /// Continue with a script, without a terminal
     #[arg(long, value_name = "FILE")]
     pub script: Option<PathBuf>,
     /// Options of scripts.
@@ -134,7 +134,7 @@ pub struct ReplayArgs {
     /// Folder of the session, or a recording of it
     #[arg(value_name = "DIR|FILE.rrd")]
     pub folder: PathBuf,
-    /// Entry of the journal to begin with [default: the first; with '--print' and '--csv' the last]
+    /// Entry of the journal to start with [default: the first; with '--print' and '--csv' the last]
     #[arg(long, value_name = "N")]
     pub entry: Option<u64>,
     /// Print the entries and the points up to there, without a terminal
@@ -161,7 +161,7 @@ pub enum Command {
     Plan(PlanArgs),
     /// Write a robot program that visits the poses of a plan
     Program(ProgramArgs),
-    /// Correct targets so that the real arm reaches what was meant
+    /// Correct targets so that the real arm reaches them
     Compensate(compensate::CompensateArgs),
     /// Write the identified arm as a profile, URDF or table
     Export(compensate::ExportArgs),
@@ -171,7 +171,7 @@ pub enum Command {
     Demo(DemoArgs),
     /// Continue a session where it ended
     Resume(ResumeArgs),
-    /// Look at a session again, entry by entry, without changing it
+    /// Step through a session, entry by entry, without changing it
     Replay(ReplayArgs),
     /// List, show or export sessions
     #[command(subcommand)]
@@ -196,7 +196,7 @@ pub enum Command {
 /// Arguments of `completions`.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct CompletionsArgs {
-    /// Shell that is to complete commands and options
+    /// Shell to complete commands and options for
     #[arg(value_enum)]
     pub shell: clap_complete::Shell,
 }
@@ -237,10 +237,10 @@ pub struct EstimationArgs {
     /// Rows to identify from, such as 'pose % 17 == 0' or "position != 'left'"
     #[arg(long = "use", value_name = "CONDITION")]
     pub filter: Option<String>,
-    /// How samples are trusted
+    /// How outliers are treated
     #[arg(long, value_enum, default_value_t)]
     pub estimator: Estimator,
-    /// What is assumed about deviations: those the profile expects, or nothing (the paper's minimum-norm solution)
+    /// Assumption about deviations: those the profile expects, or nothing (the paper's minimum-norm solution)
     #[arg(long, value_enum, default_value_t)]
     pub prior: Prior,
     /// What is identified
@@ -350,7 +350,7 @@ pub struct PlanArgs {
     /// Score the poses of this plan or list instead of choosing new ones
     #[arg(long, value_name = "CSV", conflicts_with_all = ["poses", "objective", "include", "out"])]
     pub check: Option<PathBuf>,
-    /// Number of new poses to identify from; those of '--include' come on top
+    /// Number of new poses to identify from; those of '--include' are added
     #[arg(long, value_name = "N", default_value_t = PlanRequest::default().poses)]
     pub poses: usize,
     /// Number of poses to verify with
@@ -359,7 +359,7 @@ pub struct PlanArgs {
     /// Number of candidates to choose from
     #[arg(long, value_name = "N", default_value_t = PlanRequest::default().candidates, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(10..=1_000_000))]
     pub candidates: usize,
-    /// What to choose for
+    /// What the poses are chosen for
     #[arg(long, value_enum, default_value_t)]
     pub objective: Objective,
     /// Seed of all random decisions: the same seed gives the same plan
@@ -398,7 +398,7 @@ pub struct PlanArgs {
     /// Repeat the first pose after every N poses to detect drift; 0: never
     #[arg(long, value_name = "N", default_value_t = PlanRequest::default().drift_every)]
     pub drift_every: usize,
-    /// Part of the full joint speed that the program will use
+    /// Percentage of the full joint speed that the program will use
     #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * Pace::default().speed, value_parser = speed_percent)]
     pub speed_percent: f64,
     /// Wait before the first reading of a pose
@@ -436,7 +436,7 @@ pub struct ProgramArgs {
     /// Wait for the operator at each pose instead of a fixed time
     #[arg(long, conflicts_with = "dwell_s")]
     pub acknowledge: bool,
-    /// Part of the full joint speed
+    /// Percentage of the full joint speed
     #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * Pace::default().speed, value_parser = speed_percent)]
     pub speed_percent: f64,
     /// Folder for the program's files [default: print them]
@@ -467,7 +467,7 @@ impl FromStr for JointLimit {
             return Err(expected());
         }
         if low >= high {
-            return Err(format!("'{text}' is crossed: the lower limit {low} is not below the upper one {high}"));
+            return Err(format!("in '{text}' the lower limit {low} is not below the upper limit {high}"));
         }
         Ok(Self { joint: joint.trim().to_owned(), low, high })
     }

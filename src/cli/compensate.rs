@@ -18,7 +18,7 @@ pub struct CompensateArgs {
     /// Targets: joint values, or positions with roll, pitch, yaw; CSV with units in the column names
     #[arg(long, value_name = "CSV", required_unless_present = "program", conflicts_with = "program")]
     pub targets: Option<PathBuf>,
-    /// Robot program whose joint targets are corrected; everything else in it stays
+    /// Robot program whose joint targets are corrected; everything else in it is kept
     #[arg(long, value_name = "FILE", requires = "dialect")]
     pub program: Option<PathBuf>,
     /// Language of the program
@@ -30,10 +30,10 @@ pub struct CompensateArgs {
     /// File for the table of commands, or the program [default: print it]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Reach the position only, whatever the orientation
+    /// Reach the position only and ignore the orientation
     #[arg(long)]
     pub position_only: bool,
-    /// Point that is to be reached: a target (SMR) of the profile [default: the flange]
+    /// Point to bring to the targets: a target (SMR) of the profile [default: the flange]
     #[arg(long, value_name = "NAME")]
     pub target: Option<String>,
 }
@@ -47,16 +47,16 @@ pub struct ExportArgs {
     /// Format of the model
     #[arg(long, value_enum)]
     pub format: Format,
-    /// URDF that is to take the geometry; only the origins of its chain change
+    /// URDF to write the geometry into; only the origins of its chain change
     #[arg(long, value_name = "URDF")]
     pub into: Option<PathBuf>,
-    /// Link of that URDF which is the base of the profile
+    /// Link of that URDF at the base of the profile
     #[arg(long, value_name = "LINK", default_value = "base_link", requires = "into")]
     pub base: String,
     /// Link of that URDF at the end of the arm
     #[arg(long, value_name = "LINK", default_value = "tool0", requires = "into")]
     pub tip: String,
-    /// UR kinematics: let the tool take what the file cannot say about the flange
+    /// UR kinematics: let the tool carry what the file cannot express about the flange
     #[arg(long)]
     pub with_tool_offset: bool,
     /// File to write

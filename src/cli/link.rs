@@ -32,7 +32,7 @@ pub struct LinkTestArgs {
     /// How long to watch before the shots (s)
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,
-    /// Log every byte in both directions to this file
+    /// Log every byte to and from instruments on a wire to this file
     #[arg(long, value_name = "FILE")]
     pub raw_log: Option<PathBuf>,
 }
@@ -46,10 +46,10 @@ pub struct SimulateArgs {
     /// TCP address to listen on, such as '127.0.0.1:7000'; port 0 for any free one
     #[arg(long, value_name = "HOST:PORT", required_unless_present = "pty", conflicts_with = "pty")]
     pub listen: Option<String>,
-    /// Listen behind a pseudo-terminal, as on a serial line
+    /// Listen on a pseudo-terminal, as on a serial line
     #[arg(long)]
     pub pty: bool,
-    /// Let the controller of the same robot report its joints by RTDE at this TCP address
+    /// Report the joints of the simulated robot by RTDE at this TCP address
     #[arg(long, value_name = "HOST:PORT")]
     pub robot: Option<String>,
     /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
@@ -58,7 +58,7 @@ pub struct SimulateArgs {
     /// Seed of the hidden deviations and of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Fault of the instrument, such as 'cut-20@3' for the third occasion or 'drip@1x5'; can be repeated
+    /// Fault of the instrument, such as 'cut-20@3' for the third occasion or 'drip@1x5'; may be repeated
     #[arg(long = "fault", value_name = "NAME")]
     pub faults: Vec<String>,
     /// Poses that the robot visits; without a plan it stays in the middle of its joint ranges

@@ -1,4 +1,4 @@
-//! Recordings for a 3D viewer.
+//! Arguments about recordings for a 3D viewer.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ const DEFAULT_PORT: &str = "9876";
 /// Options of the recording while a session is measured.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct RecordingArgs {
-    /// Show the recording while it grows: viewers connect to this port of this machine [default port: 9876]
+    /// Serve the recording while it grows, on this port of this machine [default port: 9876]
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = DEFAULT_PORT)]
     pub live: Option<u16>,
     /// Write no recording for the 3D viewer ('trupose record rebuild' makes one later)
@@ -26,7 +26,7 @@ pub struct RecordArgs {
     pub record: Option<PathBuf>,
 }
 
-/// Commands for recordings.
+/// Subcommands of `record`.
 #[derive(Debug, Subcommand)]
 pub enum RecordCommand {
     /// Make the recording of a session again from its journal

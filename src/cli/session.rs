@@ -1,27 +1,27 @@
-//! `trupose session`: what was typed.
+//! Arguments of `trupose session`.
 
 use std::path::PathBuf;
 
 use clap::Subcommand;
 
-/// What to do with sessions.
+/// Subcommands of `session`.
 #[derive(Debug, Subcommand)]
 pub enum SessionCommand {
     /// List the sessions of a folder
     List {
-        /// Folder in which they are
+        /// Folder of the sessions
         #[arg(value_name = "DIR", default_value = "sessions")]
         sessions: PathBuf,
     },
-    /// Show what a session has: robot, samples, result
+    /// Show a session: robot, samples, result
     Show {
         /// Folder of the session
         #[arg(value_name = "DIR")]
         folder: PathBuf,
-        /// All entries of the journal as well
+        /// Print all entries of the journal as well
         #[arg(long)]
         journal: bool,
-        /// All entries as one JSON array
+        /// Print all entries as one JSON array
         #[arg(long, conflicts_with = "journal")]
         json: bool,
     },
@@ -30,7 +30,7 @@ pub enum SessionCommand {
         /// Folder of the session
         #[arg(value_name = "DIR")]
         folder: PathBuf,
-        /// Name of the HTML file; the JSON file lies beside it [default: report.html in the session's folder]
+        /// Name of the HTML file; the JSON file is written beside it [default: report.html in the session's folder]
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
         /// Print the report as plain text and write no file

@@ -1,15 +1,15 @@
-//! How the terminal is used: options, and what the environment says about it.
+//! Options for the terminal, and the environment variables that concern it.
 
 use clap::{Args, ValueEnum};
 
-/// How to use the terminal.
+/// Options for the terminal.
 #[derive(Args, Clone, Copy, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub struct TerminalArgs {
     /// Colours: when the terminal has them and NO_COLOR is not set, always, or never
     #[arg(long, value_enum, default_value_t, value_name = "WHEN")]
     pub color: ColorArg,
-    /// No characters but ASCII [default: only where the locale is not UTF-8]
+    /// Use ASCII characters only [default: only where the locale is not UTF-8]
     #[arg(long)]
     pub ascii: bool,
     /// Draw with blocks instead of braille, for fonts without it
@@ -38,7 +38,7 @@ pub enum ColorArg {
     Never,
 }
 
-/// What the environment says about the terminal.
+/// Environment variables that concern the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TerminalEnvironment {
     /// `TERM`.
@@ -50,7 +50,7 @@ pub struct TerminalEnvironment {
 }
 
 impl TerminalEnvironment {
-    /// As it is.
+    /// Reads the environment of this process.
     pub fn read() -> Self {
         #[expect(clippy::disallowed_methods, reason = "the one place that reads the environment")]
         let read = |name: &str| std::env::var(name).ok();
