@@ -25,7 +25,8 @@ pub(super) fn words(advice: Advice) -> String {
         | Advice::CheckRobot
         | Advice::SwapAxes
         | Advice::StateTarget
-        | Advice::MountBesideAxis => return advice.to_string(),
+        | Advice::MountBesideAxis
+        | Advice::RebuildRecording => return advice.to_string(),
     };
     options.to_owned()
 }

@@ -91,10 +91,8 @@ fn entries_and_points(journal: &Journal, session: &Session) -> String {
     lines.extend(session.samples.iter().map(|sample| {
         let [x, y, z] = session.point_of(sample).coords.map(to_mm).into();
         let state = match sample.state {
-            SampleState::Counts => "",
-            SampleState::Superseded => "  measured again",
-            SampleState::LeftOut => "  left out",
-            SampleState::Undone => "  taken back",
+            SampleState::Counts => String::new(),
+            state => format!("  {state}"),
         };
         let pose = printable(session.pose_of(sample));
         let (nominal, identified) = errors(sample.noted.number).map_or_else(

@@ -113,7 +113,7 @@ fn show<O: Write, E: Write>(
     line(
         "not counted",
         format!(
-            "{} left out, {} measured again, {} taken back, {} without a reading",
+            "{} excluded, {} remeasured, {} undone, {} without a reading",
             in_state(SampleState::LeftOut),
             in_state(SampleState::Superseded),
             in_state(SampleState::Undone),

@@ -15,6 +15,7 @@ use super::links::LinkThread;
 use super::store_thread::{Command, StoreThread};
 use crate::link::RawLog;
 use crate::recording::{self, Live, Recorder, RecordingEvent};
+use crate::session::advice::Advice;
 use crate::session::journal::{Journal, Line};
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
@@ -163,7 +164,7 @@ impl Engine {
         self.handle(Event::Intent(intent));
     }
 
-    /// Returns the intents that were carried out, in order; refused ones, cancellations and quit are left out.
+    /// Returns the intents that were carried out, in order; refused ones, cancellations and quit are not among them.
     pub fn completed_intents(&mut self) -> &[CompletedIntent] {
         self.complete_pending();
         &self.completed
@@ -221,7 +222,7 @@ impl Engine {
     pub fn end_recording(&mut self) -> Option<String> {
         let mut recorder = self.recording.recorder.take()?;
         let cause = recorder.finish().err()?;
-        Some(format!("the 3D recording is not complete: {cause}; 'trupose record rebuild' makes it from the journal"))
+        Some(format!("the 3D recording is not complete: {cause}; {}", Advice::RebuildRecording))
     }
 
     /// Returns the outputs since the last call.
@@ -340,7 +341,7 @@ fn remark(event: &RecordingEvent) -> Notice {
         RecordingEvent::Failed(cause) => Notice::attention(format!(
             "the 3D recording has stopped: {cause}; the session itself is complete and continues"
         ))
-        .hint("'trupose record rebuild' makes the recording from the journal, at any time"),
+        .hint(Advice::RebuildRecording.to_string()),
         RecordingEvent::LiveFailed(cause) => {
             Notice::attention(format!("the live view has stopped: {cause}; recording and session continue"))
         }

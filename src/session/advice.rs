@@ -40,6 +40,8 @@ pub enum Advice {
     StateTarget,
     /// Mount the target beside the axis that is turned.
     MountBesideAxis,
+    /// Make the recording of a session again.
+    RebuildRecording,
 }
 
 impl fmt::Display for Advice {
@@ -67,6 +69,7 @@ impl fmt::Display for Advice {
             Self::MountBesideAxis => {
                 "mount the SMR beside the axis and state roughly where, state exactly where it is, or leave it free"
             }
+            Self::RebuildRecording => "it can be rebuilt from the journal at any time",
         })
     }
 }

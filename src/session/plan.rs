@@ -70,7 +70,7 @@ impl PoseKind {
 
 impl fmt::Display for PoseKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        f.pad(self.name())
     }
 }
 

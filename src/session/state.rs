@@ -1,12 +1,13 @@
 //! The state of a session: the fold of its journal, and nothing else.
 //!
-//! A sample is never removed: it is superseded by a later measurement of the same row, left out or undone, and stays to be
+//! A sample is never removed: it is superseded by a later measurement of the same row, excluded or undone, and stays to be
 //! seen. What was measured stays as it was noted; corrections are applied when samples are used ([`Session::point_of`] and the
 //! configuration).
 
 mod correction;
 
 use std::collections::BTreeSet;
+use std::fmt;
 
 use jiff::Timestamp;
 use nalgebra::Point3;
@@ -123,10 +124,21 @@ pub enum SampleState {
     Counts,
     /// Replaced by a later measurement of the same row.
     Superseded,
-    /// The operator left it out.
+    /// The operator excluded it.
     LeftOut,
     /// It was taken by mistake.
     Undone,
+}
+
+impl fmt::Display for SampleState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Counts => "counts",
+            Self::Superseded => "remeasured",
+            Self::LeftOut => "excluded",
+            Self::Undone => "undone",
+        })
+    }
 }
 
 /// A measured point.

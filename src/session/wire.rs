@@ -17,7 +17,7 @@ pub struct LinkChoice {
     /// Address of the robot's controller, if it reports joint angles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
-    /// Measures by itself when the SMR rests near the predicted place.
+    /// Measures automatically when the SMR rests near the predicted place.
     #[serde(default, skip_serializing_if = "is_false")]
     pub is_automatic: bool,
 }

@@ -24,7 +24,8 @@ pub(super) fn words(advice: Advice) -> String {
         | Advice::SeparateVerification
         | Advice::StateSocketDistance
         | Advice::StateTarget
-        | Advice::MountBesideAxis => advice.to_string(),
+        | Advice::MountBesideAxis
+        | Advice::RebuildRecording => advice.to_string(),
     }
 }
 

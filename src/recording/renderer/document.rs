@@ -124,7 +124,7 @@ fn markdown(session: &Session, identified: &IdentifiedText, time: Timestamp) -> 
         }
     }
     if !summary.rejected.is_empty() {
-        line("\n## Samples left out\n".to_owned());
+        line("\n## Samples that do not count\n".to_owned());
         for rejected in &summary.rejected {
             line(format!("* pose {}: {:.3} mm off, {}", rejected.pose, rejected.residual_mm, rejected.reason));
         }

@@ -5,7 +5,7 @@ use crate::session::journal::correction_text;
 use crate::session::state::{Refused, Sample, SampleState, Session};
 
 /// Samples that do not count. Outliers of the identification are not among them: they count, and the identification says why it
-/// left them out.
+/// excluded them.
 pub(super) fn not_counted(session: &Session) -> Vec<Refused> {
     let without = session.samples.iter().filter(|sample| sample.state != SampleState::Counts);
     without
@@ -29,8 +29,8 @@ fn reason(session: &Session, sample: &Sample) -> String {
             let later = later.map_or_else(String::new, |later| format!(" as measurement {}", later.noted.number));
             format!("measured again{later}{found}")
         }
-        SampleState::LeftOut => format!("left out by the operator{found}"),
-        SampleState::Undone => format!("taken back by the operator{found}"),
+        SampleState::LeftOut => format!("excluded by the operator{found}"),
+        SampleState::Undone => format!("undone by the operator{found}"),
     }
 }
 
@@ -75,8 +75,8 @@ pub(super) fn findings(session: &Session) -> Vec<FindingPart> {
 const fn decision(about: &Sample, raised_at: u64) -> &'static str {
     match about.state {
         SampleState::Superseded => "measured again",
-        SampleState::LeftOut => "left out by the operator",
-        SampleState::Undone => "taken back by the operator",
+        SampleState::LeftOut => "excluded by the operator",
+        SampleState::Undone => "undone by the operator",
         SampleState::Counts if about.settled >= raised_at => "set right, see the corrections",
         SampleState::Counts if about.kept => "kept by the operator",
         SampleState::Counts => "not decided: the sample counts as it is",

@@ -1,4 +1,4 @@
-//! Sections about planning, measuring and fitting, about samples left out, and about findings with their decisions.
+//! Sections about planning, measuring and fitting, about samples that do not count, and about findings with their decisions.
 
 use super::charts::{MOST, drift, norm, prediction, search};
 use super::markup::{Column, add, escape, facts, number, optional, paragraph, table, time};
@@ -46,7 +46,7 @@ pub(super) fn section(document: &Document) -> String {
 fn fit(result: &IdentificationSummary) -> Vec<(&'static str, String)> {
     let settings = &result.settings;
     let estimator = match settings.estimator {
-        Estimator::Robust => "robust: outliers are found, named and left out",
+        Estimator::Robust => "robust: outliers are detected, named and excluded",
         Estimator::LeastSquares => "least squares: every sample counts",
     };
     let residuals = result
@@ -133,7 +133,7 @@ fn drift_table(report: &Details) -> String {
 /// Samples that do not count, findings, corrections, remarks.
 pub(super) fn samples(document: &Document) -> String {
     let report = &document.report;
-    let mut html = String::from("<h2>Samples left out, findings, remarks</h2>\n");
+    let mut html = String::from("<h2>Samples that do not count, findings, remarks</h2>\n");
     html.push_str(&rejected(document));
     let columns = [("No.", Column::Number), ("pose", Column::Text), ("why", Column::Text)];
     for (title, measurements) in
@@ -168,7 +168,9 @@ pub(super) fn samples(document: &Document) -> String {
     }
     let is_quiet = report.not_counted.is_empty() && report.refused.is_empty() && report.findings.is_empty();
     if is_quiet {
-        html.push_str(&paragraph("Nothing was left out by the operator, no reading was refused, and the checks found nothing while measuring."));
+        html.push_str(&paragraph(
+            "The operator excluded nothing, no reading was refused, and the checks found nothing while measuring.",
+        ));
     }
     if !report.notes.is_empty() {
         let columns = [("time", Column::Word), ("pose", Column::Text), ("remark of the operator", Column::Text)];

@@ -31,8 +31,8 @@ impl Entry {
             Self::Decision { sample, decision } => {
                 let decision = match decision {
                     Decision::Keep => "kept",
-                    Decision::LeaveOut => "left out",
-                    Decision::Undo => "taken back",
+                    Decision::LeaveOut => "excluded",
+                    Decision::Undo => "undone",
                 };
                 format!("measurement {sample}: {decision}")
             }
@@ -109,7 +109,7 @@ pub fn correction_text(correction: &Correction) -> String {
             let joints: Vec<String> = joints.iter().map(|value| format!("{value:.3}")).collect();
             format!("corrected: at measurement {sample} the robot stood at ({})", joints.join(", "))
         }
-        Correction::TakenBack { line } => format!("the correction in line {line} is taken back"),
+        Correction::TakenBack { line } => format!("the correction in line {line} is undone"),
     }
 }
 
@@ -162,8 +162,8 @@ pub fn instrument_text(instrument: &InstrumentChoice) -> String {
         }
         InstrumentChoice::Linked(LinkChoice { address, robot, is_automatic, .. }) => {
             let robot = robot.as_ref().map_or_else(String::new, |robot| format!(", robot {robot}"));
-            let by_itself = if *is_automatic { ", measuring by itself" } else { "" };
-            crate::text::printable(&format!("{address}{robot}{by_itself}"))
+            let automatic = if *is_automatic { ", measuring automatically" } else { "" };
+            crate::text::printable(&format!("{address}{robot}{automatic}"))
         }
         InstrumentChoice::Replay { sets } => {
             let files: Vec<&str> = sets.iter().map(|set| set.file.as_str()).collect();

@@ -5,9 +5,8 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget as _;
 
 use super::{Page, Replay, SPEEDS};
-use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
-use crate::session::state::{Sample, SampleState};
+use crate::session::state::Sample;
 use crate::text::{self, wrapped};
 use crate::tui::glyphs::shortened;
 use crate::tui::keymap::KeyHint;
@@ -174,18 +173,8 @@ impl Replay {
     }
 
     fn sample_line(&self, sample: &Sample) -> String {
-        let kind = match self.session.kind_of(sample) {
-            PoseKind::Identification => "identification",
-            PoseKind::Verification => "verification",
-            PoseKind::Drift => "drift",
-            PoseKind::Home | PoseKind::Via => "on the way",
-        };
-        let state = match sample.state {
-            SampleState::Counts => "counts",
-            SampleState::Superseded => "remeasured",
-            SampleState::LeftOut => "excluded",
-            SampleState::Undone => "undone",
-        };
+        let kind = self.session.kind_of(sample);
+        let state = sample.state;
         let [x, y, z] = self.session.point_of(sample).coords.map(to_mm).into();
         let pose = self.session.pose_of(sample);
         let number = sample.noted.number;

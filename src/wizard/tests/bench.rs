@@ -246,7 +246,7 @@ impl Bench {
         Self { wizard: Wizard::new(start()), journal: Vec::new(), seen: Vec::new(), exits: 0, time: start() }
     }
 
-    /// In a step, reached on the straight way with an instrument that measures by itself.
+    /// In a step, reached on the straight way with an instrument that measures automatically.
     pub(super) fn at(step: Step) -> Self {
         Self::with(&simulated(), step)
     }

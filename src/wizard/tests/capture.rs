@@ -201,7 +201,7 @@ fn undo_takes_back_one_sample_after_the_other() {
     let mut bench = Bench::at(Step::Capture);
     bench.measure(3);
     let effects = bench.intend(Intent::Undo);
-    assert_eq!(texts(&effects), ["append 13 measurement 3: taken back"]);
+    assert_eq!(texts(&effects), ["append 13 measurement 3: undone"]);
     bench.settle(effects);
     assert_eq!((bench.capture().pose.as_deref(), bench.capture().measured), (Some("3"), 2));
     bench.does(Intent::Undo);

@@ -1,4 +1,4 @@
-//! Readings in another unit: found, corrected, and the correction taken back.
+//! Readings in another unit: found, corrected, and the correction undone.
 
 use super::bench::{Bench, MEASURED, reading, seen_at, started, texts};
 use crate::session::journal::{Correction, Entry, FindingCause};
@@ -66,7 +66,7 @@ fn undo_takes_the_correction_back_that_the_sample_led_to() {
     let mut bench = one_in_inches();
     corrects(&mut bench);
     let effects = bench.intend(Intent::Undo);
-    assert_eq!(texts(&effects), ["append 20 the correction in line 19 is taken back | 21 measurement 9: taken back"]);
+    assert_eq!(texts(&effects), ["append 20 the correction in line 19 is undone | 21 measurement 9: undone"]);
     bench.settle(effects);
     assert!(bench.told().contains("is undone with it"), "{}", bench.told());
     let session = bench.wizard.session();
