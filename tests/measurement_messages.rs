@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use crate::support::root;
 use trupose::kinematics::JointType;
-use trupose::session::constraints::{read_constraints, read_constraints_bytes};
+use trupose::session::constraints::read_constraints;
 use trupose::session::filter::Filter;
-use trupose::session::measurements::{Layout, read, read_as, read_bytes};
+use trupose::session::measurements::{Layout, read, read_as};
 
 const JOINTS: [JointType; 3] = [JointType::Revolute; 3];
 
@@ -22,9 +22,9 @@ fn defects_are_named_with_place_and_remedy() {
         let name = file.file_name().unwrap().to_str().unwrap();
         let bytes = fs::read(&file).unwrap();
         let errors = if name.starts_with("constraints_") {
-            read_constraints_bytes(&bytes, name, &JOINTS).expect_err(name)
+            read_constraints(&bytes, name, &JOINTS).expect_err(name)
         } else {
-            read_bytes(&bytes, name, &JOINTS).expect_err(name)
+            read(&bytes, name, &JOINTS).expect_err(name)
         };
         messages = format!("{messages}{errors}\n\n");
     }

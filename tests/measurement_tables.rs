@@ -6,9 +6,9 @@ use crate::support::measured_data;
 use nalgebra::Point3;
 use proptest::prelude::*;
 use trupose::kinematics::JointType::{self, Prismatic, Revolute};
-use trupose::session::constraints::{Constraints, read_constraints, read_constraints_bytes};
+use trupose::session::constraints::{Constraints, read_constraints};
 use trupose::session::filter::Filter;
-use trupose::session::measurements::{self, Layout, Row, read, read_as, read_bytes, read_bytes_as, write};
+use trupose::session::measurements::{self, Layout, Row, read, read_as, write};
 
 fn close(a: f64, b: f64, tolerance: f64) -> bool {
     (a - b).abs() <= tolerance
@@ -42,7 +42,7 @@ fn separators_decimal_commas_and_line_endings_make_no_difference() {
         format!("\u{feff}{plain}\n\n,,,,,\n"),
         plain.replace("A,", "\"A\" ,"),
     ] {
-        let read = read_bytes(text.as_bytes(), "t", &[Revolute]).unwrap();
+        let read = read(text.as_bytes(), "t", &[Revolute]).unwrap();
         let same = read.rows.iter().zip(&expected.rows).all(|(a, b)| {
             (&a.pose, &a.configuration, a.point, a.sigma, a.line)
                 == (&b.pose, &b.configuration, b.point, b.sigma, b.line)
@@ -260,9 +260,9 @@ proptest! {
 fn survive(bytes: &[u8]) {
     let errors = Layout::ALL
         .into_iter()
-        .filter_map(|layout| read_bytes_as(layout, bytes, "t", &JOINTS).err())
-        .chain(read_bytes_as(Layout::RoboDk, bytes, "t", &[Revolute; 6]).err())
-        .chain(read_constraints_bytes(bytes, "t", &JOINTS).err());
+        .filter_map(|layout| read_as(layout, bytes, "t", &JOINTS).err())
+        .chain(read_as(Layout::RoboDk, bytes, "t", &[Revolute; 6]).err())
+        .chain(read_constraints(bytes, "t", &JOINTS).err());
     for error in errors {
         assert!(!error.problems.is_empty());
         assert!(!error.to_string().chars().any(|c| c.is_control() && c != '\n'), "{error}");

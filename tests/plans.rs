@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use proptest::prelude::*;
 use trupose::kinematics::JointType::{self, Prismatic, Revolute};
 use trupose::session::plan::PoseKind::{Drift, Home, Identification, Verification, Via};
-use trupose::session::plan::{PlannedPose, PoseKind, header, read, read_bytes, write};
+use trupose::session::plan::{PlannedPose, PoseKind, header, read, write};
 
 const JOINTS: [JointType; 3] = [Revolute, Prismatic, Revolute];
 
@@ -110,8 +110,8 @@ proptest! {
 
     #[test]
     fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        let _outcome = read_bytes(&bytes, "t", &JOINTS);
+        let _outcome = read(&bytes, "t", &JOINTS);
         let headed = [header(&JOINTS).as_bytes(), b"\n", bytes.as_slice()].concat();
-        let _outcome = read_bytes(&headed, "t", &JOINTS);
+        let _outcome = read(&headed, "t", &JOINTS);
     }
 }

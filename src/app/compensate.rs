@@ -14,9 +14,9 @@ use crate::error::{ExitStatus, Failure};
 use crate::kinematics::{Arm, Joint};
 use crate::model::{CalibratedArm, from_roll_pitch_yaw};
 use crate::procedure::joint_types;
-use crate::session::targets::{TargetGoal, decimal, quoted, read_bytes};
+use crate::session::targets::{TargetGoal, quoted, read};
 use crate::store;
-use crate::text::printable;
+use crate::text::{decimal, printable};
 use crate::units::{to_deg, to_mm};
 
 /// Targets that a message lists one by one.
@@ -63,7 +63,7 @@ fn table<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-    let rows = read_bytes(&bytes, &path.display().to_string(), &joint_types(&arm.profile))
+    let rows = read(&bytes, &path.display().to_string(), &joint_types(&arm.profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     let (nominal, identified) = tool_arms(arm, args.target.as_deref())?;
     let limits: Vec<_> = arm.profile.joints().iter().map(|range| range.limits).collect();

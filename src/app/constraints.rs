@@ -11,7 +11,7 @@ use crate::identification::{Length, LengthEnd, SharedPoint, Weighting};
 use crate::kinematics::Place;
 use crate::procedure::identify::{Distances, IdentifyRequest, SampleSet};
 use crate::procedure::{SampleName, checks, input_file, joint_types};
-use crate::session::constraints::{Constraints, Lengths, SharedPoints, read_constraints_bytes};
+use crate::session::constraints::{Constraints, Lengths, SharedPoints, read_constraints};
 use crate::session::filter::Filter;
 use crate::session::summary::{InputRole, VerificationMode};
 use crate::store;
@@ -28,7 +28,7 @@ pub(super) fn run<O: Write, E: Write>(
     }
     let bytes = store::read(&args.measurements).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = args.measurements.display().to_string();
-    let table = read_constraints_bytes(&bytes, &file, &joint_types(&loaded.profile))
+    let table = read_constraints(&bytes, &file, &joint_types(&loaded.profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     let (columns, odd) = match &table {
         Constraints::SharedPoints(shared) => (&shared.columns, &shared.warnings),

@@ -9,7 +9,7 @@ use crate::procedure::{input_file, joint_types};
 use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
 use crate::session::export::simulation_of_table;
 use crate::session::filter::Filter;
-use crate::session::measurements::{Layout, Measurements, Row, read_bytes_as};
+use crate::session::measurements::{Layout, Measurements, Row, read_as};
 use crate::session::summary::{InputFile, InputRole, Warning};
 use crate::store;
 use crate::text::counted;
@@ -76,7 +76,7 @@ pub(super) fn measurements(
 ) -> Result<LoadedTable, Failure> {
     let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = path.display().to_string();
-    let table = read_bytes_as(layout, &bytes, &file, &joint_types(profile))
+    let table = read_as(layout, &bytes, &file, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     let simulated = simulation_of_table(&bytes).map(|said| Warning::simulated(&said));
     Ok(LoadedTable { table, input: input_file(role, file, &bytes), simulated })

@@ -119,7 +119,7 @@ struct Listed {
 fn listed_poses(file: &Path, profile: &Profile) -> Result<Listed, Failure> {
     let bytes = store::read(file).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let name = file.display().to_string();
-    let listed = plan::read_bytes(&bytes, &name, &joint_types(profile))
+    let listed = plan::read(&bytes, &name, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     let warnings = checks::table_warnings(None, &listed.warnings);
     Ok(Listed { rows: listed.rows, warnings, input: input_file(InputRole::Plan, name, &bytes) })

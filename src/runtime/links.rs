@@ -14,7 +14,7 @@ use super::events::Events;
 use crate::link::{Link, LinkError, LinkEvent, RawLog, Rehearsal, Replay, SimulatedCell, Wired};
 use crate::profile::Profile;
 use crate::session::filter::Filter;
-use crate::session::measurements::{Layout, read_bytes_as};
+use crate::session::measurements::{Layout, read_as};
 use crate::session::plan::PlannedPose;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{InstrumentChoice, RecordedSet};
@@ -223,7 +223,7 @@ fn recording(
     })?;
     let layout: Layout = set.layout.parse().map_err(|error| set_up(format!("'{}': {error}", set.layout)))?;
     let joints = profile.chain().joints().iter().map(|joint| joint.joint_type).collect::<Vec<_>>();
-    let mut table = read_bytes_as(layout, &bytes, &set.file, &joints).map_err(|errors| set_up(errors.to_string()))?;
+    let mut table = read_as(layout, &bytes, &set.file, &joints).map_err(|errors| set_up(errors.to_string()))?;
     let distinct = table.distinct_rows().cloned().collect();
     (table.rows, table.duplicates) = (distinct, Vec::new());
     if let Some(condition) = &set.rows {

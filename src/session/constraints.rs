@@ -29,49 +29,19 @@ pub enum Constraints {
     Lengths(Lengths),
 }
 
-/// Reads a table of direct distances for a robot with the given joints. `file` is its name in messages.
-///
-/// # Errors
-/// All defects of the table together.
-pub fn read_constraints(text: &str, file: &str, joints: &[JointType]) -> Result<Constraints, TableErrors> {
-    read(text, file, joints, Vec::new())
-}
-
-/// As [`read_constraints`], from the bytes of a file: UTF-8, with or without byte order mark.
+/// Reads a table of direct distances for a robot with the given joints: UTF-8, with or without byte order mark. `file` is its
+/// name in messages.
 ///
 /// # Errors
 /// All defects of the table together, lines that are not UTF-8 among them.
-pub fn read_constraints_bytes(bytes: &[u8], file: &str, joints: &[JointType]) -> Result<Constraints, TableErrors> {
-    let mut problems = Vec::new();
-    let text = decode(bytes, &mut problems);
-    if text.is_empty() && !problems.is_empty() {
-        return Err(TableErrors::new(file, problems, Vec::new()));
-    }
-    read(&text, file, joints, problems)
-}
-
-/// The lines of column names for this robot: socket table, table of lengths.
-pub fn headers(joints: &[JointType]) -> [String; 2] {
-    let names = |prefix| joint_names(prefix, joints).join(",");
-    [format!("position,socket,{}", names("")), format!("{},{},length_mm", names("from_"), names("to_"))]
-}
-
-/// What both kinds of table are read from.
-struct Input<'a> {
-    header: Header,
-    records: Vec<Record>,
-    decimal_comma: bool,
-    joints: &'a [JointType],
-}
-
-fn read(
-    text: &str,
+pub fn read_constraints(
+    content: impl AsRef<[u8]>,
     file: &str,
     joints: &[JointType],
-    mut problems: Vec<TableProblem>,
 ) -> Result<Constraints, TableErrors> {
+    let (text, mut problems) = decode(content.as_ref(), file)?;
     let [sockets, lengths] = headers(joints);
-    let table = table::split(text, Shape::Named, &mut problems);
+    let table = table::split(&text, Shape::Named, &mut problems);
     let Some(record) = table.header else {
         problems.push(Defect::NoRows.of_table());
         return Err(TableErrors::new(file, problems, vec![sockets, lengths]));
@@ -96,6 +66,20 @@ fn read(
         return Err(TableErrors::new(file, problems, vec![sockets, lengths]));
     };
     if problems.is_empty() { Ok(constraints) } else { Err(TableErrors::new(file, problems, expected)) }
+}
+
+/// The lines of column names for this robot: socket table, table of lengths.
+pub fn headers(joints: &[JointType]) -> [String; 2] {
+    let names = |prefix| joint_names(prefix, joints).join(",");
+    [format!("position,socket,{}", names("")), format!("{},{},length_mm", names("from_"), names("to_"))]
+}
+
+/// What both kinds of table are read from.
+struct Input<'a> {
+    header: Header,
+    records: Vec<Record>,
+    decimal_comma: bool,
+    joints: &'a [JointType],
 }
 
 /// All joint values of a row; `None` with problems when one is missing.

@@ -26,7 +26,7 @@ use nalgebra::Point3;
 pub(super) use consistency::farthest_joint;
 pub use layout::{Layout, UnknownLayout};
 pub use writer::write;
-pub(super) use writer::{decimal, joint_cells, quoted};
+pub(super) use writer::{joint_cells, quoted};
 
 use super::table::{
     self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,
@@ -78,48 +78,62 @@ impl Measurements {
     }
 }
 
-/// Reads a table with named columns for a robot with the given joints. `file` is its name in messages.
-///
-/// # Errors
-/// All defects of the table together.
-pub fn read(text: &str, file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
-    read_as(Layout::Named, text, file, joints)
-}
-
-/// As [`read`], from the bytes of a file: UTF-8, with or without byte order mark.
+/// Reads a table with named columns for a robot with the given joints: UTF-8, with or without byte order mark. `file` is its
+/// name in messages.
 ///
 /// # Errors
 /// All defects of the table together, lines that are not UTF-8 among them.
-pub fn read_bytes(bytes: &[u8], file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
-    read_bytes_as(Layout::Named, bytes, file, joints)
+pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
+    read_as(Layout::Named, content, file, joints)
 }
 
 /// As [`read`], in a layout chosen by the user.
 ///
 /// # Errors
-/// All defects of the table together.
-pub fn read_as(layout: Layout, text: &str, file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
-    read_with(layout, text, file, joints, Vec::new())
-}
-
-/// As [`read_bytes`], in a layout chosen by the user.
-///
-/// # Errors
 /// All defects of the table together, lines that are not UTF-8 among them.
-pub fn read_bytes_as(
+pub fn read_as(
     layout: Layout,
-    bytes: &[u8],
+    content: impl AsRef<[u8]>,
     file: &str,
     joints: &[JointType],
 ) -> Result<Measurements, TableErrors> {
-    let mut problems = Vec::new();
-    let text = decode(bytes, &mut problems);
-    if text.is_empty() && !problems.is_empty() {
-        return Err(TableErrors::new(file, problems, Vec::new()));
+    let (text, mut problems) = decode(content.as_ref(), file)?;
+    let mut warnings = Vec::new();
+    let split = match layout {
+        Layout::Named => split_named(&text, joints, &mut problems),
+        Layout::RoboDk => imported::split_robodk(&text, joints, &mut problems, &mut warnings),
+        Layout::Delmia => Some(imported::split_delmia(&text, joints, &mut problems, &mut warnings)),
+    };
+    let headers = if layout == Layout::Named { vec![header(joints)] } else { Vec::new() };
+    let Some(Split { mut columns, places, records, decimal_comma }) = split else {
+        return Err(TableErrors::new(file, problems, headers));
+    };
+    if records.is_empty() && problems.is_empty() {
+        problems.push(Defect::NoRows.of_table());
     }
-    read_with(layout, &text, file, joints, problems)
+    let mut numbers = Numbers::new(&columns, decimal_comma);
+    let numbered = places.pose.is_none();
+    let mut rows = Vec::with_capacity(records.len());
+    for (index, record) in records.into_iter().enumerate() {
+        rows.extend(row(index, record, &places, &mut numbers, &mut problems));
+    }
+    if layout == Layout::RoboDk {
+        imported::name_targets(&mut rows);
+    }
+    if numbered {
+        columns.insert(0, "pose".to_owned());
+        for row in &mut rows {
+            row.fields.insert(0, row.pose.clone());
+        }
+    }
+    let duplicates = consistency::check(&rows, joints, &mut problems, &mut warnings);
+    if problems.is_empty() {
+        warnings.sort_by_key(|warning| warning.line);
+        Ok(Measurements { rows, columns, layout, duplicates, warnings })
+    } else {
+        Err(TableErrors::new(file, problems, headers))
+    }
 }
-
 /// The line of column names that a table for this robot can have: `pose,target,q1_deg,…,x_mm,y_mm,z_mm`.
 pub fn header(joints: &[JointType]) -> String {
     let mut names = vec!["pose".to_owned(), "target".to_owned()];
@@ -153,50 +167,6 @@ struct Split {
     places: Places,
     records: Vec<Record>,
     decimal_comma: bool,
-}
-
-fn read_with(
-    layout: Layout,
-    text: &str,
-    file: &str,
-    joints: &[JointType],
-    mut problems: Vec<TableProblem>,
-) -> Result<Measurements, TableErrors> {
-    let mut warnings = Vec::new();
-    let split = match layout {
-        Layout::Named => split_named(text, joints, &mut problems),
-        Layout::RoboDk => imported::split_robodk(text, joints, &mut problems, &mut warnings),
-        Layout::Delmia => Some(imported::split_delmia(text, joints, &mut problems, &mut warnings)),
-    };
-    let headers = if layout == Layout::Named { vec![header(joints)] } else { Vec::new() };
-    let Some(Split { mut columns, places, records, decimal_comma }) = split else {
-        return Err(TableErrors::new(file, problems, headers));
-    };
-    if records.is_empty() && problems.is_empty() {
-        problems.push(Defect::NoRows.of_table());
-    }
-    let mut numbers = Numbers::new(&columns, decimal_comma);
-    let numbered = places.pose.is_none();
-    let mut rows = Vec::with_capacity(records.len());
-    for (index, record) in records.into_iter().enumerate() {
-        rows.extend(row(index, record, &places, &mut numbers, &mut problems));
-    }
-    if layout == Layout::RoboDk {
-        imported::name_targets(&mut rows);
-    }
-    if numbered {
-        columns.insert(0, "pose".to_owned());
-        for row in &mut rows {
-            row.fields.insert(0, row.pose.clone());
-        }
-    }
-    let duplicates = consistency::check(&rows, joints, &mut problems, &mut warnings);
-    if problems.is_empty() {
-        warnings.sort_by_key(|warning| warning.line);
-        Ok(Measurements { rows, columns, layout, duplicates, warnings })
-    } else {
-        Err(TableErrors::new(file, problems, headers))
-    }
 }
 
 /// Finds the columns of the table's own layout.

@@ -20,11 +20,12 @@ use std::str::FromStr;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-use super::measurements::{decimal, farthest_joint, joint_cells, joint_names, quoted};
+use super::measurements::{farthest_joint, joint_cells, joint_names, quoted};
 use super::table::{
     self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,
 };
 use crate::kinematics::JointType;
+use crate::text::decimal;
 use crate::units::to_mm;
 
 /// Purpose of a row of a plan.
@@ -45,7 +46,6 @@ pub enum PoseKind {
 }
 
 impl PoseKind {
-    /// All of them.
     pub const ALL: [Self; 5] = [Self::Identification, Self::Verification, Self::Home, Self::Drift, Self::Via];
 
     /// As in the column `kind`.
@@ -107,25 +107,22 @@ pub struct PlannedPose {
     pub point_in_base: Option<Point3<f64>>,
 }
 
-/// Reads a plan for a robot with the given joints. `file` is its name in messages.
-///
-/// # Errors
-/// All defects of the table together.
-pub fn read(text: &str, file: &str, joints: &[JointType]) -> Result<Plan, TableErrors> {
-    read_with(text, file, joints, Vec::new())
-}
-
-/// As [`read`], from the bytes of a file: UTF-8, with or without byte order mark.
+/// Reads a plan for a robot with the given joints: UTF-8, with or without byte order mark. `file` is its name in messages.
 ///
 /// # Errors
 /// All defects of the table together, lines that are not UTF-8 among them.
-pub fn read_bytes(bytes: &[u8], file: &str, joints: &[JointType]) -> Result<Plan, TableErrors> {
-    let mut problems = Vec::new();
-    let text = decode(bytes, &mut problems);
-    if text.is_empty() && !problems.is_empty() {
-        return Err(TableErrors::new(file, problems, Vec::new()));
+pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Result<Plan, TableErrors> {
+    let (text, mut problems) = decode(content.as_ref(), file)?;
+    let rows = rows(&text, joints, &mut problems).unwrap_or_default();
+    if problems.is_empty() && !rows.iter().any(|(_, row)| row.kind.is_measured()) {
+        problems.push(Defect::NothingToMeasure.of_table());
     }
-    read_with(&text, file, joints, problems)
+    let warnings = consistency(&rows, joints, &mut problems);
+    if problems.is_empty() {
+        Ok(Plan { rows: rows.into_iter().map(|(_, row)| row).collect(), warnings })
+    } else {
+        Err(TableErrors::new(file, problems, vec![header(joints)]))
+    }
 }
 
 /// The line of column names of a plan for this robot: `pose,kind,q1_deg,…`.
@@ -166,25 +163,7 @@ struct Places {
 /// A row with its line in the file.
 type Placed = (usize, PlannedPose);
 
-fn read_with(
-    text: &str,
-    file: &str,
-    joints: &[JointType],
-    mut problems: Vec<TableProblem>,
-) -> Result<Plan, TableErrors> {
-    let rows = rows(text, joints, &mut problems).unwrap_or_default();
-    if problems.is_empty() && !rows.iter().any(|(_, row)| row.kind.is_measured()) {
-        problems.push(Defect::NothingToMeasure.of_table());
-    }
-    let warnings = consistency(&rows, joints, &mut problems);
-    if problems.is_empty() {
-        Ok(Plan { rows: rows.into_iter().map(|(_, row)| row).collect(), warnings })
-    } else {
-        Err(TableErrors::new(file, problems, vec![header(joints)]))
-    }
-}
-
-/// All rows without defects; `None`, reported, when the columns cannot be told.
+/// All rows without defects; `None`, reported, if the columns are not recognised.
 fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> Option<Vec<Placed>> {
     let table = table::split(text, Shape::Named, problems);
     if table.records.is_empty() && problems.is_empty() {

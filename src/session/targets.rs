@@ -27,7 +27,6 @@ pub enum TargetGoal {
     },
 }
 
-/// One row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetRow {
     /// Line in the file, from 1.
@@ -38,16 +37,15 @@ pub struct TargetRow {
     pub goal: TargetGoal,
 }
 
-/// Column of a table of commands, which must not be compensated once more.
+/// Column of a table of commands, which must not be compensated again.
 const COMMANDS: &str = "status";
 
 /// Reads targets for a robot with these joints. `file` is its name in messages.
 ///
 /// # Errors
 /// All defects of the table together.
-pub fn read_bytes(bytes: &[u8], file: &str, joints: &[JointType]) -> Result<Vec<TargetRow>, TableErrors> {
-    let mut problems = Vec::new();
-    let text = decode(bytes, &mut problems);
+pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Result<Vec<TargetRow>, TableErrors> {
+    let (text, mut problems) = decode(content.as_ref(), file)?;
     let rows = if problems.is_empty() { rows(&text, joints, &mut problems) } else { None };
     if problems.is_empty() {
         Ok(rows.unwrap_or_default())
@@ -104,11 +102,6 @@ fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> O
         }
     }
     Some(rows)
-}
-
-/// A number of an output table: fixed decimals without the sign of a rounded zero.
-pub fn decimal(value: f64, decimals: usize) -> String {
-    super::measurements::decimal(value, decimals)
 }
 
 /// A name of an output table, in quotation marks where it needs them.

@@ -2,7 +2,7 @@
 
 use super::{Row, joint_names};
 use crate::kinematics::JointType;
-use crate::text::printable;
+use crate::text::{decimal, printable};
 use crate::units::{Quantity, to_mm};
 
 /// Decimals of an angle in degrees: 0.02 nrad.
@@ -56,13 +56,6 @@ pub(in crate::session) fn joint_cells(configuration: &[f64], joints: &[JointType
         };
         decimal(quantity.to_edge(value), decimals)
     })
-}
-
-/// A fixed number of decimals, without the sign of a rounded zero.
-pub(in crate::session) fn decimal(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
-    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
 /// A cell in quotation marks where the text could be taken for something else.

@@ -1,14 +1,17 @@
 //! Bytes of a table into text.
 
-use super::{Defect, TableProblem};
+use super::{Defect, TableErrors, TableProblem};
 
-/// The text of `bytes`. Lines that are not UTF-8 are reported, and read with replacement characters so that the rest of
-/// the table can be checked as well.
-pub(in crate::session) fn decode(bytes: &[u8], problems: &mut Vec<TableProblem>) -> String {
+/// The text of `bytes`, and its lines that are not UTF-8. They are read with replacement characters so that the rest of the
+/// table can be checked as well.
+///
+/// # Errors
+/// The file is UTF-16.
+pub(in crate::session) fn decode(bytes: &[u8], file: &str) -> Result<(String, Vec<TableProblem>), TableErrors> {
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        problems.push(Defect::Utf16.of_table());
-        return String::new();
+        return Err(TableErrors::new(file, vec![Defect::Utf16.of_table()], Vec::new()));
     }
+    let mut problems = Vec::new();
     let mut text = String::with_capacity(bytes.len());
     let mut line = 1;
     let mut reported = 0;
@@ -23,5 +26,5 @@ pub(in crate::session) fn decode(bytes: &[u8], problems: &mut Vec<TableProblem>)
             text.push(char::REPLACEMENT_CHARACTER);
         }
     }
-    text
+    Ok((text, problems))
 }
