@@ -50,7 +50,6 @@ pub enum Dialog {
 /// State of a dialog after a key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DialogOutcome {
-    /// Still open.
     Open,
     /// Closed without an intent.
     Closed,

@@ -10,7 +10,6 @@ pub enum Glyphs {
     Unicode,
     /// Half blocks instead of braille, for fonts without it.
     Blocks,
-    /// ASCII only.
     Ascii,
 }
 

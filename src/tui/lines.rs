@@ -57,13 +57,7 @@ pub fn run(
     while !engine.has_exited() && engine.wait(LAST_ENTRY) {}
     at_end(engine.completed_intents());
     let remarks = engine.end_recording().into_iter().collect();
-    let wizard = engine.wizard();
-    Ok(Exit {
-        cause: wizard.ended().unwrap_or("ended").to_owned(),
-        signal: received.signal(),
-        folder: wizard.folder().map(str::to_owned),
-        remarks,
-    })
+    Ok(Exit::of(engine.wizard(), received.signal(), remarks))
 }
 
 /// Starts the reading thread. It is never joined, because a read may never return.

@@ -73,6 +73,13 @@ pub enum ScreenOutcome {
     Open(Box<Dialog>),
 }
 
+/// Whether local state changed.
+impl From<bool> for ScreenOutcome {
+    fn from(has_changed: bool) -> Self {
+        if has_changed { Self::Changed } else { Self::Ignored }
+    }
+}
+
 /// The content of a step.
 pub trait Screen: fmt::Debug {
     /// Observes a new view, for what a screen remembers of earlier ones.
@@ -84,7 +91,9 @@ pub trait Screen: fmt::Debug {
     fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome;
 
     /// Handles pasted text.
-    fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome;
+    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
+        ScreenOutcome::Ignored
+    }
 
     /// Where in `area` the robot is shown, so that the keys of the picture make sense.
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace;

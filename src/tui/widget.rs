@@ -9,7 +9,7 @@ pub mod tabs;
 pub use bar::bar;
 pub use chart::Chart;
 pub use table::{Column, Table};
-pub use tabs::tabs;
+pub use tabs::{TabView, draw_tabs};
 
 #[cfg(test)]
 mod tests;

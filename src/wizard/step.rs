@@ -20,7 +20,7 @@ use jiff::Timestamp;
 
 use super::effect::{Answer, Request};
 use super::intent::{Intent, IntentInfo};
-use super::notice::Notice;
+use super::notice::{Notice, Problem};
 use super::view::Content;
 use crate::profile::Profile;
 use crate::session::journal::Entry;
@@ -42,6 +42,13 @@ impl Cx<'_> {
     /// The robot; every step after the first has one.
     pub(super) fn robot(&self) -> Option<&Robot> {
         self.session.robot.as_ref()
+    }
+
+    /// Notes a measurement at a pose that gave no sample, and says why.
+    pub(super) fn refuse(&self, pose: String, problem: Problem) -> Vec<Action> {
+        let number = self.session.measurements + 1;
+        let entry = Entry::Refused { number, pose, reason: problem.message.clone(), xyz_mm: None };
+        vec![Action::Write(vec![entry]), Action::Say(problem.into())]
     }
 
     /// The profile with the chosen target.

@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use super::intent::{IntentInfo, PlanSettings};
+use super::intent::{Intent, IntentInfo, PlanSettings};
 use super::notice::{Notice, Severity};
 use super::{RequestProgress, Wizard};
 use crate::identification::{self, Iteration};
@@ -38,6 +38,18 @@ pub struct ViewModel {
     pub intents: Vec<IntentInfo>,
     /// Reason why the program ends, if it does.
     pub ended: Option<String>,
+}
+
+impl ViewModel {
+    /// Whether such an intent is possible now.
+    pub fn offers(&self, is_wanted: impl Fn(&Intent) -> bool) -> bool {
+        self.intents.iter().any(|info| info.is_enabled() && is_wanted(&info.intent))
+    }
+
+    /// Whether the operator has to resolve something before continuing.
+    pub fn is_stopped(&self) -> bool {
+        self.notice.as_ref().is_some_and(|notice| notice.severity == Severity::Stop)
+    }
 }
 
 /// Live reading of the instrument between measurements. Never a measurement.
@@ -420,7 +432,6 @@ pub struct PredictionView {
     pub is_enough: bool,
 }
 
-/// State of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowState {
@@ -580,12 +591,5 @@ fn part_done(progress: &RequestProgress) -> Option<f64> {
         }
         RequestProgress::Search(plan::Progress::Searching | plan::Progress::Unreachable { .. })
         | RequestProgress::Identify(_) => None,
-    }
-}
-
-impl ViewModel {
-    /// Whether the operator has to resolve something before continuing.
-    pub fn is_stopped(&self) -> bool {
-        self.notice.as_ref().is_some_and(|notice| notice.severity == Severity::Stop)
     }
 }

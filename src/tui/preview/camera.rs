@@ -35,7 +35,6 @@ pub enum Projection {
 /// What the picture frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Framing {
-    /// The arm.
     #[default]
     Arm,
     /// Everything: points and tracker too.

@@ -30,11 +30,9 @@ pub(super) enum Material {
     KeepOut,
     /// The nominal arm.
     Nominal,
-    /// The tracker.
     Tracker,
     /// The identified arm.
     Identified,
-    /// The beam.
     Beam,
     /// A planned point that is not measured yet.
     Open,
@@ -60,7 +58,6 @@ pub(super) enum Stroke {
     ByDepth,
     /// Dotted, more widely with depth.
     Dotted,
-    /// Dashes.
     Dashed,
     /// Two dots wide.
     Thick,

@@ -19,15 +19,13 @@ mod prediction;
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::widgets::Widget as _;
 
+use super::page::picture_if_any;
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::tui::dialog::ask;
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
-use crate::tui::preview::Preview;
-use crate::tui::theme::Role;
-use crate::tui::widget::tabs;
+use crate::tui::widget::{TabView, draw_tabs};
 use crate::wizard::Intent;
 use crate::wizard::view::{CaptureView, Content, ViewModel};
 
@@ -53,18 +51,15 @@ enum Tab {
     Picture,
 }
 
-impl Tab {
-    const ALL: [Self; 6] = [Self::GoTo, Self::Poses, Self::Prediction, Self::Live, Self::Notes, Self::Picture];
-    const NAMES: [&'static str; 6] = ["Go to", "Poses", "Prediction", "Live", "Notes", "Picture"];
-
-    fn index(self) -> usize {
-        Self::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
-    }
-
-    /// The view `by` places further on.
-    fn turned(self, by: usize) -> Self {
-        Self::ALL.get((self.index() + by) % Self::ALL.len()).copied().unwrap_or_default()
-    }
+impl TabView for Tab {
+    const ALL: &'static [(Self, &'static str)] = &[
+        (Self::GoTo, "Go to"),
+        (Self::Poses, "Poses"),
+        (Self::Prediction, "Prediction"),
+        (Self::Live, "Live"),
+        (Self::Notes, "Notes"),
+        (Self::Picture, "Picture"),
+    ];
 }
 
 /// The shown view and the position in it.
@@ -86,7 +81,7 @@ fn content(view: &ViewModel) -> Option<&CaptureView> {
 
 /// Whether coordinates can be typed now.
 fn takes_typing(view: &ViewModel) -> bool {
-    view.intents.iter().any(|info| matches!(info.intent, Intent::TypeReading(_)) && info.is_enabled())
+    view.offers(|intent| matches!(intent, Intent::TypeReading(_)))
 }
 
 /// Opens the dialog for coordinates, starting with the text typed or pasted so far.
@@ -140,8 +135,7 @@ impl CaptureScreen {
 
 impl Screen for CaptureScreen {
     fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
-        let next = Tab::NAMES.get(self.tab.turned(1).index()).copied().unwrap_or("other view");
-        let mut items = vec![KeyHint::new("Tab", next.to_lowercase(), 4)];
+        let mut items = vec![KeyHint::new("Tab", self.tab.turned(1).1.to_lowercase(), 4)];
         match self.tab {
             Tab::Poses => {
                 items.push(KeyHint::new("Enter", "go to this pose", 0));
@@ -160,8 +154,7 @@ impl Screen for CaptureScreen {
         let Some(content) = content(cx.view) else { return ScreenOutcome::Ignored };
         match key.code {
             _ if key.has_modifier() => return ScreenOutcome::Ignored,
-            KeyCode::Tab => self.tab = self.tab.turned(1),
-            KeyCode::BackTab => self.tab = self.tab.turned(Tab::ALL.len() - 1),
+            code if self.tab.on_key(code) => {}
             KeyCode::Char(c @ ('0'..='9' | '-' | '+' | '.' | ','))
                 if self.tab != Tab::Picture && takes_typing(cx.view) =>
             {
@@ -194,7 +187,7 @@ impl Screen for CaptureScreen {
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let Some(content) = content(cx.view) else { return };
         let (main, beside) = parts(cx, content, area);
-        tabs(cx.theme, &Tab::NAMES, self.tab.index(), paint::band(main, 0, 1), buf);
+        draw_tabs(cx.theme, self.tab, paint::band(main, 0, 1), buf);
         let body = paint::band(main, 1, main.height);
         match self.tab {
             Tab::GoTo => go_to::draw(cx, content, body, buf),
@@ -205,14 +198,8 @@ impl Screen for CaptureScreen {
             Tab::Picture => {}
         }
         let picture = if self.tab == Tab::Picture { Some(paint::band(area, 1, area.height)) } else { beside };
-        match (cx.scene, picture) {
-            (Some(scene), Some(picture)) => {
-                Preview { scene, camera: cx.camera, theme: cx.theme }.render(picture, buf);
-            }
-            (None, Some(picture)) => {
-                paint::text(buf, picture, (0, 1), "no robot to show", cx.theme.style(Role::Dim));
-            }
-            (_, None) => {}
+        if let Some(picture) = picture {
+            picture_if_any(cx, picture, buf);
         }
     }
 }

@@ -144,11 +144,7 @@ impl Screen for DeliverScreen {
             return ScreenOutcome::Open(Box::new(Dialog::Confirm { intent: Intent::Quit, lines, is_yes: true }));
         }
         let lines = page(cx, 78, 0).len();
-        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
-    }
-
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
-        ScreenOutcome::Ignored
+        self.scroll.on_key(key, lines).into()
     }
 
     fn picture_place(&self, _cx: &ScreenCx<'_>, _area: Rect) -> PicturePlace {

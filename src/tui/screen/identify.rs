@@ -5,9 +5,10 @@ mod pages;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::page::{Page, Scroll, Tabs, picture, split};
+use super::page::{Page, Parts, Scroll, Tabs, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::tui::keymap::{Key, KeyHint};
+use crate::tui::preview::Scene;
 use crate::wizard::view::{Content, IdentifyView};
 
 /// Columns of the text beside the picture.
@@ -47,6 +48,10 @@ impl IdentifyScreen {
         }
         page
     }
+
+    fn parts(self, cx: &ScreenCx<'_>, area: Rect) -> Parts {
+        Parts::of(cx, area, TEXT, has_result(cx) && self.tabs.at == PICTURE)
+    }
 }
 
 fn has_result(cx: &ScreenCx<'_>) -> bool {
@@ -64,30 +69,17 @@ impl Screen for IdentifyScreen {
             return ScreenOutcome::Changed;
         }
         let lines = self.page(cx, TEXT).len();
-        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
-    }
-
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
-        ScreenOutcome::Ignored
+        self.scroll.on_key(key, lines).into()
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
-        let is_beside = split(area, TEXT, cx.scene.is_some()).1.is_some();
-        let is_alone = cx.scene.is_some() && has_result(cx) && self.tabs.at == PICTURE;
-        PicturePlace::of(is_alone && !is_beside, is_beside)
+        self.parts(cx, area).picture_place()
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let area = if has_result(cx) { self.tabs.draw(cx.theme, area, buf) } else { area };
-        let (text, side) = split(area, TEXT, cx.scene.is_some());
-        match (cx.scene, side) {
-            (Some(scene), None) if has_result(cx) && self.tabs.at == PICTURE => picture(cx, scene, area, buf),
-            (scene, side) => {
-                self.page(cx, text.width).draw(self.scroll.0, text, buf);
-                if let (Some(scene), Some(side)) = (scene, side) {
-                    picture(cx, scene, side, buf);
-                }
-            }
-        }
+        let page = |columns| self.page(cx, columns);
+        let picture = |scene: &Scene, area, buf: &mut Buffer| picture(cx, scene, area, buf);
+        self.parts(cx, area).draw(cx, buf, (page, self.scroll), picture);
     }
 }

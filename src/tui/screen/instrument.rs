@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::menu::Menu;
-use super::page::{Page, Scroll, picture, split};
+use super::page::{Page, Parts, Scroll, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::text::counted;
@@ -45,8 +45,7 @@ const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a InstrumentView> {
 
 /// Whether the instrument can no longer be changed.
 fn is_fixed(cx: &ScreenCx<'_>) -> bool {
-    let mut offers = cx.view.intents.iter().filter(|info| matches!(info.intent, Intent::ChooseInstrument(_)));
-    offers.all(|info| !info.is_enabled()) && cx.view.busy.is_none()
+    !cx.view.offers(|intent| matches!(intent, Intent::ChooseInstrument(_))) && cx.view.busy.is_none()
 }
 
 impl InstrumentScreen {
@@ -144,22 +143,16 @@ impl Screen for InstrumentScreen {
                 _ => {}
             }
         }
-        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
-    }
-
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
-        ScreenOutcome::Ignored
+        self.scroll.on_key(key, lines).into()
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
-        PicturePlace::of(false, split(area, TEXT, cx.scene.is_some()).1.is_some())
+        Parts::of(cx, area, TEXT, false).picture_place()
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
-        let (text, side) = split(area, TEXT, cx.scene.is_some());
-        self.page(cx, text.width).draw(self.scroll.0, text, buf);
-        if let (Some(side), Some(scene)) = (side, cx.scene) {
-            picture(cx, scene, side, buf);
-        }
+        let page = |columns| self.page(cx, columns);
+        let parts = Parts::of(cx, area, TEXT, false);
+        parts.draw(cx, buf, (page, self.scroll), |scene, area, buf| picture(cx, scene, area, buf));
     }
 }

@@ -9,7 +9,7 @@ use crate::tui::glyphs::shortened;
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::preview::{Preview, Scene};
-use crate::tui::screen::ScreenCx;
+use crate::tui::screen::{PicturePlace, ScreenCx};
 use crate::tui::theme::{Role, Theme};
 
 /// Rows that PgUp and PgDn scroll.
@@ -74,7 +74,7 @@ impl Page {
         self.line(vec![(text.to_owned(), Role::Title)]);
     }
 
-    /// A paragraph behind a mark; further lines stand below its text.
+    /// A paragraph behind a mark; further lines are below its text.
     pub(super) fn marked(&mut self, mark: (&str, Role), text: &str, role: Role) {
         let lead = text::columns(mark.0);
         let room = self.columns.saturating_sub(lead).max(1);
@@ -197,6 +197,43 @@ impl Tabs {
     }
 }
 
+/// Areas of the text and of the picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts {
+    text: Option<Rect>,
+    picture: Option<Rect>,
+}
+
+impl Parts {
+    /// The picture is beside a text of `wanted` columns if there is room for both, else alone if its own tab is shown.
+    pub(super) const fn of(cx: &ScreenCx<'_>, area: Rect, wanted: u16, is_picture_tab: bool) -> Self {
+        match split(area, wanted, cx.scene.is_some()) {
+            (_, None) if is_picture_tab && cx.scene.is_some() => Self { text: None, picture: Some(area) },
+            (text, picture) => Self { text: Some(text), picture },
+        }
+    }
+
+    pub(super) const fn picture_place(self) -> PicturePlace {
+        PicturePlace::of(self.text.is_none(), self.picture.is_some())
+    }
+
+    /// Draws the page for the columns of the text, scrolled to a line, and the picture.
+    pub(super) fn draw(
+        self,
+        cx: &ScreenCx<'_>,
+        buf: &mut Buffer,
+        (page, scroll): (impl FnOnce(u16) -> Page, Scroll),
+        picture: impl FnOnce(&Scene, Rect, &mut Buffer),
+    ) {
+        if let Some(text) = self.text {
+            page(text.width).draw(scroll.0, text, buf);
+        }
+        if let (Some(scene), Some(area)) = (cx.scene, self.picture) {
+            picture(scene, area, buf);
+        }
+    }
+}
+
 /// Splits `area` into text of `wanted` columns and a picture, if there is room for both.
 pub(super) const fn split(area: Rect, wanted: u16, has_picture: bool) -> (Rect, Option<Rect>) {
     let left = wanted + 2;
@@ -212,17 +249,12 @@ pub(super) fn picture(cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Bu
     Preview { scene, camera: cx.camera, theme: cx.theme }.render(area, buf);
 }
 
-/// A number with fixed decimals, without a negative zero, and with an exponent above 1e9.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
-    if value.abs() > 1e9 {
-        return format!("{value:.3e}");
+/// Draws the robot, or says that there is none.
+pub(super) fn picture_if_any(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+    match cx.scene {
+        Some(scene) => picture(cx, scene, area, buf),
+        None => {
+            paint::text(buf, area, (0, 1), "no robot to show", cx.theme.style(Role::Dim));
+        }
     }
-    let text = format!("{value:.decimals$}");
-    let is_zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
-    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
-}
-
-/// Decimals that show two significant digits of an uncertainty, from 1 to 6.
-pub(super) fn decimals_for(sigma: f64) -> usize {
-    (1..=6_u8).find(|&decimals| sigma * 10_f64.powi(i32::from(decimals)) >= 9.95).map_or(6, usize::from)
 }

@@ -16,15 +16,14 @@ mod weak;
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::widgets::Widget as _;
 
+use super::page::picture_if_any;
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::text::wrapped;
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
-use crate::tui::preview::Preview;
 use crate::tui::theme::Role;
-use crate::tui::widget::tabs;
+use crate::tui::widget::{TabView, draw_tabs};
 use crate::wizard::view::{Content, PlanView, ViewModel};
 use crate::wizard::{Intent, PlanSettings};
 use form::SettingsForm;
@@ -57,17 +56,13 @@ enum Tab {
     Picture,
 }
 
-impl Tab {
-    const ALL: [Self; 4] = [Self::Plan, Self::TradeOff, Self::Weak, Self::Picture];
-    const NAMES: [&'static str; 4] = ["Plan", "Trade-off", "Weak parameters", "Picture"];
-
-    fn index(self) -> usize {
-        Self::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
-    }
-
-    fn turned(self, by: usize) -> Self {
-        Self::ALL.get((self.index() + by) % Self::ALL.len()).copied().unwrap_or_default()
-    }
+impl TabView for Tab {
+    const ALL: &'static [(Self, &'static str)] = &[
+        (Self::Plan, "Plan"),
+        (Self::TradeOff, "Trade-off"),
+        (Self::Weak, "Weak parameters"),
+        (Self::Picture, "Picture"),
+    ];
 }
 
 /// Settings that are not sent yet, and the results of the search so far.
@@ -93,7 +88,7 @@ fn makes_by_default(view: &ViewModel) -> bool {
 
 /// Whether poses can be chosen now.
 fn can_make(view: &ViewModel) -> bool {
-    view.intents.iter().any(|info| info.is_enabled() && matches!(info.intent, Intent::MakePlan(_)))
+    view.offers(|intent| matches!(intent, Intent::MakePlan(_)))
 }
 
 impl PlanScreen {
@@ -112,8 +107,7 @@ impl Screen for PlanScreen {
     }
 
     fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
-        let next = Tab::NAMES.get(self.tab.turned(1).index()).copied().unwrap_or("other view");
-        let mut items = vec![KeyHint::new("Tab", next.to_lowercase(), 5)];
+        let mut items = vec![KeyHint::new("Tab", self.tab.turned(1).1.to_lowercase(), 5)];
         if !can_make(cx.view) {
             return items;
         }
@@ -138,8 +132,7 @@ impl Screen for PlanScreen {
         }
         let is_free = can_make(cx.view);
         match key.code {
-            KeyCode::Tab => self.tab = self.tab.turned(1),
-            KeyCode::BackTab => self.tab = self.tab.turned(Tab::ALL.len() - 1),
+            code if self.tab.on_key(code) => self.scroll = 0,
             KeyCode::Enter if is_free && (self.form.is_changed() || makes_by_default(cx.view)) => {
                 let settings = self.form.settings();
                 return self.make(settings);
@@ -153,7 +146,7 @@ impl Screen for PlanScreen {
                 return self.make(settings);
             }
             code if self.tab == Tab::Plan && is_free => {
-                return if self.form.on_key(code) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored };
+                return self.form.on_key(code).into();
             }
             KeyCode::Up | KeyCode::Down if self.tab == Tab::TradeOff && is_free => {
                 let poses = self.form.settings().poses;
@@ -172,14 +165,7 @@ impl Screen for PlanScreen {
             }
             _ => return ScreenOutcome::Ignored,
         }
-        if matches!(key.code, KeyCode::Tab | KeyCode::BackTab) {
-            self.scroll = 0;
-        }
         ScreenOutcome::Changed
-    }
-
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
-        ScreenOutcome::Ignored
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
@@ -192,7 +178,7 @@ impl Screen for PlanScreen {
         let Some(content) = content(cx.view) else { return };
         let is_wide = area.width >= WIDE && cx.scene.is_some();
         let main = Rect { width: if is_wide { VIEWS.max(area.width / 2) } else { area.width }, ..area };
-        tabs(cx.theme, &Tab::NAMES, self.tab.index(), paint::band(main, 0, 1), buf);
+        draw_tabs(cx.theme, self.tab, paint::band(main, 0, 1), buf);
         let body = paint::band(main, 2, main.height);
         match self.tab {
             Tab::Plan => self.overview(cx, content, body, buf),
@@ -208,12 +194,8 @@ impl Screen for PlanScreen {
             Tab::Picture => Some(paint::band(area, 1, area.height)),
             _ => is_wide.then(beside),
         };
-        match (cx.scene, picture) {
-            (Some(scene), Some(picture)) => Preview { scene, camera: cx.camera, theme: cx.theme }.render(picture, buf),
-            (None, Some(picture)) => {
-                paint::text(buf, picture, (0, 1), "no robot to show", cx.theme.style(Role::Dim));
-            }
-            (_, None) => {}
+        if let Some(picture) = picture {
+            picture_if_any(cx, picture, buf);
         }
     }
 }

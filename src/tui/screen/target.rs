@@ -7,7 +7,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::menu::Menu;
-use super::page::{Page, Scroll, picture, split};
+use super::page::{Page, Parts, Scroll, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::session::set_up::TargetChoice;
 use crate::tui::dialog::ask;
@@ -47,12 +47,11 @@ const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a TargetView> {
 
 /// Whether the SMR can no longer be changed.
 fn is_fixed(cx: &ScreenCx<'_>) -> bool {
-    let mut offers = cx.view.intents.iter().filter(|info| matches!(info.intent, Intent::ChooseTarget(_)));
-    offers.all(|info| !info.is_enabled()) && cx.view.busy.is_none()
+    !cx.view.offers(|intent| matches!(intent, Intent::ChooseTarget(_))) && cx.view.busy.is_none()
 }
 
 fn is_offered(cx: &ScreenCx<'_>, wanted: &Intent) -> bool {
-    cx.view.intents.iter().any(|info| info.intent == *wanted && info.is_enabled())
+    cx.view.offers(|intent| intent == wanted)
 }
 
 /// Whether a point of a circle is to be measured now.
@@ -161,7 +160,7 @@ impl Screen for TargetScreen {
             _ => {}
         }
         let lines = self.page(cx, TEXT).len();
-        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
+        self.scroll.on_key(key, lines).into()
     }
 
     fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome {
@@ -173,14 +172,12 @@ impl Screen for TargetScreen {
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
-        PicturePlace::of(false, split(area, columns(cx), cx.scene.is_some()).1.is_some())
+        Parts::of(cx, area, columns(cx), false).picture_place()
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
-        let (text, side) = split(area, columns(cx), cx.scene.is_some());
-        self.page(cx, text.width).draw(self.scroll.0, text, buf);
-        if let (Some(side), Some(scene)) = (side, cx.scene) {
-            picture(cx, scene, side, buf);
-        }
+        let page = |columns| self.page(cx, columns);
+        let parts = Parts::of(cx, area, columns(cx), false);
+        parts.draw(cx, buf, (page, self.scroll), |scene, area, buf| picture(cx, scene, area, buf));
     }
 }

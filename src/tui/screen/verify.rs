@@ -9,7 +9,7 @@ use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::page::{Page, Scroll, Tabs, picture, split};
+use super::page::{Page, Parts, Scroll, Tabs, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
@@ -91,30 +91,17 @@ impl Screen for VerifyScreen {
             return ScreenOutcome::Changed;
         }
         let lines = self.page(cx, TEXT).len();
-        if self.scroll.on_key(key, lines) { ScreenOutcome::Changed } else { ScreenOutcome::Ignored }
-    }
-
-    fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
-        ScreenOutcome::Ignored
+        self.scroll.on_key(key, lines).into()
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
-        let is_beside = split(area, TEXT, cx.scene.is_some()).1.is_some();
-        let is_alone = cx.scene.is_some() && self.tabs.at == PICTURE;
-        PicturePlace::of(is_alone && !is_beside, is_beside)
+        Parts::of(cx, area, TEXT, self.tabs.at == PICTURE).picture_place()
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let area = self.tabs.draw(cx.theme, area, buf);
-        let (text, side) = split(area, TEXT, cx.scene.is_some());
-        match (cx.scene, side) {
-            (Some(scene), None) if self.tabs.at == PICTURE => self.picture(cx, scene, area, buf),
-            (scene, side) => {
-                self.page(cx, text.width).draw(self.scroll.0, text, buf);
-                if let (Some(scene), Some(side)) = (scene, side) {
-                    self.picture(cx, scene, side, buf);
-                }
-            }
-        }
+        let page = |columns| self.page(cx, columns);
+        let picture = |scene: &Scene, area, buf: &mut Buffer| self.picture(cx, scene, area, buf);
+        Parts::of(cx, area, TEXT, self.tabs.at == PICTURE).draw(cx, buf, (page, self.scroll), picture);
     }
 }

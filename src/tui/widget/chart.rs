@@ -129,7 +129,6 @@ fn on_line(points: &[(f64, f64)], x: f64) -> Option<(f64, f64)> {
     }
 }
 
-/// Sets a dot.
 fn set_dot(cells: &mut [u8], columns: usize, (across, down): (usize, usize)) {
     let bit = (down % DOTS.1) * DOTS.0 + across % DOTS.0;
     if let Some(cell) = cells.get_mut(down / DOTS.1 * columns + across / DOTS.0) {

@@ -7,6 +7,16 @@ use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 
+#[derive(Clone, Copy, PartialEq)]
+enum Shown {
+    GoTo,
+    Poses,
+}
+
+impl TabView for Shown {
+    const ALL: &'static [(Self, &'static str)] = &[(Self::GoTo, "Go to"), (Self::Poses, "Poses")];
+}
+
 fn theme(glyphs: Glyphs) -> Theme {
     Theme { has_colour: true, glyphs }
 }
@@ -29,7 +39,7 @@ const COLUMNS: [Column<'static>; 2] = [Column::text("pose", 8), Column::number("
 fn all(glyphs: Glyphs, area: Rect, buf: &mut Buffer) {
     let theme = theme(glyphs);
     let part = |from: u16, rows: u16| paint::band(area, from, rows);
-    tabs(theme, &["Go to", "Poses"], 1, part(0, 1), buf);
+    draw_tabs(theme, Shown::Poses, part(0, 1), buf);
     bar(theme, 0.43, part(1, 1), buf);
     digits::draw("-123.456", glyphs, theme.style(Role::Title), part(2, 3), buf);
     digits::draw("7890", glyphs, theme.style(Role::Title), part(5, 3), buf);

@@ -451,9 +451,7 @@ impl StepMachine for CaptureStep {
         let row = self.row.filter(|_| was_measuring).and_then(|row| cx.session.rows.get(row));
         let Some(row) = row else { return vec![Action::Say(problem.into())] };
         let pose = row.planned.pose.clone();
-        let number = cx.session.measurements + 1;
-        let entry = Entry::Refused { number, pose, reason: problem.message.clone(), xyz_mm: None };
-        vec![Action::Write(vec![entry]), Action::Say(problem.into())]
+        cx.refuse(pose, problem)
     }
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {

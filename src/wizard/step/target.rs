@@ -277,9 +277,7 @@ impl StepMachine for TargetStep {
             return vec![Action::Say(problem.into())];
         };
         let pose = pose_name(robot, next.joint, next.index);
-        let number = cx.session.measurements + 1;
-        let entry = Entry::Refused { number, pose, reason: problem.message.clone(), xyz_mm: None };
-        vec![Action::Write(vec![entry]), Action::Say(problem.into())]
+        cx.refuse(pose, problem)
     }
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {

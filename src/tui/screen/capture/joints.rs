@@ -3,8 +3,8 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::text;
-use crate::tui::glyphs::{Glyphs, shortened};
+use crate::text::{self, decimal};
+use crate::tui::glyphs::shortened;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::digits;
@@ -59,12 +59,7 @@ pub(super) fn layout(joints: &[JointShown], columns: u16, rows: u16) -> Layout {
 }
 
 fn number(joint: &JointShown) -> String {
-    // No minus before a zero.
-    let text = format!("{:.3}", joint.value);
-    if text.trim_start_matches('-').bytes().all(|byte| matches!(byte, b'0' | b'.')) {
-        return text.trim_start_matches('-').to_owned();
-    }
-    text
+    decimal(joint.value, 3)
 }
 
 /// Draws the joints column by column, like a pendant.
@@ -85,16 +80,20 @@ pub(super) fn draw(joints: &[JointShown], layout: Layout, theme: Theme, area: Re
     }
 }
 
-fn lead(joint: &JointShown, glyphs: Glyphs) -> &'static str {
-    if joint.moves_most { glyphs.pointer() } else { "  " }
+/// Draws the name behind the mark of the joint that moves most, and returns the column of the name.
+fn draw_name(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut Buffer) -> u16 {
+    let glyphs = theme.glyphs;
+    let lead = if joint.moves_most { glyphs.pointer() } else { "  " };
+    let column = paint::text(buf, cell, (0, 0), lead, theme.style(Role::Hint));
+    let name = shortened(&glyphs.show(&joint.name), usize::from(label - AROUND_NAME), glyphs);
+    let role = if joint.moves_most { Role::Focus } else { Role::Title };
+    paint::text(buf, cell, (column, 0), &name, theme.style(role));
+    column
 }
 
 fn draw_large(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut Buffer) {
     let glyphs = theme.glyphs;
-    let column = paint::text(buf, cell, (0, 0), lead(joint, glyphs), theme.style(Role::Hint));
-    let name = shortened(&glyphs.show(&joint.name), usize::from(label - AROUND_NAME), glyphs);
-    let role = if joint.moves_most { Role::Focus } else { Role::Title };
-    paint::text(buf, cell, (column, 0), &name, theme.style(role));
+    let column = draw_name(joint, label, theme, cell, buf);
     paint::text(buf, cell, (column, 1), &glyphs.show(&joint.unit), theme.style(Role::Dim));
     if joint.moves_most {
         paint::text(buf, cell, (column, 2), "most", theme.style(Role::Hint));
@@ -109,10 +108,7 @@ fn draw_large(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mu
 
 fn draw_line(joint: &JointShown, label: u16, theme: Theme, cell: Rect, buf: &mut Buffer) {
     let glyphs = theme.glyphs;
-    let column = paint::text(buf, cell, (0, 0), lead(joint, glyphs), theme.style(Role::Hint));
-    let name = shortened(&glyphs.show(&joint.name), usize::from(label - AROUND_NAME), glyphs);
-    let role = if joint.moves_most { Role::Focus } else { Role::Title };
-    paint::text(buf, cell, (column, 0), &name, theme.style(role));
+    draw_name(joint, label, theme, cell, buf);
     let text = number(joint);
     let start = usize::from(label) + 10_usize.saturating_sub(text::columns(&text));
     let column = paint::text(buf, cell, (u16::try_from(start).unwrap_or(0), 0), &text, theme.style(Role::Title));

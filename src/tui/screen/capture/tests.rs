@@ -330,6 +330,6 @@ proptest! {
     ) {
         let view = [|| of(normal()), in_question, held, all_measured, manual][state]();
         let theme = themes()[usize::from(ascii)];
-        prop_assert!(!leaks(&on(Tab::ALL[tab]), &view, theme, Rect::new(x, y, width, height)));
+        prop_assert!(!leaks(&on(Tab::ALL[tab].0), &view, theme, Rect::new(x, y, width, height)));
     }
 }

@@ -3,7 +3,8 @@
 use crate::identification::{SigmaSource, TerminationReason};
 use crate::session::summary::{IdentificationSummary, ParameterSummary};
 use crate::text::counted;
-use crate::tui::screen::page::{Page, decimals_for, fixed};
+use crate::text::{decimals_for, fixed};
+use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
 use crate::wizard::view::IdentifyView;
 

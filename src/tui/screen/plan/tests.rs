@@ -242,7 +242,7 @@ proptest! {
             2 => (seen(&accepted()), accepted()),
             _ => has_searched(),
         };
-        let plan = PlanScreen { tab: Tab::ALL[tab], ..plan };
+        let plan = PlanScreen { tab: Tab::ALL[tab].0, ..plan };
         prop_assert!(!leaks(&plan, &view, themes()[usize::from(ascii)], Rect::new(x, y, width, height)));
     }
 }

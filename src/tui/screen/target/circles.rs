@@ -1,6 +1,7 @@
 //! The circle-point analysis: the configuration to go to, and the result.
 
-use crate::tui::screen::page::{Page, fixed};
+use crate::text::fixed;
+use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
 use crate::wizard::view::CirclesView;
 

@@ -1,15 +1,10 @@
 //! Verdict and tables of the verification.
 
-use crate::session::summary::{ModelSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationSummary};
-use crate::text::counted;
-use crate::tui::screen::page::{Page, fixed};
+use crate::session::summary::{Verdict, VerdictStatus, VerificationSummary};
+use crate::text::{counted, fixed};
+use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
 use crate::wizard::view::VerifyView;
-
-/// Least share of the square error that a joint must explain to be reported.
-const WORTH_NAMING: f64 = 0.1;
-/// Least share times number of samples, about four standard deviations of what chance explains.
-const CHANCE: f64 = 4.0;
 
 /// Verdict, limits, warnings and tables.
 pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
@@ -70,9 +65,6 @@ fn limits(verdict: &Verdict, page: &mut Page) {
     }
 }
 
-/// Selects one kind of error of a model.
-type Pick = fn(&ModelSummary) -> Option<StatisticsSummary>;
-
 /// Errors before and after, as in tables III and IV of the method paper.
 fn tables(verification: &VerificationSummary, page: &mut Page) {
     let VerificationSummary { samples, basis, independent, nominal, identified, .. } = verification;
@@ -82,13 +74,8 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.paragraph(&format!("Errors at {samples} poses that {which}: {basis}."), Role::Plain);
     let names = names(page);
     page.line(vec![(format!("{:<names$}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
-    let pairs: [(&str, Pick); 3] = [
-        ("position error", |model| model.position_mm),
-        ("distance error", |model| model.distance_mm),
-        ("off the shared point", |model| model.seat_mm),
-    ];
-    for (name, pick) in pairs {
-        let (Some(before), Some(after)) = (pick(nominal), pick(identified)) else { continue };
+    for ((name, before), (_, after)) in nominal.errors().into_iter().zip(identified.errors()) {
+        let (Some(before), Some(after)) = (before, after) else { continue };
         row(page, &format!("{name}, mean of {}", after.count), before.mean, after.mean);
         row(page, "  rms", before.rms, after.rms);
         row(page, "  95 %", before.p95, after.p95);
@@ -141,24 +128,9 @@ pub(super) fn joints(content: &VerifyView, page: &mut Page) {
         Role::Dim,
     )]);
     for joint in joints {
-        let (Some(first), Some(last)) = (joint.bins.first(), joint.bins.last()) else { continue };
-        let range = format!("{:>5.0} ..{:>5.0} {}", first.from, last.to, joint.unit);
-        let decimals = |value: f64| if value < 100.0 { 3 } else { 1 };
-        let bins: String = joint
-            .bins
-            .iter()
-            .map(|bin| match bin.count {
-                0 => format!("{:>7}", "-"),
-                _ => format!("{:>7}", fixed(bin.mean_mm, decimals(bin.mean_mm))),
-            })
-            .collect();
-        let count: usize = joint.bins.iter().map(|bin| bin.count).sum();
-        let follows = joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64);
-        let (share, role) = if follows {
-            (format!("{:.0} %", 100.0 * joint.explained), Role::Warn)
-        } else {
-            ("-".to_owned(), Role::Dim)
-        };
+        let Some(range) = joint.range() else { continue };
+        let bins: String = joint.bins.iter().map(|bin| format!("{:>7}", bin.mean())).collect();
+        let (share, role) = joint.share().map_or_else(|| ("-".to_owned(), Role::Dim), |share| (share, Role::Warn));
         page.line(vec![(format!("{:<6}{range:<18}{bins}", joint.joint), Role::Plain), (format!("{share:>7}"), role)]);
     }
     page.gap();

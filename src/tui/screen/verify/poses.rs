@@ -1,9 +1,10 @@
 //! Errors of the identified arm at the verification poses: a histogram, then pose by pose.
 
 use crate::session::summary::LimitedQuantity;
+use crate::text::fixed;
 use crate::tui::glyphs::Glyphs;
 use crate::tui::preview::Scene;
-use crate::tui::screen::page::{Page, fixed};
+use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
 use crate::units::to_mm;
 use crate::wizard::view::VerifyView;
