@@ -23,6 +23,7 @@ pub use truth::HiddenArm;
 
 use super::{Link, LinkError};
 use crate::kinematics::{ForwardKinematics, JointType};
+use crate::planning::order::Pace;
 use crate::profile::{Instrument, JointRange, Profile};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::simulation::{Fault, FaultKind, Simulation};
@@ -33,12 +34,6 @@ use random::{Random, Use};
 const DEFAULT_NOISE: f64 = 0.01 * MILLIMETRE;
 /// Standard deviation of the tracker's position, per coordinate (m).
 const TRACKER_SPREAD: f64 = 0.1;
-/// Fraction of the joint speeds used by the operator.
-const SPEED: f64 = 0.1;
-/// Extra time of a move for acceleration and braking (s).
-const RAMP: f64 = 1.0;
-/// Duration of one shot (s).
-const SHOT: f64 = 1.0;
 /// Duration of a whole measurement for the drift (s).
 const USUAL_TIME: f64 = 15.0;
 
@@ -222,16 +217,10 @@ impl SimulatedCell {
     /// Duration of a measurement and of the move to the next pose (s).
     pub(super) fn time(&self, request: &MeasureRequest, shots: u32) -> f64 {
         let onward = request.following.as_deref().unwrap_or(&request.configuration);
-        let joints = self.truth.arm.chain.joints().iter().zip(&self.joints);
-        let slowest = joints.zip(request.configuration.iter().zip(onward)).fold(
-            0.0_f64,
-            |slowest, ((joint, range), (from, to))| {
-                let speed = range.max_speed.unwrap_or_else(|| default_speed(joint.joint_type));
-                slowest.max((to - from).abs() / (speed * SPEED))
-            },
-        );
-        let moving = if slowest > 0.0 { slowest + RAMP } else { 0.0 };
-        moving + request.settle + f64::from(shots) * SHOT
+        let max_speeds = self.joints.iter().map(|joint| joint.max_speed).collect();
+        let pace = Pace { max_speeds, ..Pace::default() };
+        let joint_types = self.truth.arm.chain.joints().iter().map(|joint| joint.joint_type);
+        pace.move_time(joint_types, &request.configuration, onward) + request.settle + f64::from(shots) * pace.shot
     }
 
     fn check(&self, request: &MeasureRequest) -> Result<(), LinkError> {
@@ -246,14 +235,6 @@ impl SimulatedCell {
             }
         }
         Ok(())
-    }
-}
-
-/// Speed of a joint if the profile states none (rad/s or m/s).
-const fn default_speed(joint_type: JointType) -> f64 {
-    match joint_type {
-        JointType::Revolute => 60.0 * DEGREE,
-        JointType::Prismatic => 0.25,
     }
 }
 
