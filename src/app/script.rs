@@ -29,8 +29,7 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
-    let engine = Engine::new(Options { live: live(args.recording, console)?, ..options(&script, args)? })
-        .map_err(|error| internal(&error))?;
+    let engine = Engine::new(live_options(clock(&script), args, console)?).map_err(|error| internal(&error))?;
     play(engine, &script, args, console)
 }
 
@@ -45,9 +44,7 @@ pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O,
         script_args.values.push(("wires".to_owned(), wires));
     }
     let script = parse(DEMO, "demo", &script_args)?;
-    let engine =
-        Engine::new(Options { live: live(args.script.recording, console)?, ..options(&script, &script_args)? })
-            .map_err(|error| internal(&error))?;
+    let engine = Engine::new(live_options(clock(&script), &script_args, console)?).map_err(|error| internal(&error))?;
     play(engine, &script, &script_args, console)
 }
 
@@ -60,7 +57,7 @@ pub(super) fn resume<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
-    let engine = open(folder, Options { live: live(args.recording, console)?, ..options(&script, args)? })?;
+    let engine = open(folder, live_options(clock(&script), args, console)?)?;
     play(engine, &script, args, console)
 }
 
@@ -84,22 +81,33 @@ fn parse(text: &str, file: &str, args: &ScriptArgs) -> Result<Script, Failure> {
     })
 }
 
-fn options(script: &Script, args: &ScriptArgs) -> Result<Options, Failure> {
+fn clock(script: &Script) -> Clock {
     let start = script.clock.as_deref().and_then(|clock| clock.parse::<Timestamp>().ok());
+    start.map_or(Clock::System, Clock::starting_at)
+}
+
+/// The settings of an engine, without a live view.
+fn options(clock: Clock, args: &ScriptArgs) -> Result<Options, Failure> {
     Ok(Options {
         sessions: args.sessions.clone(),
-        clock: start.map_or(Clock::System, Clock::starting_at),
+        clock,
         is_recorded: !args.recording.no_recording,
         live: None,
         raw_log: link::raw_log(args.raw_log.as_deref())?,
     })
 }
 
-/// Opens the port of the live view, if there is to be one.
-pub(super) fn live<O: Write, E: Write>(
-    args: RecordingArgs,
+/// The settings of an engine, with the live view if there is to be one.
+pub(super) fn live_options<O: Write, E: Write>(
+    clock: Clock,
+    args: &ScriptArgs,
     console: &mut Console<O, E>,
-) -> Result<Option<Live>, Failure> {
+) -> Result<Options, Failure> {
+    Ok(Options { live: live(args.recording, console)?, ..options(clock, args)? })
+}
+
+/// Opens the port of the live view, if there is to be one.
+fn live<O: Write, E: Write>(args: RecordingArgs, console: &mut Console<O, E>) -> Result<Option<Live>, Failure> {
     let Some(port) = args.live else { return Ok(None) };
     let live = Live::on(port).map_err(|error| {
         Failure::from_error(ExitStatus::Usage, &error).hint("another program listens there; give '--live' another port")
@@ -159,7 +167,7 @@ fn play<O: Write, E: Write>(
     let format = if args.json { Format::Json } else { Format::Text };
     let transcript = Transcript::new(&mut console.out, format, script.clock.is_some());
     let reopen = |folder: &str| {
-        let engine = options(script, args)
+        let engine = options(clock(script), args)
             .and_then(|options| open(Path::new(folder), options))
             .map_err(|failure| failure.message)?;
         received.redirect(engine.sender());

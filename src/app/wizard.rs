@@ -3,10 +3,10 @@
 use std::io::{IsTerminal as _, Write, stdin, stdout};
 use std::path::Path;
 
-use super::{Console, link, script};
+use super::{Console, script};
 use crate::cli::{ColorArg, ScriptArgs, TerminalArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
-use crate::runtime::{Clock, CompletedIntent, Engine, Options};
+use crate::runtime::{Clock, CompletedIntent, Engine};
 use crate::script::{Script, ScriptStep};
 use crate::store;
 use crate::tui;
@@ -22,8 +22,8 @@ pub(super) fn run<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
-    let mut engine =
-        Engine::new(options(args, console)?).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+    let mut engine = Engine::new(script::live_options(Clock::System, args, console)?)
+        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
     if let Some(profile) = profile {
         engine.intend(Intent::ChooseProfile(profile.to_owned()));
     }
@@ -38,18 +38,8 @@ pub(super) fn resume<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
-    let engine = script::open(folder, options(args, console)?)?;
+    let engine = script::open(folder, script::live_options(Clock::System, args, console)?)?;
     play(engine, surface, args.record_script.as_deref(), console)
-}
-
-fn options<O: Write, E: Write>(args: &ScriptArgs, console: &mut Console<O, E>) -> Result<Options, Failure> {
-    Ok(Options {
-        sessions: args.sessions.clone(),
-        clock: Clock::System,
-        is_recorded: !args.recording.no_recording,
-        live: script::live(args.recording, console)?,
-        raw_log: link::raw_log(args.raw_log.as_deref())?,
-    })
 }
 
 /// Where the wizard is shown.
