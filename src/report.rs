@@ -10,11 +10,11 @@ mod plan;
 mod tables;
 mod text;
 
+pub use crate::text::fixed as number;
 pub use document::{
     Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, ParameterNote, PointOrigin, PointPart,
     PredictionPart, ResultState, RobotPart, SessionPart, TemperaturePart,
 };
 pub use html::report_html;
 pub use plan::plan_text;
-pub use tables::fixed as number;
 pub use text::{identification_text, verification_text};

@@ -117,6 +117,23 @@ fn joined<S: Borrow<str>>(items: &[S], last_word: &str) -> String {
     }
 }
 
+/// A number with fixed decimals, without the sign of a rounded zero.
+pub fn decimal(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+/// As [`decimal`], but with an exponent above 1e9, so that it fits into a column.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if value.abs() > 1e9 { format!("{value:.3e}") } else { decimal(value, decimals) }
+}
+
+/// Decimals that show two significant digits of an uncertainty, from 1 to 6.
+pub fn decimals_for(sigma: f64) -> usize {
+    (1..=6_u8).find(|&decimals| sigma * 10_f64.powi(i32::from(decimals)) >= 9.95).map_or(6, usize::from)
+}
+
 /// An error and everything that caused it, joined by colons.
 pub fn causes(error: &dyn Error) -> String {
     let mut text = error.to_string();
@@ -184,6 +201,19 @@ mod tests {
         assert_eq!(near_miss("speed", &["joints", "base"]), None);
         assert_eq!(near_miss("x", &[]), None);
         assert_eq!(near_miss(&"long".repeat(10_000), &["joints"]), None);
+    }
+
+    #[test]
+    fn two_digits_of_the_uncertainty_are_shown() {
+        let shown = [12.0, 1.2, 0.12, 0.012, 0.0995, 0.000_001, 0.0].map(decimals_for);
+        assert_eq!(shown, [1, 1, 2, 3, 2, 6, 6]);
+    }
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(fixed(-0.0004, 3), "0.000");
+        assert_eq!(fixed(-0.0006, 3), "-0.001");
+        assert_eq!(fixed(-1e308, 3), "-1.000e308");
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
     let profile = &loaded.profile;
     let bytes = store::read(&args.plan).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = args.plan.display().to_string();
-    let listed = plan::read_bytes(&bytes, &file, &joint_types(profile))
+    let listed = plan::read(&bytes, &file, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     for problem in &listed.warnings {
         console.remark(&format!("note: {problem}"));

@@ -129,8 +129,8 @@ fn moved_set_up(identified: &ModelSummary) -> Option<Warning> {
     (position > MOVED * distance.max(to_mm(MICROMETRE))).then(|| {
         let message = format!(
             "the distances fit ({} mm), the positions do not ({} mm): the tracker, or the SMR, is not where it was at the identification. '--refit frame' fits the position of the tracker, '--refit frame+target' that of the SMR too",
-            report::number(distance, 4),
-            report::number(position, 4)
+            text::fixed(distance, 4),
+            text::fixed(position, 4)
         );
         Warning::new("another_set_up", message, true)
     })

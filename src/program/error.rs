@@ -8,10 +8,8 @@ use super::{Dialect, MAX_DWELL, MAX_SPEED};
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ProgramError {
-    /// Unknown dialect.
     #[error("there is no dialect '{text}'; dialects: {}", Dialect::ALL.map(Dialect::name).join(", "))]
     UnknownDialect { text: String },
-    /// The plan is empty.
     #[error("the plan has no poses")]
     EmptyPlan,
     /// A pose of another robot.

@@ -6,6 +6,7 @@
 
 use super::names::{ascii, identifier};
 use super::{CRLF, Job, ProgramError, ProgramFile};
+use crate::text::decimal;
 use crate::units::{from_deg, to_deg};
 
 /// Longest job name on old controllers (characters).
@@ -81,7 +82,7 @@ fn pulses(
             return Err(ProgramError::TooManyPulses { joint: ascii(&joint.name), pose: ascii(&pose.pose), pulses });
         }
         job.note_rounding(from_deg(pulses / size), q);
-        written.push(super::decimal(pulses, 0));
+        written.push(decimal(pulses, 0));
     }
     Ok(written)
 }

@@ -4,7 +4,8 @@
 //! of `vmax` and the value in the predefined speeds, so that 10 % is 250 mm/s.
 
 use super::names::{MAX_NAME, identifier};
-use super::{COMMENT_WIDTH, CRLF, Job, ProgramError, ProgramFile, decimal};
+use super::{COMMENT_WIDTH, CRLF, Job, ProgramError, ProgramFile};
+use crate::text::decimal;
 
 /// Decimals: RAPID's numbers have 23 bits.
 const DECIMALS: usize = 5;

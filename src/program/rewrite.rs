@@ -8,7 +8,8 @@ mod scanner;
 
 use std::ops::Range;
 
-use super::{Dialect, ProgramError, Robot, decimal};
+use super::{Dialect, ProgramError, Robot};
+use crate::text::decimal;
 use crate::units::{from_deg, to_deg};
 
 /// A joint target in a program.

@@ -6,6 +6,7 @@
 
 use super::names::{MAX_NAME, ascii, identifier};
 use super::{COMMENT_WIDTH, Job, LF, Pause, ProgramError, ProgramFile};
+use crate::text::decimal;
 
 const DECIMALS: usize = 8;
 
@@ -74,7 +75,7 @@ fn speeds(job: &Job<'_>) -> Result<Vec<f64>, ProgramError> {
 
 /// A time as whole seconds and nanoseconds, rounded to a millisecond.
 fn duration(time: f64) -> String {
-    let text = super::decimal(time, 3);
+    let text = decimal(time, 3);
     let (seconds, milliseconds) = text.split_once('.').unwrap_or((&text, "0"));
     let nanoseconds = milliseconds.trim_start_matches('0');
     let nanoseconds = if nanoseconds.is_empty() { "0".to_owned() } else { format!("{nanoseconds}000000") };

@@ -3,7 +3,8 @@
 //! The file defines one function without calling it. Sent to a controller directly it runs; in a Script node it must be called.
 
 use super::names::{MAX_NAME, identifier};
-use super::{COMMENT_WIDTH, Job, LF, ProgramError, ProgramFile, decimal};
+use super::{COMMENT_WIDTH, Job, LF, ProgramError, ProgramFile};
+use crate::text::decimal;
 use crate::units::DEGREE;
 
 const DECIMALS: usize = 8;

@@ -28,7 +28,6 @@ pub struct Document {
     pub report: Details,
 }
 
-/// State of the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ResultState {
@@ -42,7 +41,6 @@ pub enum ResultState {
     Current,
 }
 
-/// Origin of the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PointOrigin {
@@ -139,7 +137,6 @@ pub struct SessionPart {
     pub journal_entries: u64,
 }
 
-/// The robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RobotPart {
     pub title: String,

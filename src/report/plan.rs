@@ -1,8 +1,9 @@
 //! The report of `plan` on a terminal.
 
-use super::tables::{fixed, paragraph, push_line};
+use super::tables::{paragraph, push_line};
 use super::text::{title, warnings};
 use crate::session::plan_summary::PlanSummary;
+use crate::text::fixed;
 
 /// The report of a plan: its quality compared with random sets, its time, and what stays weak.
 pub fn plan_text(summary: &PlanSummary) -> String {

@@ -1,20 +1,16 @@
 //! The reports of `identify`, `constraints` and `verify` on a terminal.
 
 use super::document::Found;
-use super::tables::{decimals_for, fixed, paragraph, push_line};
+use super::tables::{paragraph, push_line};
 use crate::identification::{Estimator, SigmaSource, TerminationReason};
 use crate::session::summary::{
-    IdentificationSummary, JointSummary, ModelSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict,
-    VerdictStatus, VerificationReport, VerificationSummary, Warning,
+    IdentificationSummary, JointSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict, VerdictStatus,
+    VerificationReport, VerificationSummary, Warning,
 };
-use crate::text::counted;
+use crate::text::{counted, decimals_for, fixed};
 
 /// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
 const WEAK: f64 = 0.5;
-/// A joint is only named if it explains this share of what is left …
-const WORTH_NAMING: f64 = 0.1;
-/// … and this over the number of samples: about four standard deviations of what chance explains.
-const CHANCE: f64 = 4.0;
 
 /// Report of an identification.
 pub fn identification_text(summary: &IdentificationSummary) -> String {
@@ -97,9 +93,6 @@ fn verdict(verdict: &Verdict) -> String {
     text
 }
 
-/// Picks one kind of error of a model.
-type Pick = fn(&ModelSummary) -> Option<StatisticsSummary>;
-
 /// Nominal and identified side by side: tables III and IV of the method paper, with root mean square and 95 %.
 fn verification_tables(verification: &VerificationSummary) -> String {
     let VerificationSummary { samples, basis, independent, nominal, identified, .. } = verification;
@@ -107,13 +100,8 @@ fn verification_tables(verification: &VerificationSummary) -> String {
         if *independent { "that the identification did not see" } else { "that the identification saw in part or all" };
     let mut text = paragraph("", &format!("Accuracy on {} {which}: {basis}", counted(*samples, "sample")));
     push_line(&mut text, &format!("  {:<34}{:>12}{:>14}", "mm", "nominal", "identified"));
-    let pairs: [(&str, Pick); 3] = [
-        ("position error", |model| model.position_mm),
-        ("distance error", |model| model.distance_mm),
-        ("off the shared point", |model| model.seat_mm),
-    ];
-    for (name, pick) in pairs {
-        if let (Some(nominal), Some(identified)) = (pick(nominal), pick(identified)) {
+    for ((name, nominal), (_, identified)) in nominal.errors().into_iter().zip(identified.errors()) {
+        if let (Some(nominal), Some(identified)) = (nominal, identified) {
             text.push_str(&statistics_rows(name, &nominal, &identified));
         }
     }
@@ -296,12 +284,6 @@ fn rejected_lines(summary: &IdentificationSummary) -> String {
     text
 }
 
-/// Whether more of the error follows a joint than chance explains.
-pub(super) fn is_worth_naming(joint: &JointSummary) -> bool {
-    let count: usize = joint.bins.iter().map(|bin| bin.count).sum();
-    joint.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64)
-}
-
 /// Mean error over each joint's range, which shows patterns, and the joints that the errors follow.
 fn joint_lines(joints: &[JointSummary]) -> String {
     let mut text = String::new();
@@ -311,20 +293,9 @@ fn joint_lines(joints: &[JointSummary]) -> String {
     push_line(&mut text, "Mean error of the identified model over fifths of each joint's range (mm), and");
     push_line(&mut text, "how much of the square error follows the joint:");
     for joint in joints {
-        let (Some(first), Some(last)) = (joint.bins.first(), joint.bins.last()) else { continue };
-        let range = format!("{:>5.0} ..{:>5.0} {}", first.from, last.to, joint.unit);
-        let bins: String = joint
-            .bins
-            .iter()
-            .map(|bin| {
-                if bin.count == 0 {
-                    format!("{:>8}", "-")
-                } else {
-                    format!("{:>8}", fixed(bin.mean_mm, if bin.mean_mm < 100.0 { 3 } else { 1 }))
-                }
-            })
-            .collect();
-        let share = if is_worth_naming(joint) { format!("{:.0} %", 100.0 * joint.explained) } else { "-".to_owned() };
+        let Some(range) = joint.range() else { continue };
+        let bins: String = joint.bins.iter().map(|bin| format!("{:>8}", bin.mean())).collect();
+        let share = joint.share().unwrap_or_else(|| "-".to_owned());
         push_line(&mut text, &format!("  {:<6}{range:<18}{bins}{share:>7}", joint.joint));
     }
     text.push('\n');

@@ -12,7 +12,7 @@ use super::measurements::Layout;
 use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Terms, Weighting};
 use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::Level;
-use crate::text::{names, names_of_option, written_as_text};
+use crate::text::{fixed, names, names_of_option, written_as_text};
 
 /// Version of the layout of these objects.
 pub const SCHEMA: u32 = 1;
@@ -53,7 +53,6 @@ names!(InputRole {
     Session = "session",
 });
 
-/// An input file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputFile {
     pub role: InputRole,
@@ -63,7 +62,6 @@ pub struct InputFile {
     pub sha256: String,
 }
 
-/// Settings of an identification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentificationSettings {
     pub level: Level,
@@ -270,6 +268,17 @@ pub struct ModelSummary {
     pub seat_mm: Option<StatisticsSummary>,
 }
 
+impl ModelSummary {
+    /// The kinds of error, each with its name.
+    pub const fn errors(&self) -> [(&'static str, Option<StatisticsSummary>); 3] {
+        [
+            ("position error", self.position_mm),
+            ("distance error", self.distance_mm),
+            ("off the shared point", self.seat_mm),
+        ]
+    }
+}
+
 /// Mean error over a part of a joint's range.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointBin {
@@ -289,6 +298,38 @@ pub struct JointSummary {
     /// Share of the square error that follows this joint, 0 … 1.
     pub explained: f64,
     pub bins: Vec<JointBin>,
+}
+
+impl JointBin {
+    /// The mean error (mm), or a dash without samples.
+    pub fn mean(&self) -> String {
+        let decimals = if self.mean_mm < 100.0 { 3 } else { 1 };
+        if self.count == 0 { "-".to_owned() } else { fixed(self.mean_mm, decimals) }
+    }
+}
+
+/// Least share of the square error that a joint must explain to be named.
+const WORTH_NAMING: f64 = 0.1;
+/// Least share times number of samples: about four standard deviations of what chance explains.
+const CHANCE: f64 = 4.0;
+
+impl JointSummary {
+    /// Whether more of the error follows the joint than chance explains.
+    pub fn is_worth_naming(&self) -> bool {
+        let count: usize = self.bins.iter().map(|bin| bin.count).sum();
+        self.explained >= WORTH_NAMING.max(CHANCE / count.max(1) as f64)
+    }
+
+    /// The share of the square error, if it is worth naming.
+    pub fn share(&self) -> Option<String> {
+        self.is_worth_naming().then(|| format!("{:.0} %", 100.0 * self.explained))
+    }
+
+    /// The range of the joint with its unit, if there are samples.
+    pub fn range(&self) -> Option<String> {
+        let (first, last) = (self.bins.first()?, self.bins.last()?);
+        Some(format!("{:>5.0} ..{:>5.0} {}", first.from, last.to, self.unit))
+    }
 }
 
 /// What is fitted to verification samples because the set-up changed. The comments on the values are the help of `--refit`.
@@ -355,14 +396,13 @@ impl LimitedQuantity {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitCheck {
     pub quantity: LimitedQuantity,
-    /// Value found; none where these data cannot tell.
+    /// Value found; none if the data do not determine it.
     pub value_mm: Option<f64>,
     pub limit_mm: f64,
     /// Whether it is met; none where it could not be evaluated.
     pub met: Option<bool>,
 }
 
-/// The verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     pub status: VerdictStatus,

@@ -1,6 +1,6 @@
 //! Text, numbers and tables as HTML. Text from outside passes through [`escape`]; nothing refers to other files or addresses.
 
-use crate::report::tables::fixed;
+use crate::text::fixed;
 use crate::text::printable;
 
 /// Shown for a number that is missing or not finite.
@@ -54,7 +54,7 @@ pub(super) fn optional(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| NONE.to_owned(), |value| number(value, decimals))
 }
 
-/// A number with so many decimals, filled up with blanks so that its point stands below those of `most` decimals.
+/// A number with fixed decimals, padded so that its point lines up with numbers of `most` decimals.
 pub(super) fn aligned(value: Option<f64>, decimals: usize, most: usize) -> String {
     let shown = optional(value, decimals);
     if shown == NONE { shown } else { shown + &FIGURE_SPACE.repeat(most.saturating_sub(decimals)) }

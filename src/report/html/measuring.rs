@@ -17,7 +17,7 @@ pub(super) fn section(document: &Document) -> String {
     if let Some(result) = &document.result {
         add(&mut html, &format!("<h2>The fit</h2>\n{}", facts(&fit(result))));
         html.push_str(&paragraph(
-            "Residuals of the fit tell how well the model describes the poses it was fitted to. They are no accuracy.",
+            "Residuals of the fit show how well the model describes the poses it was fitted to. They are not an accuracy.",
         ));
     }
     html.push_str("<h2>Poses and measuring</h2>\n");

@@ -3,8 +3,8 @@
 use super::markup::{Column, aligned, escape, list, number, paragraph, table};
 use crate::kinematics::ParameterId;
 use crate::report::document::{Document, Found};
-use crate::report::tables::decimals_for;
 use crate::session::summary::{IdentificationSummary, ParameterSummary};
+use crate::text::decimals_for;
 
 /// Decimals where there is no standard deviation.
 const PLAIN: usize = 4;

@@ -66,7 +66,7 @@ impl Scale {
         Self { from, to, ..self }
     }
 
-    /// Place of a value; values beyond an end stand at the end.
+    /// Place of a value; values beyond an end are placed at the end.
     pub(super) fn at(&self, value: f64) -> f64 {
         let value = if self.is_log { value.max(f64::MIN_POSITIVE).log10() } else { value };
         let part = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);

@@ -19,7 +19,6 @@ fn about(file: &str) -> &'static str {
     }
 }
 
-/// The section.
 pub(super) fn section(document: &Document) -> String {
     let report = &document.report;
     let mut html = String::from("<h2>How to apply the result</h2>\n");

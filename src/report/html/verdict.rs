@@ -249,7 +249,7 @@ fn joints_named(document: &Document) -> String {
     let joints = document.result.iter().filter_map(|result| result.verification.as_ref());
     let named: Vec<String> = joints
         .flat_map(|verification| &verification.residual_by_joint)
-        .filter(|joint| crate::report::text::is_worth_naming(joint))
+        .filter(|joint| joint.is_worth_naming())
         .map(|joint| format!("{}: {} %", escape(&joint.joint), number(100.0 * joint.explained, 0)))
         .collect();
     if named.is_empty() {
