@@ -17,7 +17,6 @@ use rand_chacha::ChaCha8Rng;
 use crate::kinematics::{ForwardKinematics, KinematicChain};
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, Quantity};
 
-/// An arm with its tool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToolArm {
     pub chain: KinematicChain,

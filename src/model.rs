@@ -43,7 +43,7 @@ pub enum ModelError {
     Geometry(#[from] KinematicsError),
     /// A flange that the UR kinematics file cannot carry.
     #[error(
-        "the file has no place for the flange beside axis 6: {offset} (alpha6, a6). Let the tool take it, or fix alpha6 and a6 \
+        "the file cannot express the flange offset from axis 6: {offset} (alpha6, a6). Let the tool carry it, or fix alpha6 and a6 \
          in the profile and identify again"
     )]
     FlangeOffset {

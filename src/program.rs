@@ -37,7 +37,7 @@ pub use names::MAX_NAME;
 
 use crate::kinematics::{JointType, KinematicChain};
 use crate::session::plan::{PlannedPose, PoseKind};
-use crate::text::wrapped;
+use crate::text::{decimal, wrapped};
 
 /// A robot programming language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -99,7 +99,7 @@ impl Dialect {
             Self::Urscript => Some("In PolyScope: load it in a Script node, then call the function."),
             Self::Val3 => Some("Add the .dtx and the .pgx to an application."),
             Self::Ros => {
-                Some("The arm must stand at the first point before this is sent. Put the joint names of the URDF here.")
+                Some("The arm must be at the first point before this is sent. Enter the joint names of the URDF here.")
             }
             Self::Fanuc | Self::Inform => None,
         }
@@ -161,7 +161,6 @@ pub struct Options {
 /// Largest fraction of full speed of a measuring program.
 pub const MAX_SPEED: f64 = 0.5;
 
-/// A file of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProgramFile {
     /// File name with extension, without folder.
@@ -296,7 +295,7 @@ impl Job<'_> {
             "Moves are joint moves: the active tool does not matter for the path.".to_owned(),
             match self.options.pause {
                 Pause::Dwell(dwell) => format!("Each measured pose is held for {} s.", decimal(dwell, 1)),
-                Pause::Acknowledge => "Each measured pose is held until the operator goes on.".to_owned(),
+                Pause::Acknowledge => "Each measured pose is held until the operator continues.".to_owned(),
             },
         ];
         lines.extend(self.options.dangers.iter().map(|danger| format!("DANGER: {}", names::ascii(danger))));
@@ -351,13 +350,6 @@ impl Job<'_> {
     fn percent(&self) -> String {
         decimal((self.options.speed * 100.0).round().max(1.0), 0)
     }
-}
-
-/// A number with fixed decimals, without the sign of a rounded zero.
-fn decimal(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
-    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
 /// Length of a comment line if the controller has no limit (characters).

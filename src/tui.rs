@@ -40,6 +40,7 @@ use ratatui::backend::{Backend as _, CrosstermBackend};
 use ratatui::layout::{Position, Rect};
 
 use crate::runtime::{CompletedIntent, Engine, signals};
+use crate::wizard::Wizard;
 use input::Input;
 use terminal::TerminalGuard;
 use theme::Theme;
@@ -84,6 +85,13 @@ pub struct Exit {
     pub remarks: Vec<String>,
 }
 
+impl Exit {
+    fn of(wizard: &Wizard, signal: Option<i32>, remarks: Vec<String>) -> Self {
+        let cause = wizard.ended().unwrap_or("ended").to_owned();
+        Self { cause, signal, folder: wizard.folder().map(str::to_owned), remarks }
+    }
+}
+
 /// Called with the completed intents before the program ends, however it ends.
 pub type AtEnd<'a> = &'a mut dyn FnMut(&[CompletedIntent]);
 
@@ -120,13 +128,7 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
     drop(guard);
     at_end(engine.completed_intents());
     let remarks = engine.end_recording().into_iter().chain(terminal::take_remarks()).collect();
-    let wizard = engine.wizard();
-    Ok(Exit {
-        cause: wizard.ended().unwrap_or("ended").to_owned(),
-        signal: received.signal(),
-        folder: wizard.folder().map(str::to_owned),
-        remarks,
-    })
+    Ok(Exit::of(engine.wizard(), received.signal(), remarks))
 }
 
 /// Closes the session without touching the terminal, and ends the process.

@@ -188,7 +188,7 @@ fn bad_requests_are_refused_with_a_reason() {
     let cases: [(&[&str], &str); 6] = [
         (&["--profile", "soochow", "--limit", "j9=0..1"], "no joint 'j9'"),
         (&["--profile", "soochow", "--limit", "j2=170..175"], "leaves nothing of the range"),
-        (&["--profile", "soochow", "--limit", "j2=60..-30"], "is crossed"),
+        (&["--profile", "soochow", "--limit", "j2=60..-30"], "is not below the upper limit"),
         (&["--profile", "soochow", "--poses", "5", "--no-filters", "--candidates", "100"], "5 poses"),
         (&["--profile", "soochow", "--box", "5000..6000,0..10,0..10", "--candidates", "50"], "configurations tried"),
         (&["--profile", inside, "--candidates", "50"], "tracker"),

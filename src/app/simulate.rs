@@ -79,7 +79,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
         console.print(&format!("robot: {address}\n"))?;
     }
     console.remark(served.title());
-    console.remark(&format!("the robot stands at {}", route.text()));
+    console.remark(&format!("the robot is at {}", route.text()));
     console.remark("'next', 'goto POSE', 'where', 'quit' or Ctrl-C");
     let (sender, orders) = channel();
     let signalled = sender.clone();
@@ -165,7 +165,7 @@ fn poses(args: &SimulateArgs, profile: &Profile) -> Result<Vec<PlannedPose>, Fai
     };
     let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = path.display().to_string();
-    let mut listed = plan::read_bytes(&bytes, &file, &joint_types(profile))
+    let mut listed = plan::read(&bytes, &file, &joint_types(profile))
         .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
     listed.rows.retain(|row| row.kind.is_measured());
     if listed.rows.is_empty() {

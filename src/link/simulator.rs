@@ -42,7 +42,6 @@ pub trait Simulator: Send + Debug {
     /// Handles everything that is due.
     fn tick(&mut self, source: &mut dyn PointSource, now: Moment);
 
-    /// The next output.
     fn next_output(&mut self) -> Option<Output>;
 
     /// The latest time for the next call of [`Self::tick`].

@@ -48,7 +48,6 @@ impl Format {
     }
 }
 
-/// A calibrated arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibratedArm {
     /// The nominal robot with the targets as they were mounted.
@@ -138,7 +137,6 @@ pub struct GivenUrdf<'a> {
     pub tip: &'a str,
 }
 
-/// Options of an export.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ExportOptions<'a> {
     /// URDF only: put the geometry into this URDF.

@@ -51,7 +51,6 @@ pub enum UrdfJointType {
     Unsupported,
 }
 
-/// A joint of a URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfJoint {
     pub name: String,

@@ -121,7 +121,6 @@ fn escaped(text: &str) -> String {
 /// A given URDF with other origins.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Patched {
-    /// The text.
     pub(super) text: String,
     /// Pose of the tip link in the flange of the arm, which does not change.
     pub(super) flange_from_tip: Isometry3<f64>,

@@ -35,7 +35,6 @@ impl Live {
         Ok(Self { port })
     }
 
-    /// Returns the port.
     pub const fn port(&self) -> u16 {
         self.port
     }

@@ -25,7 +25,6 @@ pub(super) const GUIDE: &str = "guide";
 
 /// Name and start of the recording.
 pub(super) const PROPERTIES: &str = "__properties";
-/// Properties of the session.
 pub(super) const SESSION_PROPERTIES: &str = "__properties/session";
 /// Properties of the last result.
 pub(super) const RESULT_PROPERTIES: &str = "__properties/result";
@@ -84,7 +83,6 @@ pub(super) const MAP_IDENTIFIED: &str = "pairs_map/identified_um";
 pub(super) const READING: &str = "reading/xyz_mm";
 /// Scatter of the shots.
 pub(super) const SCATTER: &str = "capture/scatter_mm";
-/// Temperature.
 pub(super) const TEMPERATURE: &str = "capture/temperature_degc";
 /// Distance of a repeated pose from its first measurement.
 pub(super) const DRIFT: &str = "capture/drift_mm";

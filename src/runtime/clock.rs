@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicI64, Ordering};
 
 use jiff::Timestamp;
 
-/// A clock.
 #[derive(Clone, Debug)]
 pub enum Clock {
     /// The clock of the system.

@@ -143,7 +143,6 @@ impl Engine {
         })
     }
 
-    /// Returns the wizard.
     pub const fn wizard(&self) -> &Wizard {
         &self.wizard
     }

@@ -21,7 +21,6 @@ pub struct Script {
     pub steps: Vec<ScriptStep>,
 }
 
-/// A step of a script.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ScriptStep {
     /// Send the intent and wait until it is finished. It must be possible.

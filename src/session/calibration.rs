@@ -202,24 +202,13 @@ pub enum CalibrationError {
     },
     /// A number that is not finite.
     #[error("parameter '{parameter}' has a number that is not finite")]
-    NotFinite {
-        /// Which parameter.
-        parameter: ParameterId,
-    },
+    NotFinite { parameter: ParameterId },
     /// A unit that a parameter cannot have.
     #[error("parameter '{parameter}' has the unit '{unit}'; it must be '{}'", parameter.unit())]
-    Unit {
-        /// Which parameter.
-        parameter: ParameterId,
-        /// Unit found.
-        unit: ParameterUnit,
-    },
+    Unit { parameter: ParameterId, unit: ParameterUnit },
     /// A standard or expected deviation that is not a positive number.
     #[error("parameter '{parameter}' has a standard or expected deviation that is negative or not finite")]
-    Sigma {
-        /// Which parameter.
-        parameter: ParameterId,
-    },
+    Sigma { parameter: ParameterId },
     /// A pose whose numbers are not finite, or whose quaternion is not of length 1.
     #[error("'{field}' is not a pose: its numbers must be finite and its quaternion of length 1")]
     Pose {

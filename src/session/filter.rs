@@ -10,7 +10,7 @@
 //! ```
 //!
 //! A column is a name as in the table, upper and lower case alike; a name with other characters than letters, digits, `_`
-//! and `.` stands in double quotation marks. Numbers are compared as numbers **in the unit of the column**, text letter
+//! and `.` is written in double quotation marks. Numbers are compared as numbers **in the unit of the column**, text letter
 //! by letter and for equality only; a quotation mark inside a text is written twice. `%` is the remainder, never
 //! negative.
 

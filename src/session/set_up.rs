@@ -78,7 +78,6 @@ impl fmt::Display for Step {
 /// Unit of measured coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CoordinateUnit {
-    /// Millimetre.
     #[default]
     Millimetre,
     Metre,
@@ -87,7 +86,6 @@ pub enum CoordinateUnit {
 }
 
 impl CoordinateUnit {
-    /// All of them.
     pub const ALL: [Self; 4] = [Self::Millimetre, Self::Metre, Self::Inch, Self::Micrometre];
 
     /// One unit (m).
@@ -111,14 +109,10 @@ impl CoordinateUnit {
     }
 }
 
-/// Choice of the instrument.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum InstrumentChoice {
     /// The operator types or pastes coordinates.
-    Manual {
-        /// In this unit.
-        unit: CoordinateUnit,
-    },
+    Manual { unit: CoordinateUnit },
     /// A simulated cell, to rehearse on.
     Simulated(Simulation),
     /// An instrument that answers over a wire.

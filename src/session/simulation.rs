@@ -1,4 +1,4 @@
-//! The simulated cell as it is asked for: which robot is hidden in it, how its instrument scatters, and what goes wrong when.
+//! Settings of the simulated cell: which robot is hidden in it, how its instrument scatters, and what goes wrong when.
 //!
 //! A fault is written `NAME@FIRST[-LAST][:SIZE]`: `wrong-pose@12`, `target-bumped@20:5mm`, `joint-sign@1:j3`, `beam-break@7-9`.
 //! FIRST and LAST are numbers of measurements in the session, counted from 1. Faults of the set-up (unit, sign, bump, drift) last
@@ -87,7 +87,7 @@ pub struct Fault {
     pub kind: FaultKind,
     /// First measurement with it, from 1.
     pub first: u64,
-    /// Last one; `None`: as long as the kind lasts by itself.
+    /// Last one; `None`: as long as the kind lasts.
     pub last: Option<u64>,
 }
 
@@ -115,13 +115,9 @@ pub enum FaultKind {
     /// The instrument counts in metres although millimetres are expected.
     Metre,
     /// A joint turns the other way than its profile says.
-    JointSign {
-        /// Which joint.
-        joint: usize,
-    },
-    /// A joint stands elsewhere than shown, by this much (deg or mm).
+    JointSign { joint: usize },
+    /// A joint is elsewhere than shown, by this much (deg or mm).
     MistypedJoint {
-        /// Which joint.
         joint: usize,
         /// True less shown value.
         by: f64,

@@ -30,7 +30,6 @@ use correction::is_factor;
 /// A longer time between two entries (s) is a break, or a clock that was set.
 const LONGEST_STEP: f64 = 3600.0;
 
-/// A session.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Session {
     pub name: String,
@@ -117,10 +116,8 @@ impl Row {
     }
 }
 
-/// State of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleState {
-    /// It counts.
     Counts,
     /// Replaced by a later measurement of the same row.
     Superseded,

@@ -1,4 +1,4 @@
-//! Where the tracker stands, as far as the measured points tell.
+//! Position of the tracker, as far as the measured points determine it.
 
 use nalgebra::Point3;
 
@@ -6,7 +6,7 @@ use super::state::{Sample, Session};
 use crate::geometry::{Registration, register};
 use crate::kinematics::ForwardKinematics;
 
-/// Fewest samples that tell it.
+/// Fewest samples that determine it.
 pub const FEWEST: usize = 4;
 
 /// The measured coordinates registered to the base: the samples that count, to where the nominal arm has the reflector. `None` before

@@ -60,7 +60,6 @@ fn holder(process: Option<&str>) -> String {
     process.map_or_else(String::new, |process| format!(" (process {process})"))
 }
 
-/// Storage of a journal.
 pub trait JournalStorage {
     /// Appends bytes.
     ///

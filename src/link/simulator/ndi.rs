@@ -16,7 +16,6 @@ use crate::link::protocol::ndi::FrameDecoder;
 use crate::link::protocol::ndi::encode_binary;
 use crate::link::protocol::ndi::encode_text;
 
-/// Frames per second.
 const FRAMES_PER_SECOND: f64 = 60.0;
 
 /// Time from a command to its reply.

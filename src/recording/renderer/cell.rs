@@ -86,7 +86,7 @@ fn floor(canvas: &mut Canvas, profile: &Profile) {
     }
     let grid = LineStrips3D::new(strips).with_radii([Radius::new_ui_points(0.5)]).with_colors([style::CELL]);
     canvas.draw_static(names::FLOOR, &grid);
-    // A pedestal where the robot stands above the floor, a plate where it does not.
+    // A pedestal if the robot is above the floor, otherwise a plate.
     let plate = 0.09 * reach(profile);
     let top = height.max(-0.001);
     let (low, high) = if height < -0.02 { (height, 0.0) } else { (top - 0.02, top) };

@@ -107,7 +107,7 @@ pub fn correction_text(correction: &Correction) -> String {
         }
         Correction::Joints { sample, joints } => {
             let joints: Vec<String> = joints.iter().map(|value| format!("{value:.3}")).collect();
-            format!("corrected: at measurement {sample} the robot stood at ({})", joints.join(", "))
+            format!("corrected: at measurement {sample} the robot was at ({})", joints.join(", "))
         }
         Correction::TakenBack { line } => format!("the correction in line {line} is undone"),
     }

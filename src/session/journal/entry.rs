@@ -203,7 +203,7 @@ pub fn from_edge(values: &[f64], joints: &[JointType]) -> Vec<f64> {
     joints.iter().zip(values).map(|(joint, value)| joint.quantity().from_edge(*value)).collect()
 }
 
-/// A point (m) in mm with so many decimals.
+/// A point (m) in mm, rounded to this many decimals.
 pub fn to_xyz_mm(point: &Point3<f64>, decimals: i32) -> (f64, f64, f64) {
     let edge = |value: f64| rounded(to_mm(value), decimals);
     (edge(point.x), edge(point.y), edge(point.z))
@@ -219,7 +219,7 @@ pub const fn from_xyz_mm((x, y, z): (f64, f64, f64)) -> Point3<f64> {
     Point3::new(from_mm(x), from_mm(y), from_mm(z))
 }
 
-/// Rounded to so many decimals, without a negative zero.
+/// Rounded to this many decimals, without a negative zero.
 fn rounded(value: f64, decimals: i32) -> f64 {
     let scale = 10.0_f64.powi(decimals);
     (value * scale).round() / scale + 0.0
@@ -254,7 +254,6 @@ pub struct MeasuredText {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter_mm: Option<f64>,
     pub shots: u32,
-    /// Temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
     /// Time that the measurement took, motion included (s).

@@ -36,7 +36,6 @@ pub enum FaultError {
     UnknownName {
         /// What was given.
         text: String,
-        /// Its name.
         name: String,
     },
     /// A known name with the wrong parts.

@@ -10,7 +10,6 @@ use crate::session::journal::{Correction, MeasuredText, to_edge};
 pub struct Corrected {
     /// Line of the journal that has it, from 1.
     pub line: u64,
-    /// The correction.
     pub correction: Correction,
     /// Number of the last measurement at that time: it, or one before, led to the correction.
     pub measurements: u64,

@@ -39,7 +39,6 @@ impl Measure {
     }
 }
 
-/// A column of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::session) struct NumberColumn {
     /// 0-based place in the row.
@@ -69,7 +68,7 @@ pub(in crate::session) struct Header {
 }
 
 impl Header {
-    /// Names of a record. Reports names that stand twice; a column without name becomes `column5`, counted from 1.
+    /// Names of a record. Reports names that appear twice; a column without name becomes `column5`, counted from 1.
     /// `None`, reported, for a line of numbers: to look for names in it would only hide the reason.
     pub(in crate::session) fn new(record: Record, problems: &mut Vec<TableProblem>) -> Option<Self> {
         let Record { line, cells } = record;

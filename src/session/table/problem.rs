@@ -119,7 +119,7 @@ pub enum Defect {
     },
     /// A table of commands where one of targets should be.
     #[error(
-        "it is a table of commands that 'compensate' wrote: corrected once more they would lead elsewhere; give the targets that were meant"
+        "it is a table of commands that 'compensate' wrote; correcting them again would move the arm elsewhere, so use the original targets"
     )]
     AlreadyCompensated,
     /// Nothing to read.
@@ -182,7 +182,6 @@ pub enum Defect {
         /// Text of the cell.
         text: String,
     },
-    /// A negative length.
     #[error("'{}' is not a length; write the measured distance, which is never negative", excerpt(text))]
     NegativeLength {
         /// Text of the cell.
@@ -195,7 +194,7 @@ pub enum Defect {
     ZeroPoint,
     /// One pose number, two configurations.
     #[error(
-        "pose '{}'{} stands on line {first_line} with another configuration: joint {joint} was {first} {unit} there and is \
+        "pose '{}'{} is on line {first_line} with another configuration: joint {joint} was {first} {unit} there and is \
          {here} {unit} here; correct the joint values, or give one of the two another pose",
         excerpt(pose),
         of_target(target.as_deref())
@@ -216,19 +215,19 @@ pub enum Defect {
         /// `deg` or `mm`.
         unit: &'static str,
     },
-    /// Warning: a row that stands twice.
+    /// Warning: a row that appears twice.
     #[error("the row repeats line {first_line}, joint values and point alike; it is left out as a copy")]
     Repeats {
         /// Line of the first of the two.
         first_line: usize,
     },
-    /// Warning: a configuration that stands twice for the same point.
-    #[error("the joint values are those of line {first_line}; a second row with them tells nothing new")]
+    /// Warning: a configuration that appears twice for the same point.
+    #[error("the joint values are those of line {first_line}; a second row with them adds no information")]
     RepeatsConfiguration {
         /// Line of the first of the two.
         first_line: usize,
     },
-    /// Warning: a length that stands twice.
+    /// Warning: a length that appears twice.
     #[error("the row repeats line {first_line}, joint values and length alike; remove it if it is a copy")]
     RepeatsLength {
         /// Line of the first of the two.
