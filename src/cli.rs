@@ -524,11 +524,11 @@ fn speed_percent(text: &str) -> Result<f64, String> {
 }
 
 /// A parser of the names of a closed set, which the help and the completions list.
-fn one_of<T, const N: usize>(all: [T; N], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
+fn one_of<T>(all: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
 where
-    T: FromStr<Err: Into<Box<dyn Error + Send + Sync>>> + Clone + Send + Sync + 'static,
+    T: FromStr<Err: Into<Box<dyn Error + Send + Sync>>> + Copy + Send + Sync + 'static,
 {
-    PossibleValuesParser::new(all.map(name)).try_map(|name| name.parse::<T>())
+    PossibleValuesParser::new(all.iter().copied().map(name)).try_map(|name| name.parse::<T>())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -27,9 +27,6 @@ mod ros;
 mod urscript;
 mod val3;
 
-use std::fmt;
-use std::str::FromStr;
-
 use jiff::civil::DateTime;
 
 pub use error::ProgramError;
@@ -37,7 +34,7 @@ pub use names::MAX_NAME;
 
 use crate::kinematics::{JointType, KinematicChain};
 use crate::session::plan::{PlannedPose, PoseKind};
-use crate::text::{decimal, wrapped};
+use crate::text::{decimal, names, wrapped};
 
 /// A robot programming language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -58,24 +55,15 @@ pub enum Dialect {
     Ros,
 }
 
-impl Dialect {
-    /// All dialects.
-    pub const ALL: [Self; 7] =
-        [Self::Rapid, Self::Krl, Self::Fanuc, Self::Urscript, Self::Val3, Self::Inform, Self::Ros];
-
-    /// Name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Rapid => "rapid",
-            Self::Krl => "krl",
-            Self::Fanuc => "fanuc",
-            Self::Urscript => "urscript",
-            Self::Val3 => "val3",
-            Self::Inform => "inform",
-            Self::Ros => "ros",
-        }
-    }
-}
+names!(Dialect {
+    Rapid = "rapid",
+    Krl = "krl",
+    Fanuc = "fanuc",
+    Urscript = "urscript",
+    Val3 = "val3",
+    Inform = "inform",
+    Ros = "ros",
+});
 
 impl Dialect {
     /// Name in messages.
@@ -103,21 +91,6 @@ impl Dialect {
             }
             Self::Fanuc | Self::Inform => None,
         }
-    }
-}
-
-impl fmt::Display for Dialect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Dialect {
-    type Err = ProgramError;
-
-    fn from_str(text: &str) -> Result<Self, ProgramError> {
-        let known = Self::ALL.into_iter().find(|dialect| dialect.name().eq_ignore_ascii_case(text));
-        known.ok_or_else(|| ProgramError::UnknownDialect { text: text.to_owned() })
     }
 }
 

@@ -259,8 +259,8 @@ proptest! {
 /// Reads in every way; errors must have a text without control characters.
 fn survive(bytes: &[u8]) {
     let errors = Layout::ALL
-        .into_iter()
-        .filter_map(|layout| read_as(layout, bytes, "t", &JOINTS).err())
+        .iter()
+        .filter_map(|layout| read_as(*layout, bytes, "t", &JOINTS).err())
         .chain(read_as(Layout::RoboDk, bytes, "t", &[Revolute; 6]).err())
         .chain(read_constraints(bytes, "t", &JOINTS).err());
     for error in errors {

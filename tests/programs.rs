@@ -84,7 +84,7 @@ fn shown(program: &Program) -> String {
 
 #[test]
 fn programs_read_as_their_controllers_want_them() {
-    for dialect in Dialect::ALL {
+    for &dialect in Dialect::ALL {
         let arm = arm_of(dialect);
         let program = write(dialect, &arm.robot(), &plan(), &options(Pause::Dwell(3.0))).unwrap();
         insta::assert_snapshot!(format!("{dialect}_dwell"), shown(&program));
@@ -99,7 +99,7 @@ fn programs_read_as_their_controllers_want_them() {
 fn text_is_ascii_with_the_line_ends_of_the_controller() {
     let mut plan = plan();
     plan[1].pose = "Prüfung\"; end\n\u{1b}".to_owned();
-    for dialect in Dialect::ALL {
+    for &dialect in Dialect::ALL {
         let arm = arm_of(dialect);
         let program = write(dialect, &arm.robot(), &plan, &options(Pause::Dwell(2.5))).unwrap();
         for file in &program.files {
@@ -158,7 +158,7 @@ fn values(dialect: Dialect, program: &Program) -> Vec<Vec<f64>> {
 #[test]
 fn joint_values_read_back_are_those_of_the_plan() {
     let plan = plan();
-    for dialect in Dialect::ALL {
+    for &dialect in Dialect::ALL {
         let arm = arm_of(dialect);
         let program = write(dialect, &arm.robot(), &plan, &options(Pause::Dwell(3.0))).unwrap();
         let read = values(dialect, &program);
@@ -256,7 +256,7 @@ fn what_cannot_be_written_is_refused_with_a_reason() {
 
 #[test]
 fn dialects_have_names() {
-    for dialect in Dialect::ALL {
+    for &dialect in Dialect::ALL {
         assert_eq!(dialect.name().to_uppercase().parse(), Ok(dialect));
     }
 }

@@ -8,8 +8,6 @@ use super::{Dialect, MAX_DWELL, MAX_SPEED};
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ProgramError {
-    #[error("there is no dialect '{text}'; dialects: {}", Dialect::ALL.map(Dialect::name).join(", "))]
-    UnknownDialect { text: String },
     #[error("the plan has no poses")]
     EmptyPlan,
     /// A pose of another robot.

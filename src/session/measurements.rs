@@ -24,7 +24,7 @@ use std::mem;
 use nalgebra::Point3;
 
 pub(super) use consistency::farthest_joint;
-pub use layout::{Layout, UnknownLayout};
+pub use layout::Layout;
 pub use writer::write;
 pub(super) use writer::{joint_cells, quoted};
 

@@ -14,8 +14,6 @@
 //! A drift pose has the name and the configuration of the pose that it repeats.
 
 use std::collections::BTreeMap;
-use std::fmt;
-use std::str::FromStr;
 
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -25,7 +23,7 @@ use super::table::{
     self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,
 };
 use crate::kinematics::JointType;
-use crate::text::decimal;
+use crate::text::{decimal, names};
 use crate::units::to_mm;
 
 /// Purpose of a row of a plan.
@@ -45,45 +43,21 @@ pub enum PoseKind {
     Via,
 }
 
+names!(PoseKind {
+    Identification = "identification",
+    Verification = "verification",
+    Home = "home",
+    Drift = "drift",
+    Via = "via",
+});
+
 impl PoseKind {
-    pub const ALL: [Self; 5] = [Self::Identification, Self::Verification, Self::Home, Self::Drift, Self::Via];
-
-    /// As in the column `kind`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Identification => "identification",
-            Self::Verification => "verification",
-            Self::Home => "home",
-            Self::Drift => "drift",
-            Self::Via => "via",
-        }
-    }
-
     /// Whether the tracker measures here.
     pub const fn is_measured(self) -> bool {
         match self {
             Self::Identification | Self::Verification | Self::Drift => true,
             Self::Home | Self::Via => false,
         }
-    }
-}
-
-impl fmt::Display for PoseKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A text that is none of the kinds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct UnknownKind;
-
-impl FromStr for PoseKind {
-    type Err = UnknownKind;
-
-    /// Upper and lower case are the same.
-    fn from_str(text: &str) -> Result<Self, UnknownKind> {
-        Self::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(text)).ok_or(UnknownKind)
     }
 }
 
@@ -208,8 +182,8 @@ fn row(
     }
     let kind = match text(places.kind) {
         None | Some("") => PoseKind::default(),
-        Some(text) => text.parse().unwrap_or_else(|UnknownKind| {
-            let allowed = PoseKind::ALL.map(PoseKind::name).to_vec();
+        Some(text) => text.parse().unwrap_or_else(|_| {
+            let allowed = PoseKind::ALL.iter().copied().map(PoseKind::name).collect();
             problems.push(Defect::UnknownKind { text: text.to_owned(), allowed }.at_cell(record.line, "kind"));
             PoseKind::default()
         }),

@@ -21,7 +21,7 @@ impl UnknownName {
     }
 }
 
-/// Names the values of an enum, for `Display` and `FromStr`.
+/// Names the values of an enum, for `Display` and `FromStr`, which takes upper and lower case alike.
 macro_rules! names {
     ($type:ident { $($variant:ident = $name:literal,)* }) => {
         impl $type {
@@ -46,7 +46,7 @@ macro_rules! names {
             type Err = $crate::text::UnknownName;
 
             fn from_str(text: &str) -> Result<Self, Self::Err> {
-                let known = Self::ALL.iter().copied().find(|value| value.name() == text);
+                let known = Self::ALL.iter().copied().find(|value| value.name().eq_ignore_ascii_case(text));
                 known.ok_or_else(|| $crate::text::UnknownName::new(text, &[$($name),*]))
             }
         }
@@ -120,6 +120,7 @@ mod tests {
     fn what_is_written_is_read_back() {
         for fruit in Fruit::ALL {
             assert_eq!(fruit.name().parse(), Ok(*fruit));
+            assert_eq!(fruit.name().to_uppercase().parse(), Ok(*fruit));
             let text = ron::to_string(fruit).unwrap();
             assert_eq!(text, format!("\"{fruit}\""));
             assert_eq!(ron::from_str(&text), Ok(*fruit));

@@ -121,7 +121,7 @@ fn plan() -> PlanText {
         search: vec![Figures { condition_number: 61.5, o1: 0.25, predicted_error: 0.7 }],
         rows: PoseKind::ALL
             .into_iter()
-            .map(|kind| row(kind, Some((1.0, 2.0, -3.001))))
+            .map(|kind| row(*kind, Some((1.0, 2.0, -3.001))))
             .chain([row(PoseKind::Via, None)])
             .collect(),
     }
