@@ -143,7 +143,7 @@ fn the_whole_calibration_is_walked_by_keys() {
 
 #[test]
 fn a_terminal_that_goes_away_in_any_step_ends_the_program_in_good_order() {
-    for step in Step::ALL {
+    for &step in Step::ALL {
         for hangs_up in [true, false] {
             let place = Place::new();
             let mut terminal = if step == Step::Profile { place.wizard(&[], &[]) } else { place.resumed(step) };

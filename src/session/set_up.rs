@@ -1,12 +1,11 @@
 //! Choices made before measuring: instrument, target, and the steps of the wizard.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use super::plan::PoseKind;
 use super::simulation::Simulation;
 use super::wire::LinkChoice;
+use crate::text::names;
 use crate::units::{INCH, MICROMETRE, MILLIMETRE};
 
 /// A step of the wizard.
@@ -31,19 +30,18 @@ pub enum Step {
     Deliver,
 }
 
-impl Step {
-    /// All steps in order.
-    pub const ALL: [Self; 8] = [
-        Self::Profile,
-        Self::Instrument,
-        Self::Target,
-        Self::Plan,
-        Self::Capture,
-        Self::Identify,
-        Self::Verify,
-        Self::Deliver,
-    ];
+names!(Step {
+    Profile = "Profile",
+    Instrument = "Instrument",
+    Target = "Target",
+    Plan = "Plan",
+    Capture = "Capture",
+    Identify = "Identify",
+    Verify = "Verify",
+    Deliver = "Deliver",
+});
 
+impl Step {
     /// From 1.
     pub fn number(self) -> usize {
         Self::ALL.iter().position(|step| *step == self).map_or(1, |index| index + 1)
@@ -57,21 +55,6 @@ impl Step {
     /// The step before this one.
     pub fn previous(self) -> Option<Self> {
         self.number().checked_sub(2).and_then(|index| Self::ALL.get(index)).copied()
-    }
-}
-
-impl fmt::Display for Step {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Profile => "Profile",
-            Self::Instrument => "Instrument",
-            Self::Target => "Target",
-            Self::Plan => "Plan",
-            Self::Capture => "Capture",
-            Self::Identify => "Identify",
-            Self::Verify => "Verify",
-            Self::Deliver => "Deliver",
-        })
     }
 }
 

@@ -31,7 +31,6 @@ pub use parser::LineParser;
 pub use parser::ParsedLine;
 pub use parser::Rejection;
 pub use preset::Preset;
-pub use preset::UnknownPreset;
 
 #[cfg(test)]
 mod tests;

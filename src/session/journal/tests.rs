@@ -257,7 +257,7 @@ fn all_entries() -> Vec<Entry> {
         Entry::Closed { reason: TRICKY.to_owned() },
         Entry::Connected { identity: TRICKY.to_owned() },
     ];
-    entries.extend(Step::ALL.map(Entry::Step));
+    entries.extend(Step::ALL.iter().copied().map(Entry::Step));
     entries.push(Entry::About(About { serial: TRICKY.to_owned(), ..About::default() }));
     entries.extend(instruments.map(Entry::Instrument));
     entries.extend(targets.map(Entry::Target));

@@ -31,7 +31,7 @@ fn is_over(bench: &mut Bench) {
 
 #[test]
 fn every_step_closes_the_journal_and_ends() {
-    for step in Step::ALL.into_iter().skip(1) {
+    for &step in Step::ALL.iter().skip(1) {
         let mut bench = Bench::at(step);
         let effects = shut_down(&mut bench);
         assert_eq!(texts(&effects), [format!("append {} closed: SIGTERM", bench.journal.len() + 1)], "{step}");

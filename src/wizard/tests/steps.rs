@@ -395,7 +395,7 @@ fn what_is_measured_fixes_robot_instrument_and_target() {
 
 #[test]
 fn every_offer_has_a_label_and_at_most_one_is_the_default() {
-    for step in Step::ALL {
+    for &step in Step::ALL {
         let bench = Bench::at(step);
         let intents = bench.wizard.intents();
         assert!(intents.iter().all(|info| !info.label.is_empty()), "{step}");

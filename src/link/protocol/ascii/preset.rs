@@ -1,14 +1,10 @@
 //! Options for common sources.
 
-use std::fmt;
-use std::str::FromStr;
-
-use thiserror::Error;
-
 use super::options::AsciiOptions;
 use super::options::Column;
 use super::options::Layout;
 use super::options::Mode;
+use crate::text::names;
 
 /// Both forms of the answer. No comma may follow the third value: with decimal commas there would be six values.
 const ANSWER_OF_T2SA: &str =
@@ -34,22 +30,16 @@ pub enum Preset {
     Bridge,
 }
 
+names!(Preset {
+    Xyz = "xyz",
+    NameXyz = "name,x,y,z",
+    T2sa = "T2SA",
+    Mitutoyo = "Mitutoyo 1-D",
+    UdpXyzTime = "UDP xyz+time",
+    Bridge = "bridge",
+});
+
 impl Preset {
-    /// All presets.
-    pub const ALL: [Self; 6] = [Self::Xyz, Self::NameXyz, Self::T2sa, Self::Mitutoyo, Self::UdpXyzTime, Self::Bridge];
-
-    /// Name in profiles and on screens.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Xyz => "xyz",
-            Self::NameXyz => "name,x,y,z",
-            Self::T2sa => "T2SA",
-            Self::Mitutoyo => "Mitutoyo 1-D",
-            Self::UdpXyzTime => "UDP xyz+time",
-            Self::Bridge => "bridge",
-        }
-    }
-
     /// Options of the preset.
     pub fn options(self) -> AsciiOptions {
         let columns =
@@ -91,27 +81,5 @@ fn t2sa() -> AsciiOptions {
         ignore_pattern: Some(r"^ACK-\d+".to_owned()),
         timeout_s: 30.0,
         ..AsciiOptions::default()
-    }
-}
-
-impl fmt::Display for Preset {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// No preset has this name.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("there is no preset `{}`; presets: {}", .0, Preset::ALL.map(Preset::name).join(" | "))]
-pub struct UnknownPreset(String);
-
-impl FromStr for Preset {
-    type Err = UnknownPreset;
-
-    fn from_str(name: &str) -> Result<Self, UnknownPreset> {
-        Self::ALL
-            .into_iter()
-            .find(|preset| preset.name().eq_ignore_ascii_case(name))
-            .ok_or_else(|| UnknownPreset(name.to_owned()))
     }
 }

@@ -208,7 +208,7 @@ fn a_source_that_never_rests_cannot_be_drained() {
 
 #[test]
 fn presets_are_found_by_name() {
-    for preset in Preset::ALL {
+    for &preset in Preset::ALL {
         assert_eq!(preset.to_string().parse(), Ok(preset));
     }
     assert!("none".parse::<Preset>().is_err());

@@ -87,7 +87,7 @@ fn a_point_comes_back_in_every_format() {
 
 #[test]
 fn every_preset_but_the_gauge_gives_points() {
-    for preset in Preset::ALL {
+    for &preset in Preset::ALL {
         let options = preset.options();
         if preset == Preset::Mitutoyo {
             assert!(options.validate().is_err_and(|text| text.contains("one dimension")));

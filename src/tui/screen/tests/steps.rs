@@ -124,7 +124,7 @@ fn terminal(view: &ViewModel, keys: &[Key], size: (u16, u16), theme: Theme) -> S
 
 #[test]
 fn every_step_in_every_state_at_80x24() {
-    for step in Step::ALL {
+    for &step in Step::ALL {
         let [normal, busy, error] = states(step).map(|(_, view, keys)| terminal(&view, &keys, SMALL, theme(false)));
         let (busy, error) = (paint::differences(&normal, &busy), paint::differences(&normal, &error));
         insta::assert_snapshot!(
@@ -153,7 +153,7 @@ fn key_screens_at_other_sizes() {
 
 #[test]
 fn no_size_is_too_small_for_any_state() {
-    for step in Step::ALL {
+    for &step in Step::ALL {
         for (name, view, keys) in states(step) {
             for size in [(0, 0), (1, 1), (0, 24), (80, 0), (59, 18), (60, 17)] {
                 let shown = terminal(&view, &keys, size, theme(true));
