@@ -51,7 +51,7 @@ pub enum RecordingError {
     #[error("{what}: {message}")]
     Library { what: &'static str, message: String },
     /// The file is not a recording of this program.
-    #[error("'{}' is no recording of trupose: {message}", path.display())]
+    #[error("'{}' is not a recording of trupose: {message}", path.display())]
     Foreign { path: PathBuf, message: String },
     /// The journal in a recording is damaged.
     #[error("the journal in '{}'", path.display())]

@@ -59,7 +59,7 @@ impl<'a, W: Write> Progress<'a, W> {
     pub(super) fn say(&mut self, text: impl FnOnce() -> String) {
         if self.last.seconds() >= INTERVAL.as_secs_f64() {
             self.last = Stopwatch::new();
-            // Progress is optional: a closed stderr is no failure.
+            // Progress is optional: a closed stderr is not a failure.
             drop(writeln!(self.out, "{}", text()));
         }
     }

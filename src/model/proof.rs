@@ -65,7 +65,7 @@ pub fn configurations(chain: &KinematicChain, limits: &[Option<(f64, f64)>], cou
 /// Compares `written` with `meant` at random configurations within the limits.
 ///
 /// # Errors
-/// They differ by more than `tolerance`, or `written` is no number somewhere.
+/// They differ by more than `tolerance`, or `written` is not a number somewhere.
 pub fn prove(
     meant: &KinematicChain,
     limits: &[Option<(f64, f64)>],

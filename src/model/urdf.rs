@@ -369,7 +369,7 @@ impl Reader<'_, '_> {
     fn finite(&self, node: Node<'_, '_>, element: &str, name: &str, text: &str) -> Result<f64, UrdfError> {
         let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
         value.ok_or_else(|| {
-            let message = format!("attribute '{name}' has '{}', which is no number", printable(text));
+            let message = format!("attribute '{name}' has '{}', which is not a number", printable(text));
             self.element(node, element.to_owned(), message)
         })
     }

@@ -194,7 +194,7 @@ impl<R: Fn(RecordingEvent)> Work<R> {
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "when files are written is no input of a calibration")]
+#[expect(clippy::disallowed_methods, reason = "the time of writing does not enter a calibration")]
 fn now() -> Instant {
     Instant::now()
 }

@@ -32,8 +32,8 @@ pub fn measurements_csv(session: &Session, robot: &Robot) -> String {
     table(session, robot, &[PoseKind::Identification, PoseKind::Verification])
 }
 
-/// The repetitions that show a drift; none without repetitions. They are no part of the
-/// measurements: a repeated identification pose is no verification.
+/// The repetitions that show a drift; none without repetitions. They are not among the
+/// measurements, because a repeated identification pose does not verify anything.
 pub fn drift_csv(session: &Session, robot: &Robot) -> Option<String> {
     session.counted_of(PoseKind::Drift).next()?;
     Some(table(session, robot, &[PoseKind::Drift]))

@@ -72,7 +72,7 @@ pub(super) fn are_numbers(text: &str, items: &[Range<usize>]) -> bool {
     items.iter().all(|item| part(text, item.clone()).parse::<f64>().is_ok_and(f64::is_finite))
 }
 
-/// The first place at or behind `at` that is no blank or line end.
+/// The first place at or behind `at` that is neither blank nor line end.
 pub(super) fn after_blanks(text: &str, at: usize) -> usize {
     let rest = text.get(at..).unwrap_or_default();
     at + (rest.len() - rest.trim_start().len())

@@ -96,7 +96,7 @@ pub(super) fn accuracy(document: &Document) -> String {
     let title = "<h2>Accuracy on poses that the identification did not see</h2>\n";
     let Some(result) = &document.result else { return String::new() };
     let Some(verification) = &result.verification else {
-        let text = "No verification poses were measured, so nothing can be said about the accuracy. The residuals of the fit below are no accuracy: the parameters were chosen to make them small.";
+        let text = "No verification poses were measured, so nothing can be said about the accuracy. The residuals of the fit below are not an accuracy: the parameters were chosen to make them small.";
         return format!("<h2>Accuracy</h2>\n{}", paragraph(text));
     };
     let mut html = if verification.independent {

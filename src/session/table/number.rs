@@ -2,7 +2,7 @@
 
 use super::{Defect, NumberColumn, Record, TableProblem};
 
-/// Larger numbers (m, rad) are no measurement in any unit: a lost decimal point, or rubbish that would end as infinity.
+/// Larger numbers (m, rad) are not a measurement in any unit, but a lost decimal point or rubbish that would become infinity.
 const LARGEST: f64 = 1e6;
 
 /// Reads the number cells of one table and gathers what is wrong with them.
@@ -36,7 +36,7 @@ impl<'a> Numbers<'a> {
         self.optional(record, column, problems)
     }
 
-    /// As [`Numbers::required`], but an empty cell is no value and no problem.
+    /// As [`Numbers::required`], but an empty cell is neither a value nor a problem.
     pub(in crate::session) fn optional(
         &mut self,
         record: &Record,
