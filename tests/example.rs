@@ -1,6 +1,6 @@
-//! The examples in `sessions/`, made anew and checked against what is committed.
+//! The examples in `sessions/`, made again and checked against what is committed.
 //!
-//! `soochow-example` is made here from the method paper's tables. To write it anew: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test main example`.
+//! `soochow-example` is made here from the method paper's tables. To write it again: `TRUPOSE_WRITE_EXAMPLE=1 cargo test --test main example`.
 //! `example` is a finished session; the head of `sessions/example.script.ron` has the command that makes it.
 
 use std::fs;
@@ -136,7 +136,7 @@ fn the_finished_session_is_what_its_script_makes() {
         let [made, committed] = [&made, &committed].map(|folder| fs::read_to_string(folder.join(name)).unwrap());
         assert!(
             words(&made) == words(&committed),
-            "{name} is not what the program writes today: make the example anew"
+            "{name} is not what the program writes today: make the example again"
         );
     }
     let text = |folder: &Path, name: &str| fs::read_to_string(folder.join(name)).unwrap();

@@ -217,7 +217,7 @@ fn what_is_no_serial_chain_is_refused_with_its_place() {
         ),
         (
             &joint("\n<origin rpy='0 1 x'/>"),
-            "line 4: <origin> of joint 'j': attribute 'rpy' has 'x', which is no number",
+            "line 4: <origin> of joint 'j': attribute 'rpy' has 'x', which is not a number",
         ),
         (&joint("<axis xyz='0 0 0'/>"), "line 2: <axis> of joint 'j': it has no direction"),
         (&joint("\n<limit lower='1' upper='-1'/>"), "line 4: <limit> of joint 'j': lower 1 is above upper -1"),

@@ -1,7 +1,7 @@
 //! The pictures of the screens in `docs/technician.md`: the program in a real terminal of 80×24, resumed from the first entries of the
 //! journal in `sessions/example`, shows exactly what is printed there.
 //!
-//! To print them anew: `TRUPOSE_WRITE_PICTURES=1 cargo test --test main pictures`.
+//! To write them again: `TRUPOSE_WRITE_PICTURES=1 cargo test --test main pictures`.
 
 use std::fs;
 use std::path::PathBuf;

@@ -71,13 +71,13 @@ impl Place {
         self.run(&["--script", &script, "--json", "--no-recording"])
     }
 
-    /// Goes on with a session by a script.
+    /// Resumes a session with a script.
     fn resume(&self, folder: &str, steps: &[String]) -> Output {
         let script = self.write_script("rest.script.ron", &steps.join(", "));
         self.run(&["resume", folder, "--script", &script, "--json", "--no-recording"])
     }
 
-    /// Goes on with a session from where it is, to its end.
+    /// Resumes a session and completes it.
     fn complete(&self, folder: &str) -> Output {
         let session = Session::of(&read_journal(&self.path(folder)).unwrap()).unwrap();
         let output = self.resume(folder, &from_step(session.step));
@@ -419,7 +419,7 @@ fn a_signal_at_any_moment_leaves_a_session_that_goes_on() {
 
 // --------------------------------------------------------------------------------------------------------------- full disk
 
-/// What a run that cannot write its journal any more must say; and that it goes on when it can.
+/// A run that can no longer write its journal must say so, and continue once it can.
 fn says_what_is_safe(place: &Place, output: &Output, reason: &str) {
     let errors = text(&output.stderr).replace("\n  ", " ");
     assert_ne!(output.status.code(), Some(0));
@@ -498,7 +498,7 @@ fn a_full_disk_stops_the_run_and_goes_on_when_there_is_room() {
         says_what_is_safe(&place, &output, "No space left on device");
         fs::remove_file(&ballast).unwrap();
         if read_journal(&place.session()).is_err() {
-            // Nothing was measured: begun anew, under the same name if the folder could not be made either.
+            // Nothing was measured: started again, under the same name if the folder could not be created either.
             assert_eq!(place.run_steps(&whole()).status.code(), Some(0));
             continue;
         }
@@ -529,7 +529,7 @@ fn a_clock_that_jumps_back_holds_nothing_up() {
     let expected = place.measurements("sessions/s");
     let future = 4_000_000_000;
     let measured = 15; // lines, of which the last ones are measurements
-    // Backwards all the time; forth and back; and all in the future of the clock that it goes on with.
+    // Backwards all the time; forth and back; and all in the future of the clock that it continues with.
     retimed(&place, "back", measured, |index| 1_700_000_000 - 60 * index);
     retimed(&place, "zigzag", measured, |index| 1_700_000_000 + if index % 2 == 0 { 60 * index } else { -86_400 });
     retimed(&place, "future", measured, |index| future + 10 * index);

@@ -386,7 +386,7 @@ fn garbage_does_not_make_it_fail() {
             // What is pasted must end, or all the rest is a part of it.
             terminal.send("\u{1b}[201~");
         }
-        // What is drawn anew has been drawn after all of it.
+        // What was drawn again came after all of it.
         terminal.resize((81, 24));
         terminal.wait_for("a step", |shown| shown.step().is_some());
         terminal.signal("TERM");

@@ -29,7 +29,7 @@ fn an_identification_from_files_is_recorded() {
     compare_frames(&path, &session, "/world/nominal/frames", "nominal", profile.chain());
     assert_eq!(results(&journal).len(), 1);
     assert!(!views(&path).contains(TEMPERATURES));
-    // A recording may be made anew; nothing else is overwritten, least of all what was measured.
+    // A recording may be replaced; nothing else is overwritten, least of all what was measured.
     let identify = ["identify", "--profile", "soochow", "--measurements", "measured.csv", "--record"];
     for (target, code) in [("out.rrd", &[0, 1][..]), ("measured.csv", &[2])] {
         let output = place.run(&[&identify[..], &[target]].concat());

@@ -172,7 +172,7 @@ fn the_tracker_is_drawn_as_planned_until_points_tell_where_it_stands() {
     succeeded(&place.run(&["resume", "sessions/s", "--script", &rest, "--json"]));
     let (drawn, label) = tracker(&place.recording());
     assert_eq!(label, "[tracker]");
-    // The identified arm tells it to a millimetre; what is less than 20 mm off is not drawn anew.
+    // The identified arm locates it to a millimetre; it is not drawn again for less than 20 mm.
     assert!((drawn - stands).norm() < 0.021, "{drawn} instead of {stands}");
     let (_, session) = session_of(&place.session());
     beams(&drawn, session.samples.len());

@@ -44,7 +44,7 @@ fn torn_and_damaged_files_are_named_and_never_stop_a_replay() {
         fs::write(place.path(name), bytes).unwrap();
         let output = place.run(&["replay", "--print", name]);
         assert_eq!(output.status.code(), Some(5));
-        assert!(text(&output.stderr).contains("is no recording of trupose"), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("is not a recording of trupose"), "{}", text(&output.stderr));
     }
 }
 

@@ -364,7 +364,7 @@ fn a_scale_of_the_tracker_refuses_the_link_and_a_shift_is_warned_of() {
     assert!(matches!(warnings.as_slice(), [text] if text.contains("distances stay right") && identity.contains(text)));
 }
 
-/// A peer that prints lines until it is told to be silent; the connection stays.
+/// A peer that prints lines until it is silenced; the connection stays.
 fn printing(stop: &Arc<AtomicBool>) -> u16 {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = listener.local_addr().unwrap().port();

@@ -307,7 +307,7 @@ fn every_entry_comes_back_as_it_was() {
     }
     assert_eq!(journal.lines.len(), lines.len());
     assert_eq!((journal.good_bytes, journal.torn_bytes), (*starts.last().unwrap(), 0));
-    // What is written next goes on from there.
+    // The next entry continues from there.
     let (next, _) = encode(&lines[0], &journal.sum).unwrap();
     let (other, _) = encode(&lines[0], &Sum::default()).unwrap();
     assert_ne!(next, other);

@@ -260,7 +260,7 @@ impl Bench {
         bench
     }
 
-    /// Does what a step is for, and goes on.
+    /// Completes a step and continues.
     pub(super) fn pass(&mut self, instrument: &InstrumentChoice) {
         match self.step() {
             Step::Profile => {

@@ -143,7 +143,7 @@ fn a_fault_of_a_reading_in_the_other_unit_is_found_behind_it() {
     assert!(found.is_some(), "{}", bench.told());
 }
 
-/// Journals of earlier versions: a correction without an end goes on.
+/// Journals of earlier versions: a correction without an end continues.
 #[test]
 fn a_correction_without_an_end_counts_for_all_that_follows() {
     let mut bench = one_in_inches();

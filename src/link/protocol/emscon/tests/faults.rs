@@ -1,4 +1,4 @@
-//! Every fault of the simulated tracker: the right words, no wrong point, and the link goes on or says why not.
+//! Every fault of the simulated tracker: the right words, no wrong point, and the link continues or reports why not.
 
 use std::time::Duration;
 
