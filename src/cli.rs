@@ -279,7 +279,7 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
     /// Layout of the tables
-    #[arg(long, value_parser = one_of(Layout::ALL, Layout::name), ignore_case = true, default_value_t)]
+    #[arg(long, value_parser = one_of::<Layout>(Layout::NAMES), ignore_case = true, default_value_t)]
     pub layout: Layout,
     /// Verify on the points of another file measured in the same set-up
     #[arg(long, value_name = "CSV", conflicts_with = "verify_rest")]
@@ -302,7 +302,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
     /// Layout of the table
-    #[arg(long, value_parser = one_of(Layout::ALL, Layout::name), ignore_case = true, default_value_t)]
+    #[arg(long, value_parser = one_of::<Layout>(Layout::NAMES), ignore_case = true, default_value_t)]
     pub layout: Layout,
     /// Rows to verify on, such as 'pose < 20'
     #[arg(long = "use", value_name = "CONDITION")]
@@ -425,7 +425,7 @@ pub struct ProgramArgs {
     #[arg(long, value_name = "CSV")]
     pub plan: PathBuf,
     /// Language of the robot controller
-    #[arg(long, value_parser = one_of(Dialect::ALL, Dialect::name), ignore_case = true)]
+    #[arg(long, value_parser = one_of::<Dialect>(Dialect::NAMES), ignore_case = true)]
     pub dialect: Dialect,
     /// Name of the program
     #[arg(long, default_value = "calposes")]
@@ -524,11 +524,11 @@ fn speed_percent(text: &str) -> Result<f64, String> {
 }
 
 /// A parser of the names of a closed set, which the help and the completions list.
-fn one_of<T>(all: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
+fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
-    T: FromStr<Err: Into<Box<dyn Error + Send + Sync>>> + Copy + Send + Sync + 'static,
+    T: FromStr<Err: Into<Box<dyn Error + Send + Sync>>> + Clone + Send + Sync + 'static,
 {
-    PossibleValuesParser::new(all.iter().copied().map(name)).try_map(|name| name.parse::<T>())
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -22,7 +22,7 @@ pub struct CompensateArgs {
     #[arg(long, value_name = "FILE", requires = "dialect")]
     pub program: Option<PathBuf>,
     /// Language of the program
-    #[arg(long, value_parser = one_of(Dialect::ALL, Dialect::name), ignore_case = true)]
+    #[arg(long, value_parser = one_of::<Dialect>(Dialect::NAMES), ignore_case = true)]
     pub dialect: Option<Dialect>,
     /// ROS: names of the joints in the trajectory, from base to flange [default: those of the profile]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]

@@ -183,7 +183,7 @@ fn row(
     let kind = match text(places.kind) {
         None | Some("") => PoseKind::default(),
         Some(text) => text.parse().unwrap_or_else(|_| {
-            let allowed = PoseKind::ALL.iter().copied().map(PoseKind::name).collect();
+            let allowed = PoseKind::NAMES.to_vec();
             problems.push(Defect::UnknownKind { text: text.to_owned(), allowed }.at_cell(record.line, "kind"));
             PoseKind::default()
         }),

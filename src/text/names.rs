@@ -28,6 +28,9 @@ macro_rules! names {
             /// All values, in order.
             pub const ALL: &'static [Self] = &[$(Self::$variant),*];
 
+            /// The names of all values, in order.
+            pub const NAMES: &'static [&'static str] = &[$($name),*];
+
             /// The name in files and in messages.
             pub const fn name(self) -> &'static str {
                 match self {
@@ -47,7 +50,7 @@ macro_rules! names {
 
             fn from_str(text: &str) -> Result<Self, Self::Err> {
                 let known = Self::ALL.iter().copied().find(|value| value.name().eq_ignore_ascii_case(text));
-                known.ok_or_else(|| $crate::text::UnknownName::new(text, &[$($name),*]))
+                known.ok_or_else(|| $crate::text::UnknownName::new(text, Self::NAMES))
             }
         }
     };

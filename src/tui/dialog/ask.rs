@@ -2,6 +2,7 @@
 
 use super::{Dialog, Form};
 use crate::session::filter::Filter;
+use crate::session::measurements::Layout;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
@@ -13,8 +14,6 @@ use crate::wizard::{Intent, reading};
 /// Words for [`Truth`], in the order of [`TRUTHS`].
 const TRUTH_WORDS: &[&str] = &["random", "paper", "nominal"];
 const TRUTHS: [Truth; 3] = [Truth::Drawn, Truth::Paper, Truth::Nominal];
-/// Layouts of tables.
-const LAYOUTS: &[&str] = &["named", "robodk", "delmia"];
 
 /// Asks for the coordinates of a reading, starting with the text typed or pasted so far. They are checked while they are typed.
 pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
@@ -158,7 +157,7 @@ pub fn recorded() -> Dialog {
             .text("rows to use", "", rows)
             .pick(
                 "layout",
-                LAYOUTS,
+                Layout::NAMES,
                 0,
                 "Left/Right. named: header with names and units; robodk, delmia: exported by those programs.",
             ),
