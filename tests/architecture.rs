@@ -19,7 +19,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("program", &["units", "kinematics", "session"]),
     ("model", &["units", "kinematics", "profile", "session"]),
     ("search", &["planning"]),
-    ("link", &["units", "geometry", "kinematics", "profile", "session"]),
+    ("link", &["units", "geometry", "kinematics", "planning", "profile", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
     ("report", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session"]),
     ("recording", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "store"]),
