@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Point3, SMatrix, Vector3};
 
 use super::Identification;
-use crate::kinematics::{Arm, IdentificationJacobian, ParameterId, Place};
+use crate::kinematics::{Arm, FreeParameter, IdentificationJacobian, ParameterId, Place};
 
 /// Coordinates of a rigid motion.
 const MOTIONS: usize = 6;
@@ -80,6 +80,79 @@ impl<'a> Predictor<'a> {
     }
 }
 
+/// The error predicted for a calibration while its poses are measured one by one. Each takes the same time, however many there
+/// were before.
+///
+/// It carries the covariance of all parameters, in units of their expected deviations, and of the frame, about which nothing is known
+/// within a metre and a radian.
+#[derive(Clone, Debug)]
+pub struct Forecast {
+    arm: Arm,
+    ids: Vec<ParameterId>,
+    expected: Vec<f64>,
+    /// Variance of a measured coordinate (m²).
+    variance: f64,
+    covariance: DMatrix<f64>,
+    /// Mean of `GᵀG` over the fresh places, with the derivatives G of a position (m²).
+    fresh: DMatrix<f64>,
+    /// Mean square error at the fresh places (m²).
+    square: f64,
+}
+
+impl Forecast {
+    /// Before the first measurement of the `parameters` of `arm`, judged by the error at the `fresh` places. `sigma` is the standard
+    /// deviation of a measured coordinate (m).
+    pub fn new(arm: &Arm, parameters: &[FreeParameter], fresh: &[Place], sigma: f64) -> Self {
+        let size = parameters.len() + MOTIONS;
+        let mut forecast = Self {
+            arm: arm.clone(),
+            ids: parameters.iter().map(|parameter| parameter.id).collect(),
+            expected: parameters.iter().map(|parameter| parameter.expected).collect(),
+            variance: sigma * sigma,
+            covariance: DMatrix::identity(size, size),
+            fresh: DMatrix::zeros(size, size),
+            square: 0.0,
+        };
+        let mut columns = DMatrix::zeros(size, 3 * fresh.len());
+        for (index, place) in fresh.iter().enumerate() {
+            columns.columns_mut(3 * index, 3).copy_from(&forecast.derivatives(place));
+        }
+        forecast.fresh = &columns * columns.transpose() / fresh.len().max(1) as f64;
+        forecast.square = forecast.fresh.trace();
+        forecast
+    }
+
+    /// Derivatives of the position at a place, one column per coordinate.
+    fn derivatives(&self, place: &Place) -> DMatrix<f64> {
+        let n = self.ids.len();
+        let mut rows = vec![0.0; 3 * n];
+        let point = IdentificationJacobian::new(&self.ids).at(&self.arm.prepared(), place, &mut rows);
+        let motion = motion(&point.coords);
+        DMatrix::from_fn(n + MOTIONS, 3, |parameter, axis| match self.expected.get(parameter) {
+            Some(expected) => rows[n * axis + parameter] * expected,
+            None => motion[(axis, parameter - n)],
+        })
+    }
+
+    /// Takes a measurement at `place` into account.
+    pub fn measure(&mut self, place: &Place) {
+        let derivatives = self.derivatives(place);
+        let gain = &self.covariance * &derivatives;
+        let seen = derivatives.transpose() * &gain;
+        let innovation = Matrix3::from_fn(|i, j| f64::midpoint(seen[(i, j)], seen[(j, i)]))
+            + Matrix3::identity() * self.variance.max(f64::MIN_POSITIVE);
+        let Some(inverse) = innovation.try_inverse() else { return };
+        let weighted = &gain * inverse;
+        self.square -= (&self.fresh * &gain).dot(&weighted);
+        self.covariance.gemm(-1.0, &weighted, &gain.transpose(), 1.0);
+    }
+
+    /// Root mean square position error predicted at the fresh places (m).
+    pub fn error(&self) -> f64 {
+        self.square.max(0.0).sqrt()
+    }
+}
+
 /// Derivative of a point at `arm` from the centre by shift and turn.
 fn motion(arm: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
     let mut motion = SMatrix::<f64, 3, 6>::zeros();
@@ -122,4 +195,69 @@ fn without_motions(jacobian: DMatrix<f64>, arm: &Arm, places: &[&Place]) -> DMat
         (0..basis.singular_values.len()).filter(|&index| basis.singular_values[index] > 1e-9 * largest).collect();
     let q = u.select_columns(&spanned);
     &jacobian - &q * (q.transpose() * &jacobian)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::identification::{Observations, PointSample, Problem, Settings, SigmaSource, identify};
+    use crate::kinematics::{Convention, Joint, JointType, KinematicChain, Link, LinkParameter};
+
+    fn arm() -> Arm {
+        let joint = |index: usize| Joint {
+            name: format!("J{}", index + 1),
+            joint_type: JointType::Revolute,
+            link: Link { alpha: 1.5 * (index % 2) as f64, a: 0.3, d: 0.1, theta: 0.0, beta: 0.0 },
+            direction: 1.0,
+            coupling: Vec::new(),
+        };
+        let joints = (0..4).map(joint).collect();
+        let chain =
+            KinematicChain::new(Convention::Standard, Isometry3::identity(), joints, Isometry3::identity()).unwrap();
+        Arm { chain, targets: vec![Point3::new(0.05, 0.0, 0.1)] }
+    }
+
+    fn place(index: usize) -> Place {
+        let value = |joint: usize| 4.0 * (((index + 1) as f64 * (joint as f64 + 2.0).sqrt()).fract() - 0.5);
+        Place { configuration: (0..4).map(value).collect(), target: 0 }
+    }
+
+    /// Measuring one by one leads to the covariance of an identification from all of them.
+    #[test]
+    fn one_by_one_is_the_same_as_all_at_once() {
+        let arm = arm();
+        let of_joint = |joint| {
+            LinkParameter::ALL
+                .map(|parameter| FreeParameter { id: ParameterId::Link { joint, parameter }, expected: 1e-3 })
+        };
+        let parameters: Vec<FreeParameter> = (0..4).flat_map(of_joint).collect();
+        let measured: Vec<Place> = (0..25).map(place).collect();
+        let fresh: Vec<Place> = (100..160).map(place).collect();
+        let station = Isometry3::new(Vector3::new(1.0, 2.0, 0.3), Vector3::new(0.2, 0.1, 1.0));
+        // Residuals of the size that is stated leave the noise at what is stated.
+        let sigma = 1e-3;
+        let points = measured.iter().enumerate().map(|(index, at)| {
+            let noise = Vector3::from_fn(|axis, _| sigma * (((index * 3 + axis) as f64 * 0.754).fract() - 0.5) * 3.46);
+            let point = station.inverse() * (arm.point_in_base(at) + noise);
+            PointSample { at: at.clone(), station: 0, point, sigma: None }
+        });
+        let observations = Observations { points: points.collect(), ..Observations::default() };
+        let problem = Problem { arm: &arm, parameters: &parameters, observations: &observations };
+        let settings = Settings { sigma: Some((sigma, SigmaSource::Option)), ..Settings::default() };
+        let found = identify(&problem, &settings, &mut |_| {}).unwrap();
+        let predictor = Predictor::new(&found, &measured.iter().collect::<Vec<_>>()).unwrap();
+        let covariances = predictor.covariances(&fresh.iter().collect::<Vec<_>>());
+        let all_at_once = (covariances.iter().map(Matrix3::trace).sum::<f64>() / fresh.len() as f64).sqrt();
+
+        let mut forecast = Forecast::new(&arm, &parameters, &fresh, found.sigma.used);
+        let mut before = forecast.error();
+        for at in &measured {
+            forecast.measure(at);
+            assert!(forecast.error() <= before);
+            before = forecast.error();
+        }
+        assert!((forecast.error() / all_at_once - 1.0).abs() < 0.02, "{} {all_at_once}", forecast.error());
+    }
 }

@@ -162,19 +162,19 @@ fn select(
     let shared = Shared::new(&complete, settings, found);
     let mut selection = Selection::default();
     let mut starts: Vec<Start> = Vec::new();
-    let mut known: Vec<Vec<FreeParameter>> = Vec::new();
+    let mut known: Vec<Terms> = Vec::new();
     let of = candidates.iter().map(Vec::len).sum();
     let mut number = 0;
     for group in candidates {
         let mut best: Option<usize> = None;
         for terms in group {
             number += 1;
-            // An arm without masses has no compliance: the candidate is one that was tried.
-            let own = terms.parameters(&problem.arm.chain);
-            if known.contains(&own) {
+            // What this arm cannot have leaves a candidate that was tried.
+            let terms = &terms.on(&problem.arm.chain);
+            if known.contains(terms) {
                 continue;
             }
-            known.push(own);
+            known.push(*terms);
             if progress(Stage::Candidate { number, of, terms: *terms }).is_break() {
                 return Err(IdentificationError::Cancelled);
             }

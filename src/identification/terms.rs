@@ -111,6 +111,18 @@ impl Terms {
         (0..chain.dof()).flat_map(of_joint).collect()
     }
 
+    /// Those of these terms that the arm can have: without masses it has no compliance and no tilt.
+    #[must_use]
+    pub fn on(self, chain: &KinematicChain) -> Self {
+        let has = |term: JointTerm| (0..chain.dof()).any(|joint| chain.has_term(joint, term));
+        Self {
+            compliance: self.compliance && has(JointTerm::Compliance),
+            tilt: self.tilt && has(JointTerm::Tilt(TiltAxis::X)),
+            harmonics: self.harmonics && has(JointTerm::Sine(1)),
+            curves: self.curves.filter(|_| has(JointTerm::Sine(MAX_ORDER))),
+        }
+    }
+
     /// Factor of a term's prior against that of [`Self::all`] with curves of one radian; zero for one that is not there.
     pub(super) fn scale(&self, term: JointTerm) -> f64 {
         let is_there = match term {

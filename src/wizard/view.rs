@@ -418,15 +418,11 @@ pub struct DriftView {
 /// Predicted quality of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PredictionView {
-    /// Predicted error per σ against the number of identification samples.
-    pub curve_sigma: Vec<(usize, f64)>,
-    /// Predicted error per σ with the samples so far.
-    pub now_sigma: f64,
-    /// The same for the instrument of the profile, without errors that no kinematic model can express.
-    pub now_mm: Option<f64>,
-    /// Predicted error per σ with the rest of the plan.
-    pub with_all_sigma: Option<f64>,
-    /// The same for the instrument of the profile.
+    /// Predicted error against the number of identification samples.
+    pub curve_mm: Vec<(usize, f64)>,
+    /// Predicted error with the samples so far.
+    pub now_mm: f64,
+    /// Predicted error with the rest of the plan.
     pub with_all_mm: Option<f64>,
     /// Whether the remaining poses are not worth their time.
     pub is_enough: bool,

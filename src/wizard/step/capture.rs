@@ -41,8 +41,8 @@ pub(in crate::wizard) struct CaptureStep {
     fewest: Option<usize>,
     /// Prediction from the samples so far.
     prediction: Prediction,
-    /// The prediction that includes the measurement of this number, which is being written.
-    expected: Option<(u64, Prediction)>,
+    /// Number of the measurement that is being written and that the prediction already includes.
+    expected: Option<u64>,
 }
 
 /// A reading that counts only if the operator accepts it.
@@ -72,13 +72,14 @@ impl CaptureStep {
     /// Enters the step at the row that was shown last, or at the next one that is open.
     pub(super) fn enter(session: &Session) -> Self {
         let last = session.shown.unwrap_or(0);
+        let fewest = fewest_samples(session);
         let mut step = Self {
             row: session.open_rows().find(|row| *row >= last).or_else(|| session.open_rows().next()),
             held: None,
             questioned: None,
             measuring: false,
-            fewest: fewest_samples(session),
-            prediction: Prediction::of(session),
+            fewest,
+            prediction: Prediction::of(session, fewest),
             expected: None,
         };
         step.question_last_doubt(session);
@@ -177,9 +178,13 @@ impl CaptureStep {
         let mut with = cx.session.clone();
         let line = Line { number: with.lines + 1, time: cx.now, entry: Entry::Sample(noted.clone()) };
         if with.apply(&line).is_ok() {
-            let prediction = Prediction::of(&with);
-            noted.predicted_error_sigma = prediction.now().map(|sigma| (sigma * 1e6).round() / 1e6);
-            self.expected = Some((noted.number, prediction));
+            if self.expected.replace(noted.number).is_some() {
+                // The last one was never written.
+                self.prediction = Prediction::of(cx.session, self.fewest);
+            }
+            self.prediction.follow(&with);
+            let in_sigma = |error: f64| (error / self.prediction.sigma * 1e6).round() / 1e6;
+            noted.predicted_error_sigma = self.prediction.now().map(in_sigma);
         }
         Entry::Sample(noted)
     }
@@ -459,10 +464,9 @@ impl StepMachine for CaptureStep {
         match entry {
             Entry::Sample(noted) => {
                 self.held = None;
-                self.prediction = match self.expected.take() {
-                    Some((number, prediction)) if number == noted.number => prediction,
-                    _ => Prediction::of(session),
-                };
+                if self.expected.take() != Some(noted.number) {
+                    self.prediction = Prediction::of(session, self.fewest);
+                }
                 self.question_last_doubt(session);
                 match (self.questioned, noted.findings.first()) {
                     (Some(_), Some(finding)) => {
@@ -476,7 +480,7 @@ impl StepMachine for CaptureStep {
                 }
             }
             Entry::Decision { sample, decision } => {
-                self.prediction = Prediction::of(session);
+                self.prediction = Prediction::of(session, self.fewest);
                 match decision {
                     Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
                     Decision::Keep | Decision::LeaveOut => self.advance(session),
@@ -484,7 +488,7 @@ impl StepMachine for CaptureStep {
                 self.question_last_doubt(session);
             }
             Entry::Correction(correction) => {
-                self.prediction = Prediction::of(session);
+                self.prediction = Prediction::of(session, self.fewest);
                 self.row = session.open_rows().next();
                 self.question_last_doubt(session);
                 return vec![Action::Say(Notice::info(corrected(correction)))];
@@ -495,7 +499,7 @@ impl StepMachine for CaptureStep {
             }
             Entry::Skipped { skipped: true, .. } => self.advance(session),
             Entry::PlanExtended(_) | Entry::Plan(_) => {
-                self.prediction = Prediction::of(session);
+                self.prediction = Prediction::of(session, self.fewest);
                 self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());
             }
             _ => {}

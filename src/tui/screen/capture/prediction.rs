@@ -10,12 +10,11 @@ use crate::tui::widget::Chart;
 use crate::wizard::view::{CaptureView, PredictionView};
 
 /// Meaning of the predicted error.
-const MEANING: &str = "RMS position error that the noise of the instrument alone would leave in the identified arm. \
-    Errors that no kinematic model can express are added to it; only Verify measures the real error.";
+const MEANING: &str = "RMS position error anywhere in the range of the joints, predicted from the noise of instrument and arm and \
+    from what lengths, angles and joints of arms deviate by. Only Verify measures the real error.";
 
-/// An error with its unit: mm if the profile states an instrument, otherwise multiples of σ.
-fn error(sigma: f64, mm: Option<f64>) -> String {
-    mm.map_or_else(|| format!("{sigma:.3} sigma"), |mm| format!("{mm:.4} mm"))
+fn error(mm: f64) -> String {
+    format!("{mm:.3} mm")
 }
 
 /// Whether the rest is worth the time.
@@ -25,12 +24,12 @@ fn verdict(prediction: &PredictionView) -> &'static str {
 
 /// The prediction in a line.
 pub(super) fn in_short(prediction: &PredictionView, open: usize) -> String {
-    let now = error(prediction.now_sigma, prediction.now_mm);
+    let now = error(prediction.now_mm);
     if open == 0 {
         // Nothing is left of the plan, so there is nothing to say about the rest.
         return format!("predicted error {now} with all poses of the plan");
     }
-    let all = prediction.with_all_sigma.map(|sigma| error(sigma, prediction.with_all_mm));
+    let all = prediction.with_all_mm.map(error);
     let all = all.map_or_else(String::new, |all| format!(", {all} with all"));
     format!("predicted error {now}{all}: {}", verdict(prediction))
 }
@@ -45,10 +44,10 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
         text(theme, &lines, room, area, buf);
         return;
     };
-    let now = error(prediction.now_sigma, prediction.now_mm);
+    let now = error(prediction.now_mm);
     lines.push((format!("now, {}: {now}", counted(content.identification, "identification pose")), Role::Title));
-    if let Some(sigma) = prediction.with_all_sigma.filter(|_| content.open > 0) {
-        lines.push((format!("with all poses of the plan: {}", error(sigma, prediction.with_all_mm)), Role::Plain));
+    if let Some(mm) = prediction.with_all_mm.filter(|_| content.open > 0) {
+        lines.push((format!("with all poses of the plan: {}", error(mm)), Role::Plain));
     }
     let role = if prediction.is_enough { Role::Ok } else { Role::Hint };
     let said = if content.open == 0 { "all poses of the plan have been measured" } else { verdict(prediction) };
@@ -56,18 +55,14 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
     lines.push((MEANING.to_owned(), Role::Dim));
     let used = text(theme, &lines, room, area, buf);
 
-    // In mm if known; both are multiples of σ.
-    let mm = prediction.now_mm.map(|mm| mm / prediction.now_sigma).filter(|mm| mm.is_finite());
-    let factor = mm.unwrap_or(1.0);
-    let points: Vec<(f64, f64)> =
-        prediction.curve_sigma.iter().map(|(poses, sigma)| (*poses as f64, sigma * factor)).collect();
+    let points: Vec<(f64, f64)> = prediction.curve_mm.iter().map(|(poses, mm)| (*poses as f64, *mm)).collect();
     let chart = Chart {
         points: &points,
-        level: prediction.with_all_sigma.map(|sigma| sigma * factor),
+        level: prediction.with_all_mm,
         mark: points.last().map(|point| point.0),
-        y_title: if mm.is_some() { "predicted error (mm); dotted: with all poses" } else { "predicted error (sigma)" },
+        y_title: "predicted error (mm); dotted: with all poses",
         x_title: "identification poses",
-        digits: if mm.is_some() { 4 } else { 3 },
+        digits: 3,
     };
     chart.draw(theme, paint::band(area, used + 1, area.height), buf);
 }

@@ -63,10 +63,8 @@ fn normal() -> CaptureView {
         finding: None,
         drift: vec![DriftView { pose: "1".to_owned(), measurement: 13, moved_mm: 0.004 }],
         prediction: Some(PredictionView {
-            curve_sigma: (9..=12).map(|n| (n, 20.0 / n as f64)).collect(),
-            now_sigma: 20.0 / 12.0,
-            now_mm: Some(0.0250),
-            with_all_sigma: Some(0.8),
+            curve_mm: (9..=12).map(|n| (n, 0.3 / n as f64)).collect(),
+            now_mm: 0.0250,
             with_all_mm: Some(0.0120),
             is_enough: false,
         }),

@@ -1,10 +1,13 @@
 //! The error predicted for a calibration from the samples so far, and whether more samples are worth the time.
 
+use crate::identification::Terms;
+use crate::identification::predicted::Forecast;
 use crate::kinematics::Place;
-use crate::planning::{Information, JointBox, fewest_poses, findable, random};
+use crate::planning::{JointBox, fewest_poses, findable, random};
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
 use crate::session::state::Session;
+use crate::units::{MICROMETRE, MICRORADIAN};
 
 /// Fresh poses over which the prediction is averaged.
 const FRESH_POSES: usize = 200;
@@ -13,36 +16,74 @@ const FRESH_SEED: u64 = 0x5eed;
 /// Relative improvement below which the rest of the plan is not worth the time.
 const WORTHWHILE: f64 = 0.05;
 
-/// Predicted RMS position error at fresh poses, per σ of the instrument.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Size of joint curves that is expected before anything was measured (rad, rms).
+const EXPECTED_CURVES: f64 = 100.0 * MICRORADIAN;
+/// What arms scatter by from pose to pose (m).
+const REPEATABILITY: f64 = 20.0 * MICROMETRE;
+
+/// Predicted RMS position error at fresh poses of an arm with errors of its joints.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Prediction {
-    /// Error by number of identification samples, from the first number that determines all identifiable parameters.
+    /// Error by number of identification samples (m), from the first number that determines the geometry.
     pub(super) curve: Vec<(usize, f64)>,
-    /// Error with the rest of the plan included.
+    /// Error with the rest of the plan included (m).
     pub(super) with_all: Option<f64>,
+    /// Standard deviation of a measured coordinate (m): instrument and repeatability.
+    pub(super) sigma: f64,
+    /// State after the samples so far, and their number.
+    forecast: Option<(Forecast, usize)>,
+    /// Fewest samples that determine the geometry.
+    fewest: usize,
 }
 
 impl Prediction {
     /// Predicts from the samples of a session.
-    pub(super) fn of(session: &Session) -> Self {
-        Self::try_of(session).unwrap_or_default()
+    pub(super) fn of(session: &Session, fewest: Option<usize>) -> Self {
+        Self::try_of(session, fewest).unwrap_or_default()
     }
 
-    fn try_of(session: &Session) -> Option<Self> {
+    fn try_of(session: &Session, fewest: Option<usize>) -> Option<Self> {
         let profile = &session.mounted_profile()?;
-        let measured: Vec<Place> =
-            session.counted_of(PoseKind::Identification).map(|sample| at(session.configuration_of(sample))).collect();
-        let open = session
-            .open_rows()
-            .filter_map(|row| session.rows.get(row))
-            .filter(|row| row.planned.kind == PoseKind::Identification)
-            .map(|row| at(row.planned.configuration.clone()));
-        let pool: Vec<Place> = measured.iter().cloned().chain(open).collect();
-        let parameters = profile.parameters(Level::Geometric);
-        let information = Information::new(&profile.arm(), &parameters, &pool, &fresh(profile)?).ok()?;
-        let of_first = |count: usize| information.predicted_error(&(0..count).collect::<Vec<_>>());
-        let curve = (information.fewest_poses()..=measured.len()).filter_map(|n| Some((n, of_first(n)?))).collect();
-        Some(Self { curve, with_all: of_first(pool.len()) })
+        let arm = profile.arm();
+        let mut parameters = profile.parameters(Level::Geometric);
+        parameters.extend(Terms::all(EXPECTED_CURVES).parameters(&arm.chain));
+        let distance = profile.tracker().position_in_base.coords.norm();
+        let instrument = profile.instrument().map_or(0.0, |instrument| instrument.sigma_at(distance));
+        let sigma = instrument.hypot(REPEATABILITY);
+        let forecast = Forecast::new(&arm, &parameters, &fresh(profile)?, sigma);
+        let mut prediction =
+            Self { curve: Vec::new(), with_all: None, sigma, forecast: Some((forecast, 0)), fewest: fewest? };
+        for place in measured(session) {
+            prediction.append(&place);
+        }
+        let mut with_all = prediction.forecast.clone()?.0;
+        let open = session.open_rows().filter_map(|row| session.rows.get(row));
+        for row in open.filter(|row| row.planned.kind == PoseKind::Identification) {
+            with_all.measure(&at(row.planned.configuration.clone()));
+        }
+        prediction.with_all = Some(with_all.error());
+        Some(prediction)
+    }
+
+    /// The same with the samples of `session`, which has one more than before or others.
+    pub(super) fn follow(&mut self, session: &Session) {
+        let known = self.forecast.as_ref().map(|(_, known)| *known);
+        let now = session.counted_of(PoseKind::Identification).count();
+        match session.counted_of(PoseKind::Identification).last() {
+            Some(last) if known.is_some_and(|known| known + 1 == now) => {
+                self.append(&at(session.configuration_of(last)));
+            }
+            _ => *self = Self::of(session, Some(self.fewest)),
+        }
+    }
+
+    fn append(&mut self, place: &Place) {
+        let Some((forecast, known)) = &mut self.forecast else { return };
+        forecast.measure(place);
+        *known += 1;
+        if *known >= self.fewest {
+            self.curve.push((*known, forecast.error()));
+        }
     }
 
     /// Error with the samples so far.
@@ -57,6 +98,10 @@ impl Prediction {
             _ => false,
         }
     }
+}
+
+fn measured(session: &Session) -> impl Iterator<Item = Place> {
+    session.counted_of(PoseKind::Identification).map(|sample| at(session.configuration_of(sample)))
 }
 
 /// Fewest identification samples that can determine all identifiable parameters, by the same rule as planning. If the rank is

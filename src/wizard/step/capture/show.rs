@@ -44,7 +44,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
             worst: finding.worst.iter().map(|pair| pair_view(session, pair)).collect(),
         }),
         drift: drift(session),
-        prediction: prediction(step, session),
+        prediction: prediction(step),
         typed_unit: CaptureStep::manual_unit(cx).map(|unit| unit.sign().to_owned()),
         too_few: has_enough(session, step.fewest).err(),
         rows,
@@ -153,18 +153,12 @@ fn drift(session: &Session) -> Vec<DriftView> {
     found
 }
 
-fn prediction(step: &CaptureStep, session: &Session) -> Option<PredictionView> {
+fn prediction(step: &CaptureStep) -> Option<PredictionView> {
     let prediction = &step.prediction;
-    let profile = &session.robot.as_ref()?.profile;
-    let distance = profile.tracker().position_in_base.coords.norm();
-    let sigma = profile.instrument().map(|instrument| instrument.sigma_at(distance));
-    let mm = |error: f64| sigma.map(|sigma| to_mm(error * sigma));
     Some(PredictionView {
-        curve_sigma: prediction.curve.clone(),
-        now_sigma: prediction.now()?,
-        now_mm: prediction.now().and_then(mm),
-        with_all_sigma: prediction.with_all,
-        with_all_mm: prediction.with_all.and_then(mm),
+        curve_mm: prediction.curve.iter().map(|(poses, error)| (*poses, to_mm(*error))).collect(),
+        now_mm: to_mm(prediction.now()?),
+        with_all_mm: prediction.with_all.map(to_mm),
         is_enough: prediction.is_enough(),
     })
 }
