@@ -294,7 +294,7 @@ fn joint_lines(joints: &[JointSummary]) -> String {
     push_line(&mut text, "how much of the square error follows the joint:");
     for joint in joints {
         let Some(range) = joint.range() else { continue };
-        let bins: String = joint.bins.iter().map(|bin| format!("{:>8}", bin.mean())).collect();
+        let bins = joint.means(8);
         let share = joint.share().unwrap_or_else(|| "-".to_owned());
         push_line(&mut text, &format!("  {:<6}{range:<18}{bins}{share:>7}", joint.joint));
     }

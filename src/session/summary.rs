@@ -302,7 +302,7 @@ pub struct JointSummary {
 
 impl JointBin {
     /// The mean error (mm), or a dash without samples.
-    pub fn mean(&self) -> String {
+    fn mean(&self) -> String {
         let decimals = if self.mean_mm < 100.0 { 3 } else { 1 };
         if self.count == 0 { "-".to_owned() } else { fixed(self.mean_mm, decimals) }
     }
@@ -323,6 +323,12 @@ impl JointSummary {
     /// The share of the square error, if it is worth naming.
     pub fn share(&self) -> Option<String> {
         self.is_worth_naming().then(|| format!("{:.0} %", 100.0 * self.explained))
+    }
+
+    /// The mean errors over the parts of the range, each in this many columns.
+    pub fn means(&self, columns: usize) -> String {
+        let cells: Vec<String> = self.bins.iter().map(|bin| format!("{:>columns$}", bin.mean())).collect();
+        cells.concat()
     }
 
     /// The range of the joint with its unit, if there are samples.

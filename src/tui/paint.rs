@@ -74,8 +74,8 @@ pub(crate) fn snapshot(buf: &Buffer) -> String {
         }
     }
     for (style, marked) in styles {
-        let marked: String = marked.iter().map(|text| format!(" '{text}'")).collect();
-        lines.push(format!("style {style}:{marked}").trim_end_matches(':').to_owned());
+        let marked: Vec<String> = marked.iter().map(|text| format!(" '{text}'")).collect();
+        lines.push(format!("style {style}:{}", marked.concat()).trim_end_matches(':').to_owned());
     }
     lines.join("\n")
 }

@@ -120,7 +120,7 @@ fn plan() -> PlanText {
         minutes: Some(0.1),
         search: vec![Figures { condition_number: 61.5, o1: 0.25, predicted_error: 0.7 }],
         rows: PoseKind::ALL
-            .into_iter()
+            .iter()
             .map(|kind| row(*kind, Some((1.0, 2.0, -3.001))))
             .chain([row(PoseKind::Via, None)])
             .collect(),

@@ -129,7 +129,7 @@ pub(super) fn joints(content: &VerifyView, page: &mut Page) {
     )]);
     for joint in joints {
         let Some(range) = joint.range() else { continue };
-        let bins: String = joint.bins.iter().map(|bin| format!("{:>7}", bin.mean())).collect();
+        let bins = joint.means(7);
         let (share, role) = joint.share().map_or_else(|| ("-".to_owned(), Role::Dim), |share| (share, Role::Warn));
         page.line(vec![(format!("{:<6}{range:<18}{bins}", joint.joint), Role::Plain), (format!("{share:>7}"), role)]);
     }
