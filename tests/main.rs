@@ -17,6 +17,7 @@ mod compensate;
 mod docs;
 mod estimation;
 mod example;
+mod joint_errors;
 mod kinematics;
 mod lines;
 #[cfg(target_os = "linux")]
