@@ -430,7 +430,7 @@ fn the_ur_file_is_the_one_of_the_ros_description() {
     let profile = profile("ur5");
     let mut arm = calibrated(&profile);
     let error = export(&arm, Format::UrKinematics, &ExportOptions::default()).unwrap_err().to_string();
-    assert!(error.contains("alpha6, a6") && error.contains("Let the tool take it"), "{error}");
+    assert!(error.contains("alpha6, a6") && error.contains("Let the tool carry it"), "{error}");
     let options = ExportOptions { with_tool_offset: true, ..ExportOptions::default() };
     let remarks = export(&arm, Format::UrKinematics, &options).unwrap().remarks;
     assert!(remarks.iter().any(|remark| remark.contains("in front of every tool")), "{remarks:?}");

@@ -237,7 +237,11 @@ impl Scatter {
         let smallest = SMALLEST_SIGMA.powi(2) * 1e-6;
         let as_promised = sum(smallest);
         if as_promised <= target {
-            let confirmed = if self.reading > 0.0 { (as_promised / target).max(LEAST_CONFIRMED) } else { 1.0 };
+            // By an upper bound, one standard deviation of the sum above it: chance alone makes no instrument better. Outliers
+            // among the residuals say nothing about that.
+            let upper = (as_promised + (2.0 * target).sqrt()) / target;
+            let is_judged = self.reading > 0.0 && estimation == Estimation::Efficient;
+            let confirmed = if is_judged { upper.clamp(LEAST_CONFIRMED, 1.0) } else { 1.0 };
             return Noise { pose: 0.0, confirmed, ..*at };
         }
         let largest = self.residuals.iter().map(|residual| residual.square).fold(self.expected, f64::max);
