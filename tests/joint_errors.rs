@@ -157,8 +157,11 @@ fn a_range_that_was_left_out_is_named_and_not_accepted() {
     let arm = real_arm(&profile, Terms::all(150e-6), 9);
     for moved in [vec![2_usize], vec![0, 1, 3, 4, 5]] {
         let mut part = ranges(&profile);
-        let narrow: Vec<usize> =
-            if moved.len() == 1 { moved.clone() } else { (0..part.len()).filter(|joint| !moved.contains(joint)).collect() };
+        let narrow: Vec<usize> = if moved.len() == 1 {
+            moved.clone()
+        } else {
+            (0..part.len()).filter(|joint| !moved.contains(joint)).collect()
+        };
         for joint in &narrow {
             let (low, high) = part[*joint];
             let middle = f64::midpoint(low, high);

@@ -173,6 +173,9 @@ pub fn identify(
 
     let Verified { verification, warnings: doubts } = match request.verification_mode {
         VerificationMode::LeaveOneOut => {
+            // Every position left out decides again between what was kept and the geometry alone.
+            let kept = with_terms.selection.terms();
+            let candidates = if kept.is_geometry() { Vec::new() } else { vec![vec![Terms::default()], vec![kept]] };
             leave_one_out(&problem, &settings, &candidates, &identification.distances.positions, progress)?
         }
         _ => verify(request, &plausible, &nominal, found)?,
