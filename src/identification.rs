@@ -13,6 +13,36 @@
 //! - **Outliers** are points, found with a robust loss and then removed for real.
 //! - **Chirality** is checked: distances cannot see a mirrored frame.
 //!
+//! ```
+//! use nalgebra::Isometry3;
+//! use trupose::identification::{Observations, PointSample, Problem, Settings, identify};
+//! use trupose::kinematics::{LinkParameter, ParameterId, Place};
+//! use trupose::profile::{Level, Profile, builtin};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "soochow")?;
+//! let nominal = profile.arm();
+//! let length = ParameterId::Link { joint: 1, parameter: LinkParameter::A };
+//! let real = nominal.with([(length, 0.001)])?; // one link is 1 mm longer
+//!
+//! // An instrument somewhere in the room measures the target at poses that spread over the joint ranges.
+//! let station = Isometry3::translation(2.0, 1.0, 0.5);
+//! let value = |pose: usize, joint: usize| 3.0 * ((pose as f64 * (joint as f64 + 2.0).sqrt()).fract() - 0.5);
+//! let points = (1..60).map(|pose| {
+//!     let at = Place { configuration: (0..6).map(|joint| value(pose, joint)).collect(), target: 0 };
+//!     PointSample { point: station.inverse() * real.point_in_base(&at), at, station: 0, sigma: None }
+//! });
+//! let observations = Observations { points: points.collect(), ..Observations::default() };
+//! let parameters = profile.parameters(Level::Geometric);
+//! let problem = Problem { arm: &nominal, parameters: &parameters, observations: &observations };
+//!
+//! let found = identify(&problem, &Settings::default(), &mut |_| {})?;
+//! let found = found.estimates.iter().find(|estimate| estimate.id == length).unwrap();
+//! assert!((found.deviation - 0.001).abs() < 5e-6);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! Vectors and matrices over parameters follow the order of [`Problem::parameters`]; lengths in metres, angles in radians. Nothing
 //! here reads a file, a clock or a random number.
 
