@@ -36,6 +36,7 @@ mod chain;
 mod forward;
 mod jacobian;
 mod joint_error;
+mod loads;
 mod parameters;
 
 use thiserror::Error;
@@ -44,9 +45,8 @@ pub use arm::{Arm, Place, PreparedArm};
 pub use chain::{Convention, Joint, JointType, KinematicChain, Link};
 pub use forward::ForwardKinematics;
 pub use jacobian::{ConfigurationJacobian, IdentificationJacobian};
-pub use joint_error::{
-    GRAVITY, JointError, JointTerm, LinkMass, Loads, MAX_ORDER, SMOOTH_ORDERS, TiltAxis, curve_share,
-};
+pub use joint_error::{JointError, JointTerm, MAX_ORDER, SMOOTH_ORDERS, TiltAxis, curve_share};
+pub use loads::{GRAVITY, JointLoad, LinkMass, LoadScale, Loads};
 pub use parameters::{Axis, FreeParameter, LinkParameter, ParameterId, ParameterUnit};
 
 /// A geometry that cannot be built, or a parameter that does not exist.

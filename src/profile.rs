@@ -12,6 +12,7 @@ mod check;
 mod decode;
 mod diagnostic;
 mod expected;
+mod masses;
 mod schema;
 mod syntax;
 mod text;
@@ -24,11 +25,12 @@ pub use builtin::{builtin, builtin_names};
 pub use cell::{Capsule, Instrument, KeepOut, Tracker};
 pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
 pub use expected::{ExpectedDeviation, ExpectedDeviations};
+pub use masses::{Masses, Mounting};
 pub use text::{check_text, list_text, show_text};
 
 use wire::LinkSettings;
 
-use crate::kinematics::{Arm, FreeParameter, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{Arm, FreeParameter, KinematicChain, LinkMass, LinkParameter, ParameterId};
 use crate::text::{names_of_option, written_as_text};
 
 /// Angle below which neighbouring axes count as parallel (rad): 1°, far above any assembly error and far below any design angle.
@@ -43,7 +45,11 @@ pub struct Profile {
     name: String,
     title: String,
     source: String,
+    /// Under gravity, if the masses are given.
     chain: KinematicChain,
+    masses: Masses,
+    mounting: Mounting,
+    payload: Option<LinkMass>,
     joints: Vec<JointRange>,
     beta_joints: Vec<usize>,
     fixed_parameters: Vec<ParameterId>,
@@ -151,7 +157,7 @@ impl Profile {
         &self.source
     }
 
-    /// Links and joints of the nominal arm.
+    /// Links and joints of the nominal arm, with gravity on them if the masses are given.
     pub const fn chain(&self) -> &KinematicChain {
         &self.chain
     }
@@ -165,6 +171,21 @@ impl Profile {
     /// Limits and speeds, one entry per joint of the chain.
     pub fn joints(&self) -> &[JointRange] {
         &self.joints
+    }
+
+    /// Masses of the arm.
+    pub const fn masses(&self) -> &Masses {
+        &self.masses
+    }
+
+    /// How the base is mounted.
+    pub const fn mounting(&self) -> Mounting {
+        self.mounting
+    }
+
+    /// What the flange carries, if the profile says.
+    pub const fn payload(&self) -> Option<LinkMass> {
+        self.payload
     }
 
     /// Joints whose link has a β to identify, from 0, ascending.
@@ -230,6 +251,21 @@ impl Profile {
             *place = target;
         }
         changed
+    }
+
+    /// The robot with another payload. What compliance and tilt are relative to is computed again, as for an identification at this load;
+    /// an arm that is identified already changes its payload by [`KinematicChain::with_payload`].
+    #[must_use]
+    pub fn with_payload(&self, payload: LinkMass) -> Self {
+        Self { payload: Some(payload), ..self.clone() }.under_gravity()
+    }
+
+    /// The robot with the gravity that its masses, its payload and its mounting make.
+    fn under_gravity(mut self) -> Self {
+        if let Some(loads) = self.masses.loads(&self.chain, self.payload, self.mounting, &self.joints) {
+            self.chain = self.chain.with_loads(loads);
+        }
+        self
     }
 
     /// The parameters that a level identifies, in the order of equation (19) of the method paper: α, a, d, θ joint by joint,

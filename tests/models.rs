@@ -28,7 +28,7 @@ fn fixture(name: &str) -> String {
 /// The chain written as a profile and read again.
 fn through_text(arm: &ImportedArm) -> KinematicChain {
     let heading = Heading { comments: &["a test".to_owned()], name: "Test Arm", title: "t", source: "s" };
-    let part = Arm { chain: &arm.chain, ranges: &arm.ranges, beta_joints: &arm.beta_joints };
+    let part = Arm { chain: &arm.chain, ranges: &arm.ranges, beta_joints: &arm.beta_joints, masses: &arm.masses };
     let text = geometry_only(&heading, &part);
     let (read, warnings) = Profile::parse(&text, "test.ron").unwrap_or_else(|errors| panic!("{errors}\n{text}"));
     // What a URDF cannot know, and nothing else: a beta that is not needed would be warned about too.

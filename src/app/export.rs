@@ -85,7 +85,7 @@ pub(super) fn import_urdf<O: Write, E: Write>(
         title: &urdf.robot,
         source: &format!("URDF of '{}', from link '{}' to '{}'", urdf.robot, args.base, args.tip),
     };
-    let part = Arm { chain: &arm.chain, ranges: &arm.ranges, beta_joints: &arm.beta_joints };
+    let part = Arm { chain: &arm.chain, ranges: &arm.ranges, beta_joints: &arm.beta_joints, masses: &arm.masses };
     let profile = geometry_only(&heading, &part);
     // A written profile must be readable.
     load::parse_profile(profile.clone(), "the imported profile")?;

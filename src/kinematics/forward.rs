@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::joint_error::RelativeLoad;
+use super::loads::JointLoad;
 use super::{Convention, Joint, JointError, JointType, KinematicChain, Link};
 
 /// A chain prepared for many configurations: sines and cosines of the constant angles are computed once.
@@ -25,7 +25,7 @@ enum Disturbance {
     Loads,
 }
 
-const UNLOADED: RelativeLoad = RelativeLoad { torque: 0.0, moment: [0.0; 2] };
+const UNLOADED: JointLoad = JointLoad { torque: 0.0, moment: [0.0; 2] };
 
 /// Link constants with the sine and cosine of the fixed angles.
 #[derive(Clone, Copy, Debug)]
@@ -240,7 +240,7 @@ impl<'a> ForwardKinematics<'a> {
     }
 
     /// Gravity on each joint relative to the largest; empty without masses.
-    pub(super) fn relative_loads(&self, q: &[f64]) -> Vec<RelativeLoad> {
+    pub(super) fn relative_loads(&self, q: &[f64]) -> Vec<JointLoad> {
         self.chain.loads().map_or_else(Vec::new, |loads| loads.relative(&loads.forward(), q))
     }
 

@@ -5,27 +5,18 @@
 //! geometry and masses, so it does not change while the geometry is identified.
 
 use std::fmt;
-use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::chain::JointType;
-use super::forward::ForwardKinematics;
+use super::loads::{JointLoad, NO_TORQUE};
 use super::{Axis, KinematicChain};
 use crate::units::MILLIRADIAN;
 
-/// Gravitational acceleration (m/s²).
-pub const GRAVITY: f64 = 9.81;
 /// Highest order of a harmonic: a term's order fits every table.
 pub const MAX_ORDER: u8 = 50;
 /// Harmonics up to this order have a prior of their own; a joint curve begins above.
 pub const SMOOTH_ORDERS: u8 = 2;
-/// Steps over a joint's full turn when the largest load is looked for.
-const LOAD_SAMPLES: usize = 4096;
-/// Their square roots are irrational parts that have nothing in common.
-const PRIMES: [u8; 10] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29];
-/// A joint with less gravity torque than this (N·m) has no compliance to find.
-const NO_TORQUE: f64 = 1e-3;
 
 /// A term of the error of one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -177,7 +168,7 @@ impl JointError {
     }
 
     /// The rotation about x, y and z (rad) at the joint value `q` under the relative `load`.
-    pub(super) fn rotation(&self, q: f64, load: &RelativeLoad) -> Vector3<f64> {
+    pub(super) fn rotation(&self, q: f64, load: &JointLoad) -> Vector3<f64> {
         let angle = self.compliance * load.torque + self.curve(q);
         Vector3::new(self.tilt[0] * load.moment[0], self.tilt[1] * load.moment[1], angle)
     }
@@ -207,134 +198,7 @@ pub(super) fn harmonics(q: f64, orders: usize) -> impl Iterator<Item = (f64, f64
     })
 }
 
-/// A mass that a link carries.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LinkMass {
-    /// Mass (kg).
-    pub mass: f64,
-    /// Centre of mass in the frame at the end of the link (m).
-    pub centre: Point3<f64>,
-}
-
-/// Gravity on the joints of the nominal arm.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Loads {
-    nominal: KinematicChain,
-    links: Vec<LinkMass>,
-    payload: LinkMass,
-    gravity: Vector3<f64>,
-    largest_torques: Vec<f64>,
-    largest_moment: f64,
-}
-
-/// Gravity on one joint, relative to the largest that there is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct RelativeLoad {
-    /// Torque about the joint's axis, relative to the largest about it.
-    pub(super) torque: f64,
-    /// Moment about x and y, relative to the largest of the arm.
-    pub(super) moment: [f64; 2],
-}
-
-impl Loads {
-    /// Of the arm `nominal` whose links carry `links`, with `payload` in the flange frame. `down` is the direction of gravity in the
-    /// base. `ranges` are the limits of the pendant joints, over which the largest loads are taken.
-    pub fn new(
-        nominal: &KinematicChain,
-        links: Vec<LinkMass>,
-        payload: LinkMass,
-        down: Vector3<f64>,
-        ranges: &[(f64, f64)],
-    ) -> Self {
-        let dof = nominal.dof();
-        let gravity = down.try_normalize(f64::EPSILON).unwrap_or_else(|| -Vector3::z()) * GRAVITY;
-        let mut loads = Self {
-            nominal: nominal.without_errors(),
-            links,
-            payload,
-            gravity,
-            largest_torques: vec![0.0; dof],
-            largest_moment: 0.0,
-        };
-        // Evenly spread without a pattern: multiples of irrational parts of each range.
-        let part = |joint: usize| f64::from(PRIMES[joint % PRIMES.len()]).sqrt().fract();
-        for sample in 0..LOAD_SAMPLES {
-            let q: Vec<f64> = (0..dof)
-                .map(|joint| {
-                    let (low, high) =
-                        ranges.get(joint).copied().unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
-                    low + (high - low) * ((sample as f64 + 0.5) * part(joint)).fract()
-                })
-                .collect();
-            for (joint, (torque, moment)) in loads.at(&q).into_iter().enumerate() {
-                loads.largest_torques[joint] = loads.largest_torques[joint].max(torque.abs());
-                loads.largest_moment = loads.largest_moment.max(moment[0].hypot(moment[1])).max(torque.abs());
-            }
-        }
-        loads
-    }
-
-    /// Largest gravity torque about the axis of a joint (N·m): what one unit of its compliance term stands for.
-    pub fn largest_torque(&self, joint: usize) -> f64 {
-        self.largest_torques.get(joint).copied().unwrap_or(0.0)
-    }
-
-    /// Largest gravity moment of the arm (N·m).
-    pub const fn largest_moment(&self) -> f64 {
-        self.largest_moment
-    }
-
-    /// Whether gravity ever turns the joint.
-    pub fn turns(&self, joint: usize) -> bool {
-        self.largest_torque(joint) > NO_TORQUE
-    }
-
-    /// Gravity torque about the axis and moments about x and y of every joint (N·m).
-    fn at(&self, q: &[f64]) -> Vec<(f64, [f64; 2])> {
-        let forward = ForwardKinematics::new(&self.nominal);
-        self.at_with(&forward, q)
-    }
-
-    fn at_with(&self, forward: &ForwardKinematics<'_>, q: &[f64]) -> Vec<(f64, [f64; 2])> {
-        let (joints, ends, flange) = forward.frames(q);
-        let mut mass = self.payload.mass;
-        let mut weighted = (flange.origin + flange.axes() * self.payload.centre.coords) * mass;
-        let mut loads = vec![(0.0, [0.0; 2]); joints.len()];
-        for (joint, frame) in joints.iter().enumerate().rev() {
-            if let Some(link) = self.links.get(joint) {
-                weighted += (ends[joint].origin + ends[joint].axes() * link.centre.coords) * link.mass;
-                mass += link.mass;
-            }
-            let moment = (weighted - frame.origin * mass).cross(&self.gravity);
-            loads[joint] = (frame.z.dot(&moment), [frame.x.dot(&moment), frame.y.dot(&moment)]);
-        }
-        loads
-    }
-
-    pub(super) fn forward(&self) -> ForwardKinematics<'_> {
-        ForwardKinematics::new(&self.nominal)
-    }
-
-    /// Relative loads of every joint.
-    pub(super) fn relative(&self, forward: &ForwardKinematics<'_>, q: &[f64]) -> Vec<RelativeLoad> {
-        let loads = self.at_with(forward, q).into_iter().enumerate();
-        let over = |value: f64, largest: f64| if largest > NO_TORQUE { value / largest } else { 0.0 };
-        loads
-            .map(|(joint, (torque, moment))| RelativeLoad {
-                torque: over(torque, self.largest_torque(joint)),
-                moment: moment.map(|moment| over(moment, self.largest_moment)),
-            })
-            .collect()
-    }
-}
-
 impl KinematicChain {
-    /// The same arm under gravity.
-    #[must_use]
-    pub fn with_loads(self, loads: Loads) -> Self {
-        self.loaded(Some(Arc::new(loads)))
-    }
-
     /// Whether the joint can have this term: harmonics belong to turning joints, compliance and tilt need masses.
     pub fn has_term(&self, joint: usize, term: JointTerm) -> bool {
         let Some(of) = self.joints().get(joint) else { return false };

@@ -17,9 +17,10 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use super::ModelError;
 use super::proof::{self, Agreement, prove};
 use super::transforms::{between_axes, from_axes, screw_z};
-use super::urdf::UrdfChain;
-use crate::kinematics::{Convention, Joint, JointType, KinematicChain, Link};
-use crate::profile::{JointRange, PARALLEL_TOLERANCE};
+use super::urdf::{UrdfChain, UrdfJointType};
+use crate::kinematics::{Convention, ForwardKinematics, Joint, JointType, KinematicChain, Link, LinkMass};
+use crate::profile::{JointRange, Masses, PARALLEL_TOLERANCE};
+use crate::text::printable;
 
 /// Lengths (m) below this count as zero where only a direction depends on them.
 const NO_LENGTH: f64 = 1e-12;
@@ -36,6 +37,8 @@ pub struct ImportedArm {
     pub ranges: Vec<JointRange>,
     /// Joints whose link has a β.
     pub beta_joints: Vec<usize>,
+    /// Masses of the links, if the URDF has any.
+    pub masses: Masses,
     /// Remarks about what the URDF leaves open, one sentence each.
     pub notes: Vec<String>,
     /// Its agreement with the URDF at random configurations.
@@ -91,6 +94,7 @@ pub fn import(urdf: &UrdfChain<'_>, convention: Convention) -> Result<ImportedAr
             pulses_per_degree: None,
         })
         .collect();
+    let masses = masses(urdf, &chain);
     let unlimited = moving.iter().filter(|(joint, _)| joint.limits.is_none());
     let notes = unlimited.map(|(joint, _)| {
         if joint.type_name == "continuous" {
@@ -99,7 +103,34 @@ pub fn import(urdf: &UrdfChain<'_>, convention: Convention) -> Result<ImportedAr
             format!("joint '{}' has no usable <limit>; poses are planned only within limits", joint.name)
         }
     });
-    Ok(ImportedArm { notes: notes.collect(), chain, ranges, beta_joints, agreement })
+    let tools = urdf.on_tip.iter().map(|link| {
+        format!(
+            "link '{}' is fixed to the tip: its mass is not part of the arm; state it as 'payload'",
+            printable(link)
+        )
+    });
+    Ok(ImportedArm { notes: notes.chain(tools).collect(), chain, ranges, beta_joints, masses, agreement })
+}
+
+/// The masses of the links, in the frames at the ends of the links of `chain`.
+fn masses(urdf: &UrdfChain<'_>, chain: &KinematicChain) -> Masses {
+    if urdf.masses.iter().all(|link| link.mass <= 0.0) {
+        return Masses::Unknown;
+    }
+    let ends = ForwardKinematics::new(chain).base_from_links(&vec![0.0; chain.dof()]);
+    let mut pose = urdf.base_from_top;
+    let mut children = Vec::new();
+    for joint in &urdf.joints {
+        pose *= joint.origin;
+        if joint.joint_type != UrdfJointType::Fixed {
+            children.push(pose);
+        }
+    }
+    let in_end = |((link, child), end): ((&LinkMass, &Isometry3<f64>), &Isometry3<f64>)| LinkMass {
+        centre: (end.inverse() * child * link.centre).map(tidy),
+        ..*link
+    };
+    Masses::Links(urdf.masses.iter().zip(&children).zip(&ends[1..]).map(in_end).collect())
 }
 
 fn axes_at_rest(urdf: &UrdfChain<'_>) -> (Vec<Axis>, Isometry3<f64>) {

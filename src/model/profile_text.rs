@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::transforms::{number, roll_pitch_yaw};
-use crate::kinematics::{Convention, Joint, JointType, KinematicChain};
-use crate::profile::{ExpectedDeviations, JointRange, Profile, Target};
+use crate::kinematics::{Convention, Joint, JointType, KinematicChain, LinkMass};
+use crate::profile::{ExpectedDeviations, JointRange, Masses, Mounting, Profile, Target};
 use crate::text::printable;
 use crate::units::{MICROMETRE, MILLIRADIAN, Quantity, to_deg, to_mm};
 
@@ -29,6 +29,8 @@ pub struct Arm<'a> {
     pub ranges: &'a [JointRange],
     /// Joints whose link has a β.
     pub beta_joints: &'a [usize],
+    /// Masses of the links.
+    pub masses: &'a Masses,
 }
 
 /// A profile of an arm of which only geometry and limits are known. Everything else keeps its default, and comments in the text
@@ -44,8 +46,12 @@ pub fn geometry_only(heading: &Heading<'_>, arm: &Arm<'_>) -> String {
         "    // instrument: estimated from the residuals",
         "    // tracker: at (3000, 0, 1000) mm in the base, for planning only",
         "    // bodies, floor_mm, keep_out: nothing is checked for collisions",
+        "    // payload, mounting: nothing on the flange, base on the floor",
     ] {
         lines.push(line.to_owned());
+    }
+    if *arm.masses == Masses::Unknown {
+        lines.push("    // weight_kg, or mass_kg and centre_mm of the joints: without them nothing about gravity is identified".to_owned());
     }
     finished(lines)
 }
@@ -53,8 +59,9 @@ pub fn geometry_only(heading: &Heading<'_>, arm: &Arm<'_>) -> String {
 /// The profile with another arm and other targets; everything else but the comments is kept.
 pub fn complete(heading: &Heading<'_>, profile: &Profile, chain: &KinematicChain, targets: &[Target]) -> String {
     let mut lines = Vec::new();
-    let arm = Arm { chain, ranges: profile.joints(), beta_joints: profile.beta_joints() };
+    let arm = Arm { chain, ranges: profile.joints(), beta_joints: profile.beta_joints(), masses: profile.masses() };
     head(&mut lines, heading, &arm);
+    lines.extend(gravity_lines(profile));
     lines.push("    targets: [".to_owned());
     for target in targets {
         let axis = target.axis_in_flange.into_inner();
@@ -158,13 +165,45 @@ fn head(lines: &mut Vec<String>, heading: &Heading<'_>, arm: &Arm<'_>) {
     lines.push("    joints: [".to_owned());
     for (index, joint) in arm.chain.joints().iter().enumerate() {
         let range = arm.ranges.get(index).copied().unwrap_or_default();
-        lines.extend(joint_lines(joint, &range, arm.beta_joints.contains(&index), arm.chain));
+        let mass = match arm.masses {
+            Masses::Links(links) => links.get(index),
+            Masses::Weight(_) | Masses::Unknown => None,
+        };
+        lines.extend(joint_lines(joint, &range, mass, arm.beta_joints.contains(&index), arm.chain));
     }
     lines.push("    ],".to_owned());
     lines.extend(pose("flange", arm.chain.flange()));
 }
 
-fn joint_lines(joint: &Joint, range: &JointRange, has_beta: bool, chain: &KinematicChain) -> Vec<String> {
+/// Weight, payload and mounting, where they differ from the defaults.
+fn gravity_lines(profile: &Profile) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Masses::Weight(weight) = profile.masses() {
+        lines.push(format!("    weight_kg: {},", number(*weight)));
+    }
+    lines.extend(profile.payload().map(|payload| format!("    payload: ({}),", mass_fields(&payload))));
+    match profile.mounting() {
+        Mounting::Floor => {}
+        Mounting::Wall => lines.push("    mounting: Wall,".to_owned()),
+        Mounting::Ceiling => lines.push("    mounting: Ceiling,".to_owned()),
+        Mounting::Gravity(direction) => {
+            lines.push(format!("    gravity_in_base: {},", triple(direction.into_inner().into())));
+        }
+    }
+    lines
+}
+
+fn mass_fields(mass: &LinkMass) -> String {
+    format!("mass_kg: {}, centre_mm: {}", number(mass.mass), point(&mass.centre))
+}
+
+fn joint_lines(
+    joint: &Joint,
+    range: &JointRange,
+    mass: Option<&LinkMass>,
+    has_beta: bool,
+    chain: &KinematicChain,
+) -> Vec<String> {
     let link = joint.link;
     let (joint_type, unit) = match joint.joint_type {
         JointType::Revolute => ("Revolute", "deg"),
@@ -206,11 +245,10 @@ fn joint_lines(joint: &Joint, range: &JointRange, has_beta: bool, chain: &Kinema
     interval("planning_limits", range.planning_limits.filter(|planning| Some(*planning) != range.limits));
     second.extend(range.max_speed.map(|speed| format!("max_speed_{unit}_s: {}", edge(quantity, speed))));
     second.extend(range.pulses_per_degree.map(|pulses| format!("pulses_per_degree: {}", number(pulses))));
-    if second.is_empty() {
-        vec![format!("{first}),")]
-    } else {
-        vec![format!("{first},"), format!("            {}),", second.join(", "))]
-    }
+    let more = [second.join(", "), mass.map(mass_fields).unwrap_or_default()];
+    let more = more.into_iter().filter(|fields| !fields.is_empty()).map(|fields| format!("            {fields}"));
+    let fields: Vec<String> = std::iter::once(first).chain(more).collect();
+    format!("{}),", fields.join(",\n")).lines().map(str::to_owned).collect()
 }
 
 /// A limit with the digits that makers give: without the last bits of the conversion.

@@ -6,12 +6,12 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Unit, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use roxmltree::{Document, Node};
 use thiserror::Error;
 
 use super::transforms::{from_roll_pitch_yaw, motion};
-use crate::kinematics::JointType;
+use crate::kinematics::{JointType, LinkMass};
 use crate::text::printable;
 
 /// A defect of a URDF.
@@ -87,6 +87,8 @@ pub struct Urdf {
     pub links: Vec<String>,
     /// Joints in the order of the file.
     pub joints: Vec<UrdfJoint>,
+    /// Masses of the links that have an `<inertial>`, with the centre in the frame of the link (m).
+    pub masses: BTreeMap<String, LinkMass>,
 }
 
 /// The path between two links.
@@ -96,6 +98,11 @@ pub struct UrdfChain<'u> {
     pub base_from_top: Isometry3<f64>,
     /// The joints down to the tip, fixed ones among them.
     pub joints: Vec<&'u UrdfJoint>,
+    /// What each moving joint carries up to the next one, with the centre in the frame of its child link (m): that link and all
+    /// that is fixed to it, without what hangs on the tip.
+    pub masses: Vec<LinkMass>,
+    /// Links with a mass that are fixed to the tip: a tool.
+    pub on_tip: Vec<&'u str>,
 }
 
 impl Urdf {
@@ -121,6 +128,7 @@ impl Urdf {
         }
         let mut links: BTreeMap<&str, u32> = BTreeMap::new();
         let mut link_names = Vec::new();
+        let mut masses = BTreeMap::new();
         for node in elements(root, "link") {
             let name = reader.attribute(node, "<link>", "name")?;
             if let Some(line) = links.insert(name, reader.line(node)) {
@@ -128,6 +136,9 @@ impl Urdf {
                 return Err(reader.element(node, format!("link '{}'", printable(name)), message));
             }
             link_names.push(name.to_owned());
+            if let Some(inertial) = elements(node, "inertial").next() {
+                masses.insert(name.to_owned(), reader.mass(inertial, name)?);
+            }
         }
         let mut joints: Vec<UrdfJoint> = Vec::new();
         for node in elements(root, "joint") {
@@ -149,7 +160,7 @@ impl Urdf {
             joints.push(joint);
         }
         let robot = root.attribute("name").unwrap_or("robot").to_owned();
-        Ok(Self { robot, links: link_names, joints })
+        Ok(Self { robot, links: link_names, joints, masses })
     }
 
     /// The chain from the frame of link `base` to that of link `tip`. From the base the way may lead up, but only over fixed
@@ -204,12 +215,57 @@ impl Urdf {
                 return Err(joint.error(message));
             }
         }
-        let chain = UrdfChain { base_from_top, joints: down };
+        let masses = self.carried(&down, tip);
+        let mut on_tip = Vec::new();
+        self.fixed_to(tip, None, &mut |link, _| {
+            if let Some((name, mass)) = self.masses.get_key_value(link)
+                && link != tip
+                && mass.mass > 0.0
+            {
+                on_tip.push(name.as_str());
+            }
+        });
+        let chain = UrdfChain { base_from_top, joints: down, masses, on_tip };
         if chain.moving().next().is_none() {
             let message = format!("no joint moves between '{}' and '{}'", printable(base), printable(tip));
             return Err(UrdfError::Chain(message));
         }
         Ok(chain)
+    }
+
+    /// What each moving joint of `way` carries up to the next one.
+    fn carried(&self, way: &[&UrdfJoint], tip: &str) -> Vec<LinkMass> {
+        let moving = way.iter().filter(|joint| joint.joint_type != UrdfJointType::Fixed);
+        moving
+            .map(|joint| {
+                let (mut mass, mut weighted) = (0.0, Vector3::zeros());
+                self.fixed_to(&joint.child, Some(tip), &mut |link, pose| {
+                    if let Some(own) = self.masses.get(link) {
+                        mass += own.mass;
+                        weighted += (pose * own.centre).coords * own.mass;
+                    }
+                });
+                let centre = if mass > 0.0 { Point3::from(weighted / mass) } else { Point3::origin() };
+                LinkMass { mass, centre }
+            })
+            .collect()
+    }
+
+    /// Visits a link and all that is fixed to it, with their poses in its frame. What hangs on the link `end` is left out.
+    fn fixed_to(&self, link: &str, end: Option<&str>, visit: &mut dyn FnMut(&str, &Isometry3<f64>)) {
+        let mut open = vec![(link, Isometry3::identity())];
+        let mut visited = 0;
+        while let Some((link, pose)) = open.pop() {
+            visit(link, &pose);
+            visited += 1;
+            if Some(link) == end || visited > self.joints.len() {
+                continue;
+            }
+            let fixed = self.joints.iter().filter(|joint| joint.joint_type == UrdfJointType::Fixed);
+            open.extend(
+                fixed.filter(|joint| joint.parent == link).map(|joint| (joint.child.as_str(), pose * joint.origin)),
+            );
+        }
     }
 
     /// The joints above a link, nearest first.
@@ -288,6 +344,25 @@ impl Reader<'_, '_> {
     fn attribute<'a>(&self, node: Node<'a, '_>, element: &str, name: &str) -> Result<&'a str, UrdfError> {
         let value = node.attribute(name).filter(|value| !value.trim().is_empty());
         value.ok_or_else(|| self.element(node, element.to_owned(), format!("has no attribute '{name}'")))
+    }
+
+    /// Mass and centre of an `<inertial>` of this link.
+    fn mass(&self, node: Node<'_, '_>, link: &str) -> Result<LinkMass, UrdfError> {
+        let what = format!("<inertial> of link '{}'", printable(link));
+        let Some(mass) = elements(node, "mass").next() else {
+            return Err(self.element(node, what, "has no <mass>"));
+        };
+        let element = format!("<mass> of link '{}'", printable(link));
+        let text = self.attribute(mass, &element, "value")?;
+        let value = self.finite(mass, &element, "value", text)?;
+        if value < 0.0 {
+            return Err(self.element(mass, element, format!("{value} kg is below zero")));
+        }
+        let centre = match elements(node, "origin").next() {
+            Some(origin) => self.triple(origin, &format!("<origin> of the {what}"), "xyz")?.unwrap_or([0.0; 3]),
+            None => [0.0; 3],
+        };
+        Ok(LinkMass { mass: value, centre: Point3::from(centre) })
     }
 
     fn joint(&self, node: Node<'_, '_>, links: &BTreeMap<&str, u32>) -> Result<UrdfJoint, UrdfError> {

@@ -11,6 +11,10 @@
 //! | joint `planning_limits_…` | the joint limits |
 //! | `targets` | one target 'smr' at the flange origin, free (with a warning) |
 //! | target `uncertainty_mm`, `axis_in_flange` | 50 mm; +z of the flange |
+//! | joint `mass_kg`, `centre_mm` | no mass; both or none; the centre is in the frame at the end of the joint's link |
+//! | `weight_kg` | no masses; the arm's weight as its maker states it, split over the links by their lengths |
+//! | `payload`: `(mass_kg, centre_mm)` | nothing on the flange; the centre is in the flange frame |
+//! | `mounting` | `Floor`; `Wall` (gravity along +x of the base), `Ceiling`, or `gravity_in_base: (x, y, z)` |
 //! | `fixed`, `keep_out`, `bodies` | none |
 //! | `expected_deviations` | 1 mm, α β 2 mrad, joint offset 10 mrad, prismatic offset 1 mm |
 //! | `acceptance` | no limit |
@@ -21,6 +25,7 @@
 
 mod cell;
 mod joint;
+mod masses;
 mod parameters;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -28,7 +33,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use super::decode::{Fields, choice, direction, fields, list, not_negative, number, numbers, point, text};
 use super::diagnostic::{Diagnostic, Findings, ProfileErrors};
 use super::syntax::{self, Ast};
-use super::{FREE_TARGET_UNCERTAINTY, JointRange, Profile, Target, check};
+use super::{FREE_TARGET_UNCERTAINTY, JointRange, Masses, Profile, Target, check};
 use crate::kinematics::{Convention, Joint, KinematicChain};
 use crate::units::{from_deg, from_mm};
 use joint::DecodedJoint;
@@ -45,6 +50,10 @@ const FIELDS: &[&str] = &[
     "base",
     "joints",
     "flange",
+    "weight_kg",
+    "payload",
+    "mounting",
+    "gravity_in_base",
     "targets",
     "fixed",
     "expected_deviations",
@@ -89,6 +98,8 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let instrument = cell::instrument(&top, findings);
     let link = cell::link(&top, findings);
     let tracker = cell::tracker(&top, findings);
+    let mounting = masses::mounting(&top, findings);
+    let payload = masses::payload(&top, findings);
     let floor = top.get("floor_mm").and_then(|ast| number(ast, findings)).map(from_mm);
     let keep_out = cell::keep_out(&top, findings);
     let known = joints.as_ref().map(|joints| joints.shapes.as_slice());
@@ -101,6 +112,8 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let decoded = joints?;
     let joints = decoded.complete?;
     let spans: Vec<_> = joints.iter().map(|joint| joint.span).collect();
+    let links: Vec<_> = joints.iter().map(|joint| (joint.mass, joint.span)).collect();
+    let masses = masses::masses(&top, &links, findings);
     let (chain_joints, joint_ranges, has_beta) = unzipped(joints);
     let chain = match KinematicChain::new(convention?, base?, chain_joints, flange?) {
         Ok(chain) => chain,
@@ -115,6 +128,9 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
         title: title?,
         source: source?,
         chain,
+        masses: masses?,
+        mounting: mounting?,
+        payload: payload?,
         joints: joint_ranges,
         beta_joints,
         fixed_parameters: fixed_parameters?,
@@ -129,14 +145,18 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
         tracker: tracker?,
     };
     check::check(&profile, &spans, findings);
-    Some(profile)
+    if let (Masses::Unknown, Some(ast)) = (&profile.masses, top.get("payload")) {
+        let hint = "add 'weight_kg', or 'mass_kg' and 'centre_mm' of the joints".to_owned();
+        findings.warning(ast.span, "the payload has no effect: the masses of the arm are not given", hint);
+    }
+    Some(profile.under_gravity())
 }
 
 fn unzipped(joints: Vec<DecodedJoint>) -> (Vec<Joint>, Vec<JointRange>, Vec<bool>) {
     let mut chain_joints = Vec::with_capacity(joints.len());
     let mut ranges = Vec::with_capacity(joints.len());
     let mut has_beta = Vec::with_capacity(joints.len());
-    for DecodedJoint { joint, range, has_beta: beta, span: _ } in joints {
+    for DecodedJoint { joint, range, has_beta: beta, .. } in joints {
         chain_joints.push(joint);
         ranges.push(range);
         has_beta.push(beta);

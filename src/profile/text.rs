@@ -3,8 +3,8 @@
 //! Degrees and millimetres, as in the file. Every text ends with a line break.
 
 use super::diagnostic::joined;
-use super::{Diagnostic, JointRange, Level, PARALLEL_TOLERANCE, Profile, ProfileErrors};
-use crate::kinematics::{Convention, Joint, JointType};
+use super::{Diagnostic, JointRange, Level, Masses, Mounting, PARALLEL_TOLERANCE, Profile, ProfileErrors};
+use crate::kinematics::{Convention, Joint, JointType, LinkMass, Loads};
 use crate::text::{counted, counted_as, printable, shortened, wrapped};
 use crate::units::{Quantity, to_deg, to_mm};
 
@@ -33,6 +33,8 @@ pub fn show_text(profile: &Profile) -> String {
     lines.extend(range_lines(profile));
     lines.push(String::new());
     lines.extend(target_lines(profile));
+    lines.push(String::new());
+    lines.extend(mass_lines(profile));
     lines.push(String::new());
     lines.extend(parameter_lines(profile));
     lines.push(String::new());
@@ -140,6 +142,42 @@ fn target_lines(profile: &Profile) -> Vec<String> {
         let [x, y, z] = [0, 1, 2].map(|axis| fixed(to_mm(target.position_in_flange[axis]), 3));
         lines.push(clipped(&format!("{:<12}{x:>11}{y:>11}{z:>11}  {state}", target.name)));
     }
+    lines
+}
+
+fn mass_lines(profile: &Profile) -> Vec<String> {
+    let loads = profile.chain().loads();
+    let links: Vec<String> =
+        loads.map(Loads::links).unwrap_or_default().iter().map(|link| fixed(link.mass, 3)).collect();
+    let masses = match profile.masses() {
+        Masses::Unknown => "not given, nothing about gravity can be identified".to_owned(),
+        Masses::Weight(weight) => {
+            format!(
+                "{} kg, {} kg of the arm split over the links by their lengths",
+                links.join(", "),
+                fixed(*weight, 1)
+            )
+        }
+        Masses::Links(_) => format!("{} kg, stated link by link", links.join(", ")),
+    };
+    let payload = profile.payload().map_or_else(
+        || "none".to_owned(),
+        |LinkMass { mass, centre }| {
+            let [x, y, z] = [0, 1, 2].map(|axis| fixed(to_mm(centre[axis]), 1));
+            format!("{} kg, centre ({x}, {y}, {z}) mm in the flange", fixed(mass, 3))
+        },
+    );
+    let mounting = match profile.mounting() {
+        Mounting::Floor => "mounted on the floor".to_owned(),
+        Mounting::Wall => "mounted on a wall, gravity along +x of the base".to_owned(),
+        Mounting::Ceiling => "mounted on the ceiling".to_owned(),
+        Mounting::Gravity(direction) => {
+            let [x, y, z] = [0, 1, 2].map(|axis| fixed(direction[axis], 3));
+            format!("gravity along ({x}, {y}, {z}) in the base")
+        }
+    };
+    let mut lines = wrapped(&format!("masses of the links: {masses}"), WIDTH);
+    lines.extend(wrapped(&format!("payload: {payload}; {mounting}"), WIDTH));
     lines
 }
 

@@ -4,7 +4,8 @@ use super::super::JointRange;
 use super::super::decode::{Fields, choice, fields, list, number, number_map, positive, range, text};
 use super::super::diagnostic::{Findings, Span};
 use super::super::syntax::{Ast, shortened};
-use crate::kinematics::{Joint, JointType, Link};
+use super::masses;
+use crate::kinematics::{Joint, JointType, Link, LinkMass};
 use crate::text::near_miss;
 use crate::units::Quantity;
 
@@ -25,6 +26,8 @@ const FIELDS: &[&str] = &[
     "max_speed_deg_s",
     "max_speed_mm_s",
     "pulses_per_degree",
+    "mass_kg",
+    "centre_mm",
 ];
 
 /// A valid joint.
@@ -32,6 +35,7 @@ pub(super) struct DecodedJoint {
     pub(super) joint: Joint,
     pub(super) range: JointRange,
     pub(super) has_beta: bool,
+    pub(super) mass: Option<LinkMass>,
     /// Span of its name, as the location of problems of the whole joint.
     pub(super) span: Span,
 }
@@ -72,10 +76,12 @@ pub(super) fn joints(ast: &Ast, findings: &mut Findings<'_>) -> Option<DecodedJo
         let has_beta = inside.get("beta_deg").is_some();
         shapes.push(JointShape { has_beta });
         let joint = joint(inside, index, joint_type, &names, findings);
-        match (joint, &mut complete) {
-            (Some((joint, range)), Some(complete)) => {
+        let has_mass = ["mass_kg", "centre_mm"].iter().any(|field| inside.get(field).is_some());
+        let mass = if has_mass { masses::mass(inside, findings).map(Some) } else { Some(None) };
+        match (joint, mass, &mut complete) {
+            (Some((joint, range)), Some(mass), Some(complete)) => {
                 let span = inside.get("name").map_or_else(|| inside.start(), |name| name.span);
-                complete.push(DecodedJoint { joint, range, has_beta, span });
+                complete.push(DecodedJoint { joint, range, has_beta, mass, span });
             }
             _ => complete = None,
         }
