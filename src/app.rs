@@ -22,10 +22,12 @@ mod wizard;
 
 use std::io::{self, Write};
 
-use crate::cli::{Cli, Command, EstimationArgs, ScriptArgs};
+use crate::cli::{Cli, Command, EstimationArgs, PayloadArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::Weighting;
 use crate::procedure::EstimationSettings;
+use crate::profile::Profile;
+use crate::session::set_up::PayloadText;
 use crate::text::printable;
 use crate::units::from_mm;
 
@@ -120,6 +122,20 @@ fn estimation_settings(args: &EstimationArgs, weighting: Weighting) -> Estimatio
         expected_deviation: args.expected_deviation,
         filter: args.filter.clone(),
     }
+}
+
+/// The payload that the options state for the arm of `profile`.
+///
+/// # Errors
+/// The masses of that arm are unknown: a payload would change nothing.
+fn payload_of(args: &PayloadArgs, profile: &Profile) -> Result<Option<PayloadText>, Failure> {
+    let payload = args.text();
+    if payload.is_some() && profile.chain().loads().is_none() {
+        let text = format!("a payload changes nothing: the profile '{}' gives no masses of the arm", profile.name());
+        return Err(Failure::new(ExitStatus::Usage, text)
+            .hint("add 'weight_kg', or 'mass_kg' and 'centre_mm' of the joints, to the profile"));
+    }
+    Ok(payload)
 }
 
 /// A JSON object as printed: indented, with a line break at the end.

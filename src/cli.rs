@@ -1,6 +1,7 @@
 //! Arguments of the command line.
 
 mod link;
+mod payload;
 mod recording;
 mod session;
 mod terminal;
@@ -27,6 +28,7 @@ use crate::units::{from_mm, to_mm};
 
 use link::wires;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
+pub use payload::PayloadArgs;
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
 pub use session::SessionCommand;
 pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
@@ -258,6 +260,9 @@ pub struct EstimationArgs {
     /// Expected deviation of every length and every angle instead of the profile's, such as '1mm,0.1deg'
     #[arg(long, value_name = "LENGTH,ANGLE")]
     pub expected_deviation: Option<ExpectedDeviation>,
+    /// What the flange carried.
+    #[command(flatten)]
+    pub payload: PayloadArgs,
     /// Folder for the results (calibration.ron, report.html, report.json); created if it is missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -307,6 +312,9 @@ pub struct VerifyArgs {
     /// Rows to verify on, such as 'pose < 20'
     #[arg(long = "use", value_name = "CONDITION")]
     pub filter: Option<String>,
+    /// What the flange carried.
+    #[command(flatten)]
+    pub payload: PayloadArgs,
     /// What to fit to these points because the set-up changed: nothing, the tracker's place, or also the SMR's mounting
     #[arg(long, value_enum, default_value_t)]
     pub refit: Refit,

@@ -18,6 +18,7 @@ mod docs;
 mod estimation;
 mod example;
 mod joint_errors;
+mod gravity;
 mod kinematics;
 mod lines;
 #[cfg(target_os = "linux")]

@@ -50,6 +50,7 @@ fn request() -> IdentifyRequest {
     };
     IdentifyRequest {
         mounted: None,
+        payload: None,
         profile,
         profile_text,
         created: CREATED.to_owned(),

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3};
 
-use super::{Console, export};
+use super::{Console, export, payload_of};
 use crate::cli::compensate::CompensateArgs;
 use crate::compensation::{Compensated, Compensator, Goal, Settings, Status, ToolArm};
 use crate::error::{ExitStatus, Failure};
@@ -33,7 +33,13 @@ pub(super) fn run<O: Write, E: Write>(
         return Err(Failure::new(ExitStatus::Usage, message)
             .hint("write to another file: corrected targets must not be corrected a second time"));
     }
-    let arm = export::calibrated_arm(&args.calibration, console)?;
+    let mut arm = export::calibrated_arm(&args.calibration, console)?;
+    if let Some(payload) = payload_of(&args.payload, &arm.profile)? {
+        arm.identified = arm.identified.with_payload(payload.mass());
+        if !arm.identified.chain.is_loaded() {
+            console.remark("note: this calibration has no compliance: another payload changes nothing");
+        }
+    }
     if !args.position_only && args.target.is_none() && !arm.untold.is_empty() {
         let names: Vec<&str> = arm.profile.targets().iter().map(|target| target.name.as_str()).collect();
         console.remark(&format!(

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 
 use super::identify::run_request;
-use super::{Console, estimation_settings, load};
+use super::{Console, estimation_settings, load, payload_of};
 use crate::cli::ConstraintsArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::{Length, LengthEnd, SharedPoint, Weighting};
@@ -55,11 +55,13 @@ pub(super) fn run<O: Write, E: Write>(
         return Err(Failure::new(ExitStatus::Usage, "no row is left for the verification")
             .hint("'--use' must leave some rows out"));
     }
+    let payload = payload_of(&estimation.payload, &loaded.profile)?;
     let verification = if args.verify_rest { rest } else { Distances::default() };
     let request = IdentifyRequest {
         profile: loaded.profile,
         profile_text: loaded.text,
         mounted: None,
+        payload,
         created: load::now(),
         inputs: vec![input_file(InputRole::Identification, file, &bytes)],
         settings: estimation_settings(estimation, Weighting::Covariance),

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::load::now;
 use super::progress::Progress;
-use super::{Console, advice, estimation_settings, load, record, to_json};
+use super::{Console, advice, estimation_settings, load, payload_of, record, to_json};
 use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::checks;
@@ -60,8 +60,10 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     let of_verification = || verification.as_ref().and_then(|loaded| loaded.simulated.clone());
     set.warnings.extend(identification.simulated.clone().or_else(of_verification));
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
+    let payload = payload_of(&estimation.payload, &loaded.profile)?;
     let request = IdentifyRequest {
         mounted: None,
+        payload,
         profile: loaded.profile,
         profile_text: loaded.text,
         created: now(),

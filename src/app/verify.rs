@@ -6,7 +6,7 @@ use std::io::Write;
 use nalgebra::Isometry3;
 
 use super::identify::exit_status;
-use super::{Console, advice, load, to_json};
+use super::{Console, advice, load, payload_of, to_json};
 use crate::cli::VerifyArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
@@ -18,6 +18,7 @@ use crate::procedure::{ProcedureError, input_file, provenance};
 use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
+use crate::session::set_up::PayloadText;
 use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
 use crate::text;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
@@ -45,7 +46,8 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     }
 
     let plausible = check_table(args, profile, &samples)?;
-    let models = Models::new(&calibration, profile, &file)?;
+    let payload = payload_of(&args.payload, profile)?;
+    let models = Models::new(&calibration, profile, payload.as_ref(), &file)?;
     let (nominal, identified) = models.set_up(args.refit, profile, &samples, &file)?;
     let errors = |setup: &FittedSetup| {
         ModelErrors::new(&setup.arm, &setup.base_from_station, &samples)
@@ -175,12 +177,20 @@ struct Models {
 }
 
 impl Models {
-    fn new(calibration: &Calibration, profile: &Profile, file: &str) -> Result<Self, Failure> {
+    /// The arms of a calibration, with another payload if there is one.
+    fn new(
+        calibration: &Calibration,
+        profile: &Profile,
+        payload: Option<&PayloadText>,
+        file: &str,
+    ) -> Result<Self, Failure> {
         let unusable =
             |error: &dyn Error| Failure::new(ExitStatus::Usage, format!("'{file}': {}", text::causes(error)));
+        let identified = calibration.identified(profile).map_err(|error| unusable(&error))?;
         Ok(Self {
             nominal: calibration.nominal(profile).map_err(|error| unusable(&error))?,
-            identified: calibration.identified(profile).map_err(|error| unusable(&error))?,
+            identified: payload
+                .map_or_else(|| identified.clone(), |payload| identified.clone().with_payload(payload.mass())),
             nominal_station: calibration.nominal_base_from_station.as_ref().map(Into::into),
             station: calibration.base_from_station.as_ref().map(Into::into),
         })

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::one_of;
+use super::{PayloadArgs, one_of};
 use crate::kinematics::Convention;
 use crate::model::Format;
 use crate::program::Dialect;
@@ -33,6 +33,9 @@ pub struct CompensateArgs {
     /// Reach the position only and ignore the orientation
     #[arg(long)]
     pub position_only: bool,
+    /// What the flange carries when these commands run.
+    #[command(flatten)]
+    pub payload: PayloadArgs,
     /// Point to bring to the targets: a target (SMR) of the profile [default: the flange]
     #[arg(long, value_name = "NAME")]
     pub target: Option<String>,

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::{ForwardKinematics, KinematicChain, KinematicsError, ParameterId};
+use super::{ForwardKinematics, KinematicChain, KinematicsError, LinkMass, ParameterId};
 
 /// A configuration and the target that is observed there.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -65,6 +65,12 @@ impl Arm {
             ParameterId::Joint { .. } => None,
             ParameterId::Target { target, axis } => Some(&mut self.targets.get_mut(target)?[axis.index()]),
         }
+    }
+
+    /// The same arm with another payload on its flange; see [`KinematicChain::with_payload`].
+    #[must_use]
+    pub fn with_payload(self, payload: LinkMass) -> Self {
+        Self { chain: self.chain.with_payload(payload), ..self }
     }
 
     /// The arm prepared for many places.

@@ -170,6 +170,11 @@ impl KinematicChain {
         &self.errors
     }
 
+    /// Whether gravity bends the arm: a joint has compliance or tilt.
+    pub fn is_loaded(&self) -> bool {
+        self.errors.iter().any(JointError::is_loaded)
+    }
+
     /// Gravity on the joints, where the masses of the links are known.
     pub fn loads(&self) -> Option<&Loads> {
         self.loads.as_deref()

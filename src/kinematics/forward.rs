@@ -181,7 +181,7 @@ impl<'a> ForwardKinematics<'a> {
             flange_rotation: *flange.rotation.to_rotation_matrix().matrix(),
             flange_translation: flange.translation.vector,
             flange_is_identity: *flange == Isometry3::identity(),
-            disturbance: if chain.errors().iter().any(JointError::is_loaded) {
+            disturbance: if chain.is_loaded() {
                 Disturbance::Loads
             } else if chain.errors().iter().any(|error| *error != JointError::default()) {
                 Disturbance::Curves

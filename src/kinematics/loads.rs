@@ -190,6 +190,15 @@ impl KinematicChain {
         }
     }
 
+    /// The same arm with the meaning that coefficients had in an earlier identification; unchanged if its masses are unknown.
+    #[must_use]
+    pub fn with_load_scale(self, scale: LoadScale) -> Self {
+        match self.loads().map(|loads| loads.with_scale(scale)) {
+            Some(loads) => self.with_loads(loads),
+            None => self,
+        }
+    }
+
     /// A rough split of the arm's weight (kg) over its links, for arms whose maker publishes only the total.
     ///
     /// Half of the weight is drives, half is structure. A drive weighs in proportion to the reach of the arm beyond its joint, which

@@ -14,8 +14,9 @@ use crate::identification::{
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
 use crate::session::advice::Advice;
-use crate::session::calibration::{self, Calibration, MountedText, SampleText};
+use crate::session::calibration::{self, Calibration, LoadsText, MountedText, SampleText};
 use crate::session::measurements::Layout;
+use crate::session::set_up::PayloadText;
 use crate::session::summary::{
     IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
 };
@@ -85,6 +86,8 @@ pub struct IdentifyRequest {
     pub profile_text: String,
     /// Position of the first target, if it differs from the profile.
     pub mounted: Option<MountedText>,
+    /// What the flange carries, if it differs from the profile.
+    pub payload: Option<PayloadText>,
     /// Time of the request (RFC 3339, UTC).
     pub created: String,
     /// Files that the samples came from.
@@ -140,8 +143,8 @@ pub fn identify(
     request: &IdentifyRequest,
     progress: &mut dyn FnMut(Stage) -> ControlFlow<()>,
 ) -> Result<Identified, ProcedureError> {
-    let IdentifyRequest { identification, mounted, .. } = request;
-    let profile = &mounted.map_or_else(|| request.profile.clone(), |mounted| mounted.on(&request.profile));
+    let IdentifyRequest { identification, mounted, payload, .. } = request;
+    let profile = &calibration::mounted_on(&request.profile, mounted.as_ref(), payload.as_ref());
     let parameters = request.settings.parameters(profile);
     let arm = profile.arm();
     let observations = identification.observations();
@@ -193,6 +196,7 @@ pub fn identify(
     summary.workspace = workspace.map(|workspace| workspace.summary);
     let calibration = is_usable.then(|| Calibration {
         mounted: *mounted,
+        payload: *payload,
         geometric: joint_errors::geometric(&with_terms, &settings),
         ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, found)
     });
@@ -341,6 +345,8 @@ fn calibration(
             .collect(),
         samples: problem.observations.places().map(sample).collect(),
         mounted: None,
+        payload: None,
+        loads: LoadsText::of(&found.arm.chain, &summary.parameters),
         geometric: Vec::new(),
         selection: summary.selection.clone(),
         joint_errors: summary.joint_errors.clone(),

@@ -6,11 +6,12 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::set_up::PayloadText;
 use super::summary::{
     IdentificationSettings, JointErrorSummary, ParameterSummary, Provenance, SelectionSummary, SigmaSummary, Verdict,
     Warning, WorkspaceSummary,
 };
-use crate::kinematics::{Arm, KinematicsError, ParameterId, ParameterUnit};
+use crate::kinematics::{Arm, JointTerm, KinematicChain, KinematicsError, LoadScale, ParameterId, ParameterUnit};
 use crate::profile::{Profile, Target};
 use crate::units::{from_mm, to_mm};
 
@@ -143,8 +144,45 @@ pub struct Calibration {
     /// The error predicted over the workspace.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub workspace: Option<WorkspaceSummary>,
+    /// What the flange carried, if not what the profile says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload: Option<PayloadText>,
+    /// What the coefficients of compliance and tilt are relative to; none if there are no such terms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub loads: Option<LoadsText>,
     /// The profile, as it was read.
     pub profile: String,
+}
+
+/// The largest loads over the joint ranges at the payload of the identification: a coefficient of compliance or tilt is the angle at
+/// these loads, whatever the arm carries later.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadsText {
+    /// Largest gravity torque about each joint.
+    pub torques_nm: Vec<f64>,
+    /// Largest gravity moment of the arm.
+    pub moment_nm: f64,
+}
+
+impl LoadsText {
+    /// The loads that terms among `parameters` need, if any does.
+    pub fn of(chain: &KinematicChain, parameters: &[ParameterSummary]) -> Option<Self> {
+        let is_loaded = |id| match id {
+            ParameterId::Joint { term, .. } => matches!(term, JointTerm::Compliance | JointTerm::Tilt(_)),
+            ParameterId::Link { .. } | ParameterId::Target { .. } => false,
+        };
+        let scale = chain.loads().filter(|_| parameters.iter().any(|parameter| is_loaded(parameter.id)))?.scale();
+        Some(Self { torques_nm: scale.torques.clone(), moment_nm: scale.moment })
+    }
+
+    fn scale(&self) -> LoadScale {
+        LoadScale { torques: self.torques_nm.clone(), moment: self.moment_nm }
+    }
+
+    fn is_usable(&self) -> bool {
+        self.torques_nm.iter().chain([&self.moment_nm]).all(|value| value.is_finite() && *value >= 0.0)
+    }
 }
 
 /// A target that is mounted elsewhere than the profile says.
@@ -174,6 +212,12 @@ impl MountedText {
         let (x, y, z) = self.xyz_mm;
         [x, y, z].into_iter().all(f64::is_finite) && self.sigma_mm.is_finite() && self.sigma_mm >= 0.0
     }
+}
+
+/// The robot of `profile` with its first target and its payload as they are mounted, where that is not as the profile says.
+pub fn mounted_on(profile: &Profile, target: Option<&MountedText>, payload: Option<&PayloadText>) -> Profile {
+    let profile = target.map_or_else(|| profile.clone(), |mounted| mounted.on(profile));
+    payload.map_or_else(|| profile.clone(), |payload| profile.with_payload(payload.mass()))
 }
 
 /// A calibration file that cannot be used.
@@ -223,6 +267,12 @@ pub enum CalibrationError {
         /// Number of targets of the robot.
         expected: usize,
     },
+    /// A payload that is no payload.
+    #[error("'payload' needs a mass of at least 0 kg and a centre, all finite")]
+    Payload,
+    /// Loads that are no loads.
+    #[error("'loads' has a number that is negative or not finite")]
+    Loads,
     /// Target coordinates that are not finite.
     #[error("the nominal coordinates of target {target} are not finite")]
     Target {
@@ -232,9 +282,9 @@ pub enum CalibrationError {
 }
 
 impl Calibration {
-    /// The robot of `profile` with its first target as it was mounted for this calibration.
+    /// The robot of `profile` with its first target and its payload as they were mounted for this calibration.
     pub fn mounted_on(&self, profile: &Profile) -> Profile {
-        self.mounted.map_or_else(|| profile.clone(), |mounted| mounted.on(profile))
+        mounted_on(profile, self.mounted.as_ref(), self.payload.as_ref())
     }
 
     /// The nominal arm with the targets that its own fit placed.
@@ -250,7 +300,8 @@ impl Calibration {
         Ok(Arm { chain: profile.chain().clone(), targets })
     }
 
-    /// The identified arm of the robot of `profile`.
+    /// The identified arm of the robot of `profile`, with the payload of the identification; for another one see
+    /// [`Arm::with_payload`].
     ///
     /// # Errors
     /// A parameter that this robot does not have.
@@ -279,7 +330,11 @@ impl Calibration {
     ) -> Result<Arm, KinematicsError> {
         let inside =
             |(parameter, deviation): (&ParameterSummary, f64)| (parameter.id, parameter.unit.from_edge(deviation));
-        self.mounted_on(profile).arm().with(self.parameters.iter().zip(deviations).map(inside))
+        let mut arm = self.mounted_on(profile).arm();
+        if let Some(loads) = &self.loads {
+            arm.chain = arm.chain.with_load_scale(loads.scale());
+        }
+        arm.with(self.parameters.iter().zip(deviations).map(inside))
     }
 
     /// The text of the file.
@@ -323,6 +378,12 @@ impl Calibration {
         }
         if calibration.mounted.is_some_and(|mounted| !mounted.is_usable()) {
             return Err(CalibrationError::Target { target: 1 });
+        }
+        if calibration.payload.is_some_and(|payload| !payload.is_usable()) {
+            return Err(CalibrationError::Payload);
+        }
+        if calibration.loads.as_ref().is_some_and(|loads| !loads.is_usable()) {
+            return Err(CalibrationError::Loads);
         }
         for (index, (x, y, z)) in calibration.nominal_targets_mm.iter().enumerate() {
             if ![x, y, z].into_iter().all(|value| value.is_finite()) {

@@ -1,10 +1,14 @@
 //! Choices made before measuring: instrument, target, and the steps of the wizard.
 
+use std::fmt;
+
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::plan::PoseKind;
 use super::simulation::Simulation;
 use super::wire::LinkChoice;
+use crate::kinematics::LinkMass;
 use crate::text::names;
 use crate::units::{INCH, MICROMETRE, MILLIMETRE};
 
@@ -152,6 +156,41 @@ pub enum TargetChoice {
         /// Standard deviation of each coordinate.
         sigma_mm: f64,
     },
+}
+
+/// What the flange carries besides the SMR.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PayloadText {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Centre of mass in the flange frame.
+    pub centre_mm: (f64, f64, f64),
+}
+
+impl PayloadText {
+    /// Heaviest payload (kg): arms that carry more do not exist.
+    pub const HEAVIEST: f64 = 5000.0;
+
+    /// The mass on the flange.
+    pub fn mass(&self) -> LinkMass {
+        let (x, y, z) = self.centre_mm;
+        LinkMass { mass: self.mass_kg, centre: Point3::new(x, y, z) * MILLIMETRE }
+    }
+
+    /// Whether its numbers can be meant.
+    pub fn is_usable(&self) -> bool {
+        let (x, y, z) = self.centre_mm;
+        (0.0..=Self::HEAVIEST).contains(&self.mass_kg) && [x, y, z].into_iter().all(|value| value.abs() < 10_000.0)
+    }
+}
+
+/// `2.5 kg, centre (0, 0, 60) mm in the flange`.
+impl fmt::Display for PayloadText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (x, y, z) = self.centre_mm;
+        write!(f, "{} kg, centre ({x}, {y}, {z}) mm in the flange", self.mass_kg)
+    }
 }
 
 /// Details for the report that only people know. Empty: not given.

@@ -14,13 +14,13 @@ use nalgebra::Point3;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
-use super::calibration::MountedText;
+use super::calibration::{MountedText, mounted_on};
 use super::journal::{
     CirclePointText, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText,
     from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
-use super::set_up::{About, InstrumentChoice, Step, TargetChoice};
+use super::set_up::{About, InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::kinematics::JointType;
 use crate::profile::Profile;
 use crate::units::from_mm;
@@ -50,6 +50,8 @@ pub struct Session {
     pub instrument: Option<InstrumentChoice>,
     /// Position of the SMR on the flange.
     pub target: Option<TargetChoice>,
+    /// What the flange carries, if not what the profile says.
+    pub payload: Option<PayloadText>,
     /// Points of the circle-point analysis.
     pub circle_points: Vec<CirclePointText>,
     /// All rows of all plans, in the order of the programs.
@@ -235,6 +237,7 @@ impl Session {
                 }
                 self.robot = Some(robot(line.number, source, sha256, text)?);
                 self.target = None;
+                self.payload = None;
                 self.rows.clear();
                 self.shown = None;
                 self.plan = None;
@@ -249,6 +252,7 @@ impl Session {
                 self.identities.push(identity.clone());
             }
             Entry::Target(target) => self.target = Some(*target),
+            Entry::Payload(payload) => self.payload = Some(*payload),
             Entry::CirclePoint(point) => {
                 self.measurements = self.measurements.max(point.number);
                 self.circle_points.push(point.clone());
@@ -334,10 +338,10 @@ impl Session {
         }
     }
 
-    /// The robot with the SMR where it is mounted.
+    /// The robot with the SMR where it is mounted, and with its payload.
     pub fn mounted_profile(&self) -> Option<Profile> {
         let profile = &self.robot.as_ref()?.profile;
-        Some(self.mounted().map_or_else(|| profile.clone(), |mounted| mounted.on(profile)))
+        Some(mounted_on(profile, self.mounted().as_ref(), self.payload.as_ref()))
     }
 
     /// Whether nothing is really measured: in the simulated cell, or by an instrument that says that it is simulated.

@@ -69,6 +69,7 @@ impl Dialog {
             Intent::NameSession(proposal) => text("Name of the session", proposal, Intent::NameSession),
             Intent::LoadPlan(proposal) => text("File with the poses (CSV)", proposal, Intent::LoadPlan),
             Intent::TypeReading(_) => Some(ask::coordinates(view, "")),
+            Intent::StatePayload(payload) => Some(ask::payload(payload)),
             Intent::About(about) => Some(ask::about(about)),
             Intent::Note(_) => text("Note", "", Intent::Note),
             Intent::GoToPose(_) => choose_pose(view),

@@ -106,7 +106,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 pub const BELL: Key = Key::ctrl('b');
 
 /// The table. Of several bindings with the same key, the first one whose intent is possible applies.
-const BINDINGS: [Binding; 42] = [
+const BINDINGS: [Binding; 43] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Target::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Target::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -122,6 +122,7 @@ const BINDINGS: [Binding; 42] = [
     offer('p', 3, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Profile))),
     offer('f', 4, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Free { .. }))),
     offer('k', 4, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Known { .. }))),
+    offer('y', 6, |intent| matches!(intent, Intent::StatePayload(_))),
     offer('c', 4, |intent| matches!(intent, Intent::StartCircles)),
     offer('u', 3, |intent| matches!(intent, Intent::UseCircles)),
     offer('d', 6, |intent| matches!(intent, Intent::DiscardCircles)),

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::procedure::plan::{INTERACTIVE_CANDIDATES, PlanRequest};
-use crate::session::set_up::{About, InstrumentChoice, TargetChoice};
+use crate::session::set_up::{About, InstrumentChoice, PayloadText, TargetChoice};
 
 /// A command of the operator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +25,8 @@ pub enum Intent {
     ChooseInstrument(InstrumentChoice),
     /// Choose where the SMR sits on the flange.
     ChooseTarget(TargetChoice),
+    /// State what the flange carries besides the SMR.
+    StatePayload(PayloadText),
     /// Locate the SMR by circle-point analysis.
     StartCircles,
     /// Use the result of the circle-point analysis.
@@ -87,6 +89,7 @@ impl Intent {
             Self::NameSession(_) => "NameSession",
             Self::ChooseInstrument(_) => "ChooseInstrument",
             Self::ChooseTarget(_) => "ChooseTarget",
+            Self::StatePayload(_) => "StatePayload",
             Self::StartCircles => "StartCircles",
             Self::UseCircles => "UseCircles",
             Self::DiscardCircles => "DiscardCircles",

@@ -18,6 +18,7 @@ impl Entry {
             Self::Instrument(instrument) => format!("instrument: {}", instrument_text(instrument)),
             Self::Connected { identity } => format!("connected: {identity}"),
             Self::Target(target) => format!("SMR: {}", target_text(target)),
+            Self::Payload(payload) => format!("payload: {payload}"),
             Self::CirclePoint(point) => {
                 format!("measurement {}: joint {} turned, at {}", point.number, point.joint + 1, xyz(point.xyz_mm))
             }

@@ -9,7 +9,7 @@ use crate::planning::Figures;
 use crate::session::calibration::Calibration;
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
-use crate::session::set_up::{About, InstrumentChoice, Step, TargetChoice};
+use crate::session::set_up::{About, InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::session::summary::IdentificationSummary;
 use crate::text::{names, written_as_text};
 use crate::units::{from_mm, to_mm};
@@ -43,6 +43,8 @@ pub enum Entry {
     },
     /// Position of the SMR on the flange.
     Target(TargetChoice),
+    /// What the flange carries besides the SMR.
+    Payload(PayloadText),
     /// A point of the circle-point analysis.
     CirclePoint(CirclePointText),
     /// The points of the circle-point analysis are to be measured again.

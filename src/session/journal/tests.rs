@@ -13,7 +13,7 @@ use crate::procedure::identify::{IdentifyRequest, NamedSample, identify};
 use crate::profile::{Profile, builtin};
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, Step, TargetChoice};
+use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, Step, TargetChoice};
 use crate::session::simulation::{Fault, SimulatedWire, Simulation, Truth};
 use crate::session::summary::VerificationMode;
 use crate::session::wire::WireProtocol;
@@ -152,6 +152,7 @@ fn identified() -> IdentifiedText {
     let found = identify(
         &IdentifyRequest {
             mounted: None,
+            payload: Some(PayloadText { mass_kg: 2.5, centre_mm: (0.0, 0.0, 60.0) }),
             profile,
             profile_text: profile_text.to_owned(),
             created: "2026-01-02T03:04:05Z".to_owned(),
@@ -261,6 +262,7 @@ fn all_entries() -> Vec<Entry> {
     entries.push(Entry::About(About { serial: TRICKY.to_owned(), ..About::default() }));
     entries.extend(instruments.map(Entry::Instrument));
     entries.extend(targets.map(Entry::Target));
+    entries.push(Entry::Payload(PayloadText { mass_kg: 2.5, centre_mm: (0.1, -20.0, 1e-9) }));
     entries.extend(corrections.map(Entry::Correction));
     let decisions = [Decision::Keep, Decision::LeaveOut, Decision::Undo];
     entries.extend(decisions.map(|decision| Entry::Decision { sample: u64::MAX, decision }));
@@ -292,6 +294,7 @@ fn variant(entry: &Entry) -> usize {
         Entry::Row(_) => 19,
         Entry::About(_) => 20,
         Entry::Connected { .. } => 21,
+        Entry::Payload(_) => 22,
     }
 }
 

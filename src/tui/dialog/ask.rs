@@ -4,7 +4,7 @@ use super::{Dialog, Form};
 use crate::session::filter::Filter;
 use crate::session::measurements::Layout;
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, RecordedSet, TargetChoice};
+use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
 use crate::tui::form::{TextField, Validator};
@@ -65,6 +65,29 @@ fn known(values: &[String]) -> Result<Intent, String> {
     }
     let xyz_mm = (number("x", x)?, number("y", y)?, number("z", z)?);
     Ok(Intent::ChooseTarget(TargetChoice::Known { xyz_mm, sigma_mm }))
+}
+
+/// Asks for the payload, starting with the one stated so far.
+pub fn payload(stated: &PayloadText) -> Dialog {
+    let (x, y, z) = stated.centre_mm;
+    Dialog::Form(
+        Form::new("What the flange carries while it is measured, besides the SMR", carried)
+            .text("mass (kg)", &stated.mass_kg.to_string(), "Tool and workpiece together. 0: nothing.")
+            .text("x (mm)", &x.to_string(), "Centre of mass in the flange frame.")
+            .text("y (mm)", &y.to_string(), "Along the y axis of the flange as the profile defines it.")
+            .text("z (mm)", &z.to_string(), "Along the flange axis, away from the arm."),
+    )
+}
+
+fn carried(values: &[String]) -> Result<Intent, String> {
+    let [mass, x, y, z] = values else { return Err("four numbers are needed".to_owned()) };
+    let centre_mm = (number("x", x)?, number("y", y)?, number("z", z)?);
+    let payload = PayloadText { mass_kg: number("mass", mass)?, centre_mm };
+    if payload.is_usable() {
+        Ok(Intent::StatePayload(payload))
+    } else {
+        Err(format!("the mass is from 0 to {} kg, the centre within 10 m of the flange", PayloadText::HEAVIEST))
+    }
 }
 
 /// Asks for an instrument on a wire, starting with the link of the profile.

@@ -63,6 +63,7 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
         profile: robot.profile.clone(),
         profile_text: robot.text.clone(),
         mounted: cx.session.mounted(),
+        payload: cx.session.payload,
         created: cx.now.to_string(),
         inputs: vec![InputFile {
             role: InputRole::Session,

@@ -8,7 +8,7 @@ use crate::identification::circle_point::{CirclePointError, CircleSeries, Target
 use crate::profile::{FREE_TARGET_UNCERTAINTY, Level};
 use crate::session::journal::{CirclePointText, Entry, from_edge, from_xyz_mm, target_text, to_edge, to_xyz_mm};
 use crate::session::reading::{MeasureRequest, Reading};
-use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step, TargetChoice};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::session::state::{Robot, Session};
 use crate::units::{to_deg, to_mm};
 use crate::wizard::effect::{Answer, CircleConfigurations, Request};
@@ -174,6 +174,8 @@ impl StepMachine for TargetStep {
         let has_point = || require(is_measuring_circles, "start the circles first");
         let is_connected = || require(cx.connection.is_some(), "the instrument is not responding");
 
+        let has_masses = cx.profile().is_some_and(|profile| profile.chain().loads().is_some());
+
         let start = if has_circles { "continue the circles" } else { "find it by circles" };
         let as_profile = Intent::ChooseTarget(TargetChoice::Profile);
         let free = Intent::ChooseTarget(TargetChoice::Free { sigma_mm: to_mm(FREE_TARGET_UNCERTAINTY) });
@@ -188,6 +190,17 @@ impl StepMachine for TargetStep {
             offer(Intent::Next, "continue to Plan", [has_choice()]),
             offer(as_profile.clone(), "as the profile says", [can_change()]),
             offer(free, "leave it free", [can_change()]),
+            offer(
+                Intent::StatePayload(session.payload.unwrap_or_default()),
+                "payload",
+                [
+                    can_change(),
+                    require(
+                        has_masses,
+                        "the profile gives no masses of the arm: without them a payload changes nothing",
+                    ),
+                ],
+            ),
             offer(
                 Intent::StartCircles,
                 start,
@@ -220,6 +233,15 @@ impl StepMachine for TargetStep {
             Intent::ChooseTarget(_) => {
                 let notice = Notice::error("this is not a plausible SMR position")
                     .hint("coordinates must be below 5 m, and the standard deviation from 0 to 1000 mm");
+                vec![Action::Say(notice)]
+            }
+            Intent::StatePayload(payload) if payload.is_usable() => {
+                vec![Action::Write(vec![Entry::Payload(payload)])]
+            }
+            Intent::StatePayload(_) => {
+                let heaviest = PayloadText::HEAVIEST;
+                let notice = Notice::error("this is not a plausible payload")
+                    .hint(format!("its mass is from 0 to {heaviest} kg, its centre within 10 m of the flange"));
                 vec![Action::Say(notice)]
             }
             Intent::StartCircles => {
