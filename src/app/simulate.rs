@@ -5,7 +5,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-use super::{Console, load};
+use super::{Console, load, payload_of};
 use crate::cli::SimulateArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::link::{LinkError, Served};
@@ -65,7 +65,8 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     let loaded = load::profile(&args.profile)?;
     let profile = &loaded.profile;
     let mut route = Route { poses: poses(args, profile)?, at: 0 };
-    let simulation = Simulation { seed: args.seed, ..Simulation::default() };
+    let payload = payload_of(&args.payload, profile)?;
+    let simulation = Simulation { seed: args.seed, joint_errors: args.joint_errors, payload, ..Simulation::default() };
     let usage = |error: &LinkError| Failure::new(ExitStatus::Usage, error.to_string());
     let mut served = Served::new(profile, &simulation, args.protocol, args.listen.as_deref(), &args.faults)
         .map_err(|error| usage(&error))?;

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use crate::session::simulation::SimulatedWire;
+use super::PayloadArgs;
+use crate::session::simulation::{JointErrorSizes, SimulatedWire};
 use crate::session::wire::WireProtocol;
 
 /// Subcommands of `link`.
@@ -58,6 +59,12 @@ pub struct SimulateArgs {
     /// Seed of the hidden deviations and of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Sizes of hidden errors of the joints (urad), such as 'curves=100,compliance=500,tilt=100,harmonics=50'
+    #[arg(long, value_name = "SIZES")]
+    pub joint_errors: Option<JointErrorSizes>,
+    /// What the robot carries.
+    #[command(flatten)]
+    pub payload: PayloadArgs,
     /// Fault of the instrument, such as 'cut-20@3' for the third occasion or 'drip@1x5'; may be repeated
     #[arg(long = "fault", value_name = "NAME")]
     pub faults: Vec<String>,

@@ -6,6 +6,7 @@
 //!
 //! - **Arm.** Nominal plus the hidden deviations ([`HiddenArm`]); free targets are within a few millimetres of their nominal
 //!   position, whatever uncertainty the profile states for them.
+//!   Where a script asks for them, its joints have curves, compliance, tilt and harmonics of stated sizes, and it carries a payload.
 //! - **Tracker.** Within about 0.1 m of its position in the profile, with a random orientation, so that nothing can rely on
 //!   its frame.
 //! - **Noise.** Normal and independent per coordinate and shot; the stated σ is that of the mean of the shots.
@@ -64,7 +65,7 @@ impl SimulatedCell {
     /// The cell of a profile.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: invalid noise, a fault of a joint that the arm does not have or with the wrong unit, or the
+    /// [`LinkError::SetUp`]: invalid noise, errors of joints that the arm cannot have, a fault of a joint that the arm does not have or with the wrong unit, or the
     /// deviations of the method paper for another arm.
     pub fn new(profile: &Profile, simulation: &Simulation) -> Result<Self, LinkError> {
         let noise = match (simulation.noise_mm, profile.instrument()) {
@@ -84,7 +85,7 @@ impl SimulatedCell {
         Ok(Self {
             title: profile.title().to_owned(),
             seed,
-            truth: truth::hidden_arm(profile, simulation.truth, seed, base_from_tracker)?,
+            truth: truth::hidden_arm(profile, simulation, base_from_tracker)?,
             tracker_from_base: base_from_tracker.inverse(),
             joints: profile.joints().to_vec(),
             noise,

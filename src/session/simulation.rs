@@ -7,9 +7,13 @@
 
 mod text;
 
+use std::str::FromStr;
+
 use serde::{Deserialize, Serialize};
 
+use super::set_up::PayloadText;
 use super::wire::WireProtocol;
+use crate::text::printable;
 use crate::units::Quantity;
 pub use text::FaultError;
 
@@ -23,6 +27,12 @@ pub struct Simulation {
     /// How the robot really is.
     #[serde(default)]
     pub truth: Truth,
+    /// Errors of its joints beyond the geometry; none: its joints are exact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_errors: Option<JointErrorSizes>,
+    /// What it really carries; none: what the profile says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload: Option<PayloadText>,
     /// Standard deviation of a coordinate (mm); none: that of the profile's instrument, else 0.01 mm.
     #[serde(default)]
     pub noise_mm: Option<f64>,
@@ -63,7 +73,71 @@ const fn first_seed() -> u64 {
 
 impl Default for Simulation {
     fn default() -> Self {
-        Self { seed: first_seed(), truth: Truth::default(), noise_mm: None, faults: Vec::new(), wires: Vec::new() }
+        Self {
+            seed: first_seed(),
+            truth: Truth::default(),
+            joint_errors: None,
+            payload: None,
+            noise_mm: None,
+            faults: Vec::new(),
+            wires: Vec::new(),
+        }
+    }
+}
+
+/// Sizes of the errors of the joints of a simulated robot (µrad), drawn by seed: standard deviations of the coefficients, but for
+/// the curves, whose size is their rms. What gravity does bends the arm downwards: those coefficients are not negative.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct JointErrorSizes {
+    /// Joint curves: harmonics from the third on, with the spectrum that identification expects.
+    pub curves_urad: f64,
+    /// Turn of a joint at its largest gravity torque.
+    pub compliance_urad: f64,
+    /// Tilt of a bearing at the largest gravity moment of the arm.
+    pub tilt_urad: f64,
+    /// Each coefficient of the first two harmonics of a joint.
+    pub harmonics_urad: f64,
+}
+
+impl JointErrorSizes {
+    /// The sizes with their names.
+    pub const fn named(&self) -> [(&'static str, f64); 4] {
+        [
+            ("curves", self.curves_urad),
+            ("compliance", self.compliance_urad),
+            ("tilt", self.tilt_urad),
+            ("harmonics", self.harmonics_urad),
+        ]
+    }
+}
+
+/// `curves=100,compliance=500`; what is not named is zero.
+impl FromStr for JointErrorSizes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            let names = Self::default().named().map(|(name, _)| name);
+            format!(
+                "'{}' does not give sizes; write for example 'curves=100,compliance=500' ({})",
+                printable(text),
+                names.join(", ")
+            )
+        };
+        let mut sizes = Self::default();
+        for part in text.split(',') {
+            let (name, size) = part.split_once('=').ok_or_else(wrong)?;
+            let size = size.trim().parse().map_err(|_not_a_number: std::num::ParseFloatError| wrong())?;
+            match name.trim() {
+                "curves" => sizes.curves_urad = size,
+                "compliance" => sizes.compliance_urad = size,
+                "tilt" => sizes.tilt_urad = size,
+                "harmonics" => sizes.harmonics_urad = size,
+                _ => return Err(wrong()),
+            }
+        }
+        Ok(sizes)
     }
 }
 

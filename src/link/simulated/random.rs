@@ -13,6 +13,8 @@ use crate::session::simulation::FaultKind;
 pub(super) enum Use {
     /// Deviations of the arm.
     Arm,
+    /// Errors of its joints.
+    JointErrors,
     /// Pose of the tracker.
     Tracker,
     /// Noise of the measurement with this number.
@@ -34,6 +36,7 @@ impl Use {
             Self::Fault(FaultKind::Outlier { .. }, number) => (6, number),
             Self::Fault(FaultKind::Drift { .. }, number) => (7, number),
             Self::Fault(_, number) => (8, number),
+            Self::JointErrors => (9, 0),
         };
         (purpose << 56) ^ number
     }

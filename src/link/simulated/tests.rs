@@ -1,9 +1,10 @@
 //! The simulated cell does what its documentation says.
 
 use super::*;
-use crate::kinematics::{LinkParameter, ParameterId};
+use crate::kinematics::{Arm, JointTerm, LinkParameter, MAX_ORDER, ParameterId, SMOOTH_ORDERS, TiltAxis};
 use crate::profile::{Level, builtin};
-use crate::session::simulation::Truth;
+use crate::session::set_up::PayloadText;
+use crate::session::simulation::{JointErrorSizes, Truth};
 
 fn profile(name: &str) -> Profile {
     Profile::parse(builtin(name).unwrap(), name).unwrap().0
@@ -225,7 +226,7 @@ fn time_counts_settling_shots_and_the_way_onward() {
 fn what_cannot_be_simulated_is_said() {
     let refused = |name: &str, truth, noise_mm, fault: &str| {
         let faults = if fault.is_empty() { Vec::new() } else { vec![fault.parse().unwrap()] };
-        let simulation = Simulation { seed: 1, truth, noise_mm, faults, wires: Vec::new() };
+        let simulation = Simulation { seed: 1, truth, noise_mm, faults, ..Simulation::default() };
         SimulatedCell::new(&profile(name), &simulation).unwrap_err().to_string()
     };
     let messages = [
@@ -250,4 +251,53 @@ fn what_cannot_be_simulated_is_said() {
     assert!(matches!(cell(&[]).measure(&other, &|| true), Err(LinkError::SetUp(_))));
     let connected = noisy(&[], 0.02).connect().unwrap();
     assert_eq!(connected, "simulated cell: Soochow University six-axis arm (method paper), noise 0.02 mm, seed 1");
+}
+
+#[test]
+fn joints_have_the_errors_that_are_asked_for() {
+    let sizes = |curves_urad, compliance_urad, tilt_urad, harmonics_urad| {
+        Some(JointErrorSizes { curves_urad, compliance_urad, tilt_urad, harmonics_urad })
+    };
+    let hidden = |name: &str, joint_errors, payload| {
+        let simulation = Simulation { truth: Truth::Nominal, joint_errors, payload, ..Simulation::default() };
+        SimulatedCell::new(&profile(name), &simulation).map(|cell| cell.truth().arm.clone())
+    };
+    let rigid = hidden("ur5", None, None).unwrap();
+    assert_eq!(rigid, profile("ur5").arm());
+    let arm = hidden("ur5", sizes(100.0, 500.0, 200.0, 300.0), None).unwrap();
+    let value = |arm: &Arm, joint, term| arm.value(ParameterId::Joint { joint, term });
+    let (mut curve, mut smooth) = (0.0, 0.0);
+    for joint in 0..6 {
+        // Gravity bends downwards, and a vertical axis does not feel it.
+        let compliance = value(&arm, joint, JointTerm::Compliance);
+        assert!(if joint == 0 { compliance.is_none() } else { compliance.unwrap() > 0.0 }, "{compliance:?}");
+        assert!(TiltAxis::ALL.iter().all(|axis| value(&arm, joint, JointTerm::Tilt(*axis)).unwrap() > 0.0));
+        for order in 1..=MAX_ORDER {
+            let pair = [JointTerm::Sine(order), JointTerm::Cosine(order)].map(|term| value(&arm, joint, term).unwrap());
+            let power = (pair[0].powi(2) + pair[1].powi(2)) / 2.0;
+            *(if order > SMOOTH_ORDERS { &mut curve } else { &mut smooth }) += power / 6.0;
+        }
+    }
+    let [curve, smooth] = [curve, smooth].map(|power: f64| power.sqrt() / 1e-6);
+    assert!((curve - 100.0).abs() < 15.0, "{curve}");
+    assert!((smooth - 300.0 * 2.0_f64.sqrt()).abs() < 130.0, "{smooth}");
+    // The geometry is drawn as without them, and the same joints fail alike under a payload.
+    let payload = PayloadText { mass_kg: 3.0, centre_mm: (0.0, 0.0, 80.0) };
+    let loaded = hidden("ur5", sizes(100.0, 500.0, 200.0, 300.0), Some(payload)).unwrap();
+    assert_eq!(loaded.chain.errors(), arm.chain.errors());
+    assert_eq!(loaded.chain.loads().unwrap().payload(), payload.mass());
+    assert_eq!(loaded.chain.joints(), arm.chain.joints());
+    let refused = |name: &str, joint_errors, payload| hidden(name, joint_errors, payload).unwrap_err().to_string();
+    let messages = [
+        refused("soochow", sizes(100.0, 500.0, 0.0, 0.0), None),
+        refused("ur5", sizes(-1.0, 0.0, 0.0, 0.0), None),
+        refused("ur5", None, Some(PayloadText { mass_kg: -2.0, ..payload })),
+    ];
+    insta::assert_snapshot!(messages.join("\n"), @r"
+    compliance and tilt need the masses of the arm, which the profile 'soochow' does not give
+    the joint errors have curves of -1 urad; they must be from 0 to 20000 urad
+    a payload of -2 kg, centre (0, 0, 80) mm in the flange cannot be simulated
+    ");
+    // Without masses a joint can still have curves.
+    assert!(hidden("soochow", sizes(100.0, 0.0, 0.0, 0.0), None).is_ok());
 }

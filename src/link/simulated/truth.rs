@@ -3,15 +3,21 @@
 use nalgebra::Isometry3;
 
 use super::random::{Random, Use};
-use crate::kinematics::{Arm, Convention, FreeParameter, JointType, KinematicChain, LinkParameter, ParameterId};
+use crate::kinematics::{
+    Arm, Convention, FreeParameter, JointTerm, JointType, KinematicChain, LinkParameter, ParameterId, SMOOTH_ORDERS,
+    curve_share,
+};
 use crate::link::LinkError;
 use crate::profile::{Level, Profile};
-use crate::session::simulation::Truth;
-use crate::units::{MILLIMETRE, from_deg, from_mm, to_mm};
+use crate::session::simulation::{JointErrorSizes, Simulation, Truth};
+use crate::units::{MICRORADIAN, MILLIMETRE, from_deg, from_mm, to_mm};
 
 /// Largest standard deviation per coordinate of a drawn target (m). The uncertainty in a profile may cover a whole flange; a
 /// technician with a ruler measures better than that.
 const TARGET_SPREAD: f64 = 2.0 * MILLIMETRE;
+
+/// Largest size of an error of a joint (µrad): more is no gear but a defect.
+const LARGEST_JOINT_ERROR: f64 = 20_000.0;
 
 /// Largest difference of a constant from that of the method paper's arm (m or rad).
 const SAME_GEOMETRY: f64 = 1e-6;
@@ -42,7 +48,7 @@ const TABLE_II_BETA_2: f64 = 0.155;
 /// Constants of a table row, in order.
 const COLUMNS: [LinkParameter; 4] = [LinkParameter::Alpha, LinkParameter::A, LinkParameter::D, LinkParameter::Theta];
 
-/// The true geometry of a simulated cell, which an identification should find.
+/// The true arm of a simulated cell, which an identification should find.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HiddenArm {
     /// The arm, with its targets before any bump.
@@ -129,14 +135,65 @@ fn is_paper_arm(chain: &KinematicChain) -> Result<(), String> {
     Ok(())
 }
 
+/// The errors of the joints (rad). All that an arm can have are drawn, so that masses and payload do not change the others.
+fn joint_errors(chain: &KinematicChain, sizes: &JointErrorSizes, seed: u64) -> Vec<(ParameterId, f64)> {
+    let mut random = Random::new(seed, Use::JointErrors);
+    let mut drawn = Vec::new();
+    for joint in 0..chain.dof() {
+        for term in JointTerm::all() {
+            let normal = random.normal();
+            let value = match term {
+                JointTerm::Compliance => sizes.compliance_urad * normal.abs(),
+                JointTerm::Tilt(_) => sizes.tilt_urad * normal.abs(),
+                JointTerm::Sine(order) | JointTerm::Cosine(order) if order <= SMOOTH_ORDERS => {
+                    sizes.harmonics_urad * normal
+                }
+                JointTerm::Sine(order) | JointTerm::Cosine(order) => sizes.curves_urad * curve_share(order) * normal,
+            };
+            if chain.has_term(joint, term) && value != 0.0 {
+                drawn.push((ParameterId::Joint { joint, term }, value * MICRORADIAN));
+            }
+        }
+    }
+    drawn
+}
+
+/// Checks the sizes of the errors of the joints, and that the arm can have them.
+fn check_joint_errors(profile: &Profile, sizes: &JointErrorSizes) -> Result<(), LinkError> {
+    let refused = |message: String| Err(LinkError::SetUp(message));
+    for (name, size) in sizes.named() {
+        if !(0.0..=LARGEST_JOINT_ERROR).contains(&size) {
+            return refused(format!(
+                "the joint errors have {name} of {size} urad; they must be from 0 to {LARGEST_JOINT_ERROR} urad"
+            ));
+        }
+    }
+    let name = profile.name();
+    if profile.chain().loads().is_none() && (sizes.compliance_urad > 0.0 || sizes.tilt_urad > 0.0) {
+        return refused(format!(
+            "compliance and tilt need the masses of the arm, which the profile '{name}' does not give"
+        ));
+    }
+    Ok(())
+}
+
 /// The true arm and targets of a profile.
 pub(super) fn hidden_arm(
     profile: &Profile,
-    truth: Truth,
-    seed: u64,
+    simulation: &Simulation,
     base_from_tracker: Isometry3<f64>,
 ) -> Result<HiddenArm, LinkError> {
-    let deviations = deviations(profile, truth, seed)?;
-    let arm = profile.arm().with(deviations).map_err(|error| LinkError::SetUp(error.to_string()))?;
+    let Simulation { seed, truth, .. } = *simulation;
+    let loaded = match simulation.payload {
+        Some(payload) if payload.is_usable() => &profile.with_payload(payload.mass()),
+        Some(payload) => return Err(LinkError::SetUp(format!("a payload of {payload} cannot be simulated"))),
+        None => profile,
+    };
+    let mut deviations = deviations(loaded, truth, seed)?;
+    if let Some(sizes) = &simulation.joint_errors {
+        check_joint_errors(loaded, sizes)?;
+        deviations.extend(joint_errors(loaded.chain(), sizes, seed));
+    }
+    let arm = loaded.arm().with(deviations).map_err(|error| LinkError::SetUp(error.to_string()))?;
     Ok(HiddenArm { arm, base_from_tracker })
 }

@@ -14,7 +14,7 @@ use crate::profile::{Profile, builtin};
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, Step, TargetChoice};
-use crate::session::simulation::{Fault, SimulatedWire, Simulation, Truth};
+use crate::session::simulation::{Fault, JointErrorSizes, SimulatedWire, Simulation, Truth};
 use crate::session::summary::VerificationMode;
 use crate::session::wire::WireProtocol;
 
@@ -200,6 +200,8 @@ fn all_entries() -> Vec<Entry> {
         InstrumentChoice::Simulated(Simulation {
             seed: u64::MAX,
             truth: Truth::Paper,
+            joint_errors: Some(JointErrorSizes { curves_urad: 100.0, ..JointErrorSizes::default() }),
+            payload: Some(PayloadText { mass_kg: 2.5, centre_mm: (0.0, 0.0, 60.0) }),
             noise_mm: Some(0.5),
             faults,
             wires: vec![SimulatedWire::Serial(WireProtocol::Geocom)],

@@ -141,27 +141,30 @@ pub fn simulated(is_paper: bool) -> Dialog {
             .text("seed", "1", "The same seed gives the same errors and noise again.")
             .pick("hidden errors of the arm", TRUTH_WORDS, truth, "Left/Right. random: drawn by seed; paper: table II of the method paper (only its own arm); nominal: none.")
             .text("noise (mm)", "", "Standard deviation of a coordinate. Empty: that of the profile's instrument.")
+            .text("errors of joints", "", "Beyond the geometry (urad): curves=100,compliance=500,tilt=100,harmonics=50. Empty: none.")
             .text("faults", "", "What goes wrong, separated by commas: wrong-pose@12, outlier@9:3mm, target-bumped@20:5mm, beam-break@7-9. Empty: nothing."),
     )
 }
 
 fn simulation(values: &[String]) -> Result<Intent, String> {
-    let [seed, truth, noise, faults] = values else { return Err("four values are needed".to_owned()) };
+    let [seed, truth, noise, joints, faults] = values else { return Err("five values are needed".to_owned()) };
     let seed = seed.parse().ok().ok_or_else(|| format!("'{seed}' is not a whole number"))?;
     let truth = TRUTH_WORDS.iter().zip(TRUTHS).find(|(word, _)| *word == truth).map_or(Truth::Drawn, |(_, one)| one);
     let noise_mm = if noise.is_empty() { None } else { Some(number("noise", noise)?) };
     if noise_mm.is_some_and(|noise| !(0.0..=100.0).contains(&noise)) {
         return Err("noise must be from 0 to 100 mm".to_owned());
     }
+    let joint_errors = if joints.is_empty() { None } else { Some(joints.parse()?) };
     let faults = faults.split([',', ';']).map(str::trim).filter(|text| !text.is_empty());
     let faults =
         faults.map(|text| text.parse::<Fault>().map_err(|error| error.to_string())).collect::<Result<_, _>>()?;
     Ok(Intent::ChooseInstrument(InstrumentChoice::Simulated(Simulation {
         seed,
         truth,
+        joint_errors,
         noise_mm,
         faults,
-        wires: Vec::new(),
+        ..Simulation::default()
     })))
 }
 
@@ -300,12 +303,28 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_checked() {
-        let cell = simulation(&values(&["7", "paper", "", "wrong-pose@12, outlier@9:3mm"])).unwrap();
+    fn faults_and_errors_of_joints_are_checked() {
+        let cell = simulation(&values(&["7", "paper", "", "", "wrong-pose@12, outlier@9:3mm"])).unwrap();
         let Intent::ChooseInstrument(InstrumentChoice::Simulated(cell)) = cell else { panic!("{cell:?}") };
         assert_eq!((cell.seed, cell.truth, cell.noise_mm, cell.faults.len()), (7, Truth::Paper, None, 2));
-        assert!(simulation(&values(&["7", "paper", "", "earthquake@3"])).is_err());
-        assert!(simulation(&values(&["x", "paper", "", ""])).is_err());
+        assert!(simulation(&values(&["7", "paper", "", "", "earthquake@3"])).is_err());
+        assert!(simulation(&values(&["x", "paper", "", "", ""])).is_err());
+        let cell = simulation(&values(&["7", "random", "", "curves=100, tilt=20", ""])).unwrap();
+        let Intent::ChooseInstrument(InstrumentChoice::Simulated(cell)) = cell else { panic!("{cell:?}") };
+        let sizes = cell.joint_errors.unwrap().named().map(|(_, size)| size);
+        assert!(sizes.iter().sum::<f64>() > 119.0 && sizes.iter().sum::<f64>() < 121.0, "{sizes:?}");
+        for wrong in ["curves", "curves=x", "gears=1", "100"] {
+            assert!(simulation(&values(&["7", "random", "", wrong, ""])).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_payload_needs_plausible_numbers() {
+        let payload = PayloadText { mass_kg: 2.5, centre_mm: (0.0, -10.0, 60.0) };
+        assert_eq!(carried(&values(&["2,5", "0", "-10", "60"])), Ok(Intent::StatePayload(payload)));
+        for wrong in [["-1", "0", "0", "0"], ["2", "0", "0", "20000"], ["a", "0", "0", "0"]] {
+            assert!(carried(&values(&wrong)).is_err(), "{wrong:?}");
+        }
     }
 
     #[test]
