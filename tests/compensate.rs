@@ -9,13 +9,15 @@ use nalgebra::{DVector, Isometry3, Point3, Translation3};
 use trupose::compensation::{Compensator, Goal, Settings, Status, ToolArm};
 use trupose::geometry::register;
 use trupose::identification::identify;
-use trupose::kinematics::{Arm, ForwardKinematics, KinematicChain};
+use trupose::kinematics::{Arm, ForwardKinematics, KinematicChain, ParameterUnit, Place};
 use trupose::link::SimulatedCell;
 use trupose::model::CalibratedArm;
 use trupose::model::proof::configurations;
 use trupose::profile::{Level, Profile, builtin, builtin_names};
-use trupose::session::calibration::Calibration;
+use trupose::session::calibration::{Calibration, LoadsText};
+use trupose::session::set_up::PayloadText;
 use trupose::session::simulation::{Simulation, Truth};
+use trupose::session::summary::ParameterSummary;
 use trupose::units::{MICROMETRE, from_deg, to_deg, to_mm};
 
 fn profile(name: &str) -> Profile {
@@ -243,6 +245,94 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
     let (code, out, err) = run(joints, &["--out", targets.to_str().unwrap()]);
     assert_eq!((code, out.as_str()), (2, ""), "{err}");
     assert_eq!(fs::read_to_string(&targets).unwrap(), joints);
+}
+
+/// A calibration with compliance, of an arm whose weight is known.
+fn soft(text: &str) -> Calibration {
+    let mut calibration = Calibration::parse(text).unwrap();
+    calibration.profile = calibration.profile.replacen("    targets: [", "    weight_kg: 400.0,\n    targets: [", 1);
+    let compliance = ParameterSummary {
+        id: "joint2.compliance".parse().unwrap(),
+        unit: ParameterUnit::Microradian,
+        nominal: 0.0,
+        deviation: 2000.0,
+        sigma: Some(10.0),
+        expected: 1000.0,
+        identifiable: true,
+    };
+    calibration.parameters.push(compliance);
+    calibration.payload = Some(PayloadText { mass_kg: 2.0, centre_mm: (0.0, 0.0, 50.0) });
+    let profile = Profile::parse(&calibration.profile, "soft").unwrap().0;
+    let chain = calibration.mounted_on(&profile).chain().clone();
+    calibration.loads = LoadsText::of(&chain, &calibration.parameters);
+    calibration
+}
+
+#[test]
+fn commands_are_for_the_payload_that_the_arm_works_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let rigid = fs::read_to_string(calibrate(folder.path())).unwrap();
+    let calibration = soft(&rigid);
+    let text = calibration.to_text().unwrap();
+    assert_eq!(Calibration::parse(&text).unwrap(), calibration);
+    assert!(!rigid.contains("payload") && !rigid.contains("loads"), "what there is not is not written");
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    fs::write(path("soft.ron"), &text).unwrap();
+    let joints = [20.0, 60.0, -30.0, 40.0, 50.0, 60.0];
+    fs::write(path("targets.csv"), "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,20,60,-30,40,50,60\n").unwrap();
+    let run = |calibration: &str, payload: &[&str]| {
+        let (calibration, targets) = (path(calibration), path("targets.csv"));
+        let mut arguments = vec!["compensate", "--calibration", &calibration, "--targets", &targets, "--target", "smr"];
+        arguments.extend(payload);
+        let output = trupose(&arguments);
+        let out = String::from_utf8(output.stdout).unwrap();
+        let command = out.lines().nth(1).map(|line| {
+            let cells = line.split(',').skip(2).take(6);
+            cells.map(|cell| from_deg(cell.parse().unwrap())).collect::<Vec<f64>>()
+        });
+        (output.status.code().unwrap(), command.unwrap_or_default(), String::from_utf8(output.stderr).unwrap())
+    };
+    let profile = Profile::parse(&calibration.profile, "soft").unwrap().0;
+    let identified = calibration.identified(&profile).unwrap();
+    let meant: Vec<f64> = joints.iter().map(|angle| from_deg(*angle)).collect();
+    let nominal = Arm { targets: vec![profile.targets()[0].position_in_flange], ..profile.arm() };
+    let point = |arm: &Arm, q: &[f64]| arm.point_in_base(&Place { configuration: q.to_vec(), target: 0 });
+    let mut commands = Vec::new();
+    for payload in [None, Some(PayloadText { mass_kg: 60.0, centre_mm: (0.0, 0.0, 200.0) })] {
+        let options: &[&str] =
+            if payload.is_some() { &["--payload-kg", "60", "--payload-centre-mm", "0,0,200"] } else { &[] };
+        let (code, command, err) = run("soft.ron", options);
+        assert_eq!(code, 0, "{err}");
+        let arm = payload.map_or_else(|| identified.clone(), |payload| identified.clone().with_payload(payload.mass()));
+        let left = (point(&arm, &command) - point(&nominal, &meant)).norm();
+        assert!(left < 2e-6, "{payload:?}: {left}");
+        commands.push(command);
+    }
+    // The heavier load bends the second joint further, by its torque against that of the identification.
+    let further = (commands[1][1] - commands[0][1]).abs();
+    assert!((1e-5..2e-3).contains(&further), "{further}");
+    // The same numbers mean the same arm if the scale is not the one that this program would compute.
+    let mut doubled = calibration.clone();
+    let loads = doubled.loads.as_mut().unwrap();
+    loads.torques_nm.iter_mut().for_each(|torque| *torque *= 2.0);
+    doubled.parameters.last_mut().unwrap().deviation *= 2.0;
+    let same = doubled.identified(&profile).unwrap();
+    assert!((point(&same, &meant) - point(&identified, &meant)).norm() < 1e-12);
+
+    // A payload needs masses, and both of its numbers.
+    let (code, _, err) = run("calibration.ron", &["--payload-kg", "60", "--payload-centre-mm", "0,0,200"]);
+    assert!(code == 2 && err.contains("gives no masses of the arm"), "{err}");
+    let (code, _, err) = run("soft.ron", &["--payload-kg", "60"]);
+    assert!(code == 2 && err.contains("--payload-centre-mm"), "{err}");
+    for wrong in ["0,0", "0,0,20000", "0,0,x"] {
+        let (code, _, err) = run("soft.ron", &["--payload-kg", "60", "--payload-centre-mm", wrong]);
+        assert!(code == 2 && err.contains("is not a point within 10 m of the flange"), "{err}");
+    }
+    for (wrong, message) in [("mass_kg: 2.0", "'payload' needs a mass"), ("moment_nm: ", "'loads' has a number")] {
+        let broken = text.replacen(wrong, &wrong.replace("2.0", "-2.0").replace("nm: ", "nm: -"), 1);
+        let error = Calibration::parse(&broken).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
 }
 
 #[test]

@@ -187,12 +187,12 @@ fn published_masses_are_in_the_frames_of_their_source() {
     }
     // Panda: centres along the stretched arm, seen from the shoulder, for the arm laid down with its elbow straight.
     let panda = [
-        (0.646926, 0.02872),
-        (3.228604, 0.316 - 0.066502),
-        (3.587895, 0.316 + 0.104419),
-        (1.225946, 0.7 - 0.038437),
-        (1.666555, 0.7 + 0.014117),
-        (0.735522, 0.7 - 0.061597),
+        (0.646_926, 0.02872),
+        (3.228_604, 0.316 - 0.066_502),
+        (3.587_895, 0.316 + 0.104_419),
+        (1.225_946, 0.7 - 0.038_437),
+        (1.666_555, 0.7 - 0.014_117),
+        (0.735_522, 0.7 - 0.061_597),
     ];
     let expected: f64 = panda.iter().map(|(mass, distance)| GRAVITY * mass * distance).sum();
     let found = torque("franka_panda", 1, &[0.0, FRAC_PI_2, 0.0, 0.0, 0.0, 0.0, 0.0]);

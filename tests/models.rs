@@ -3,13 +3,13 @@
 use std::fs;
 
 use crate::support::root;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use trupose::kinematics::{Arm as KinematicArm, Convention, ForwardKinematics, KinematicChain};
 use trupose::model::proof::{self, configurations, prove};
 use trupose::model::{
-    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, export,
+    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, complete, export,
     geometry_only, import, link_values, urdf_text,
 };
 use trupose::profile::{Level, Profile, builtin, builtin_names};
@@ -254,6 +254,65 @@ fn a_joint_without_limits_and_a_gimbal_locked_origin_are_exact() {
         for q in configurations(&read, &[], 200) {
             assert!(differs(&fk.base_from_flange(&q), &way.base_from_tip(&q)) < 1e-9);
         }
+    }
+}
+
+/// What hangs together without motion is one mass, in the frame at the end of its link; the tool is not part of the arm.
+#[test]
+fn masses_of_a_urdf_arrive_at_the_same_places() {
+    let text = "<robot name='r'>
+        <link name='base'><inertial><mass value='9'/></inertial></link>
+        <link name='upper'><inertial><origin xyz='0 0.1 0.2' rpy='1 2 3'/><mass value='4'/></inertial></link>
+        <link name='cover'><inertial><origin xyz='0 0 0.05'/><mass value='1'/></inertial></link>
+        <link name='lower'><inertial><origin xyz='0.2 0 0'/><mass value='2.5'/></inertial></link>
+        <link name='flange'/><link name='gripper'><inertial><mass value='0.7'/></inertial></link>
+        <joint name='j1' type='revolute'><parent link='base'/><child link='upper'/><origin xyz='0.1 0 0.3' rpy='0.2 0 0.1'/><axis xyz='0 0 1'/><limit lower='-2' upper='2'/></joint>
+        <joint name='screws' type='fixed'><parent link='upper'/><child link='cover'/><origin xyz='0.3 0 0' rpy='0 1.5 0'/></joint>
+        <joint name='j2' type='revolute'><parent link='upper'/><child link='lower'/><origin xyz='0 0.05 0.4' rpy='1.5 0.1 0'/><axis xyz='0 1 0'/><limit lower='-2' upper='2'/></joint>
+        <joint name='end' type='fixed'><parent link='lower'/><child link='flange'/><origin xyz='0.5 0 0'/></joint>
+        <joint name='tool' type='fixed'><parent link='flange'/><child link='gripper'/></joint></robot>";
+    let urdf = Urdf::parse(text).unwrap();
+    let way = urdf.chain("base", "flange").unwrap();
+    let pose = |name: &str, q: &[f64]| urdf.chain("base", name).unwrap().base_from_tip(q);
+    let q = [0.7, -1.1];
+    let centre = |link: &str, at: [f64; 3]| pose(link, &q) * Point3::from(at);
+    let (upper, cover) = (centre("upper", [0.0, 0.1, 0.2]), centre("cover", [0.0, 0.0, 0.05]));
+    let expected = [(5.0, (upper.coords * 4.0 + cover.coords) / 5.0), (2.5, centre("lower", [0.2, 0.0, 0.0]).coords)];
+    for convention in BOTH {
+        let arm = import(&way, convention).unwrap();
+        assert_eq!(
+            arm.notes,
+            ["link 'gripper' is fixed to the tip: its mass is not part of the arm; state it as 'payload'"]
+        );
+        let read = through_text(&arm);
+        let frames = ForwardKinematics::new(&read).base_from_links(&q);
+        for (joint, (mass, place)) in expected.iter().enumerate() {
+            let found = read.loads().unwrap().links()[joint];
+            assert!((found.mass - mass).abs() < 1e-9);
+            assert!(((frames[joint + 1] * found.centre).coords - place).norm() < 1e-9, "{convention:?} {joint}");
+        }
+    }
+    for (wrong, message) in [
+        ("<inertial><mass value='-9'/>", "line 2: <mass> of link 'base': -9 kg is below zero"),
+        ("<inertial><mass value='x'/>", "line 2: <mass> of link 'base': attribute 'value' has 'x', which is no number"),
+        ("<inertial>", "line 2: <inertial> of link 'base': has no <mass>"),
+    ] {
+        let error = Urdf::parse(&text.replacen("<inertial><mass value='9'/>", wrong, 1)).unwrap_err().to_string();
+        assert_eq!(error, message);
+    }
+    // A corrected profile keeps what gravity acts on.
+    let given = builtin("ur5").unwrap().replacen("    targets: [", "    payload: (mass_kg: 2.0, centre_mm: (0.0, 1.0, 60.0)),\n    gravity_in_base: (0.0, 0.6, -0.8),\n    targets: [", 1);
+    for given in [
+        given.as_str(),
+        builtin("meca500").unwrap(),
+        &given.replace("gravity_in_base: (0.0, 0.6, -0.8)", "mounting: Wall"),
+    ] {
+        let given = Profile::parse(given, "given").unwrap().0;
+        let heading = Heading { comments: &[], name: "x", title: "t", source: "s" };
+        let written = complete(&heading, &given, given.chain(), given.targets());
+        let read = Profile::parse(&written, "written").unwrap_or_else(|errors| panic!("{errors}\n{written}")).0;
+        assert_eq!(read.masses(), given.masses());
+        assert_eq!((read.payload(), read.mounting()), (given.payload(), given.mounting()));
     }
 }
 

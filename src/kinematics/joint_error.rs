@@ -164,7 +164,7 @@ impl JointError {
 
     /// Whether gravity has a part in it.
     pub(super) fn is_loaded(&self) -> bool {
-        self.compliance != 0.0 || self.tilt != [0.0; 2]
+        self.compliance != 0.0 || self.tilt.iter().any(|tilt| *tilt != 0.0)
     }
 
     /// The rotation about x, y and z (rad) at the joint value `q` under the relative `load`.

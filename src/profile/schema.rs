@@ -130,7 +130,7 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
         chain,
         masses: masses?,
         mounting: mounting?,
-        payload: payload?,
+        payload,
         joints: joint_ranges,
         beta_joints,
         fixed_parameters: fixed_parameters?,

@@ -274,7 +274,7 @@ fn joints_have_the_errors_that_are_asked_for() {
         assert!(TiltAxis::ALL.iter().all(|axis| value(&arm, joint, JointTerm::Tilt(*axis)).unwrap() > 0.0));
         for order in 1..=MAX_ORDER {
             let pair = [JointTerm::Sine(order), JointTerm::Cosine(order)].map(|term| value(&arm, joint, term).unwrap());
-            let power = (pair[0].powi(2) + pair[1].powi(2)) / 2.0;
+            let power = f64::midpoint(pair[0].powi(2), pair[1].powi(2));
             *(if order > SMOOTH_ORDERS { &mut curve } else { &mut smooth }) += power / 6.0;
         }
     }

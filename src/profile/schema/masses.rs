@@ -53,9 +53,8 @@ pub(super) fn mounting(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<
     }
 }
 
-/// Decodes the payload.
-pub(super) fn payload(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Option<LinkMass>> {
-    let Some(ast) = top.get("payload") else { return Some(None) };
-    let inside = fields(ast, "'payload'", &["mass_kg", "centre_mm"], findings)?;
-    mass(&inside, findings).map(Some)
+/// Decodes the payload; `None` if it is absent or invalid.
+pub(super) fn payload(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<LinkMass> {
+    let inside = fields(top.get("payload")?, "'payload'", &["mass_kg", "centre_mm"], findings)?;
+    mass(&inside, findings)
 }

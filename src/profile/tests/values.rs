@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::super::{Level, Profile, Severity, Tracker, check_text, show_text};
+use super::super::{Level, Masses, Profile, Severity, Tracker, check_text, show_text};
 use crate::kinematics::{Convention, ForwardKinematics, JointType, LinkParameter, ParameterId};
 
 const EVERYTHING: &str = r#"(
@@ -11,17 +11,19 @@ const EVERYTHING: &str = r#"(
     joints: [
         (name: "A", type: Revolute, alpha_deg: 0.0, a_mm: 0.0, d_mm: 200.0, theta_deg: 0.0,
             direction: -1, limits_deg: (-90.0, 90.0), planning_limits_deg: (-45.0, 60.0),
-            max_speed_deg_s: 180.0, pulses_per_degree: -1024.0),
+            max_speed_deg_s: 180.0, pulses_per_degree: -1024.0, mass_kg: 12.5, centre_mm: (10.0, -20.0, 30.0)),
         (name: "B", type: Revolute, alpha_deg: 0.0, a_mm: 300.0, d_mm: 0.0, theta_deg: 0.0, beta_deg: 0.5,
-            limits_deg: (-90.0, 90.0), coupling: {"A": 0.5}),
+            limits_deg: (-90.0, 90.0), coupling: {"A": 0.5}, mass_kg: 4.0, centre_mm: (-150.0, 0.0, 0.0)),
         (name: "C", type: Prismatic, alpha_deg: 90.0, a_mm: 0.0, d_mm: 50.0, theta_deg: 0.0,
-            limits_mm: (0.0, 400.0), max_speed_mm_s: 500.0),
+            limits_mm: (0.0, 400.0), max_speed_mm_s: 500.0, mass_kg: 2.0, centre_mm: (0.0, 0.0, -100.0)),
     ],
     flange: (xyz_mm: (0.0, 0.0, 10.0)),
     targets: [
         (name: "one", position_mm: (1.0, 2.0, 3.0), axis_in_flange: (0.0, 2.0, 0.0)),
         (name: "two", position_mm: (4.0, 5.0, 6.0), uncertainty_mm: 0.0),
     ],
+    payload: (mass_kg: 3.0, centre_mm: (0.0, 5.0, 60.0)),
+    gravity_in_base: (0.0, 3.0, -4.0),
     fixed: ["theta1", "target1.z", "d1"],
     expected_deviations: (length_mm: 0.5, angle_mrad: 3.0, joint_offset_mrad: 20.0, prismatic_offset_mm: 2.0,
         parameters_mm: {"a2": 4.0, "target1.x": 7.0}, parameters_mrad: {"beta2": 0.1}),
@@ -99,6 +101,31 @@ fn targets_expected_deviations_and_fixed_parameters() {
     assert_eq!(offsets[0], ParameterId::Link { joint: 1, parameter: LinkParameter::Theta });
     assert_eq!(offsets[1], ParameterId::Link { joint: 2, parameter: LinkParameter::D });
     assert_eq!(offsets.len(), 4);
+}
+
+#[test]
+fn masses_arrive_in_kilogram_and_metre() {
+    let profile = everything();
+    let loads = profile.chain().loads().unwrap();
+    let Masses::Links(links) = profile.masses() else { panic!("{:?}", profile.masses()) };
+    assert_eq!(loads.links(), links);
+    assert!(near(links[0].mass, 12.5) && (links[0].centre - Point3::new(0.01, -0.02, 0.03)).norm() < 1e-12);
+    assert_eq!(profile.payload(), Some(loads.payload()));
+    assert!(near(loads.payload().mass, 3.0) && near(loads.payload().centre.z, 0.06));
+    assert!((profile.mounting().down() - Vector3::new(0.0, 0.6, -0.8)).norm() < 1e-12);
+    // A sliding joint has no limits of a turn: the loads are taken within its own.
+    assert!(loads.largest_torque(0) > 1.0);
+    for (mounting, down) in
+        [("mounting: Floor", -Vector3::z()), ("mounting: Ceiling", Vector3::z()), ("mounting: Wall", Vector3::x())]
+    {
+        let text = EVERYTHING.replace("gravity_in_base: (0.0, 3.0, -4.0)", mounting);
+        assert_eq!(Profile::parse(&text, "all.ron").unwrap().0.mounting().down(), down);
+    }
+    let split = EVERYTHING.replace(", mass_kg: 12.5, centre_mm: (10.0, -20.0, 30.0)", "");
+    let (partial, warnings) = Profile::parse(&split, "all.ron").unwrap();
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let Masses::Links(links) = partial.masses() else { panic!("{:?}", partial.masses()) };
+    assert!(near(links[0].mass, 0.0) && near(links[1].mass, 4.0));
 }
 
 #[test]
