@@ -219,6 +219,8 @@ pub struct TargetView {
     pub nominal_sigma_mm: f64,
     /// The choice in words.
     pub choice: Option<String>,
+    /// The payload that was stated, in words.
+    pub payload: Option<String>,
     /// The circle-point analysis, once it has begun.
     pub circles: Option<CirclesView>,
 }

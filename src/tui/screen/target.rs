@@ -106,6 +106,9 @@ impl TargetScreen {
         };
         page.pair("profile", &format!("({x:.3}, {y:.3}, {z:.3}) mm in the flange, {sigma}"));
         page.pair("chosen", content.choice.as_deref().unwrap_or("nothing yet: where is the centre of the SMR?"));
+        if let Some(payload) = &content.payload {
+            page.pair("payload", payload);
+        }
         if let Some(circles) = &content.circles {
             page.gap();
             circles::result(circles, &mut page);

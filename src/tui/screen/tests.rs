@@ -95,6 +95,7 @@ fn target(choice: Option<&str>, circles: Option<CirclesView>) -> ViewModel {
         nominal_mm: [-1.473, 26.384, 71.991],
         nominal_sigma_mm: 0.5,
         choice: choice.map(str::to_owned),
+        payload: None,
         circles,
     });
     let unusable = (!is_complete).then(|| "the circles are not complete".to_owned());

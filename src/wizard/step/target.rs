@@ -327,6 +327,7 @@ impl StepMachine for TargetStep {
             }),
             nominal_sigma_mm: target.map_or(0.0, |target| to_mm(target.uncertainty)),
             choice: cx.session.target.as_ref().map(target_text),
+            payload: cx.session.payload.map(|payload| payload.to_string()),
             circles: self.circles(cx),
         })
     }
