@@ -152,11 +152,7 @@ fn mass_lines(profile: &Profile) -> Vec<String> {
     let masses = match profile.masses() {
         Masses::Unknown => "not given, nothing about gravity can be identified".to_owned(),
         Masses::Weight(weight) => {
-            format!(
-                "{} kg, {} kg of the arm split over the links by their lengths",
-                links.join(", "),
-                fixed(*weight, 1)
-            )
+            format!("{} kg, split by their lengths from {} kg of the arm", links.join(", "), fixed(*weight, 1))
         }
         Masses::Links(_) => format!("{} kg, stated link by link", links.join(", ")),
     };
