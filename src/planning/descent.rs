@@ -243,22 +243,29 @@ impl<'a> Descent<'a> {
         window: &[usize],
         bar: f64,
     ) -> Option<Exchange> {
-        let hopeful = vacancy.shortlist(window, bar);
-        let mut allowed = Vec::new();
-        with_each(self.information, others, &hopeful, |candidate, merit| {
-            if merit.predicted_error() <= self.limit {
-                allowed.push((candidate, merit));
-            }
-        });
         let mut best: Option<Exchange> = None;
         let mut bar = bar;
-        for (entering, merit) in allowed {
-            if vacancy.may_reach(entering, bar) {
-                let cost = vacancy.cost(entering);
-                if cost < bar {
-                    bar = cost;
-                    best = Some(Exchange { entering, cost, merit });
+        let mut judged = 0;
+        let kk: usize = std::env::var("KK").map_or(12, |x| x.parse().unwrap());
+        for hopeful in vacancy.shortlist(window, bar).chunks(64) {
+            let mut allowed = Vec::new();
+            with_each(self.information, others, hopeful, |candidate, merit| {
+                if merit.predicted_error() <= self.limit {
+                    allowed.push((candidate, merit));
                 }
+            });
+            for (entering, merit) in allowed {
+                judged += 1;
+                if vacancy.may_reach(entering, bar) {
+                    let cost = vacancy.cost(entering);
+                    if cost < bar {
+                        bar = cost;
+                        best = Some(Exchange { entering, cost, merit });
+                    }
+                }
+            }
+            if judged > kk {
+                break;
             }
         }
         best

@@ -4,17 +4,19 @@
 //! before that by a bound that holds exactly. In the basis of eigenvectors `v_k` of the Gram matrix of the other poses:
 //!
 //! - the smallest eigenvalue of a symmetric matrix is at most that of any principal block, the largest at least any diagonal
-//!   entry (Rayleigh–Ritz). The block of the lowest directions and the top direction of a candidate cost a third of the
-//!   exact matrix, and a Cholesky factor tells whether the block lies above what would be needed;
+//!   entry (Rayleigh–Ritz). The lowest direction alone turns most candidates down. The block of the lowest directions and the
+//!   top direction of the others cost a third of the exact matrix, and a Cholesky factor tells whether the block lies above what
+//!   would be needed;
 //! - sums of concave functions of the eigenvalues are at most those of the diagonal (Schur–Horn): this bounds O1 and O5. The
 //!   bound is close and seldom turns one down, so that only the most promising candidates are judged exactly.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Point3, Vector3};
 
 use super::information::Information;
 use super::objective::Objective;
 use super::pairs::{add_pairs, direction};
 use super::score::ObservabilityIndices;
+use crate::identification::SAME_POINT;
 
 /// Directions that enter the bound: the lowest ones and, last, the top one. A multiple of the width of vector registers.
 const LANES: usize = 8;
@@ -22,8 +24,14 @@ const LANES: usize = 8;
 /// Candidates that O1 and O5 judge exactly per place.
 const SHORTLIST: usize = 12;
 
+/// Candidates that the other objectives look at per place after the lowest direction.
+const LONGLIST: usize = 2000;
+
 /// One number per direction of the bound.
 type Lanes = [f64; LANES];
+
+/// Pairs that are summed side by side.
+const SIDE_BY_SIDE: usize = 8;
 
 /// What is minimised, as a function of the eigenvalues of the pair rows' Gram matrix.
 pub(super) fn spectral_cost(objective: Objective, eigenvalues: &[f64], poses: usize) -> f64 {
@@ -57,6 +65,8 @@ pub(super) struct Vacancy<'a> {
     low: usize,
     /// Rows x, y, z of the other poses along the directions of the bound.
     rows: Vec<[Lanes; 3]>,
+    /// Points of the other poses and their rows along the lowest direction: x, y, z of each.
+    lowest: Lowest,
     /// Rows x, y, z of the other poses along all eigenvectors, rank × 3M; empty where the block decides.
     rotated: DMatrix<f64>,
 }
@@ -84,6 +94,7 @@ impl<'a> Vacancy<'a> {
             eigenvectors: DMatrix::from_columns(&columns),
             directions: Vec::new(),
             rows: Vec::new(),
+            lowest: Lowest::default(),
             rotated: DMatrix::zeros(0, 0),
         };
         let top = vacancy.eigenvectors.ncols() - 1;
@@ -97,6 +108,7 @@ impl<'a> Vacancy<'a> {
             })
             .collect();
         vacancy.rows = others.iter().map(|&other| vacancy.along_directions(other)).collect();
+        vacancy.lowest = Lowest::new(information, others, &vacancy.rows);
         if vacancy.diagonal_decides() {
             vacancy.rotated = vacancy.along_eigenvectors(others);
         }
@@ -120,18 +132,19 @@ impl<'a> Vacancy<'a> {
         self.eigenvectors.tr_mul(&rows)
     }
 
-    /// The candidates worth an exact judgement for a cost below `limit`.
+    /// The candidates worth an exact judgement for a cost below `limit`, the most promising ones first.
     pub(super) fn shortlist(&self, candidates: &[usize], limit: f64) -> Vec<usize> {
-        if !self.diagonal_decides() {
-            return candidates.iter().copied().filter(|&candidate| self.may_reach(candidate, limit)).collect();
-        }
-        let mut costs: Vec<(f64, usize)> = candidates
-            .iter()
-            .map(|&candidate| (self.diagonal_cost(candidate), candidate))
-            .filter(|(cost, _)| *cost < limit)
-            .collect();
-        costs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        costs.into_iter().take(SHORTLIST).map(|(_, candidate)| candidate).collect()
+        let (mut hopes, length): (Vec<(f64, usize)>, _) = if self.diagonal_decides() {
+            let cost = |&candidate: &usize| (self.diagonal_cost(candidate), candidate);
+            (candidates.iter().map(cost).filter(|(cost, _)| *cost < limit).collect(), SHORTLIST)
+        } else {
+            // The more it adds to the lowest direction the better.
+            let needed = self.needed(limit);
+            let shortfall = |&candidate: &usize| (needed - self.lowest_with(candidate), candidate);
+            (candidates.iter().map(shortfall).filter(|(shortfall, _)| *shortfall < 0.0).collect(), LONGLIST)
+        };
+        hopes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        hopes.into_iter().take(length).map(|(_, candidate)| candidate).collect()
     }
 
     /// The rows of a candidate along the directions of the bound.
@@ -147,6 +160,15 @@ impl<'a> Vacancy<'a> {
             }
         }
         lanes
+    }
+
+    /// The Gram matrix with `candidate` along the lowest direction of the others: its smallest eigenvalue is not larger.
+    fn lowest_with(&self, candidate: usize) -> f64 {
+        let (rank, width) = (self.information.rank(), self.information.width());
+        let lowest = self.eigenvectors.column(0);
+        let rows = self.information.rows(candidate);
+        let own = std::array::from_fn(|axis| dot(&rows[width * axis..width * axis + rank], lowest.as_slice()));
+        self.eigenvalues[0] + self.lowest.with(self.information.point(candidate), own)
     }
 
     /// The Gram matrix with `candidate` in the set.
@@ -174,8 +196,25 @@ impl<'a> Vacancy<'a> {
         }
     }
 
+    /// The smallest eigenvalue that `limit` asks for at least: a candidate can only make the largest eigenvalue larger.
+    fn needed(&self, limit: f64) -> f64 {
+        self.needed_below(limit, self.eigenvalues.last().copied().unwrap_or(0.0))
+    }
+
+    /// The smallest eigenvalue that `limit` asks for where the largest is `top`.
+    fn needed_below(&self, limit: f64, top: f64) -> f64 {
+        match self.objective {
+            Objective::O3 => limit * limit,
+            Objective::O4 => -limit * top.sqrt(),
+            _ => top / (limit * limit),
+        }
+    }
+
     /// The block of the low directions with the candidate, tested against the smallest eigenvalue that `limit` asks for.
     fn block_reaches(&self, candidate: usize, limit: f64) -> bool {
+        if self.lowest_with(candidate) <= self.needed(limit) {
+            return false;
+        }
         let own = self.along_directions(candidate);
         let mut diagonal = [0.0; LANES];
         let rows = self.others.iter().zip(&self.rows).map(|(&other, rows)| {
@@ -187,12 +226,8 @@ impl<'a> Vacancy<'a> {
         });
         let rows: Vec<Lanes> = rows.collect();
         let top = self.eigenvalues.last().copied().unwrap_or(0.0) + diagonal[LANES - 1];
-        let needed = match self.objective {
-            Objective::O3 => limit * limit,
-            Objective::O4 => -limit * top.sqrt(),
-            _ => top / (limit * limit),
-        };
-        // Most candidates fail on the diagonal alone.
+        let needed = self.needed_below(limit, top);
+        // Most of the rest fail on the diagonal alone.
         if self.eigenvalues[..self.low].iter().zip(diagonal).any(|(value, added)| value + added <= needed) {
             return false;
         }
@@ -228,6 +263,51 @@ impl<'a> Vacancy<'a> {
         }
         spectral_cost(self.objective, &diagonal, self.others.len() + 1)
     }
+}
+
+/// Points of poses and their rows along one direction, coordinate by coordinate, so that several pairs are summed at once.
+#[derive(Debug, Default)]
+struct Lowest {
+    points: [Vec<f64>; 3],
+    rows: [Vec<f64>; 3],
+}
+
+impl Lowest {
+    /// Of `others`, whose rows along the directions of the bound are `rows`, the lowest direction first.
+    fn new(information: &Information, others: &[usize], rows: &[[Lanes; 3]]) -> Self {
+        let coordinates = |axis: usize| others.iter().map(|&other| information.point(other)[axis]).collect();
+        Self {
+            points: std::array::from_fn(coordinates),
+            rows: std::array::from_fn(|axis| rows.iter().map(|row| row[axis][0]).collect()),
+        }
+    }
+
+    /// What the pairs of a pose at `point` with the rows `own` add along the direction, or a little more: two points on top of each
+    /// other count as if they were [`SAME_POINT`] apart.
+    fn with(&self, point: &Point3<f64>, own: [f64; 3]) -> f64 {
+        let [px, py, pz] = &self.points;
+        let [rx, ry, rz] = &self.rows;
+        let mut sums = [0.0; SIDE_BY_SIDE];
+        let mut add = |from: usize, to: usize| {
+            let columns = px[from..to].iter().zip(&py[from..to]).zip(&pz[from..to]);
+            let columns = columns.zip(rx[from..to].iter().zip(&ry[from..to]).zip(&rz[from..to]));
+            for (sum, (((x, y), z), ((rx, ry), rz))) in sums.iter_mut().zip(columns) {
+                let (x, y, z) = (point.x - x, point.y - y, point.z - z);
+                let along = x * (own[0] - rx) + y * (own[1] - ry) + z * (own[2] - rz);
+                *sum += along * along / (x * x + y * y + z * z).max(SAME_POINT * SAME_POINT);
+            }
+        };
+        let whole = px.len() - px.len() % SIDE_BY_SIDE;
+        for from in (0..whole).step_by(SIDE_BY_SIDE) {
+            add(from, from + SIDE_BY_SIDE);
+        }
+        add(whole, px.len());
+        sums.iter().sum()
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// `u · (own − their)` in every lane.
