@@ -74,6 +74,7 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, DVector, Point3};
 
 pub use error::IdentificationError;
+pub(crate) use factor::Factor;
 pub use observability::{BlindGroup, Observability};
 pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint};
@@ -86,7 +87,6 @@ pub use terms::{TermGroup, Terms};
 use crate::geometry::{principal_spread, register};
 use crate::kinematics::{Arm, FreeParameter};
 use crate::units::MICROMETRE;
-use factor::Factor;
 use linearise::{SMALLEST_SIGMA, Trust};
 use noise::{Estimation, Groups, Noise};
 use solver::{Basis, Linearised, Solution, Solve};

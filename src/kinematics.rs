@@ -33,6 +33,7 @@
 
 mod arm;
 mod chain;
+mod coverage;
 mod forward;
 mod jacobian;
 mod joint_error;
@@ -43,6 +44,7 @@ use thiserror::Error;
 
 pub use arm::{Arm, Place, PreparedArm};
 pub use chain::{Convention, Joint, JointType, KinematicChain, Link};
+pub use coverage::{Gap, JointCoverage, coverage};
 pub use forward::ForwardKinematics;
 pub use jacobian::{ConfigurationJacobian, IdentificationJacobian};
 pub use joint_error::{JointError, JointTerm, MAX_ORDER, SMOOTH_ORDERS, TiltAxis, curve_share};

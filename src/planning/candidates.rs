@@ -12,7 +12,7 @@ use thiserror::Error;
 use super::collision::{ArmShape, Obstruction};
 use super::visibility::{Hidden, Sight};
 use super::{Cell, CellError};
-use crate::kinematics::{JointType, KinematicChain};
+use crate::kinematics::{JointType, KinematicChain, Place};
 use crate::units::{DEGREE, MILLIMETRE};
 
 /// Joint angles in a plan are multiples of this (rad): 0.001°, the last digit of a FANUC program. At 1.5 m half of it is 13 µm,
@@ -137,6 +137,13 @@ pub struct Candidate {
     pub configuration: Vec<f64>,
     /// Centre of the SMR in the base (m).
     pub point_in_base: Point3<f64>,
+}
+
+impl Candidate {
+    /// The place of its first target.
+    pub fn place(&self) -> Place {
+        Place { configuration: self.configuration.clone(), target: 0 }
+    }
 }
 
 /// How many configurations a rule was against.

@@ -13,6 +13,9 @@ use super::information::Information;
 use super::objective::{Chosen, Objective, Progress, SearchSettings, Stage};
 use super::{PlanningError, check_count, check_members};
 
+/// Shortfall of the joint angles that the balanced objective may give away, relative to that of the best set.
+const SHORTFALL_SLACK: f64 = 0.1;
+
 /// A search, checked.
 #[derive(Clone, Debug)]
 pub struct Search<'a> {
@@ -52,7 +55,7 @@ impl<'a> Search<'a> {
     pub const fn first_stage(&self) -> Stage {
         match self.settings.objective {
             Objective::Balanced => Stage::Prediction,
-            _ => Stage::Objective { limit: f64::INFINITY },
+            _ => Stage::Objective { limit: f64::INFINITY, shortfall: f64::INFINITY },
         }
     }
 
@@ -60,7 +63,10 @@ impl<'a> Search<'a> {
     pub fn next_stage(&self, stage: Stage, best: &Chosen) -> Option<Stage> {
         match stage {
             Stage::Prediction if self.settings.objective == Objective::Balanced && !best.interrupted => {
-                Some(Stage::Objective { limit: best.figures.predicted_error * (1.0 + self.settings.prediction_slack) })
+                Some(Stage::Objective {
+                    limit: best.figures.predicted_error * (1.0 + self.settings.prediction_slack),
+                    shortfall: best.shortfall * (1.0 + SHORTFALL_SLACK),
+                })
             }
             Stage::Prediction | Stage::Objective { .. } => None,
         }
@@ -115,9 +121,11 @@ impl<'a> Search<'a> {
             let best = best_of(&results).filter(|best| best.cost.is_finite()).ok_or_else(singular)?.clone();
             let Some(next) = self.next_stage(stage, &best) else { return Ok(best) };
             stage = next;
-            if let Stage::Objective { limit } = stage {
-                // A start that ended above the limit continues from the best set.
-                for result in results.iter_mut().filter(|result| result.figures.predicted_error > limit) {
+            if let Stage::Objective { limit, shortfall } = stage {
+                // A start that ended above a limit continues from the best set.
+                let is_above =
+                    |result: &Chosen| result.figures.predicted_error > limit || result.shortfall > shortfall;
+                for result in results.iter_mut().filter(|result| is_above(result)) {
                     result.clone_from(&best);
                 }
             }

@@ -9,6 +9,7 @@ use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::exchange::{Merit, Prediction, add_pose};
+use super::filling::Unfilled;
 use super::information::Information;
 use super::objective::{Chosen, Figures, Objective, Progress, SearchSettings, Stage};
 use super::pair_exchange::{Vacancy, spectral_cost};
@@ -17,8 +18,14 @@ use super::score::{ObservabilityIndices, condition_number};
 
 /// Poses replaced at random where no exchange is left.
 const KICKED: usize = 3;
+/// Promising candidates whose predicted error is looked at together, and how many allowed ones are judged by their pairs at a place:
+/// those after them are less promising.
+const CHUNK: usize = 64;
+const ENOUGH: usize = 64;
 /// Tries to find a replacement that the limit allows.
 const KICK_TRIES: usize = 20;
+/// What a shortfall of one costs in the prediction stage, as a share of the predicted error.
+const SHORTFALL_PRICE: f64 = 0.05;
 /// An exchange must lower the cost by this share, lest rounding errors keep it going round.
 const NEGLIGIBLE: f64 = 1e-12;
 
@@ -33,19 +40,22 @@ struct State {
     gram: DMatrix<f64>,
     cost: f64,
     merit: Merit,
+    /// Of the joint angles in their ranges.
+    shortfall: f64,
 }
 
 impl State {
-    fn new(information: &Information, objective: Objective, set: Vec<usize>) -> Self {
+    fn new(information: &Information, target: Target, set: Vec<usize>) -> Self {
         let matrix = information.sum(&set);
         let gram = pair_gram(information, &set);
         let merit = Merit::new(information, matrix.clone());
-        let cost = if objective.is_spectral() {
-            spectral_cost(objective, gram.symmetric_eigenvalues().as_slice(), set.len())
+        let shortfall = information.angles().map_or(0.0, |filling| filling.shortfall(&set));
+        let cost = if target.objective.is_spectral() {
+            spectral_cost(target.objective, gram.symmetric_eigenvalues().as_slice(), set.len())
         } else {
-            merit_cost(objective, &merit)
+            target.cost(&merit, shortfall)
         };
-        Self { set, matrix, gram, cost, merit }
+        Self { set, matrix, gram, cost, merit, shortfall }
     }
 
     fn figures(&self, information: &Information) -> Figures {
@@ -59,11 +69,42 @@ impl State {
     }
 }
 
-/// What is minimised where the information matrix decides.
-fn merit_cost(objective: Objective, merit: &Merit) -> f64 {
-    match objective {
-        Objective::D => -merit.log_det,
-        _ => merit.predicted_error(),
+/// What a stage of the search goes for.
+#[derive(Clone, Copy, Debug)]
+struct Target {
+    objective: Objective,
+    /// Largest predicted error and shortfall allowed.
+    limit: f64,
+    largest_shortfall: f64,
+    /// What a shortfall of one costs, as a share of the predicted error.
+    price: f64,
+}
+
+impl Target {
+    fn new(stage: Stage, settings: &SearchSettings) -> Self {
+        match stage {
+            Stage::Prediction => Self {
+                objective: Objective::Prediction,
+                limit: f64::INFINITY,
+                largest_shortfall: f64::INFINITY,
+                price: SHORTFALL_PRICE,
+            },
+            Stage::Objective { limit, shortfall } => {
+                Self { objective: settings.objective, limit, largest_shortfall: shortfall, price: 0.0 }
+            }
+        }
+    }
+
+    /// What is minimised where the information matrix decides.
+    fn cost(&self, merit: &Merit, shortfall: f64) -> f64 {
+        match self.objective {
+            Objective::D => -merit.log_det,
+            _ => merit.predicted_error() * (1.0 + self.price * shortfall),
+        }
+    }
+
+    fn allows(&self, merit: &Merit, shortfall: f64) -> bool {
+        merit.predicted_error() <= self.limit && shortfall <= self.largest_shortfall
     }
 }
 
@@ -84,14 +125,14 @@ struct Exchange {
     entering: usize,
     cost: f64,
     merit: Merit,
+    shortfall: f64,
 }
 
 /// A start on its way.
 #[derive(Debug)]
 pub(super) struct Descent<'a> {
     information: &'a Information,
-    objective: Objective,
-    limit: f64,
+    target: Target,
     stage: Stage,
     sweeps: usize,
     window: usize,
@@ -114,17 +155,13 @@ impl<'a> Descent<'a> {
         set: Vec<usize>,
         mut rng: ChaCha8Rng,
     ) -> Self {
-        let (objective, limit) = match stage {
-            Stage::Prediction => (Objective::Prediction, f64::INFINITY),
-            Stage::Objective { limit } => (settings.objective, limit),
-        };
+        let target = Target::new(stage, settings);
         let mut pool: Vec<usize> = (0..information.len()).collect();
         pool.shuffle(&mut rng);
-        let current = State::new(information, objective, set);
+        let current = State::new(information, target, set);
         let mut descent = Self {
             information,
-            objective,
-            limit,
+            target,
             stage,
             sweeps: settings.sweeps_of(stage),
             window: settings.window.max(1),
@@ -147,7 +184,7 @@ impl<'a> Descent<'a> {
         keep_going: &(dyn Fn() -> bool + Sync),
         progress: &(dyn Fn(&Progress) + Sync),
     ) -> Chosen {
-        let first_threshold = first_threshold(self.objective, self.limit);
+        let first_threshold = first_threshold(self.target.objective, self.target.limit);
         let mut interrupted = false;
         let mut unmoved = 0;
         for sweep in 1..=self.sweeps {
@@ -167,8 +204,9 @@ impl<'a> Descent<'a> {
         let mut set = self.best.set;
         // The numbers are those of the set whatever way it was found.
         set.sort_unstable();
-        let best = State::new(self.information, self.objective, set);
-        Chosen { figures: best.figures(self.information), cost: best.cost, set: best.set, interrupted }
+        let best = State::new(self.information, self.target, set);
+        let figures = best.figures(self.information);
+        Chosen { figures, cost: best.cost, set: best.set, shortfall: best.shortfall, interrupted }
     }
 
     /// Visits every place once, in random order. Returns whether a pose changed; `None` when interrupted.
@@ -197,24 +235,26 @@ impl<'a> Descent<'a> {
         let mut matrix = self.current.matrix.clone();
         add_pose(self.information, &mut matrix, leaving, -1.0);
         let bar = self.current.cost + (threshold - NEGLIGIBLE) * self.current.cost.abs();
-        let found = if self.objective.is_spectral() {
-            let others: Vec<usize> = self.current.set.iter().copied().filter(|&pose| pose != leaving).collect();
+        let others: Vec<usize> = self.current.set.iter().copied().filter(|&pose| pose != leaving).collect();
+        let unfilled = self.unfilled(&others);
+        let found = if self.target.objective.is_spectral() {
             let mut gram = self.current.gram.clone();
             add_pairs(self.information, &mut gram, leaving, &others, -1.0);
-            let vacancy = Vacancy::new(self.information, self.objective, &others, gram);
-            let found = self.best_by_pairs(&vacancy, &matrix, &window, bar);
+            let vacancy = Vacancy::new(self.information, self.target.objective, &others, gram);
+            let found = self.best_by_pairs(&vacancy, &matrix, unfilled.as_ref(), &window, bar);
             if let Some(found) = found {
                 self.current.gram = vacancy.gram_with(found.entering);
             }
             found
         } else {
-            self.best_by_merit(&matrix, &window, bar)
+            self.best_by_merit(&matrix, unfilled.as_ref(), &window, bar)
         };
-        let Some(Exchange { entering, cost, merit }) = found else { return false };
+        let Some(Exchange { entering, cost, merit, shortfall }) = found else { return false };
         add_pose(self.information, &mut matrix, entering, 1.0);
         self.current.matrix = matrix;
         self.current.cost = cost;
         self.current.merit = merit;
+        self.current.shortfall = shortfall;
         self.current.set[place] = entering;
         self.is_in[leaving] = false;
         self.is_in[entering] = true;
@@ -222,17 +262,31 @@ impl<'a> Descent<'a> {
     }
 
     /// The candidate of lowest cost below `bar`, judged by the information matrix of the other poses.
-    fn best_by_merit(&self, others: &DMatrix<f64>, window: &[usize], bar: f64) -> Option<Exchange> {
+    fn best_by_merit(
+        &self,
+        others: &DMatrix<f64>,
+        unfilled: Option<&Unfilled<'_>>,
+        window: &[usize],
+        bar: f64,
+    ) -> Option<Exchange> {
         let mut best: Option<Exchange> = None;
         let mut bar = bar;
         with_each(self.information, others, window, |entering, merit| {
-            let cost = merit_cost(self.objective, &merit);
+            let shortfall = shortfall_with(unfilled, entering);
+            let cost = self.target.cost(&merit, shortfall);
             if cost < bar {
                 bar = cost;
-                best = Some(Exchange { entering, cost, merit });
+                best = Some(Exchange { entering, cost, merit, shortfall });
             }
         });
         best
+    }
+
+    /// The gaps that `others` leave, where ranges are to be filled.
+    fn unfilled(&self, others: &[usize]) -> Option<Unfilled<'a>> {
+        let is_asked = self.target.price > 0.0 || self.target.largest_shortfall.is_finite();
+        let filling = self.information.angles().filter(|_| is_asked)?;
+        Some(Unfilled::new(filling, others, others.len() + 1))
     }
 
     /// The same, judged by the pair rows: the bound first, then the predicted error, then the exact cost.
@@ -240,31 +294,35 @@ impl<'a> Descent<'a> {
         &self,
         vacancy: &Vacancy<'_>,
         others: &DMatrix<f64>,
+        unfilled: Option<&Unfilled<'_>>,
         window: &[usize],
         bar: f64,
     ) -> Option<Exchange> {
         let mut best: Option<Exchange> = None;
         let mut bar = bar;
         let mut judged = 0;
-        let kk: usize = std::env::var("KK").map_or(12, |x| x.parse().unwrap());
-        for hopeful in vacancy.shortlist(window, bar).chunks(64) {
+        let fills = |candidate: &usize| shortfall_with(unfilled, *candidate) <= self.target.largest_shortfall;
+        let window: Vec<usize> = window.iter().copied().filter(fills).collect();
+        let hopeful = vacancy.shortlist(&window, bar);
+        for hopeful in hopeful.chunks(CHUNK) {
             let mut allowed = Vec::new();
             with_each(self.information, others, hopeful, |candidate, merit| {
-                if merit.predicted_error() <= self.limit {
-                    allowed.push((candidate, merit));
+                let shortfall = shortfall_with(unfilled, candidate);
+                if self.target.allows(&merit, shortfall) {
+                    allowed.push((candidate, merit, shortfall));
                 }
             });
-            for (entering, merit) in allowed {
-                judged += 1;
+            judged += allowed.len();
+            for (entering, merit, shortfall) in allowed {
                 if vacancy.may_reach(entering, bar) {
                     let cost = vacancy.cost(entering);
                     if cost < bar {
                         bar = cost;
-                        best = Some(Exchange { entering, cost, merit });
+                        best = Some(Exchange { entering, cost, merit, shortfall });
                     }
                 }
             }
-            if judged > kk {
+            if judged >= ENOUGH {
                 break;
             }
         }
@@ -293,8 +351,10 @@ impl<'a> Descent<'a> {
                 let entering = self.pool[self.rng.random_range(0..self.pool.len())];
                 let mut set = self.current.set.clone();
                 set[place] = entering;
-                let within =
-                    || Merit::new(self.information, self.information.sum(&set)).predicted_error() <= self.limit;
+                let within = || {
+                    let state = State::new(self.information, self.target, set.clone());
+                    self.target.allows(&state.merit, state.shortfall)
+                };
                 if !self.is_in[entering] && within() {
                     self.rebuild(set);
                     break;
@@ -305,7 +365,7 @@ impl<'a> Descent<'a> {
 
     /// Makes `set` the current one, with matrices from scratch.
     fn rebuild(&mut self, set: Vec<usize>) {
-        self.current = State::new(self.information, self.objective, set);
+        self.current = State::new(self.information, self.target, set);
         self.mark_members();
     }
 
@@ -319,7 +379,8 @@ impl<'a> Descent<'a> {
     /// Adds the candidate that the objective (one of the information matrix) gains most from.
     pub(super) fn grow(&mut self) {
         let rest: Vec<usize> = self.pool.iter().copied().filter(|&candidate| !self.is_in[candidate]).collect();
-        if let Some(found) = self.best_by_merit(&self.current.matrix, &rest, f64::INFINITY) {
+        let unfilled = self.unfilled(&self.current.set);
+        if let Some(found) = self.best_by_merit(&self.current.matrix, unfilled.as_ref(), &rest, f64::INFINITY) {
             let mut set = self.current.set.clone();
             set.push(found.entering);
             self.rebuild(set);
@@ -332,10 +393,22 @@ impl<'a> Descent<'a> {
         self.current.set.len()
     }
 
+    /// The best set, ascending.
+    pub(super) fn set(&self) -> Vec<usize> {
+        let mut set = self.best.set.clone();
+        set.sort_unstable();
+        set
+    }
+
     /// Predicted error of the best set (σ).
     pub(super) fn predicted_error(&self) -> f64 {
         self.best.merit.predicted_error()
     }
+}
+
+/// The shortfall with `candidate`; 0 where no range is to be filled.
+fn shortfall_with(unfilled: Option<&Unfilled<'_>>, candidate: usize) -> f64 {
+    unfilled.map_or(0.0, |unfilled| unfilled.with(candidate))
 }
 
 /// Calls `visit` with the merit of the information `others` plus each of `candidates`. Too few other poses leave no inverse to

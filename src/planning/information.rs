@@ -12,7 +12,8 @@
 
 use nalgebra::{DMatrix, DMatrixView, DVector, Point3};
 
-use super::PlanningError;
+use super::filling::Filling;
+use super::{JointBox, PlanningError};
 use crate::identification::{Observability, Observations, PointSample, Problem};
 use crate::kinematics::{Arm, FreeParameter, IdentificationJacobian, Place};
 use crate::units::MILLIMETRE;
@@ -34,10 +35,16 @@ pub struct Information {
     /// `S V`: from reduced to real parameters, n × rank ((m) or (rad)).
     basis: DMatrix<f64>,
     points: Vec<Point3<f64>>,
+    /// The middle of the points.
+    middle: Point3<f64>,
     /// G of every candidate, row by row: x, y, z of m numbers each (m).
     rows: Vec<f64>,
+    /// G of the fresh poses, in the same way.
+    fresh_rows: Vec<f64>,
     /// W: mean of `GᵀG` over the fresh poses, m × m (m²).
     fresh: DMatrix<f64>,
+    /// The joint angles of the candidates in their ranges.
+    filling: Option<Filling>,
 }
 
 /// Fewest poses M that can determine so many combinations of parameters, and the frame: `3 M ≥ rank + 6`.
@@ -88,12 +95,21 @@ impl Information {
         }
         let middle = points.iter().fold(nalgebra::Vector3::zeros(), |sum, point| sum + point.coords)
             / points.len().max(1) as f64;
-        let rows = with_frame(&points, &jacobians, rank, &middle.into());
+        let middle = Point3::from(middle);
+        let rows = with_frame(&points, &jacobians, rank, &middle);
         let (fresh_points, fresh_jacobians) = reduction.jacobians(fresh);
-        let fresh_rows = with_frame(&fresh_points, &fresh_jacobians, rank, &middle.into());
+        let fresh_rows = with_frame(&fresh_points, &fresh_jacobians, rank, &middle);
         let columns = DMatrixView::from_slice(&fresh_rows, rank + FRAME, 3 * fresh.len());
         let fresh = columns * columns.transpose() / fresh.len() as f64;
-        Ok(Self { parameters: parameters.to_vec(), observability, basis, points, rows, fresh })
+        let parameters = parameters.to_vec();
+        Ok(Self { parameters, observability, basis, points, middle, rows, fresh_rows, fresh, filling: None })
+    }
+
+    /// With sets that fill these ranges of the joints, see [`super::Objective::Balanced`]. The arguments are those of [`Self::new`].
+    #[must_use]
+    pub fn filling(mut self, ranges: &JointBox, arm: &Arm, candidates: &[Place]) -> Self {
+        self.filling = Filling::new(&arm.chain, ranges, candidates);
+        self
     }
 
     /// Number of candidates.
@@ -155,6 +171,36 @@ impl Information {
     /// `S V`, n × rank.
     pub(super) const fn basis(&self) -> &DMatrix<f64> {
         &self.basis
+    }
+
+    /// Point and G of a place outside the pool, see [`Self::rows`]. `arm` is that of [`Self::new`].
+    pub(super) fn rows_at(&self, arm: &Arm, place: &Place) -> (Point3<f64>, Vec<f64>) {
+        let reduction = Reduction { arm, parameters: &self.parameters, basis: &self.basis };
+        let (points, jacobians) = reduction.jacobians(std::slice::from_ref(place));
+        let rows = with_frame(&points, &jacobians, self.rank(), &self.middle);
+        (points.first().copied().unwrap_or_default(), rows)
+    }
+
+    /// Puts a place outside the pool in the place of a candidate. Rank and identifiable directions stay those of the pool.
+    pub fn replace(&mut self, candidate: usize, arm: &Arm, place: &Place) {
+        let (point, rows) = self.rows_at(arm, place);
+        let size = 3 * self.width();
+        self.points[candidate] = point;
+        self.rows[size * candidate..size * (candidate + 1)].copy_from_slice(&rows);
+        if let Some(filling) = &mut self.filling {
+            filling.replace(candidate, place);
+        }
+    }
+
+    /// G of the fresh poses as columns, m × 3F.
+    pub(super) fn fresh_columns(&self) -> DMatrixView<'_, f64> {
+        let width = self.width();
+        DMatrixView::from_slice(&self.fresh_rows, width, self.fresh_rows.len() / width)
+    }
+
+    /// The angles of the candidates in the ranges to fill, if there are any.
+    pub(super) const fn angles(&self) -> Option<&Filling> {
+        self.filling.as_ref()
     }
 
     /// W, m × m (m²).
@@ -255,7 +301,7 @@ fn with_frame(points: &[Point3<f64>], jacobians: &DMatrix<f64>, rank: usize, mid
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::{JointBox, random};
+    use super::super::random;
     use super::*;
     use crate::kinematics::{LinkParameter, ParameterId};
     use crate::profile::{Level, Profile, builtin};

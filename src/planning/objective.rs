@@ -89,12 +89,14 @@ impl SearchSettings {
 /// A part of a search that runs on all starts before the next one begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stage {
-    /// Exchange on the predicted error: the reference of the balanced objective.
+    /// Exchange on the predicted error, and on the gaps in the ranges of the joints: the reference of the balanced objective.
     Prediction,
     /// Exchange on the objective, with a predicted error of at most this.
     Objective {
         /// Largest predicted error allowed; infinite without a bound.
         limit: f64,
+        /// Largest shortfall allowed of the joint angles in their ranges; infinite without a bound.
+        shortfall: f64,
     },
 }
 
@@ -119,6 +121,8 @@ pub struct Chosen {
     pub cost: f64,
     /// Its figures of merit.
     pub figures: Figures,
+    /// How far its joint angles fall short of filling their ranges: 0 where every gap is small enough.
+    pub shortfall: f64,
     /// Whether the search was cut short; the set is the best so far.
     pub interrupted: bool,
 }

@@ -14,10 +14,12 @@ const FIRST_SWEEPS: usize = 4;
 const SWEEPS: usize = 1;
 
 /// What a set of some size can predict.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TradeOff {
     /// Number of poses.
     pub poses: usize,
+    /// Its candidates, ascending.
+    pub set: Vec<usize>,
     /// Predicted error (σ) of a set chosen for it: a set of the balanced objective lies a few per cent above.
     pub predicted_error: f64,
 }
@@ -67,7 +69,7 @@ pub fn trade_off(
                 return Ok(table);
             }
         }
-        table.push(TradeOff { poses: size, predicted_error: descent.predicted_error() });
+        table.push(TradeOff { poses: size, set: descent.set(), predicted_error: descent.predicted_error() });
     }
     Ok(table)
 }

@@ -15,7 +15,8 @@ use crate::kinematics::{Arm, FreeParameter, JointType, Place};
 use crate::planning::candidates::{Candidate, CandidateFilter, Candidates};
 use crate::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
 use crate::planning::{
-    Chosen, Information, JointBox, Score, Search, SearchSettings, Stage, low_discrepancy, random, verification_set,
+    Chosen, Information, JointBox, Objective, Score, Search, SearchSettings, Spreading, Stage, low_discrepancy, random,
+    verification_set,
 };
 use crate::profile::Profile;
 use crate::search::{available_threads, plan_in_parallel};
@@ -164,10 +165,38 @@ impl<'a> Planner<'a> {
     }
 
     fn information(&self, pool: &[Candidate]) -> Result<Information, ProcedureError> {
-        let at = |configuration: Vec<f64>| Place { configuration, target: 0 };
-        let candidates: Vec<Place> = pool.iter().map(|candidate| at(candidate.configuration.clone())).collect();
-        let fresh: Vec<Place> = random(&self.joint_box()?, !self.request.seed).take(FRESH_POSES).map(at).collect();
-        Ok(Information::new(&self.arm, &self.parameters, &candidates, &fresh)?)
+        let candidates: Vec<Place> = pool.iter().map(Candidate::place).collect();
+        let information = Information::new(&self.arm, &self.parameters, &candidates, &self.fresh()?)?;
+        Ok(information.filling(&self.joint_box()?, &self.arm, &candidates))
+    }
+
+    /// The configurations at which predictions are averaged.
+    fn fresh(&self) -> Result<Vec<Place>, ProcedureError> {
+        let joint_box = self.joint_box()?;
+        let configurations = random(&joint_box, !self.request.seed).take(FRESH_POSES);
+        Ok(configurations.map(|configuration| Place { configuration, target: 0 }).collect())
+    }
+
+    /// Spreads the chosen poses of a balanced set over the ranges of the joints, in the pool and in its information.
+    fn spread(
+        &self,
+        information: Information,
+        pool: &mut [Candidate],
+        required: usize,
+        chosen: &Chosen,
+    ) -> Result<Information, ProcedureError> {
+        if self.request.objective != Objective::Balanced {
+            return Ok(information);
+        }
+        let places = chosen.set.iter().filter_map(|index| pool.get(*index)).map(Candidate::place).collect();
+        let spreading =
+            Spreading::new(&information, &self.arm, &self.joint_box()?, &chosen.set, places, required)?;
+        let placed = |wanted: &[f64]| self.filter.collect([wanted.to_vec()], 1).kept.pop().map(|kept| kept.configuration);
+        let (information, places) = spreading.run(self.request.seed, &placed);
+        for (&index, place) in chosen.set.iter().zip(&places) {
+            pool[index] = self.candidate(&place.configuration);
+        }
+        Ok(information)
     }
 
     /// Candidates for the plan; required poses come first.
@@ -236,6 +265,7 @@ impl<'a> Planner<'a> {
             round += 1;
             let information = self.information(&candidates.kept)?;
             let chosen = self.search(&information, required, keep_going, &told)?;
+            let information = self.spread(information, &mut candidates.kept, required, &chosen)?;
             match self.order(&candidates.kept, required, chosen)? {
                 Ok(ordered) => break (information, ordered),
                 Err(unreachable) if round < ROUNDS => {
@@ -250,7 +280,7 @@ impl<'a> Planner<'a> {
             }
         };
         let set = &ordered.chosen.set;
-        let mut summary = self.summary(&information, set, required, &candidates.rejections)?;
+        let mut summary = self.summary(&information, &candidates.kept, set, required, &candidates.rejections)?;
         let mut warnings: Vec<Warning> = self.included_warning().into_iter().collect();
         warnings.extend(self.safety_warnings());
         warnings.append(&mut summary.warnings);
@@ -379,14 +409,10 @@ impl<'a> Planner<'a> {
             .stops
             .iter()
             .filter(|(kind, _)| *kind == PoseKind::Verification)
-            .map(|(_, candidate)| Place { configuration: candidate.configuration.clone(), target: 0 })
+            .map(|(_, candidate)| candidate.place())
             .collect();
         let Some(sigma) = self.sigma().filter(|_| verification.len() >= FEWEST) else { return Ok(None) };
-        let chosen: Vec<Place> = set
-            .iter()
-            .filter_map(|index| pool.get(*index))
-            .map(|candidate| Place { configuration: candidate.configuration.clone(), target: 0 })
-            .collect();
+        let chosen: Vec<Place> = set.iter().filter_map(|index| pool.get(*index)).map(Candidate::place).collect();
         let information = Information::new(&self.arm, &self.parameters, &chosen, &verification)?;
         let all: Vec<usize> = (0..chosen.len()).collect();
         let score = Score::new(&information, &all)?;
@@ -418,7 +444,7 @@ impl<'a> Planner<'a> {
         pool.append(&mut candidates.kept);
         let information = self.information(&pool)?;
         let set: Vec<usize> = (0..count).collect();
-        let mut summary = self.summary(&information, &set, 0, &candidates.rejections)?;
+        let mut summary = self.summary(&information, &pool, &set, 0, &candidates.rejections)?;
         let mut warnings = self.safety_warnings();
         summary.poses = rows
             .iter()

@@ -16,6 +16,7 @@ pub fn plan_text(summary: &PlanSummary) -> String {
     text.push_str(&figures(summary));
     text.push_str(&comparison(summary));
     text.push_str(&trade_off(summary));
+    text.push_str(&joint_gaps(summary));
     text.push_str(&weak(summary));
     text.push_str(&candidates(summary));
     for file in &summary.written {
@@ -41,6 +42,13 @@ fn figures(summary: &PlanSummary) -> String {
             fixed(sigma, 4)
         );
         text.push_str(&paragraph("  ", line.trim_start()));
+    }
+    if let Some(rms) = summary.predicted_level3_rms_mm {
+        let line = format!(
+            "where errors of the joints are identified too (level 3): {} mm rms, the arm's repeatability included",
+            fixed(rms, 4)
+        );
+        text.push_str(&paragraph("  ", &line));
     }
     if let Some(rms) = summary.predicted_verification_rms_mm {
         let line =
@@ -98,7 +106,10 @@ fn trade_off(summary: &PlanSummary) -> String {
     push_line(&mut text, "What more or fewer poses would give (quick searches):");
     push_line(
         &mut text,
-        &format!("  {:>6}{:>18}{:>18}{:>12}", "poses", "error (sigma)", "error rms (mm)", "time (min)"),
+        &format!(
+            "  {:>6}{:>16}{:>18}{:>20}{:>12}",
+            "poses", "error (sigma)", "error rms (mm)", "level 3 rms (mm)", "time (min)"
+        ),
     );
     for row in &summary.trade_off {
         let optional =
@@ -106,13 +117,29 @@ fn trade_off(summary: &PlanSummary) -> String {
         push_line(
             &mut text,
             &format!(
-                "  {:>6}{:>18}{:>18}{:>12}",
+                "  {:>6}{:>16}{:>18}{:>20}{:>12}",
                 row.poses,
                 fixed(row.predicted_error_sigma, 3),
                 optional(row.predicted_rms_mm, 4),
+                optional(row.predicted_level3_rms_mm, 4),
                 optional(row.time_min, 0)
             ),
         );
+    }
+    text.push('\n');
+    text
+}
+
+fn joint_gaps(summary: &PlanSummary) -> String {
+    let mut text = String::new();
+    if summary.joint_gaps.is_empty() {
+        return text;
+    }
+    push_line(&mut text, "Largest gap between neighbouring values of each joint, the ends of its range included:");
+    push_line(&mut text, &format!("  {:<12}{:>10}{:>12}{:>12}{:>16}", "joint", "gap", "from", "to", "evenly spread"));
+    for gap in &summary.joint_gaps {
+        let [size, from, to, even] = [gap.largest_gap, gap.from, gap.to, gap.even_gap].map(|value| fixed(value, 1));
+        push_line(&mut text, &format!("  {:<12}{size:>10}{from:>12}{to:>12}{even:>16} {}", gap.joint, gap.unit));
     }
     text.push('\n');
     text

@@ -16,8 +16,24 @@ pub struct TradeOffSummary {
     /// Predicted error per σ.
     pub predicted_error_sigma: f64,
     pub predicted_rms_mm: Option<f64>,
+    /// RMS position error where errors of the joints are identified beside the geometry.
+    pub predicted_level3_rms_mm: Option<f64>,
     /// Time of the whole program, at the pace of this plan.
     pub time_min: Option<f64>,
+}
+
+/// The largest gap between neighbouring values of a joint that the identification poses visit, the ends of its range included.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JointGapSummary {
+    pub joint: String,
+    /// `mm` or `deg`.
+    pub unit: String,
+    pub largest_gap: f64,
+    /// Where it begins and ends. A gap through the end of a full turn ends beyond it.
+    pub from: f64,
+    pub to: f64,
+    /// The gap between evenly spread values.
+    pub even_gap: f64,
 }
 
 /// A parameter that stays weak.
@@ -97,6 +113,9 @@ pub struct PlanSummary {
     pub sigma_mm: Option<f64>,
     /// Predicted RMS position error of the identified robot over its joint ranges, from the instrument alone.
     pub predicted_rms_mm: Option<f64>,
+    /// The same where errors of the joints (curves, compliance, tilt) are identified beside the geometry, from the instrument and the
+    /// repeatability of the arm.
+    pub predicted_level3_rms_mm: Option<f64>,
     /// RMS position error that the verification poses of the plan will show, tracker noise included.
     pub predicted_verification_rms_mm: Option<f64>,
     /// Random sets of the same size.
@@ -110,6 +129,8 @@ pub struct PlanSummary {
     pub search: Vec<Figures>,
     /// Prediction against number of poses.
     pub trade_off: Vec<TradeOffSummary>,
+    /// The largest gap of every joint.
+    pub joint_gaps: Vec<JointGapSummary>,
     pub weak_parameters: Vec<WeakParameterSummary>,
     /// Blind directions in words.
     pub blind_groups: Vec<String>,

@@ -2,21 +2,30 @@
 
 use super::super::{ProcedureError, provenance};
 use super::{Planner, RANDOM_SETS, SIZES};
-use crate::planning::candidates::Rejections;
-use crate::planning::{DesignBound, Information, Score, TradeOff, Yardstick, trade_off};
+use crate::identification::Terms;
+use crate::kinematics::{FreeParameter, Place, coverage};
+use crate::planning::candidates::{Candidate, Rejections};
+use crate::planning::{DesignBound, Information, Score, TermModel, TradeOff, Yardstick, trade_off};
+use crate::profile::Level;
 use crate::session::advice::Advice;
 use crate::session::plan_summary::{
-    CandidateSummary, PlanSummary, RejectionSummary, SCHEMA, TradeOffSummary, WeakParameterSummary,
+    CandidateSummary, JointGapSummary, PlanSummary, RejectionSummary, SCHEMA, TradeOffSummary, WeakParameterSummary,
 };
 use crate::session::summary::Warning;
-use crate::units::to_mm;
+use crate::units::{MICROMETRE, MICRORADIAN, to_mm};
+
+/// Size of the joint curves that predictions expect (rad, rms): between those of a light and of a heavy arm.
+const CURVES: f64 = 100.0 * MICRORADIAN;
+/// What a coordinate scatters by from pose to pose beside the instrument (m), where the joints' errors are predicted.
+const REPEATABILITY: f64 = 20.0 * MICROMETRE;
 
 impl Planner<'_> {
-    /// Scores `set`, whose first `required` poses are measured already, and compares it with random sets, the bound and other
+    /// Scores the candidates `set` of the pool, whose first `required` poses are measured already, and compares it with random sets, the bound and other
     /// sizes.
     pub(super) fn summary(
         &self,
         information: &Information,
+        pool: &[Candidate],
         set: &[usize],
         required: usize,
         rejections: &Rejections,
@@ -29,6 +38,12 @@ impl Planner<'_> {
         let d_efficiency = bound.efficiency(information, set)?;
         let sizes = trade_off(information, &measured, &SIZES, self.request.seed, &|| true)?;
         let sigma = self.sigma();
+        let fresh = self.fresh()?;
+        let terms = self.terms().map(|terms| TermModel::new(information, &self.arm, terms, &fresh));
+        let with_terms = |set: &[usize]| {
+            let places: Vec<Place> = set.iter().filter_map(|index| pool.get(*index)).map(Candidate::place).collect();
+            terms.as_ref()?.predicted_rms(set, &places, sigma?.hypot(REPEATABILITY)).map(to_mm)
+        };
         if sigma.is_none() {
             let text = "the sigma of the instrument is not known, so there are no predictions in mm and none about weak parameters";
             warnings.push(Warning::new("no_sigma", text, false).with_advice(Advice::StateSigma));
@@ -50,11 +65,13 @@ impl Planner<'_> {
             sigma_mm: sigma.map(to_mm),
             predicted_verification_rms_mm: None,
             predicted_rms_mm: sigma.map(|sigma| to_mm(score.predicted_rms(sigma))),
+            predicted_level3_rms_mm: with_terms(set),
             random: yardstick,
             d_efficiency,
             d_bound_gap: bound.gap,
             search: Vec::new(),
-            trade_off: sizes.iter().map(|size| trade_off_row(size, sigma)).collect(),
+            trade_off: sizes.iter().map(|size| trade_off_row(size, sigma, with_terms(&size.set))).collect(),
+            joint_gaps: self.joint_gaps(pool, set),
             weak_parameters: sigma.map_or_else(Vec::new, |sigma| weak_parameters(&score, sigma)),
             blind_groups: information.observability().groups.iter().map(|group| group.description.clone()).collect(),
             candidates: candidate_summary(rejections),
@@ -66,13 +83,43 @@ impl Planner<'_> {
             written: Vec::new(),
         })
     }
+
+    /// The errors of the joints that are identified beside the geometry; `None` where the geometry is not identified either.
+    fn terms(&self) -> Option<Vec<FreeParameter>> {
+        match self.request.level {
+            Level::Offsets => None,
+            Level::Geometric => Some(Terms::all(CURVES).parameters(&self.arm.chain)),
+        }
+    }
+
+    /// The largest gap that the poses `set` leave in the range of each joint.
+    fn joint_gaps(&self, pool: &[Candidate], set: &[usize]) -> Vec<JointGapSummary> {
+        let configurations = set.iter().filter_map(|index| pool.get(*index)).map(|kept| kept.configuration.as_slice());
+        let joints = self.arm.chain.joints().iter();
+        let covered = joints.zip(coverage(&self.arm.chain, &self.limits, configurations));
+        covered
+            .map(|(joint, coverage)| {
+                let quantity = joint.joint_type.quantity();
+                let gap = coverage.largest_gap();
+                JointGapSummary {
+                    joint: joint.name.clone(),
+                    unit: quantity.unit().to_owned(),
+                    largest_gap: quantity.to_edge(gap.size()),
+                    from: quantity.to_edge(gap.from),
+                    to: quantity.to_edge(gap.to),
+                    even_gap: quantity.to_edge(coverage.even_gap(set.len())),
+                }
+            })
+            .collect()
+    }
 }
 
-fn trade_off_row(size: &TradeOff, sigma: Option<f64>) -> TradeOffSummary {
+fn trade_off_row(size: &TradeOff, sigma: Option<f64>, with_terms: Option<f64>) -> TradeOffSummary {
     TradeOffSummary {
         poses: size.poses,
         predicted_error_sigma: size.predicted_error,
         predicted_rms_mm: sigma.map(|sigma| to_mm(size.predicted_error * sigma)),
+        predicted_level3_rms_mm: with_terms,
         time_min: None,
     }
 }

@@ -17,6 +17,7 @@ fn summary() -> PlanSummary {
         poses,
         predicted_error_sigma: 5.0 / (poses as f64).sqrt(),
         predicted_rms_mm: Some(0.075 / (poses as f64).sqrt()),
+        predicted_level3_rms_mm: None,
         time_min: Some(1.9 * poses as f64 + 40.0),
     };
     let provenance = Provenance {
@@ -47,6 +48,8 @@ fn summary() -> PlanSummary {
         },
         sigma_mm: Some(0.015),
         predicted_rms_mm: Some(0.0102),
+        predicted_level3_rms_mm: None,
+        joint_gaps: Vec::new(),
         predicted_verification_rms_mm: Some(0.028),
         random: Yardstick {
             sets: 200,
