@@ -101,6 +101,10 @@ impl JointCoverage {
 
     /// The same angle in the turn that begins at the lower end of the range.
     fn folded(&self, value: f64) -> f64 {
+        // Most values are in it, and stay exactly what they are.
+        if (self.range.0..self.range.0 + TAU).contains(&value) {
+            return value;
+        }
         let beyond = (value - self.range.0).rem_euclid(TAU);
         self.range.0 + if beyond > TAU - ROUNDING { 0.0 } else { beyond }
     }

@@ -18,8 +18,8 @@ use super::score::{ObservabilityIndices, condition_number};
 
 /// Poses replaced at random where no exchange is left.
 const KICKED: usize = 3;
-/// Promising candidates whose predicted error is looked at together, and how many allowed ones are judged by their pairs at a place:
-/// those after them are less promising.
+/// Promising candidates whose predicted error is looked at together, and how many allowed ones are judged by their pairs at a place
+/// where the predicted error is limited: those after them bring nothing that lasts.
 const CHUNK: usize = 64;
 const ENOUGH: usize = 64;
 /// Tries to find a replacement that the limit allows.
@@ -301,6 +301,7 @@ impl<'a> Descent<'a> {
         let mut best: Option<Exchange> = None;
         let mut bar = bar;
         let mut judged = 0;
+        let enough = if self.target.limit.is_finite() { ENOUGH } else { usize::MAX };
         let fills = |candidate: &usize| shortfall_with(unfilled, *candidate) <= self.target.largest_shortfall;
         let window: Vec<usize> = window.iter().copied().filter(fills).collect();
         let hopeful = vacancy.shortlist(&window, bar);
@@ -322,7 +323,7 @@ impl<'a> Descent<'a> {
                     }
                 }
             }
-            if judged >= ENOUGH {
+            if judged >= enough {
                 break;
             }
         }

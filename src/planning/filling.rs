@@ -165,6 +165,9 @@ mod tests {
         let filling = filling();
         let shortfall = |count: usize| filling.shortfall(&(0..count).collect::<Vec<_>>());
         assert!((0.4..1.1).contains(&shortfall(60)), "{}", shortfall(60));
-        assert!(shortfall(300) < 0.1 && shortfall(300) < shortfall(100) && shortfall(2) > shortfall(60));
+        assert!(shortfall(300) < 0.1 && shortfall(300) < shortfall(100), "{} {}", shortfall(300), shortfall(100));
+        let everywhere: Vec<usize> = (0..300).collect();
+        let nowhere = Unfilled::new(&filling, &[], 60).shortfall;
+        assert!(nowhere > 10.0 && Unfilled::new(&filling, &everywhere, 300).shortfall < 0.1, "{nowhere}");
     }
 }

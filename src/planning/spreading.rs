@@ -246,3 +246,51 @@ impl Angles {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Score, random};
+    use super::*;
+    use crate::kinematics::coverage;
+    use crate::profile::{Level, Profile, builtin};
+
+    #[test]
+    fn gaps_close_and_the_figures_stay() {
+        let (profile, _) = Profile::parse(builtin("ur5").unwrap(), "").unwrap();
+        let arm = profile.arm();
+        let ranges = JointBox::new(vec![(-3.0, 3.0), (-2.5, 0.0), (-2.0, 2.0), (-4.0, 4.0), (-2.0, 2.0), (-3.2, 3.2)]);
+        let ranges = ranges.unwrap();
+        let places = |seed, count| -> Vec<Place> {
+            random(&ranges, seed).take(count).map(|configuration| Place { configuration, target: 0 }).collect()
+        };
+        let pool = places(1, 200);
+        let information =
+            Information::new(&arm, &profile.parameters(Level::default()), &pool, &places(2, 100)).unwrap();
+        let set: Vec<usize> = (10..60).collect();
+        let chosen = pool[10..60].to_vec();
+        let fixed = 5;
+        let spreading = Spreading::new(&information, &arm, &ranges, &set, chosen.clone(), fixed).unwrap();
+        let inside = |q: &[f64]| ranges.contains(q).then(|| q.to_vec());
+        let (spread, moved) = spreading.run(1, &inside);
+
+        assert_eq!(moved[..fixed], chosen[..fixed]);
+        assert!(moved.iter().all(|place| ranges.contains(&place.configuration)));
+        let before = Score::new(&information, &set).unwrap();
+        let after = Score::new(&spread, &set).unwrap();
+        assert!(after.predicted_error <= (1.0 + SLACK + 1e-9) * before.predicted_error);
+        assert!(after.condition_number <= (1.0 + SLACK + 1e-9) * before.condition_number);
+        let largest = |places: &[Place]| -> Vec<f64> {
+            let configurations = places.iter().map(|place| place.configuration.as_slice());
+            let joints = coverage(&arm.chain, ranges.ranges(), configurations);
+            joints.iter().map(|joint| joint.largest_gap().size() / joint.even_gap(50).max(SMALL)).collect()
+        };
+        let (before, after) = (largest(&chosen), largest(&moved));
+        assert!(before.iter().zip(&after).all(|(before, after)| *after < 0.7 * before), "{before:?} {after:?}");
+        assert!(after.iter().all(|gap| *gap < 1.8), "{after:?}");
+        // The information is that of the moved poses.
+        let scratch = Information::new(&arm, &profile.parameters(Level::default()), &pool, &places(2, 100)).unwrap();
+        let mut replaced = scratch;
+        set.iter().zip(&moved).for_each(|(&candidate, place)| replaced.replace(candidate, &arm, place));
+        assert_eq!(replaced.predicted_error(&set), spread.predicted_error(&set));
+    }
+}

@@ -92,3 +92,87 @@ fn columns(arm: &Arm, terms: &[FreeParameter], places: &[Place]) -> DMatrix<f64>
     }
     columns
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{JointBox, random};
+    use super::*;
+    use crate::identification::Terms;
+    use crate::profile::{Level, Profile, builtin};
+    use crate::units::MICROMETRE;
+
+    const SIGMA: f64 = 30.0 * MICROMETRE;
+
+    /// A pool, its fresh poses, and what scores sets of it.
+    struct Case {
+        arm: Arm,
+        pool: Vec<Place>,
+        fresh: Vec<Place>,
+        information: Information,
+    }
+
+    fn case() -> Case {
+        let (profile, _) = Profile::parse(builtin("ur5").unwrap(), "").unwrap();
+        let ranges = JointBox::new(vec![(-2.5, 2.5); 6]).unwrap();
+        let places = |seed, count| -> Vec<Place> {
+            random(&ranges, seed).take(count).map(|configuration| Place { configuration, target: 0 }).collect()
+        };
+        let (arm, pool, fresh) = (profile.arm(), places(1, 120), places(2, 50));
+        let information = Information::new(&arm, &profile.parameters(Level::default()), &pool, &fresh).unwrap();
+        Case { arm, pool, fresh, information }
+    }
+
+    #[test]
+    fn without_terms_it_is_the_predicted_error_of_the_geometry() {
+        let Case { arm, pool, fresh, information } = case();
+        let model = TermModel::new(&information, &arm, Vec::new(), &fresh);
+        let set: Vec<usize> = (0..60).collect();
+        let predicted = model.predicted_rms(&set, &pool[..60], SIGMA).unwrap();
+        let geometric = SIGMA * information.predicted_error(&set).unwrap();
+        // The prior of the geometry tells next to nothing.
+        assert!(predicted <= geometric && predicted > 0.99 * geometric, "{predicted} {geometric}");
+    }
+
+    #[test]
+    fn it_is_what_all_parameters_together_give() {
+        let Case { arm, pool, fresh, information } = case();
+        let terms = Terms::all(1e-4).parameters(&arm.chain);
+        let model = TermModel::new(&information, &arm, terms.clone(), &fresh);
+        let set: Vec<usize> = (20..60).collect();
+        let predicted = model.predicted_rms(&set, &pool[20..60], SIGMA).unwrap();
+
+        let stacked = |places: &[Place], geometry: DMatrix<f64>| {
+            let terms = columns(&arm, &terms, places);
+            let mut all = DMatrix::zeros(geometry.nrows() + terms.nrows(), geometry.ncols());
+            all.rows_mut(0, geometry.nrows()).copy_from(&geometry);
+            all.rows_mut(geometry.nrows(), terms.nrows()).copy_from(&terms);
+            all
+        };
+        let width = information.width();
+        let rows: Vec<f64> = set.iter().flat_map(|&candidate| information.rows(candidate).to_vec()).collect();
+        let measured = stacked(&pool[20..60], DMatrix::from_column_slice(width, 3 * set.len(), &rows));
+        let fresh = stacked(&fresh, information.fresh_columns().clone_owned());
+        let mut precision = &measured * measured.transpose() / (SIGMA * SIGMA);
+        for parameter in (0..information.rank()).chain(width..precision.nrows()) {
+            precision[(parameter, parameter)] += 1.0;
+        }
+        let covariance = precision.cholesky().unwrap().inverse();
+        let variance = (fresh.transpose() * covariance * &fresh).trace() / 50.0;
+        assert!((predicted / variance.sqrt() - 1.0).abs() < 1e-6, "{predicted} {}", variance.sqrt());
+    }
+
+    #[test]
+    fn more_poses_predict_better_and_terms_cost() {
+        let Case { arm, pool, fresh, information } = case();
+        let of = |terms: Terms, count: usize| {
+            let model = TermModel::new(&information, &arm, terms.parameters(&arm.chain), &fresh);
+            model.predicted_rms(&(0..count).collect::<Vec<_>>(), &pool[..count], SIGMA).unwrap()
+        };
+        let all = Terms::all(1e-4);
+        assert!(of(all, 100) < of(all, 60) && of(all, 60) < of(all, 40));
+        let smooth = Terms { curves: None, ..all };
+        assert!(of(Terms::default(), 60) < of(smooth, 60) && of(smooth, 60) < of(all, 60));
+        let model = TermModel::new(&information, &arm, Vec::new(), &fresh);
+        assert_eq!(model.predicted_rms(&[], &[], SIGMA), None);
+    }
+}
