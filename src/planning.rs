@@ -67,7 +67,7 @@ pub use objective::{Chosen, Figures, Objective, Progress, SearchSettings, Stage}
 pub use sampling::{JointBox, low_discrepancy, random};
 pub use score::{ObservabilityIndices, ParameterPrecision, Score};
 pub use spreading::Spreading;
-pub use terms::TermModel;
+pub use terms::{EXPECTED_CURVES, REPEATABILITY, TermModel};
 pub use trade_off::{TradeOff, trade_off};
 pub use yardstick::{Spread, Yardstick};
 

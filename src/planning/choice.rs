@@ -123,8 +123,7 @@ impl<'a> Search<'a> {
             stage = next;
             if let Stage::Objective { limit, shortfall } = stage {
                 // A start that ended above a limit continues from the best set.
-                let is_above =
-                    |result: &Chosen| result.figures.predicted_error > limit || result.shortfall > shortfall;
+                let is_above = |result: &Chosen| result.figures.predicted_error > limit || result.shortfall > shortfall;
                 for result in results.iter_mut().filter(|result| is_above(result)) {
                     result.clone_from(&best);
                 }

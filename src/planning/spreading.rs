@@ -265,7 +265,7 @@ mod tests {
         };
         let pool = places(1, 200);
         let information =
-            Information::new(&arm, &profile.parameters(Level::default()), &pool, &places(2, 100)).unwrap();
+            Information::new(&arm, &profile.parameters(Level::Geometric), &pool, &places(2, 100)).unwrap();
         let set: Vec<usize> = (10..60).collect();
         let chosen = pool[10..60].to_vec();
         let fixed = 5;
@@ -288,7 +288,7 @@ mod tests {
         assert!(before.iter().zip(&after).all(|(before, after)| *after < 0.7 * before), "{before:?} {after:?}");
         assert!(after.iter().all(|gap| *gap < 1.8), "{after:?}");
         // The information is that of the moved poses.
-        let scratch = Information::new(&arm, &profile.parameters(Level::default()), &pool, &places(2, 100)).unwrap();
+        let scratch = Information::new(&arm, &profile.parameters(Level::Geometric), &pool, &places(2, 100)).unwrap();
         let mut replaced = scratch;
         set.iter().zip(&moved).for_each(|(&candidate, place)| replaced.replace(candidate, &arm, place));
         assert_eq!(replaced.predicted_error(&set), spread.predicted_error(&set));

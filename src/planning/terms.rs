@@ -15,7 +15,12 @@ use nalgebra::DMatrix;
 use super::information::Information;
 use crate::identification::Factor;
 use crate::kinematics::{Arm, FreeParameter, IdentificationJacobian, Place};
+use crate::units::{MICROMETRE, MICRORADIAN};
 
+/// Size of joint curves that is expected before anything was measured (rad, rms): between those of a light and of a heavy arm.
+pub const EXPECTED_CURVES: f64 = 100.0 * MICRORADIAN;
+/// What arms scatter by from pose to pose (m), beside the instrument.
+pub const REPEATABILITY: f64 = 20.0 * MICROMETRE;
 /// Fresh poses over which the error is averaged: it differs by less than one per cent from that over all of them.
 const FRESH: usize = 300;
 
@@ -99,7 +104,6 @@ mod tests {
     use super::*;
     use crate::identification::Terms;
     use crate::profile::{Level, Profile, builtin};
-    use crate::units::MICROMETRE;
 
     const SIGMA: f64 = 30.0 * MICROMETRE;
 
@@ -118,7 +122,7 @@ mod tests {
             random(&ranges, seed).take(count).map(|configuration| Place { configuration, target: 0 }).collect()
         };
         let (arm, pool, fresh) = (profile.arm(), places(1, 120), places(2, 50));
-        let information = Information::new(&arm, &profile.parameters(Level::default()), &pool, &fresh).unwrap();
+        let information = Information::new(&arm, &profile.parameters(Level::Geometric), &pool, &fresh).unwrap();
         Case { arm, pool, fresh, information }
     }
 

@@ -189,9 +189,9 @@ impl<'a> Planner<'a> {
             return Ok(information);
         }
         let places = chosen.set.iter().filter_map(|index| pool.get(*index)).map(Candidate::place).collect();
-        let spreading =
-            Spreading::new(&information, &self.arm, &self.joint_box()?, &chosen.set, places, required)?;
-        let placed = |wanted: &[f64]| self.filter.collect([wanted.to_vec()], 1).kept.pop().map(|kept| kept.configuration);
+        let spreading = Spreading::new(&information, &self.arm, &self.joint_box()?, &chosen.set, places, required)?;
+        let placed =
+            |wanted: &[f64]| self.filter.collect([wanted.to_vec()], 1).kept.pop().map(|kept| kept.configuration);
         let (information, places) = spreading.run(self.request.seed, &placed);
         for (&index, place) in chosen.set.iter().zip(&places) {
             pool[index] = self.candidate(&place.configuration);

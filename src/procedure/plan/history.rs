@@ -55,7 +55,8 @@ mod tests {
     use super::*;
 
     fn sweep(start: usize, is_objective: bool, sweep: usize, value: f64) -> Progress {
-        let stage = if is_objective { Stage::Objective { limit: 1.0, shortfall: f64::INFINITY } } else { Stage::Prediction };
+        let stage =
+            if is_objective { Stage::Objective { limit: 1.0, shortfall: f64::INFINITY } } else { Stage::Prediction };
         let found = planning::Progress {
             start,
             stage,

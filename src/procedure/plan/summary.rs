@@ -5,19 +5,16 @@ use super::{Planner, RANDOM_SETS, SIZES};
 use crate::identification::Terms;
 use crate::kinematics::{FreeParameter, Place, coverage};
 use crate::planning::candidates::{Candidate, Rejections};
-use crate::planning::{DesignBound, Information, Score, TermModel, TradeOff, Yardstick, trade_off};
+use crate::planning::{
+    DesignBound, EXPECTED_CURVES, Information, REPEATABILITY, Score, TermModel, TradeOff, Yardstick, trade_off,
+};
 use crate::profile::Level;
 use crate::session::advice::Advice;
 use crate::session::plan_summary::{
     CandidateSummary, JointGapSummary, PlanSummary, RejectionSummary, SCHEMA, TradeOffSummary, WeakParameterSummary,
 };
 use crate::session::summary::Warning;
-use crate::units::{MICROMETRE, MICRORADIAN, to_mm};
-
-/// Size of the joint curves that predictions expect (rad, rms): between those of a light and of a heavy arm.
-const CURVES: f64 = 100.0 * MICRORADIAN;
-/// What a coordinate scatters by from pose to pose beside the instrument (m), where the joints' errors are predicted.
-const REPEATABILITY: f64 = 20.0 * MICROMETRE;
+use crate::units::to_mm;
 
 impl Planner<'_> {
     /// Scores the candidates `set` of the pool, whose first `required` poses are measured already, and compares it with random sets, the bound and other
@@ -84,11 +81,11 @@ impl Planner<'_> {
         })
     }
 
-    /// The errors of the joints that are identified beside the geometry; `None` where the geometry is not identified either.
+    /// The errors of the joints that are identified beside the geometry; `None` at levels without them.
     fn terms(&self) -> Option<Vec<FreeParameter>> {
         match self.request.level {
-            Level::Offsets => None,
-            Level::Geometric => Some(Terms::all(CURVES).parameters(&self.arm.chain)),
+            Level::Offsets | Level::Geometric => None,
+            Level::Auto | Level::Full => Some(Terms::all(EXPECTED_CURVES).parameters(&self.arm.chain)),
         }
     }
 

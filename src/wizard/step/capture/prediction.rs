@@ -3,11 +3,10 @@
 use crate::identification::Terms;
 use crate::identification::predicted::Forecast;
 use crate::kinematics::Place;
-use crate::planning::{JointBox, fewest_poses, findable, random};
+use crate::planning::{EXPECTED_CURVES, JointBox, REPEATABILITY, fewest_poses, findable, random};
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
 use crate::session::state::Session;
-use crate::units::{MICROMETRE, MICRORADIAN};
 
 /// Fresh poses over which the prediction is averaged.
 const FRESH_POSES: usize = 200;
@@ -15,11 +14,6 @@ const FRESH_POSES: usize = 200;
 const FRESH_SEED: u64 = 0x5eed;
 /// Relative improvement below which the rest of the plan is not worth the time.
 const WORTHWHILE: f64 = 0.05;
-
-/// Size of joint curves that is expected before anything was measured (rad, rms).
-const EXPECTED_CURVES: f64 = 100.0 * MICRORADIAN;
-/// What arms scatter by from pose to pose (m).
-const REPEATABILITY: f64 = 20.0 * MICROMETRE;
 
 /// Predicted RMS position error at fresh poses of an arm with errors of its joints.
 #[derive(Clone, Debug, Default)]
