@@ -48,6 +48,20 @@ pub fn plan_in_parallel(
     })
 }
 
+/// The results of `one` and `other`, found side by side where there is a second thread.
+pub fn side_by_side<A: Send, B>(threads: usize, one: impl Fn() -> A + Sync, other: impl FnOnce() -> B) -> (A, B) {
+    if threads < 2 {
+        return (one(), other());
+    }
+    thread::scope(|scope| match thread::Builder::new().name("search-figures".to_owned()).spawn_scoped(scope, &one) {
+        Ok(handle) => {
+            let other = other();
+            (handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), other)
+        }
+        Err(_) => (one(), other()),
+    })
+}
+
 /// Takes start after start until none is left.
 fn work_off(
     search: &Search<'_>,

@@ -154,6 +154,10 @@ impl<'a> Planner<'a> {
         self.request.sigma.or_else(instrument)
     }
 
+    fn threads(&self) -> usize {
+        self.request.threads.unwrap_or_else(available_threads)
+    }
+
     /// The pace of the program, with the joint speeds of the profile.
     fn pace(&self) -> Pace {
         let max_speeds = self.profile.joints().iter().map(|joint| joint.max_speed).collect();
@@ -323,7 +327,6 @@ impl<'a> Planner<'a> {
         };
         let starts = settings.starts;
         let search = Search::new(information, settings)?;
-        let threads = self.request.threads.unwrap_or_else(available_threads);
         // Starts run in parallel, so the sweeps of all of them are counted together.
         let (predicted, optimised) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let told = |found: &crate::planning::Progress| {
@@ -333,7 +336,7 @@ impl<'a> Planner<'a> {
             progress(Progress::Sweep { found: *found, done, sweeps, starts });
         };
         progress(Progress::Searching);
-        Ok(plan_in_parallel(&search, threads, keep_going, &told)?)
+        Ok(plan_in_parallel(&search, self.threads(), keep_going, &told)?)
     }
 
     /// Orders the chosen poses that are not measured yet and the verification poses; the inner error names candidates

@@ -9,6 +9,7 @@ use crate::planning::{
     DesignBound, EXPECTED_CURVES, Information, REPEATABILITY, Score, TermModel, TradeOff, Yardstick, trade_off,
 };
 use crate::profile::Level;
+use crate::search::side_by_side;
 use crate::session::advice::Advice;
 use crate::session::plan_summary::{
     CandidateSummary, JointGapSummary, PlanSummary, RejectionSummary, SCHEMA, TradeOffSummary, WeakParameterSummary,
@@ -30,10 +31,15 @@ impl Planner<'_> {
         let score = Score::new(information, set)?;
         let measured: Vec<usize> = (0..required).collect();
         let mut warnings = Vec::new();
-        let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, self.request.seed)?;
-        let bound = DesignBound::new(information, &|| true);
+        let seed = self.request.seed;
+        let compare = || {
+            let yardstick = Yardstick::new(information, set.len(), RANDOM_SETS, seed);
+            (yardstick, DesignBound::new(information, &|| true))
+        };
+        let other_sizes = || trade_off(information, &measured, &SIZES, seed, &|| true);
+        let ((yardstick, bound), sizes) = side_by_side(self.threads(), compare, other_sizes);
+        let (yardstick, sizes) = (yardstick?, sizes?);
         let d_efficiency = bound.efficiency(information, set)?;
-        let sizes = trade_off(information, &measured, &SIZES, self.request.seed, &|| true)?;
         let sigma = self.sigma();
         let fresh = self.fresh()?;
         let terms = self.terms().map(|terms| TermModel::new(information, &self.arm, terms, &fresh));
