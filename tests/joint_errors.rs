@@ -75,6 +75,7 @@ fn ranges(profile: &Profile) -> Vec<(f64, f64)> {
 fn identified(profile: &Profile, identification: Vec<NamedSample>, verification: Vec<NamedSample>) -> Identified {
     let request = IdentifyRequest {
         mounted: None,
+        payload: None,
         profile: profile.clone(),
         profile_text: text(),
         created: "2026-01-02T03:04:05Z".to_owned(),

@@ -17,8 +17,8 @@ mod compensate;
 mod docs;
 mod estimation;
 mod example;
-mod joint_errors;
 mod gravity;
+mod joint_errors;
 mod kinematics;
 mod lines;
 #[cfg(target_os = "linux")]
