@@ -3,6 +3,7 @@
 //! An export is written, read back from its own text, and compared with the identified arm at 1,000 random configurations
 //! ([`proof`]); a text that is off by more than 1 µm or 1 µrad anywhere is refused. Text in, text out: this module knows no files.
 
+mod corrections;
 mod export;
 mod import;
 mod profile_text;

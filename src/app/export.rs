@@ -11,7 +11,7 @@ use crate::model::{
 };
 use crate::session::calibration::Calibration;
 use crate::store;
-use crate::units::{MICROMETRE, MILLIRADIAN};
+use crate::units::{MICROMETRE, MICRORADIAN};
 
 /// Length that no arm exceeds (m).
 const LONGEST_ARM: f64 = 20.0;
@@ -34,12 +34,14 @@ pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O
         _ => Failure::from_error(ExitStatus::Usage, &error),
     })?;
     store::replace(&args.out, &done.text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
-    console.print(&format!(
-        "written: {}\nread back: within {:.6} um and {:.6} urad of the identified arm at 1000 configurations\n",
-        args.out.display(),
-        done.agreement.position / MICROMETRE,
-        done.agreement.angle / MILLIRADIAN * 1e3,
-    ))?;
+    let (position, angle) = (done.agreement.position / MICROMETRE, done.agreement.angle / MICRORADIAN);
+    let read_back = if format.is_geometry() {
+        let meant = if arm.lost.is_some() { "geometry that was identified alone" } else { "identified arm" };
+        format!("within {position:.6} um and {angle:.6} urad of the {meant} at 1000 configurations")
+    } else {
+        format!("within {angle:.1} urad of the curves of the joints, also between the rows")
+    };
+    console.print(&format!("written: {}\nread back: {read_back}\n", args.out.display()))?;
     for remark in &done.remarks {
         console.remark(&format!("note: {remark}"));
     }

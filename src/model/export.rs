@@ -8,11 +8,12 @@ use super::proof::{self, Agreement, prove};
 use super::tables::{read_csv, read_json, read_ur, write_csv, write_json, write_ur};
 use super::transforms::{is_coupled, link_values, motion, number, roll_pitch_yaw};
 use super::urdf::Urdf;
-use super::{ModelError, urdf_write};
+use super::{ModelError, corrections, urdf_write};
 use crate::kinematics::{Arm, ForwardKinematics, JointType, KinematicChain, ParameterId};
 use crate::profile::{Profile, Target};
 use crate::session::calibration::Calibration;
-use crate::session::summary::{SIMULATED, VerdictStatus};
+use crate::session::joint_errors::millimetres;
+use crate::session::summary::{JointErrorSummary, SIMULATED, VerdictStatus};
 use crate::units::{to_deg, to_mm};
 
 /// A format of a model. The comments on the values are the help of `--format`.
@@ -28,6 +29,8 @@ pub enum Format {
     DhCsv,
     /// Link constants for programs
     Json,
+    /// Table of corrections for the angle of each joint
+    JointCorrections,
 }
 
 impl Format {
@@ -39,12 +42,24 @@ impl Format {
             Self::UrKinematics => "default_kinematics.yaml",
             Self::DhCsv => "dh.csv",
             Self::Json => "corrected.json",
+            Self::JointCorrections => "joint-corrections.csv",
         }
     }
 
     /// Whether the format carries the positions of the targets on the flange.
     const fn has_targets(self) -> bool {
-        matches!(self, Self::CorrectedProfile | Self::Json)
+        match self {
+            Self::CorrectedProfile | Self::Json => true,
+            Self::Urdf | Self::UrKinematics | Self::DhCsv | Self::JointCorrections => false,
+        }
+    }
+
+    /// Whether the format carries geometry, and nothing else of the arm.
+    pub const fn is_geometry(self) -> bool {
+        match self {
+            Self::CorrectedProfile | Self::Urdf | Self::UrKinematics | Self::DhCsv | Self::Json => true,
+            Self::JointCorrections => false,
+        }
     }
 }
 
@@ -52,8 +67,15 @@ impl Format {
 pub struct CalibratedArm {
     /// The nominal robot with the targets as they were mounted.
     pub profile: Profile,
-    /// The identified arm.
+    /// The identified arm, with the errors of its joints.
     pub identified: Arm,
+    /// The arm that was identified as geometry alone: what formats get that know nothing else. The identified arm where its joints
+    /// have no errors; never its geometric part, which is wrong without the rest.
+    pub geometry: Arm,
+    /// What geometry alone loses, in words; none where the joints have no errors.
+    pub lost: Option<String>,
+    /// The errors of the joints.
+    pub joint_errors: Vec<JointErrorSummary>,
     /// A few lines about the origin of the result and its verdict.
     pub about: Vec<String>,
     /// Reasons not to apply it: it was not accepted, or nothing was measured.
@@ -70,9 +92,9 @@ impl CalibratedArm {
     /// The calibration has a parameter that this robot does not have.
     pub fn new(calibration: &Calibration, profile: &Profile) -> Result<Self, ModelError> {
         let profile = calibration.mounted_on(profile);
-        let identified = calibration
-            .identified(&profile)
-            .map_err(|error| ModelError::Unsuitable(format!("the calibration does not fit its profile: {error}")))?;
+        let unsuitable = |error| ModelError::Unsuitable(format!("the calibration does not fit its profile: {error}"));
+        let identified = calibration.identified(&profile).map_err(unsuitable)?;
+        let geometry = calibration.identified_geometry(&profile).map_err(unsuitable)?;
         let provenance = &calibration.provenance;
         let cautions = cautions(calibration);
         let mut about = vec![
@@ -82,13 +104,22 @@ impl CalibratedArm {
         ];
         about.extend(cautions.iter().map(|caution| format!("WARNING: {caution}")));
         let untold = untold(calibration, profile.chain().dof());
-        Ok(Self { profile, identified, about, cautions, untold })
+        let lost = (!calibration.geometric.is_empty()).then(|| lost(calibration));
+        let joint_errors = calibration.joint_errors.clone();
+        Ok(Self { profile, identified, geometry, lost, joint_errors, about, cautions, untold })
     }
 
-    /// The targets at their identified positions.
-    pub fn targets(&self) -> Vec<Target> {
-        let identified = self.profile.targets().iter().zip(&self.identified.targets);
+    /// The targets at the positions that were identified with the geometry alone.
+    fn targets(&self) -> Vec<Target> {
+        let identified = self.profile.targets().iter().zip(&self.geometry.targets);
         identified.map(|(target, place)| Target { position_in_flange: *place, ..target.clone() }).collect()
+    }
+
+    /// The same arm; what `format` loses is among the lines about it.
+    fn for_format(&self, format: Format) -> Self {
+        let mut arm = self.clone();
+        arm.about.extend(self.lost.clone().filter(|_| format.is_geometry()));
+        arm
     }
 
     fn limits(&self) -> Vec<Option<(f64, f64)>> {
@@ -114,9 +145,31 @@ fn cautions(calibration: &Calibration) -> Vec<String> {
     refused.into_iter().chain(serious.map(|warning| warning.message.clone())).collect()
 }
 
+/// What the formats of geometry lose of a calibration with errors of joints.
+fn lost(calibration: &Calibration) -> String {
+    let mut text = "geometry only, identified without the errors of the joints".to_owned();
+    let selection = calibration.selection.as_ref();
+    let alone = selection.and_then(|selection| {
+        let geometry = selection.candidates.iter().find(|candidate| candidate.terms.is_geometry())?;
+        Some((geometry.left_out_rms_mm, selection.left_rms_mm))
+    });
+    if let Some((geometry, whole)) = alone {
+        text.push_str(&format!(
+            ": at poses left out in turn it is {} mm rms off, the whole model {} mm",
+            millimetres(geometry),
+            millimetres(whole)
+        ));
+    }
+    let apart = calibration.workspace.as_ref().and_then(|workspace| workspace.beside_geometry_rms_mm);
+    if let Some(apart) = apart {
+        text.push_str(&format!("; over the whole range of the joints the two are {} mm rms apart", millimetres(apart)));
+    }
+    text
+}
+
 /// Constants of the last of `joints` links that the data determine only in combination with others.
 fn untold(calibration: &Calibration, joints: usize) -> Vec<String> {
-    let is_of_last_link = |id: ParameterId| id.joint().is_some_and(|joint| joint + 1 == joints);
+    let is_of_last_link = |id: ParameterId| !id.is_joint_error() && id.joint().is_some_and(|joint| joint + 1 == joints);
     let parameters = calibration.parameters.iter();
     parameters
         .filter(|parameter| !parameter.identifiable && is_of_last_link(parameter.id))
@@ -149,18 +202,20 @@ pub struct ExportOptions<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Export {
     pub text: String,
-    /// Its agreement with the identified arm after reading it back.
+    /// Its agreement after reading it back: with the identified geometry, or of a table of corrections with the curves of the joints,
+    /// interpolated linearly between its rows.
     pub agreement: Agreement,
     /// Remarks for its use.
     pub remarks: Vec<String>,
 }
 
-/// Writes a model, reads it back and compares it with the identified arm.
+/// Writes a model, reads it back and compares it with the identified geometry, or the table of corrections with the curves.
 ///
 /// # Errors
 /// The arm does not fit the format, or the text does not agree with it to 1 µm and 1 µrad at 1,000 random configurations.
 pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) -> Result<Export, ModelError> {
-    let (identified, limits) = (&arm.identified.chain, arm.limits());
+    let (identified, limits) = (&arm.geometry.chain, arm.limits());
+    let arm = &arm.for_format(format);
     let proven = |chain: &KinematicChain| {
         let written = ForwardKinematics::new(chain);
         prove(identified, &limits, proof::EXPORT, |q| written.base_from_flange(q))
@@ -186,8 +241,12 @@ pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) 
         }
         Format::UrKinematics => ur_kinematics(arm, options, &mut remarks)?,
         Format::Urdf => urdf(arm, options, &mut remarks)?,
+        Format::JointCorrections => corrections::write(arm)?,
     };
-    if !format.has_targets() {
+    if let Some(lost) = arm.lost.as_ref().filter(|_| format.is_geometry()) {
+        remarks.push(lost.clone());
+    }
+    if format.is_geometry() && !format.has_targets() {
         remarks.push("the place of the target on the flange is not part of this format".to_owned());
     }
     Ok(Export { text, agreement, remarks })
@@ -206,7 +265,7 @@ fn corrected_profile(arm: &CalibratedArm) -> String {
         title: &format!("{}, corrected", profile.title()),
         source: &format!("identified; nominal: {}", profile.source()),
     };
-    complete(&heading, profile, &arm.identified.chain, &arm.targets())
+    complete(&heading, profile, &arm.geometry.chain, &arm.targets())
 }
 
 fn ur_kinematics(
@@ -214,7 +273,7 @@ fn ur_kinematics(
     options: &ExportOptions<'_>,
     remarks: &mut Vec<String>,
 ) -> Result<(String, Agreement), ModelError> {
-    let written = write_ur(&arm.about, &arm.identified.chain)?;
+    let written = write_ur(&arm.about, &arm.geometry.chain)?;
     let rest = written.flange_in_wrist_3;
     let offset = offset_text(&rest);
     let is_small =
@@ -226,7 +285,7 @@ fn ur_kinematics(
         remarks.push(format!("the tool must carry what the file cannot express: in front of every tool {offset}"));
     }
     let origins = read_ur(&written.text)?;
-    let agreement = prove(&arm.identified.chain, &arm.limits(), proof::EXPORT, |q| {
+    let agreement = prove(&arm.geometry.chain, &arm.limits(), proof::EXPORT, |q| {
         let joints =
             origins.iter().zip(q).map(|(origin, q)| origin * motion(JointType::Revolute, &Vector3::z_axis(), *q));
         joints.fold(Isometry3::identity(), |pose, joint| pose * joint) * rest
@@ -252,7 +311,7 @@ fn urdf(
     options: &ExportOptions<'_>,
     remarks: &mut Vec<String>,
 ) -> Result<(String, Agreement), ModelError> {
-    let (nominal, identified, limits) = (arm.profile.chain(), &arm.identified.chain, arm.limits());
+    let (nominal, identified, limits) = (arm.profile.chain(), &arm.geometry.chain, arm.limits());
     let coupled: Vec<&str> =
         identified.joints().iter().filter(|joint| is_coupled(joint)).map(|joint| joint.name.as_str()).collect();
     let mut comments = arm.about.clone();

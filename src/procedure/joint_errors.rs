@@ -15,8 +15,8 @@ use crate::session::summary::{
 };
 use crate::units::{DEGREE, MICRORADIAN, to_deg, to_mm};
 
-/// Distance of the values that a curve is drawn at (rad).
-const STEP: f64 = 5.0 * DEGREE;
+/// Distance of the values that a curve is drawn at (rad): a few per cycle of its highest harmonics.
+const STEP: f64 = 2.0 * DEGREE;
 /// A joint whose curve is larger than this where it was measured (rad, rms) has a gear worth looking at.
 const LARGE_CURVE: f64 = 600.0 * MICRORADIAN;
 /// The same where it is so many times the median of the joints.

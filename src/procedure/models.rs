@@ -1,4 +1,5 @@
-//! The models that a session delivers: the identified arm in every suitable format, each read back and checked.
+//! The models that a session delivers: the identified arm in every suitable format and the corrections of its joints, each read back
+//! and checked.
 
 use std::path::Path;
 
@@ -21,7 +22,7 @@ pub struct ModelsRequest {
 /// The models of an identified arm.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Models {
-    /// Name and text of each file; each was read back and equals the identified arm within 1 µm and 1 µrad.
+    /// Name and text of each file; each was read back and equals the arm that it is about within 1 µm and 1 µrad.
     pub files: Vec<(String, String)>,
     /// The files that cannot carry this arm, with the reason: `NAME: REASON`.
     pub left_out: Vec<String>,
@@ -51,6 +52,9 @@ pub fn models(request: &ModelsRequest) -> Models {
     let mut formats = vec![Format::CorrectedProfile, Format::Urdf, Format::DhCsv];
     if is_like_universal_robots(request.profile.chain()) {
         formats.push(Format::UrKinematics);
+    }
+    if !request.calibration.joint_errors.is_empty() {
+        formats.push(Format::JointCorrections);
     }
     match CalibratedArm::new(&request.calibration, &request.profile) {
         Ok(arm) => {

@@ -6,6 +6,7 @@
 
 mod charts;
 mod identity;
+mod joints;
 mod markup;
 mod measuring;
 mod parameters;
@@ -37,6 +38,7 @@ pub fn report_html(document: &Document) -> String {
     html.push_str(&identity::section(document));
     html.push_str(&verdict::accuracy(document));
     html.push_str(&verdict::drawings(document));
+    html.push_str(&joints::section(document));
     html.push_str(&parameters::section(document));
     html.push_str(&measuring::section(document));
     html.push_str(&measuring::samples(document));

@@ -3,9 +3,10 @@
 use super::document::Found;
 use super::tables::{paragraph, push_line};
 use crate::identification::{Estimator, SigmaSource, TerminationReason};
+use crate::session::joint_errors::{CurveMarks, curve_drawn, curve_scale, shares_sentence, workspace_sentence};
 use crate::session::summary::{
-    IdentificationSummary, JointSummary, ParameterSummary, Provenance, StatisticsSummary, Verdict, VerdictStatus,
-    VerificationReport, VerificationSummary, Warning,
+    IdentificationSummary, JointErrorSummary, JointSummary, ParameterSummary, Provenance, SelectionSummary,
+    StatisticsSummary, Verdict, VerdictStatus, VerificationReport, VerificationSummary, Warning,
 };
 use crate::text::{counted, decimals_for, fixed};
 
@@ -20,8 +21,16 @@ pub fn identification_text(summary: &IdentificationSummary) -> String {
     if let Some(verification) = &summary.verification {
         text.push_str(&verification_tables(verification));
     }
+    if let Some(workspace) = &summary.workspace {
+        text.push_str(&paragraph("  ", &workspace_sentence(workspace)));
+        text.push('\n');
+    }
     text.push_str(&fit_lines(summary));
-    text.push_str(&parameter_table(&summary.parameters));
+    if let Some(selection) = &summary.selection {
+        text.push_str(&selection_lines(selection));
+    }
+    text.push_str(&joint_error_lines(&summary.joint_errors));
+    text.push_str(&parameter_table(summary.constants()));
     text.push_str(&blind_lines(summary));
     text.push_str(&rejected_lines(summary));
     if let Some(verification) = &summary.verification {
@@ -144,9 +153,9 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
     let mut text = paragraph(
         "",
         &format!(
-            "Identified from {} samples, {} parameters ({}), {} weighting, prior {}, {} estimator",
+            "Identified from {} samples, {} ({}), {} weighting, prior {}, {} estimator",
             summary.samples,
-            summary.parameter_count,
+            parameters_counted(summary),
             summary.settings.level,
             summary.settings.weighting,
             summary.settings.prior,
@@ -165,7 +174,7 @@ fn fit_lines(summary: &IdentificationSummary) -> String {
     push_line(&mut text, &format!("  sigma {} mm, {source}{residual}", fixed(sigma.stated_mm(), 4)));
     let rank = summary.rank.map_or_else(
         || "rank not clear".to_owned(),
-        |rank| format!("rank {rank} of {} ({})", summary.parameter_count, gap(summary.singular_value_gap)),
+        |rank| format!("rank {rank} of {} ({})", summary.constants().count(), gap(summary.singular_value_gap)),
     );
     push_line(&mut text, &format!("  {rank}"));
     if let (Some(scaled), Some(raw)) = (summary.condition_number, summary.condition_number_mm_rad) {
@@ -202,7 +211,76 @@ pub(super) const fn termination(reason: TerminationReason) -> &'static str {
     }
 }
 
-fn parameter_table(parameters: &[ParameterSummary]) -> String {
+/// `29 parameters`, and the errors of joints beside them.
+pub(super) fn parameters_counted(summary: &IdentificationSummary) -> String {
+    let constants = summary.constants().count();
+    match summary.parameter_count.saturating_sub(constants) {
+        0 => counted(constants, "parameter"),
+        errors => format!("{} and {errors} terms of joint errors", counted(constants, "parameter")),
+    }
+}
+
+/// What explains the error of the nominal arm, and the models that were tried.
+fn selection_lines(selection: &SelectionSummary) -> String {
+    let mut text = paragraph("", &format!("Causes: {}", shares_sentence(selection)));
+    if selection.candidates.len() > 1 {
+        push_line(&mut text, "Models that were tried, with their error (rms) at poses that were left out in turn:");
+        for candidate in &selection.candidates {
+            let mark = if candidate.terms == selection.kept { "kept" } else { "" };
+            push_line(
+                &mut text,
+                &format!("{mark:>6}{:>7} mm  {}", fixed(candidate.left_out_rms_mm, 3), candidate.terms),
+            );
+        }
+    }
+    text.push_str(&paragraph("  why: ", &selection.reason));
+    text.push('\n');
+    text
+}
+
+/// Columns of a drawn curve.
+const CURVE: usize = 54;
+
+/// The error of each joint: its size, and its curve over the joint's range.
+fn joint_error_lines(joints: &[JointErrorSummary]) -> String {
+    let mut text = String::new();
+    if joints.is_empty() {
+        return text;
+    }
+    push_line(&mut text, "Angle errors of the joints, and how far each gives way at its largest gravity torque");
+    push_line(
+        &mut text,
+        &format!("  {:<7}{:<22}{:>10}{:>10}  {}", "joint", "measured", "curve rms", "sigma", "gives way"),
+    );
+    let urad = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{} urad", fixed(value, 0)));
+    for joint in joints {
+        let (from, to) = joint.measured_deg;
+        push_line(
+            &mut text,
+            &format!(
+                "  {:<7}{:<22}{:>10}{:>10}  {}",
+                joint.joint,
+                format!("{from:>5.0} ..{to:>5.0} deg"),
+                urad(Some(joint.curve_rms_urad)),
+                urad(joint.sigma_urad()),
+                joint.gravity_words().unwrap_or_else(|| "-".to_owned())
+            ),
+        );
+    }
+    let scale = curve_scale(joints);
+    for joint in joints {
+        if let (Some((first, ..)), Some((last, ..))) = (joint.curve.first(), joint.curve.last()) {
+            let drawn = curve_drawn(joint, CURVE, scale, CurveMarks::Blocks);
+            push_line(&mut text, &format!("  {:<7}{first:>5.0} {drawn} {last:.0} deg", joint.joint));
+        }
+    }
+    text.push_str(&paragraph("  ", &CurveMarks::Blocks.legend(scale)));
+    text.push('\n');
+    text
+}
+
+/// The table of geometry and targets; the errors of joints have a part of their own.
+fn parameter_table<'a>(parameters: impl Iterator<Item = &'a ParameterSummary>) -> String {
     let mut text = String::new();
     push_line(
         &mut text,

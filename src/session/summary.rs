@@ -577,6 +577,13 @@ pub struct IdentificationSummary {
     pub workspace: Option<WorkspaceSummary>,
 }
 
+impl IdentificationSummary {
+    /// The parameters of geometry and targets, without the terms of joint errors.
+    pub fn constants(&self) -> impl Iterator<Item = &ParameterSummary> {
+        self.parameters.iter().filter(|parameter| !parameter.id.is_joint_error())
+    }
+}
+
 /// The verification of a calibration on other data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerificationReport {

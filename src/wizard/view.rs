@@ -15,7 +15,7 @@ use crate::session::journal::{FindingCause, PlanText};
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{About, Step};
-use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummary, Warning};
+use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummary, Warning, WorkspaceSummary};
 use crate::session::wire::LinkChoice;
 use crate::units::to_mm;
 
@@ -476,6 +476,9 @@ pub struct VerifyView {
     pub is_current: bool,
     /// Reason why nothing can be verified.
     pub too_few: Option<String>,
+    /// The error predicted over the workspace, for data with points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workspace: Option<WorkspaceSummary>,
     /// Errors at points that the identification did not use.
     pub verification: Option<Box<VerificationSummary>>,
     /// Comparison with the acceptance limits.

@@ -4,6 +4,7 @@ use super::markup::{Column, aligned, escape, list, number, paragraph, table};
 use crate::kinematics::ParameterId;
 use crate::report::document::{Document, Found};
 use crate::session::summary::{IdentificationSummary, ParameterSummary};
+use crate::text::counted;
 use crate::text::decimals_for;
 
 /// Decimals where there is no standard deviation.
@@ -15,10 +16,13 @@ pub(super) fn section(document: &Document) -> String {
     let mut html = String::from("<h2>Identified parameters</h2>\n");
     let rank = result.rank.map_or_else(|| "an unclear number".to_owned(), |rank| rank.to_string());
     html.push_str(&paragraph(&format!(
-        "{} parameters (level {}), of which the data determine {rank} independent combinations. Sigma is one standard deviation of the deviation. <b>Found:</b> <i>yes</i>; <i>weakly</i>: sigma is more than half of the expected deviation; <i>only combined</i>: not on its own, see below.",
-        result.parameter_count,
+        "{} (level {}), of which the data determine {rank} independent combinations. Sigma is one standard deviation of the deviation. <b>Found:</b> <i>yes</i>; <i>weakly</i>: sigma is more than half of the expected deviation; <i>only combined</i>: not on its own, see below.",
+        counted(result.constants().count(), "parameter"),
         result.settings.level
     )));
+    if !result.joint_errors.is_empty() {
+        html.push_str(&paragraph("These constants belong together with the errors of the joints above, and are wrong without them. A program that knows link constants only needs those of <code>dh.csv</code>, which were identified without errors of joints."));
+    }
     html.push_str(&parameter_table(document, &result.parameters));
     html.push_str(&blind(result));
     html
@@ -26,7 +30,8 @@ pub(super) fn section(document: &Document) -> String {
 
 fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> String {
     let decimals = |parameter: &ParameterSummary| parameter.sigma.map_or(PLAIN, decimals_for);
-    let most = parameters.iter().map(decimals).max().unwrap_or(PLAIN).max(PLAIN);
+    let constants = || parameters.iter().enumerate().filter(|(_, parameter)| !parameter.id.is_joint_error());
+    let most = constants().map(|(_, parameter)| decimals(parameter)).max().unwrap_or(PLAIN).max(PLAIN);
     let columns = [
         ("parameter", Column::Word),
         ("what it is", Column::Word),
@@ -37,9 +42,7 @@ fn parameter_table(document: &Document, parameters: &[ParameterSummary]) -> Stri
         ("identified", Column::Number),
         ("found", Column::Word),
     ];
-    let rows: Vec<Vec<String>> = parameters
-        .iter()
-        .enumerate()
+    let rows: Vec<Vec<String>> = constants()
         .map(|(index, parameter)| {
             let digits = decimals(parameter);
             let note = document.report.parameter_notes.get(index);

@@ -176,6 +176,14 @@ impl Plot {
         self.line(class, &places);
     }
 
+    /// The area between two curves over the same values: x, lower and upper end.
+    pub(super) fn band(&mut self, class: &str, values: impl DoubleEndedIterator<Item = (f64, f64, f64)> + Clone) {
+        let upper = values.clone().filter_map(|(x, _, high)| self.at(x, high));
+        let lower = values.rev().filter_map(|(x, low, _)| self.at(x, low));
+        let places: Vec<_> = upper.chain(lower).collect();
+        self.line(class, &places);
+    }
+
     /// A mark at a place.
     pub(super) fn mark(&mut self, mark: Mark, place: (f64, f64)) {
         self.body.push_str(&mark.svg(place));

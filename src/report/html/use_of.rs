@@ -13,6 +13,9 @@ fn about(file: &str) -> &'static str {
         "corrected.ron" => "a robot profile with the identified geometry",
         "corrected.urdf" => "the identified chain as a robot description (URDF); read back and compared",
         "dh.csv" => "the identified link constants with all digits, convention and couplings",
+        "joint-corrections.csv" => {
+            "what to add to the commanded angle of each joint, and how far it gives way under gravity"
+        }
         "default_kinematics.yaml" => "kinematics for the ROS description of Universal Robots",
         "drift.csv" => "the pose that was measured repeatedly",
         _ => "",
@@ -55,8 +58,14 @@ pub(super) fn section(document: &Document) -> String {
         html.push_str(&list(&files));
     }
     html.push_str("<h3>What to do</h3>\n");
+    let has_joint_errors = document.result.as_ref().is_some_and(|result| !result.joint_errors.is_empty());
+    let constants = if has_joint_errors {
+        "Best: let <code>trupose compensate</code> change the joint values of the programs; it knows the errors of the joints. Where only link constants can be applied, use those of <code>dh.csv</code>: they were identified without errors of joints, and the head of the file says how much accuracy that costs. Never apply the constants of the table above alone."
+    } else {
+        "Put the identified link constants of the table above into the offline programming system, or into the controller where it takes them. Use the values of <code>calibration.ron</code>: they have all digits."
+    };
     let todo = [
-        "Put the identified link constants of the table above into the offline programming system, or into the controller where it takes them. Use the values of <code>calibration.ron</code>: they have all digits.",
+        constants,
         "Check the signs and the order of the joints on one pose at low speed, with a hand on the enabling switch.",
         "Teach tool and user frames again, or convert them: those taught with the nominal model do not fit the identified one.",
         "Verify on new poses, now and after every event that may move something (collision, change of a motor or gear, new mastering): <code>trupose verify --calibration calibration.ron --measurements NEW.csv --refit frame+target</code>",

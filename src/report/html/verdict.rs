@@ -4,9 +4,10 @@ use super::charts::{MOST, against_joints, histogram, norm, of_kind, per_pose, wo
 use super::markup::{Column, NONE, add, escape, list, number, optional, paragraph, table};
 use super::views::views;
 use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
+use crate::session::joint_errors::workspace_sentence;
 use crate::session::summary::{
     IdentificationSummary, LimitCheck, LimitedQuantity, ModelSummary, StatisticsSummary, VerdictStatus,
-    VerificationMode, VerificationSummary, Warning,
+    VerificationMode, VerificationSummary, Warning, WorkspaceSummary,
 };
 use crate::text::{counted, counted_as};
 
@@ -108,7 +109,21 @@ pub(super) fn accuracy(document: &Document) -> String {
     let (before, after) = (&verification.nominal, &verification.identified);
     html.push_str(&distances(before, after));
     html.push_str(&positions(before, after));
+    if let Some(workspace) = &result.workspace {
+        html.push_str(&predicted(workspace));
+    }
     html
+}
+
+/// The error predicted where nothing was measured.
+fn predicted(workspace: &WorkspaceSummary) -> String {
+    let mut sentence = escape(&workspace_sentence(workspace));
+    if let Some(first) = sentence.get_mut(..1) {
+        first.make_ascii_uppercase();
+    }
+    paragraph(&format!(
+        "{sentence}. The tables above tell what the arm does near the measured poses; this prediction includes what is not known elsewhere."
+    ))
 }
 
 /// The verification procedure in words.

@@ -47,6 +47,7 @@ fn about(file: &str) -> &'static str {
         "corrected.ron" => "a profile with the identified constants, for this program",
         "corrected.urdf" => "the identified arm for robot software, such as ROS",
         "dh.csv" => "the identified link constants, for a controller or a spreadsheet",
+        "joint-corrections.csv" => "what to add to the angle of each joint, and its compliance",
         "default_kinematics.yaml" => "the identified arm for the ROS driver of Universal Robots",
         "recording.rrd" => "the session as a 3D recording",
         _ => "",

@@ -1,5 +1,6 @@
 //! Screen Identify: the identified parameters. No number here is an accuracy.
 
+mod joints;
 mod pages;
 
 use ratatui::buffer::Buffer;
@@ -13,8 +14,10 @@ use crate::wizard::view::{Content, IdentifyView};
 
 /// Columns of the text beside the picture.
 const TEXT: u16 = 66;
+/// Tab with the errors of the joints.
+const JOINTS: usize = 2;
 /// Tab with the picture alone.
-const PICTURE: usize = 3;
+const PICTURE: usize = 4;
 
 /// Page and scroll position.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +28,10 @@ pub(super) struct IdentifyScreen {
 
 impl Default for IdentifyScreen {
     fn default() -> Self {
-        Self { tabs: Tabs::new(&["result", "parameters", "limits of the data", "arms"]), scroll: Scroll::default() }
+        Self {
+            tabs: Tabs::new(&["result", "parameters", "joints", "limits of the data", "arms"]),
+            scroll: Scroll::default(),
+        }
     }
 }
 
@@ -44,6 +50,7 @@ impl IdentifyScreen {
             (None, _) => pages::before(content, cx.view.busy.is_some(), &mut page),
             (Some(summary), 0 | PICTURE) => pages::result(content, summary, &mut page),
             (Some(summary), 1) => pages::parameters(summary, &mut page),
+            (Some(summary), JOINTS) => joints::joints(summary, cx.theme.glyphs, &mut page),
             (Some(summary), _) => pages::limits(summary, &mut page),
         }
         page

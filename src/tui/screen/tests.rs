@@ -321,6 +321,7 @@ fn verify(verdict: Option<Verdict>) -> ViewModel {
     let is_good = verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
     let has_any = verdict.is_some();
     let content = Content::Verify(VerifyView {
+        workspace: None,
         samples: if has_any { 20 } else { 0 },
         is_current: true,
         too_few: (!has_any).then(|| "there are no verification poses: nothing can be said about accuracy".to_owned()),

@@ -201,6 +201,7 @@ impl StepMachine for VerifyStep {
             too_few: (samples < FEWEST_VERIFICATION).then(|| {
                 "there are too few verification poses to state the accuracy; go back and measure some".to_owned()
             }),
+            workspace: result(cx).and_then(|result| result.summary.workspace.clone()),
             verification: result(cx).and_then(|result| result.summary.verification.clone()).map(Box::new),
             verdict: result(cx).map(|result| Box::new(result.summary.verdict.clone())),
             warnings: result(cx).map(|result| result.summary.warnings.clone()).unwrap_or_default(),

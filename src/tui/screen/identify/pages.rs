@@ -1,6 +1,7 @@
 //! Pages of the identification.
 
 use crate::identification::{SigmaSource, TerminationReason};
+use crate::session::joint_errors::shares_sentence;
 use crate::session::summary::{IdentificationSummary, ParameterSummary};
 use crate::text::counted;
 use crate::text::{decimals_for, fixed};
@@ -63,19 +64,20 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
     page.gap();
     let rejected = match summary.rejected.len() {
         0 => "none rejected".to_owned(),
-        some => format!("{some} REJECTED, see page 3"),
+        some => format!("{some} REJECTED, see page 4"),
     };
     page.pair("samples", &format!("{} ({rejected})", summary.samples));
-    let tied = summary.parameters.iter().filter(|parameter| !parameter.identifiable).count();
-    let weak = summary.parameters.iter().filter(|parameter| found(parameter) == "weakly").count();
-    let alone = summary.parameters.len().saturating_sub(tied + weak);
-    page.pair(
-        "parameters",
-        &format!("{}: {alone} found, {weak} weakly, {tied} only combined", summary.parameter_count),
-    );
+    let constants = summary.constants().count();
+    let tied = summary.constants().filter(|parameter| !parameter.identifiable).count();
+    let weak = summary.constants().filter(|parameter| found(parameter) == "weakly").count();
+    let alone = constants.saturating_sub(tied + weak);
+    page.pair("parameters", &format!("{constants}: {alone} found, {weak} weakly, {tied} only combined"));
+    if let Some(selection) = &summary.selection {
+        page.pair("causes", &format!("{}; see page 3", shares_sentence(selection)));
+    }
     let rank = summary.rank.map_or_else(
         || "not clear from these samples".to_owned(),
-        |rank| format!("{rank} of {} combinations are determined", summary.parameter_count),
+        |rank| format!("{rank} of {constants} combinations are determined"),
     );
     page.pair("rank", &rank);
     if let Some(condition) = summary.condition_number {
@@ -125,7 +127,7 @@ pub(super) fn parameters(summary: &IdentificationSummary, page: &mut Page) {
     let head =
         format!("{:<10}{:>4}{:>12}{:>12}{:>11}  {}", "parameter", "unit", "nominal", "deviation", "sigma", "found");
     page.line(vec![(head, Role::Dim)]);
-    for parameter in &summary.parameters {
+    for parameter in summary.constants() {
         let decimals = parameter.sigma.map_or(4, decimals_for);
         let sigma = parameter.sigma.map_or_else(|| "-".to_owned(), |sigma| fixed(sigma, decimals));
         let found = found(parameter);
@@ -144,7 +146,7 @@ pub(super) fn parameters(summary: &IdentificationSummary, page: &mut Page) {
         page.line(vec![(line, Role::Plain), (found.to_owned(), role)]);
     }
     page.gap();
-    page.paragraph("deviation: identified minus nominal. sigma: its standard deviation. weakly: sigma above half of the deviation expected before measuring. only combined: see page 3.", Role::Dim);
+    page.paragraph("deviation: identified minus nominal. sigma: its standard deviation. weakly: sigma above half of the deviation expected before measuring. only combined: see page 4.", Role::Dim);
 }
 
 /// Rejected samples, and what the data cannot determine.

@@ -1,5 +1,6 @@
 //! Verdict and tables of the verification.
 
+use crate::session::joint_errors::workspace_sentence;
 use crate::session::summary::{Verdict, VerdictStatus, VerificationSummary};
 use crate::text::{counted, fixed};
 use crate::tui::screen::page::Page;
@@ -28,6 +29,10 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
     }
     if let Some(verification) = &content.verification {
         tables(verification, page);
+    }
+    if let Some(workspace) = &content.workspace {
+        page.gap();
+        page.paragraph(&workspace_sentence(workspace), Role::Plain);
     }
 }
 
