@@ -48,6 +48,7 @@ mod sessions;
 mod terminal;
 mod triage;
 mod wizard_random;
+mod worked_example;
 
 /// A file beside this one that is no module here would not even be compiled.
 #[test]

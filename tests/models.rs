@@ -6,14 +6,15 @@ use crate::support::root;
 use nalgebra::{Isometry3, Point3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use trupose::kinematics::{Arm as KinematicArm, Convention, ForwardKinematics, KinematicChain};
+use trupose::kinematics::{Arm as KinematicArm, Convention, ForwardKinematics, KinematicChain, ParameterId};
 use trupose::model::proof::{self, configurations, prove};
 use trupose::model::{
     Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, complete, export,
     geometry_only, import, link_values, urdf_text,
 };
 use trupose::profile::{Level, Profile, builtin, builtin_names};
-use trupose::units::{to_deg, to_mm};
+use trupose::session::summary::JointErrorSummary;
+use trupose::units::{MICRORADIAN, to_deg, to_mm};
 
 const BOTH: [Convention; 2] = [Convention::Standard, Convention::Modified];
 
@@ -516,6 +517,85 @@ fn the_ur_file_is_the_one_of_the_ros_description() {
     ] {
         for (found, expected) in numbers(name).iter().zip(expected) {
             assert!((found - expected).abs() < 1e-9, "{name}: {found} {expected}\n{text}");
+        }
+    }
+}
+
+/// An arm whose joints have errors of their own, with the curves as a calibration has them.
+fn with_joint_errors(name: &str) -> CalibratedArm {
+    let arm = calibrated(&profile(name));
+    let terms = [(1, "sin3", 90.0), (1, "cos20", 40.0), (3, "cos1", -120.0), (0, "sin2", 60.0)];
+    let deviation = |(joint, term, urad): (usize, &str, f64)| {
+        (format!("joint{}.{term}", joint + 1).parse::<ParameterId>().unwrap(), urad * MICRORADIAN)
+    };
+    let identified = arm.identified.with(terms.map(deviation)).unwrap();
+    let chain = &identified.chain;
+    let joint_errors = chain.joints().iter().zip(chain.errors()).map(|(joint, error)| JointErrorSummary {
+        joint: joint.name.clone(),
+        measured_deg: (-60.0, 60.0),
+        compliance_urad: (joint.name == chain.joints()[1].name).then_some((129.0, 15.0)),
+        torque_nm: Some(150.0),
+        curve_rms_urad: 50.0,
+        curve: (-50..=50)
+            .map(|index| (2.0 * f64::from(index), error.curve(f64::from(2 * index).to_radians()) / MICRORADIAN, 20.0))
+            .collect(),
+    });
+    let joint_errors = joint_errors.collect();
+    CalibratedArm { identified, joint_errors, lost: Some("geometry only: 0.12 mm".to_owned()), ..arm }
+}
+
+#[test]
+fn formats_of_geometry_get_the_geometry_identified_alone_and_say_what_is_lost() {
+    let arm = with_joint_errors("ur5");
+    for format in [Format::CorrectedProfile, Format::Urdf, Format::DhCsv, Format::Json, Format::UrKinematics] {
+        let options = ExportOptions { with_tool_offset: true, ..ExportOptions::default() };
+        let done = export(&arm, format, &options).unwrap();
+        assert!(done.agreement.position < 1e-9 && done.agreement.angle < 1e-9, "{format:?}");
+        assert!(done.text.contains("geometry only: 0.12 mm"), "{format:?}: {}", done.text);
+        assert!(done.remarks.iter().any(|remark| remark == "geometry only: 0.12 mm"), "{format:?}");
+    }
+    let without = export(&calibrated(&profile("ur5")), Format::DhCsv, &ExportOptions::default()).unwrap();
+    assert!(!without.text.contains("geometry only"), "{}", without.text);
+}
+
+/// `(joint, angle in degrees, correction in rad)`.
+fn corrections(text: &str) -> Vec<(String, f64, f64)> {
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+    assert_eq!(reader.headers().unwrap(), vec!["joint", "angle_deg", "correction_urad", "sigma_urad"]);
+    let rows = reader.deserialize::<(String, f64, f64, f64)>().map(Result::unwrap);
+    rows.map(|(joint, angle, correction, _)| (joint, angle, correction * MICRORADIAN)).collect()
+}
+
+#[test]
+fn a_joint_with_its_correction_added_turns_as_if_it_had_no_error() {
+    // Joints that count the other way are among them.
+    for name in ["ur5", "kuka_kr6_r900"] {
+        let arm = with_joint_errors(name);
+        let done = export(&arm, Format::JointCorrections, &ExportOptions::default()).unwrap();
+        assert!(done.agreement.angle < 2.0 * MICRORADIAN, "{:?}", done.agreement);
+        assert!(done.text.contains("ADD it to the commanded angle"), "{}", done.text);
+        assert!(done.text.contains("compliance 0.860 ± 0.100 urad/Nm (129 ± 15 urad at 150 Nm)"), "{}", done.text);
+        assert!(done.remarks.is_empty(), "{:?}", done.remarks);
+        let table = corrections(&done.text);
+        assert_eq!(table.len(), 6 * 201);
+        let with_errors = ForwardKinematics::new(&arm.identified.chain);
+        let without = arm.identified.chain.without_errors();
+        let without = ForwardKinematics::new(&without);
+        for angle in [-83.0, -7.0, 0.0, 45.0, 91.0] {
+            let meant = vec![f64::to_radians(angle); 6];
+            let commanded: Vec<f64> = arm
+                .identified
+                .chain
+                .joints()
+                .iter()
+                .zip(&meant)
+                .map(|(joint, value)| {
+                    let row = table.iter().find(|(name, at, _)| *name == joint.name && *at == angle).unwrap();
+                    value + row.2
+                })
+                .collect();
+            let apart = |q: &[f64]| differs(&with_errors.base_from_flange(q), &without.base_from_flange(&meant));
+            assert!(apart(&commanded) < 2e-7 && apart(&meant) > 2e-5, "{name} {angle}: {}", apart(&commanded));
         }
     }
 }

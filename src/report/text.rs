@@ -224,7 +224,7 @@ pub(super) fn parameters_counted(summary: &IdentificationSummary) -> String {
 fn selection_lines(selection: &SelectionSummary) -> String {
     let mut text = paragraph("", &format!("Causes: {}", shares_sentence(selection)));
     if selection.candidates.len() > 1 {
-        push_line(&mut text, "Models that were tried, with their error (rms) at poses that were left out in turn:");
+        push_line(&mut text, "Models that were tried, with their error (rms) at poses left out in turn:");
         for candidate in &selection.candidates {
             let mark = if candidate.terms == selection.kept { "kept" } else { "" };
             push_line(
@@ -247,7 +247,7 @@ fn joint_error_lines(joints: &[JointErrorSummary]) -> String {
     if joints.is_empty() {
         return text;
     }
-    push_line(&mut text, "Angle errors of the joints, and how far each gives way at its largest gravity torque");
+    push_line(&mut text, "Angle errors of the joints, and how far each gives way under gravity at most:");
     push_line(
         &mut text,
         &format!("  {:<7}{:<22}{:>10}{:>10}  {}", "joint", "measured", "curve rms", "sigma", "gives way"),

@@ -1,6 +1,6 @@
 //! The errors of the joints: what explains the error of the nominal arm, the models that were tried, and the curve of each joint.
 
-use super::markup::{Column, add, escape, number, optional, paragraph, table};
+use super::markup::{Column, NONE, add, escape, number, optional, paragraph, table};
 use super::plot::{Plot, Scale, WIDTH};
 use crate::report::document::Document;
 use crate::session::joint_errors::shares_sentence;
@@ -71,8 +71,10 @@ fn sizes(joints: &[JointErrorSummary]) -> String {
                 format!("{} … {}", number(from, 0), number(to, 0)),
                 number(joint.curve_rms_urad, 0),
                 optional(joint.sigma_urad(), 0),
-                optional(joint.compliance_urad.map(|(turn, _)| turn), 0),
-                optional(joint.compliance_urad.map(|(_, sigma)| sigma), 0),
+                joint.compliance_urad.map_or_else(
+                    || NONE.to_owned(),
+                    |(turn, sigma)| format!("{} ± {}", number(turn, 0), number(sigma, 0)),
+                ),
                 optional(joint.torque_nm, 1),
             ]
         })
@@ -80,11 +82,10 @@ fn sizes(joints: &[JointErrorSummary]) -> String {
     let columns = [
         ("joint", Column::Word),
         ("measured (deg)", Column::Number),
-        ("curve, rms (µrad)", Column::Number),
-        ("its sigma (µrad)", Column::Number),
+        ("curve rms (µrad)", Column::Number),
+        ("sigma (µrad)", Column::Number),
         ("gives way (µrad)", Column::Number),
-        ("its sigma (µrad)", Column::Number),
-        ("at a torque of (N·m)", Column::Number),
+        ("at (N·m)", Column::Number),
     ];
     let caption = "Size where it was measured; how far each joint gives way at its largest gravity torque";
     table(caption, &columns, &rows, true)

@@ -21,7 +21,7 @@ pub(super) fn section(document: &Document) -> String {
         result.settings.level
     )));
     if !result.joint_errors.is_empty() {
-        html.push_str(&paragraph("These constants belong together with the errors of the joints above, and are wrong without them. A program that knows link constants only needs those of <code>dh.csv</code>, which were identified without errors of joints."));
+        html.push_str(&paragraph("These constants belong together with the errors of the joints above, and are wrong without them. Programs that know only link constants need others, identified without errors of joints: <code>dh.csv</code>, or <code>trupose export</code>."));
     }
     html.push_str(&parameter_table(document, &result.parameters));
     html.push_str(&blind(result));

@@ -60,7 +60,7 @@ pub(super) fn section(document: &Document) -> String {
     html.push_str("<h3>What to do</h3>\n");
     let has_joint_errors = document.result.as_ref().is_some_and(|result| !result.joint_errors.is_empty());
     let constants = if has_joint_errors {
-        "Best: let <code>trupose compensate</code> change the joint values of the programs; it knows the errors of the joints. Where only link constants can be applied, use those of <code>dh.csv</code>: they were identified without errors of joints, and the head of the file says how much accuracy that costs. Never apply the constants of the table above alone."
+        "Best: let <code>trupose compensate</code> change the joint values of the programs; it knows the errors of the joints. Where only link constants can be applied, use those of <code>dh.csv</code> (<code>trupose export --format dh-csv</code>): they were identified without errors of joints, and the head of the file says how much accuracy that costs. Never apply the constants of the table above alone."
     } else {
         "Put the identified link constants of the table above into the offline programming system, or into the controller where it takes them. Use the values of <code>calibration.ron</code>: they have all digits."
     };
