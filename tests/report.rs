@@ -10,11 +10,15 @@ use crate::support::{trupose, trupose_in};
 use serde_json::Value;
 use trupose::procedure::deliver::{data_files, files, reports};
 use trupose::profile::builtin;
+use trupose::report::identification_text;
 use trupose::session::journal::{Entry, IdentifiedText, Journal, Line, PointErrorText};
 use trupose::session::set_up::About;
 use trupose::session::sha256;
 use trupose::session::state::Session;
-use trupose::session::summary::{RejectedSummary, StatisticsSummary, VerdictStatus, Warning};
+use trupose::session::summary::{
+    CandidateSummary, Cause, JointErrorSummary, ParameterSummary, RejectedSummary, SelectionSummary, ShareSummary,
+    StatisticsSummary, VerdictStatus, Warning, WorkspaceSummary,
+};
 use trupose::store::session::read_journal;
 
 /// A short calibration in which something goes wrong and is decided about.
@@ -496,6 +500,78 @@ fn little_or_nothing_to_show_is_said() {
         assert_eq!(json["report"]["robot"]["profile"], profile);
         assert!(html.contains("No plan was accepted."));
     }
+}
+
+/// The session with errors of joints in its result: one measured in part, one hardly larger than nothing.
+fn with_joint_errors() -> Session {
+    with_result(|result| {
+        let kept = "geometry + compliance + tilt + harmonics + curves 100 urad";
+        let candidate = |text: &str, left_out_rms_mm: f64| CandidateSummary {
+            terms: text.parse().unwrap(),
+            left_out_rms_mm,
+            residual_mm: left_out_rms_mm / 2.0,
+        };
+        let share = |cause, percent| ShareSummary { cause, percent };
+        result.summary.selection = Some(SelectionSummary {
+            candidates: vec![candidate("geometry", 0.131), candidate(kept, 0.0812)],
+            kept: kept.parse().unwrap(),
+            reason: "each group gains more than 2 %".to_owned(),
+            nominal_rms_mm: 0.72,
+            shares: vec![share(Cause::Geometry, 81.8), share(Cause::Gravity, 3.7), share(Cause::JointCurves, 3.2)],
+            left_rms_mm: 0.0812,
+        });
+        let joint = |name: &str, size: f64| JointErrorSummary {
+            joint: name.to_owned(),
+            measured_deg: (-90.5, 120.0),
+            compliance_urad: Some((129.4, 14.6)),
+            torque_nm: Some(153.2),
+            curve_rms_urad: 0.7 * size,
+            curve: (-90..=90)
+                .map(|index| 2.0 * f64::from(index))
+                .map(|value| (value, size * (5.0 * value.to_radians()).sin(), 20.0))
+                .collect(),
+        };
+        result.summary.joint_errors = vec![joint("J1<b>", 380.0), joint("J2", 4.0)];
+        result.summary.workspace = Some(WorkspaceSummary {
+            configurations: 400,
+            rms_mm: 0.104,
+            p95_mm: 0.163,
+            max_mm: 0.3,
+            beside_geometry_rms_mm: Some(0.2),
+        });
+        let term = ParameterSummary { id: "joint1.sin5".parse().unwrap(), ..result.summary.parameters[0].clone() };
+        result.summary.parameters.push(term);
+        result.summary.parameter_count += 1;
+    })
+}
+
+#[test]
+fn errors_of_joints_have_a_part_of_their_own() {
+    let session = with_joint_errors();
+    let (json, html) = report(&session);
+    assert_eq!(json["selection"]["kept"], "geometry + compliance + tilt + harmonics + curves 100 urad");
+    let shown = text(&html);
+    let sentence =
+        "eometry explains 82 %, gravity 4 % and joint curves 3 %; 0.08 mm are left (of the 0.72 mm of the nominal arm)";
+    let predicted = "redicted over the whole range of the joints: 0.10 mm rms, 0.16 mm at 95 %";
+    assert!(shown.contains(sentence) && shown.contains(predicted), "{shown}");
+    assert_eq!(row(&shown, "J2"), ["J2", "−91 … 120", "3", "20", "129 ± 15", "153.2"]);
+    assert!(
+        shown.contains("measured from −91 to 120 deg, 266 µrad rms; gives way by 129 ± 15 urad at 153 Nm"),
+        "{shown}"
+    );
+    assert_eq!(html.matches("<polyline class=\"bnd\"").count(), 2);
+    assert!(html.contains("25 parameters (level") && !html.contains("joint1.sin5"));
+
+    let printed = identification_text(&session.identified.as_deref().unwrap().summary);
+    let words = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains(sentence) && words.contains(predicted), "{printed}");
+    assert!(words.contains("25 parameters and 1 term of joint errors"), "{printed}");
+    assert!(words.contains("of 25 (gap") && !words.contains("joint1.sin5"), "{printed}");
+    assert!(words.contains("kept 0.081 mm geometry + compliance"), "{printed}");
+    assert!(printed.lines().all(|line| line.chars().count() <= 80), "{printed}");
+    let drawn = printed.lines().find(|line| line.contains("-180 ·")).unwrap();
+    assert!(drawn.contains('█') && drawn.ends_with("180 deg"), "{drawn}");
 }
 
 #[test]

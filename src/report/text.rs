@@ -216,7 +216,7 @@ pub(super) fn parameters_counted(summary: &IdentificationSummary) -> String {
     let constants = summary.constants().count();
     match summary.parameter_count.saturating_sub(constants) {
         0 => counted(constants, "parameter"),
-        errors => format!("{} and {errors} terms of joint errors", counted(constants, "parameter")),
+        errors => format!("{} and {} of joint errors", counted(constants, "parameter"), counted(errors, "term")),
     }
 }
 

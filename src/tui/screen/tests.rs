@@ -14,9 +14,10 @@ use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, TargetChoi
 use crate::session::state::Session;
 use crate::session::summary::Verdict;
 use crate::session::summary::{
-    AxisSummary, BlindGroupSummary, IdentificationSettings, IdentificationSummary, JointBin, JointSummary, LimitCheck,
-    LimitedQuantity, ModelSummary, ParameterSummary, Provenance, Refit, RejectedSummary, SigmaSummary,
-    StatisticsSummary, VerdictStatus, VerificationMode, VerificationSummary, Warning,
+    AxisSummary, BlindGroupSummary, CandidateSummary, Cause, IdentificationSettings, IdentificationSummary, JointBin,
+    JointErrorSummary, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, ParameterSummary, Provenance, Refit,
+    RejectedSummary, SelectionSummary, ShareSummary, SigmaSummary, StatisticsSummary, VerdictStatus, VerificationMode,
+    VerificationSummary, Warning, WorkspaceSummary,
 };
 use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
@@ -448,8 +449,81 @@ fn the_identification() {
     insta::assert_snapshot!("identify_parameters", changed(&good, &good, &tabs(1)));
     let bad = failed(identify(Some(summary(false)), false));
     insta::assert_snapshot!("identify_bad", changed(&good, &bad, &[]));
-    insta::assert_snapshot!("identify_limits", changed(&bad, &bad, &tabs(2)));
+    insta::assert_snapshot!("identify_limits", changed(&bad, &bad, &tabs(3)));
     insta::assert_snapshot!("identify_large", whole(&good, &tabs(1), LARGE));
+}
+
+/// A result whose joints have errors: a large one that was measured in part, and none.
+fn with_joint_errors() -> IdentificationSummary {
+    let terms = |text: &str| text.parse().unwrap();
+    let candidate = |text: &str, left_out_rms_mm: f64| CandidateSummary {
+        terms: terms(text),
+        left_out_rms_mm,
+        residual_mm: left_out_rms_mm / 2.0,
+    };
+    let share = |cause, percent| ShareSummary { cause, percent };
+    let kept = "geometry + compliance + tilt + harmonics + curves 100 urad";
+    let joint = |name: &str, size: f64, compliance_urad| JointErrorSummary {
+        joint: name.to_owned(),
+        measured_deg: (-90.0, 120.0),
+        compliance_urad,
+        torque_nm: Some(153.0),
+        curve_rms_urad: size / 2.0_f64.sqrt(),
+        curve: (-90..=90)
+            .map(|index| 2.0 * f64::from(index))
+            .map(|value| (value, size * (5.0 * value.to_radians()).sin(), 20.0))
+            .collect(),
+    };
+    IdentificationSummary {
+        selection: Some(SelectionSummary {
+            candidates: vec![
+                candidate("geometry", 0.131),
+                candidate("geometry + compliance", 0.104),
+                candidate(kept, 0.079),
+            ],
+            kept: terms(kept),
+            reason: "each group gains more than 2 %".to_owned(),
+            nominal_rms_mm: 0.72,
+            shares: vec![share(Cause::Geometry, 81.8), share(Cause::Gravity, 3.7), share(Cause::JointCurves, 3.5)],
+            left_rms_mm: 0.079,
+        }),
+        joint_errors: vec![joint("J1", 380.0, None), joint("J2", 4.0, Some((129.4, 14.6)))],
+        parameter_count: 26,
+        parameters: summary(true)
+            .parameters
+            .into_iter()
+            .chain([parameter("joint1.sin5", 380.0, Some(9.0), true)])
+            .collect(),
+        ..summary(true)
+    }
+}
+
+#[test]
+fn the_errors_of_the_joints() {
+    let view = identify(Some(with_joint_errors()), true);
+    let page = |width, is_ascii| paint::snapshot(&drawn(&view, None, &tabs(2), theme(is_ascii), (width, 20)));
+    insta::assert_snapshot!("identify_joints", page(78, false));
+    insta::assert_snapshot!("identify_joints_ascii", paint::differences(&page(78, false), &page(78, true)));
+    assert!(page(150, false).contains("180 deg"));
+    let parameters = whole(&view, &tabs(1), LARGE);
+    assert!(!parameters.contains("joint1.sin5") && parameters.contains("theta6"), "{parameters}");
+    let first = whole(&view, &[], LARGE);
+    assert!(first.contains("21 of 18 combinations") && first.contains("geometry explains 82 %"), "{first}");
+}
+
+#[test]
+fn the_prediction_stands_beside_the_accuracy() {
+    let mut view = verify(Some(verdict(VerdictStatus::Accepted)));
+    let Content::Verify(content) = &mut view.content else { panic!() };
+    content.workspace = Some(WorkspaceSummary {
+        configurations: 400,
+        rms_mm: 0.104,
+        p95_mm: 0.163,
+        max_mm: 0.3,
+        beside_geometry_rms_mm: None,
+    });
+    let shown = whole(&view, &[], LARGE);
+    assert!(shown.contains("predicted over the whole range of the joints: 0.10 mm rms, 0.16 mm at 95 %"), "{shown}");
 }
 
 #[test]

@@ -24,6 +24,11 @@ pub(super) fn before(content: &IdentifyView, is_busy: bool, page: &mut Page) {
     );
     page.marked(
         ("- ", Role::Dim),
+        "errors of the joints, gears and bearings, as far as the samples support them",
+        Role::Plain,
+    );
+    page.marked(
+        ("- ", Role::Dim),
         "the position of the tracker, and of the SMR as chosen in the step Target",
         Role::Plain,
     );

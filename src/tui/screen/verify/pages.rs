@@ -23,16 +23,15 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
         status(verdict, "see below", page);
         limits(verdict, page);
     }
+    if let Some(workspace) = &content.workspace {
+        page.marked(("  ", Role::Dim), &workspace_sentence(workspace), Role::Plain);
+    }
     for warning in &content.warnings {
         let mark = if warning.blocks_acceptance { ("WARNING ", Role::Warn) } else { ("note    ", Role::Title) };
         page.marked(mark, &warning.message, Role::Plain);
     }
     if let Some(verification) = &content.verification {
         tables(verification, page);
-    }
-    if let Some(workspace) = &content.workspace {
-        page.gap();
-        page.paragraph(&workspace_sentence(workspace), Role::Plain);
     }
 }
 
