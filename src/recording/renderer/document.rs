@@ -6,6 +6,7 @@ use rerun::{AnyValues, TextDocument};
 
 use crate::recording::canvas::Canvas;
 use crate::recording::{latin::plain, names};
+use crate::session::joint_errors::{shares_sentence, workspace_sentence};
 use crate::session::journal::IdentifiedText;
 use crate::session::state::Session;
 use crate::session::summary::{ModelSummary, StatisticsSummary, VerdictStatus};
@@ -106,10 +107,25 @@ fn markdown(session: &Session, identified: &IdentifiedText, time: Timestamp) -> 
     } else {
         line("\nNothing was verified: there is no figure of accuracy.".to_owned());
     }
+    if let Some(workspace) = &summary.workspace {
+        line(format!("\n{}", workspace_sentence(workspace)));
+    }
+    if let Some(selection) = &summary.selection {
+        line(format!("\n## What the error consists of\n\n{}\n", shares_sentence(selection)));
+    }
+    if !summary.joint_errors.is_empty() {
+        line("| joint | measured (deg) | curve rms (urad) | gives way under gravity |".to_owned());
+        line("|---|---|---|---|".to_owned());
+    }
+    for joint in &summary.joint_errors {
+        let gives_way = joint.gravity_words().unwrap_or_else(|| "-".to_owned());
+        let (from, to) = joint.measured_deg;
+        line(format!("| {} | {from:.0} .. {to:.0} | {:.0} | {gives_way} |", joint.joint, joint.curve_rms_urad));
+    }
     line("\n## Parameters\n".to_owned());
     line("| bar | | nominal | deviation | sigma | unit | |".to_owned());
     line("|---|---|---|---|---|---|---|".to_owned());
-    for (bar, parameter) in summary.parameters.iter().enumerate() {
+    for (bar, parameter) in summary.constants().enumerate() {
         let sigma = parameter.sigma.map_or_else(|| "-".to_owned(), |sigma| format!("{sigma:.4}"));
         let note = if parameter.identifiable { "" } else { "only with others" };
         line(format!(

@@ -413,11 +413,11 @@ fn solver(
     }
 }
 
-/// Draws the deviations of the parameters as bars, in units of their standard deviation.
+/// Draws the deviations of the constants as bars, in units of their standard deviation.
 fn parameters(canvas: &mut Canvas, identified: &IdentifiedText) {
-    let parameters = &identified.summary.parameters;
-    let of_sigma: Vec<f64> = parameters
-        .iter()
+    let of_sigma: Vec<f64> = identified
+        .summary
+        .constants()
         .map(|parameter| parameter.sigma.map_or(0.0, |sigma| finite(parameter.deviation / sigma)))
         .collect();
     let data = TensorData::new(vec![of_sigma.len() as u64], rerun::TensorBuffer::F64(of_sigma.into()));
