@@ -89,7 +89,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         page.title(if is_writing { "The results are being written to:" } else { nothing });
         page.paragraph(folder, Role::Plain);
         page.gap();
-        page.paragraph("calibration.ron is the identified arm; corrected.* and dh.csv are the same arm for other programs. report.html is for reading and printing, report.json has the same figures. plan.csv and measurements.csv are the data.", Role::Plain);
+        page.paragraph("calibration.ron is the identified arm; corrected.* and dh.csv are its geometry for other programs. report.html is for reading and printing, report.json has the same figures. plan.csv and measurements.csv are the data.", Role::Plain);
     } else {
         page.title("Written");
         for file in &content.files {
