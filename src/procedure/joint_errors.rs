@@ -7,7 +7,7 @@ use super::summary::parameter_summaries;
 use super::workspace::ranges;
 use crate::identification::verification::{ErrorStatistics, FittedSetup, ModelErrors};
 use crate::identification::{Identification, Problem, Scored, Settings, Terms, WithTerms};
-use crate::kinematics::{JointTerm, JointType, KinematicChain, ParameterId};
+use crate::kinematics::{JointTerm, JointType, KinematicChain, ParameterId, SMOOTH_ORDERS};
 use crate::profile::Profile;
 use crate::report::number;
 use crate::session::summary::{
@@ -198,8 +198,26 @@ pub(super) fn summaries(profile: &Profile, problem: &Problem<'_>, found: &Identi
 /// Root mean square of a joint's curve at the measured values (rad).
 fn curve_rms(parameters: &JointParameters<'_>, measured: &[f64]) -> f64 {
     let error = parameters.found.arm.chain.errors().get(parameters.joint);
-    let squares: f64 = measured.iter().map(|value| error.map_or(0.0, |error| error.curve(*value)).powi(2)).sum();
-    (squares / measured.len().max(1) as f64).sqrt()
+    root_mean_square(measured, |value| error.map_or(0.0, |error| error.curve(value)))
+}
+
+/// The same of the part above the first harmonics, which over a narrow range cannot be told from the geometry.
+fn ripple_rms(parameters: &JointParameters<'_>, measured: &[f64]) -> f64 {
+    root_mean_square(measured, |value| {
+        let of_term = |(index, term): &(usize, JointTerm)| {
+            let factor = match term {
+                JointTerm::Sine(order) if *order > SMOOTH_ORDERS => (f64::from(*order) * value).sin(),
+                JointTerm::Cosine(order) if *order > SMOOTH_ORDERS => (f64::from(*order) * value).cos(),
+                JointTerm::Sine(_) | JointTerm::Cosine(_) | JointTerm::Compliance | JointTerm::Tilt(_) => 0.0,
+            };
+            factor * parameters.found.estimates[*index].deviation
+        };
+        parameters.terms.iter().map(of_term).sum()
+    })
+}
+
+fn root_mean_square(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+    (values.iter().map(|value| of(*value).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 /// Warnings about joints that are worse than joints should be. None of them makes the result less accurate.
@@ -207,7 +225,7 @@ pub(super) fn warnings(problem: &Problem<'_>, found: &Identification) -> Vec<War
     let chain: &KinematicChain = &problem.arm.chain;
     let joints: Vec<JointParameters<'_>> = (0..chain.dof()).map(|joint| JointParameters::new(found, joint)).collect();
     let sizes: Vec<f64> =
-        joints.iter().map(|parameters| curve_rms(parameters, &values_of(problem, parameters.joint))).collect();
+        joints.iter().map(|parameters| ripple_rms(parameters, &values_of(problem, parameters.joint))).collect();
     let mut sorted = sizes.clone();
     sorted.sort_by(f64::total_cmp);
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
@@ -217,7 +235,7 @@ pub(super) fn warnings(problem: &Problem<'_>, found: &Identification) -> Vec<War
         let name = &chain.joints()[parameters.joint].name;
         if size > LARGE_CURVE || size > (LARGE_FOR_THE_ARM * median).max(SMALL_CURVE) {
             messages.push(format!(
-                "the angle error of joint {name} is {} urad rms over its turn, unusually large (median of the joints {} urad): have its gear and encoder looked at",
+                "the angle error of joint {name} ripples by {} urad rms, unusually much (median of the joints {} urad): have its gear and encoder looked at",
                 micro(size),
                 micro(median)
             ));
