@@ -299,7 +299,10 @@ fn masses_of_a_urdf_arrive_at_the_same_places() {
     }
     for (wrong, message) in [
         ("<inertial><mass value='-9'/>", "line 2: <mass> of link 'base': -9 kg is below zero"),
-        ("<inertial><mass value='x'/>", "line 2: <mass> of link 'base': attribute 'value' has 'x', which is no number"),
+        (
+            "<inertial><mass value='x'/>",
+            "line 2: <mass> of link 'base': attribute 'value' has 'x', which is not a number",
+        ),
         ("<inertial>", "line 2: <inertial> of link 'base': has no <mass>"),
     ] {
         let error = Urdf::parse(&text.replacen("<inertial><mass value='9'/>", wrong, 1)).unwrap_err().to_string();
@@ -500,6 +503,7 @@ fn the_ur_file_is_the_one_of_the_ros_description() {
     let remarks = export(&arm, Format::UrKinematics, &options).unwrap().remarks;
     assert!(remarks.iter().any(|remark| remark.contains("in front of every tool")), "{remarks:?}");
     arm.identified = profile.arm();
+    arm.geometry = profile.arm();
     let text = export(&arm, Format::UrKinematics, &ExportOptions::default()).unwrap().text;
     let numbers = |name: &str| -> Vec<f64> {
         let lines = text.lines().skip_while(|line| *line != format!("  {name}:")).skip(1).take(6);

@@ -555,9 +555,9 @@ fn errors_of_joints_have_a_part_of_their_own() {
         "eometry explains 82 %, gravity 4 % and joint curves 3 %; 0.08 mm are left (of the 0.72 mm of the nominal arm)";
     let predicted = "redicted over the whole range of the joints: 0.10 mm rms, 0.16 mm at 95 %";
     assert!(shown.contains(sentence) && shown.contains(predicted), "{shown}");
-    assert_eq!(row(&shown, "J2"), ["J2", "−91 … 120", "3", "20", "129 ± 15", "153.2"]);
+    assert_eq!(row(&shown, "J2"), ["-90 … 120", "3", "20", "129 ± 15", "153.2"]);
     assert!(
-        shown.contains("measured from −91 to 120 deg, 266 µrad rms; gives way by 129 ± 15 urad at 153 Nm"),
+        shown.contains("measured from -90 to 120 deg, 266 µrad rms; gives way by 129 ± 15 urad at 153 Nm"),
         "{shown}"
     );
     assert_eq!(html.matches("<polyline class=\"bnd\"").count(), 2);

@@ -7,6 +7,8 @@ use crate::kinematics::{Arm, FreeParameter, IdentificationJacobian, ParameterId,
 
 /// Coordinates of a rigid motion.
 const MOTIONS: usize = 6;
+/// Coordinates of a position.
+const AXES: usize = 3;
 
 /// Covariance of each position in the base (m²) that the identified arm predicts at `places`, once the base is registered to
 /// these very places: what only moves the whole arm is no error of it.
@@ -115,23 +117,30 @@ impl Forecast {
         };
         let mut columns = DMatrix::zeros(size, 3 * fresh.len());
         for (index, place) in fresh.iter().enumerate() {
-            columns.columns_mut(3 * index, 3).copy_from(&forecast.derivatives(place));
+            columns.columns_mut(3 * index, 3).copy_from(&forecast.derivatives(place).columns(0, AXES));
         }
         forecast.fresh = &columns * columns.transpose() / fresh.len().max(1) as f64;
         forecast.square = forecast.fresh.trace();
         forecast
     }
 
-    /// Derivatives of the position at a place, one column per coordinate.
+    /// Derivatives of the position at a place: one column per coordinate, then as many empty ones, because products of fewer columns
+    /// miss the fast ones of the library.
     fn derivatives(&self, place: &Place) -> DMatrix<f64> {
         let n = self.ids.len();
         let mut rows = vec![0.0; 3 * n];
         let point = IdentificationJacobian::new(&self.ids).at(&self.arm.prepared(), place, &mut rows);
         let motion = motion(&point.coords);
-        DMatrix::from_fn(n + MOTIONS, 3, |parameter, axis| match self.expected.get(parameter) {
-            Some(expected) => rows[n * axis + parameter] * expected,
-            None => motion[(axis, parameter - n)],
-        })
+        let mut derivatives = DMatrix::zeros(n + MOTIONS, 2 * AXES);
+        for axis in 0..AXES {
+            for (parameter, expected) in self.expected.iter().enumerate() {
+                derivatives[(parameter, axis)] = rows[n * axis + parameter] * expected;
+            }
+            for of_frame in 0..MOTIONS {
+                derivatives[(n + of_frame, axis)] = motion[(axis, of_frame)];
+            }
+        }
+        derivatives
     }
 
     /// Takes a measurement at `place` into account.
@@ -142,7 +151,8 @@ impl Forecast {
         let innovation = Matrix3::from_fn(|i, j| f64::midpoint(seen[(i, j)], seen[(j, i)]))
             + Matrix3::identity() * self.variance.max(f64::MIN_POSITIVE);
         let Some(inverse) = innovation.try_inverse() else { return };
-        let weighted = &gain * inverse;
+        let mut weighted = DMatrix::zeros(gain.nrows(), 2 * AXES);
+        weighted.columns_mut(0, AXES).copy_from(&(gain.columns(0, AXES) * inverse));
         self.square -= (&self.fresh * &gain).dot(&weighted);
         self.covariance.gemm(-1.0, &weighted, &gain.transpose(), 1.0);
     }

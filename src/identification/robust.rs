@@ -279,9 +279,9 @@ pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Trust 
     let nominal = suspects_of_nominal(solve, first.noise);
     let searched = graduated_search(solve, first);
     let candidates = [
-        peel(solve, first.clone(), start, false),
-        peel(solve, nominal.0, nominal.1, true),
-        peel(solve, searched.0, searched.1, false),
+        peel(solve, first.clone(), start, Begin::Fitted),
+        peel(solve, nominal.0, nominal.1, Begin::Refit),
+        peel(solve, searched.0, searched.1, Begin::Judged),
     ];
     let scatter = candidates.iter().map(|candidate| candidate.scatter).fold(SMALLEST_SCATTER, f64::max);
     let noise = candidates.iter().map(|candidate| candidate.at.noise).max_by(|a, b| a.pose.total_cmp(&b.pose));
@@ -298,7 +298,7 @@ pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Trust 
 
 /// Lets samples change sides, beginning with a fit `at` that was made with the trust of `solve`.
 pub(crate) fn settle(solve: &Solve<'_, '_>, at: Linearised) -> Candidate {
-    peel(solve, at, solve.trust.clone(), false)
+    peel(solve, at, solve.trust.clone(), Begin::Fitted)
 }
 
 /// A decision with the fit that it leads to.
@@ -325,9 +325,19 @@ fn suspects_of_nominal(solve: &Solve<'_, '_>, noise: Noise) -> (Linearised, Trus
     (at, trust)
 }
 
-/// Lets samples change sides, the worst first, until the decision agrees with the fit that it leads to. With `refit` the
-/// parameters of `from` are not yet those of a fit.
-fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Trust, refit: bool) -> Candidate {
+/// What is known of the parameters where [`peel`] begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Begin {
+    /// They are those of a fit with the trust that it begins with.
+    Fitted,
+    /// They are good enough to judge samples by.
+    Judged,
+    /// They are to be fitted first.
+    Refit,
+}
+
+/// Lets samples change sides, the worst first, until the decision agrees with the fit that it leads to.
+fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Trust, begin: Begin) -> Candidate {
     let mut trust = start;
     let mut at = from;
     let mut seen: Vec<Trust> = Vec::new();
@@ -336,12 +346,12 @@ fn peel(solve: &Solve<'_, '_>, from: Linearised, start: Trust, refit: bool) -> C
         let solve = Solve { trust, ..*solve };
         solve.run(at.z.clone(), at.noise, SEARCH_STEPS, &mut |_, _| ControlFlow::Continue(())).at
     };
-    let mut is_fitted = !refit;
-    for _ in 0..ROUNDS {
-        if !is_fitted {
+    let mut is_fitted = begin == Begin::Fitted;
+    for round in 0..ROUNDS {
+        if !is_fitted && (round > 0 || begin == Begin::Refit) {
             at = fit(&trust, &at);
+            is_fitted = true;
         }
-        is_fitted = true;
         let judged = judge(&Solve { trust: &trust, ..*solve }, &at);
         scatter = judged.scatter;
         let accepted = |sample: usize| trust.of_sample(sample) > 0.0;

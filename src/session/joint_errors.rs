@@ -217,8 +217,8 @@ mod tests {
         let joint = joint();
         let scale = curve_scale(std::slice::from_ref(&joint));
         assert!((scale - 100.0).abs() < 1e-9);
-        assert_eq!(curve_drawn(&joint, 16, scale, CurveMarks::Blocks), "····▁▂▃▄▅▆▆▇····");
-        assert_eq!(curve_drawn(&joint, 16, scale, CurveMarks::Digits), "....01234556....");
+        assert_eq!(curve_drawn(&joint, 16, scale, CurveMarks::Blocks), "····▁▂▃▄▅▆▇█····");
+        assert_eq!(curve_drawn(&joint, 16, scale, CurveMarks::Digits), "....01234567....");
         assert_eq!(joint.gravity_words().unwrap(), "129 ± 15 urad at 153 Nm");
         assert_eq!(joint.sigma_urad(), Some(30.0));
         assert_eq!((joint.at(-180.0), joint.at(45.0), joint.at(200.0)), (Some((0.0, 400.0)), Some((48.5, 30.0)), None));

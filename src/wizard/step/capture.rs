@@ -180,9 +180,9 @@ impl CaptureStep {
         if with.apply(&line).is_ok() {
             if self.expected.replace(noted.number).is_some() {
                 // The last one was never written.
-                self.prediction = Prediction::of(cx.session, self.fewest);
+                self.prediction.restart(cx.session);
             }
-            self.prediction.follow(&with);
+            self.prediction.follow(&with, noted.number);
             let in_sigma = |error: f64| (error / self.prediction.sigma * 1e6).round() / 1e6;
             noted.predicted_error_sigma = self.prediction.now().map(in_sigma);
         }
@@ -465,7 +465,7 @@ impl StepMachine for CaptureStep {
             Entry::Sample(noted) => {
                 self.held = None;
                 if self.expected.take() != Some(noted.number) {
-                    self.prediction = Prediction::of(session, self.fewest);
+                    self.prediction.restart(session);
                 }
                 self.question_last_doubt(session);
                 match (self.questioned, noted.findings.first()) {
@@ -480,7 +480,7 @@ impl StepMachine for CaptureStep {
                 }
             }
             Entry::Decision { sample, decision } => {
-                self.prediction = Prediction::of(session, self.fewest);
+                self.prediction.restart(session);
                 match decision {
                     Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
                     Decision::Keep | Decision::LeaveOut => self.advance(session),
@@ -488,7 +488,7 @@ impl StepMachine for CaptureStep {
                 self.question_last_doubt(session);
             }
             Entry::Correction(correction) => {
-                self.prediction = Prediction::of(session, self.fewest);
+                self.prediction.restart(session);
                 self.row = session.open_rows().next();
                 self.question_last_doubt(session);
                 return vec![Action::Say(Notice::info(corrected(correction)))];
@@ -499,7 +499,7 @@ impl StepMachine for CaptureStep {
             }
             Entry::Skipped { skipped: true, .. } => self.advance(session),
             Entry::PlanExtended(_) | Entry::Plan(_) => {
-                self.prediction = Prediction::of(session, self.fewest);
+                self.prediction.restart(session);
                 self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());
             }
             _ => {}

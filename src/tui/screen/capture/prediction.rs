@@ -11,7 +11,7 @@ use crate::wizard::view::{CaptureView, PredictionView};
 
 /// Meaning of the predicted error.
 const MEANING: &str = "RMS position error anywhere in the range of the joints, predicted from the noise of instrument and arm and \
-    from what lengths, angles and joints of arms deviate by. Only Verify measures the real error.";
+    from what lengths, angles and joints of arms deviate by, without their finer curves. Only Verify measures the real error.";
 
 fn error(mm: f64) -> String {
     format!("{mm:.3} mm")

@@ -1,7 +1,7 @@
 //! Checks of a new point: live triage by distance, and drift where a pose is measured again.
 
-use crate::identification::PointSample;
 use crate::identification::triage::{Cause, Finding, Names, PairDeviation, Triage, triage};
+use crate::identification::{PointSample, Terms};
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
 use crate::session::journal::{
@@ -18,6 +18,8 @@ const UNKNOWN_SIGMA: f64 = 0.05 * MILLIMETRE;
 const DRIFT_FACTOR: f64 = 6.0;
 /// Drift below the repeatability of a robot is not reported (m).
 const REPEATABILITY: f64 = 0.1 * MILLIMETRE;
+/// What arms give way under gravity, which may be more than everything else: without it a soft arm looks mismeasured.
+const GRAVITY: Terms = Terms { compliance: true, tilt: false, harmonics: false, curves: None };
 /// Relative difference below which two unit factors are the same.
 const SAME_FACTOR: f64 = 1e-9;
 
@@ -90,9 +92,12 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<D
         .collect();
     let planned: Vec<Vec<f64>> =
         rows.iter().filter_map(|row| session.rows.get(*row)).map(|row| row.planned.configuration.clone()).collect();
+    let arm = profile.arm();
+    let mut parameters = profile.parameters(Level::Geometric);
+    parameters.extend(GRAVITY.parameters(&arm.chain));
     let found = triage(&Triage {
-        arm: &profile.arm(),
-        parameters: &profile.parameters(Level::Geometric),
+        arm: &arm,
+        parameters: &parameters,
         sigma: stated_sigma(profile),
         planned: &planned,
         samples: &samples,

@@ -3,7 +3,7 @@
 use crate::identification::Terms;
 use crate::identification::predicted::Forecast;
 use crate::kinematics::Place;
-use crate::planning::{EXPECTED_CURVES, JointBox, REPEATABILITY, fewest_poses, findable, random};
+use crate::planning::{JointBox, REPEATABILITY, fewest_poses, findable, random};
 use crate::profile::{Level, Profile};
 use crate::session::plan::PoseKind;
 use crate::session::state::Session;
@@ -15,7 +15,7 @@ const FRESH_SEED: u64 = 0x5eed;
 /// Relative improvement below which the rest of the plan is not worth the time.
 const WORTHWHILE: f64 = 0.05;
 
-/// Predicted RMS position error at fresh poses of an arm with errors of its joints.
+/// Predicted RMS position error at fresh poses of an arm with smooth errors of its joints.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Prediction {
     /// Error by number of identification samples (m), from the first number that determines the geometry.
@@ -24,6 +24,8 @@ pub(super) struct Prediction {
     pub(super) with_all: Option<f64>,
     /// Standard deviation of a measured coordinate (m): instrument and repeatability.
     pub(super) sigma: f64,
+    /// State before the first sample.
+    start: Option<Forecast>,
     /// State after the samples so far, and their number.
     forecast: Option<(Forecast, usize)>,
     /// Fewest samples that determine the geometry.
@@ -40,34 +42,42 @@ impl Prediction {
         let profile = &session.mounted_profile()?;
         let arm = profile.arm();
         let mut parameters = profile.parameters(Level::Geometric);
-        parameters.extend(Terms::all(EXPECTED_CURVES).parameters(&arm.chain));
+        // Without the curves, which have six hundred parameters and would change little of what is worth measuring.
+        let terms = Terms { curves: None, ..Terms::all(1.0) };
+        parameters.extend(terms.parameters(&arm.chain));
         let distance = profile.tracker().position_in_base.coords.norm();
         let instrument = profile.instrument().map_or(0.0, |instrument| instrument.sigma_at(distance));
         let sigma = instrument.hypot(REPEATABILITY);
-        let forecast = Forecast::new(&arm, &parameters, &fresh(profile)?, sigma);
-        let mut prediction =
-            Self { curve: Vec::new(), with_all: None, sigma, forecast: Some((forecast, 0)), fewest: fewest? };
-        for place in measured(session) {
-            prediction.append(&place);
-        }
-        let mut with_all = prediction.forecast.clone()?.0;
-        let open = session.open_rows().filter_map(|row| session.rows.get(row));
-        for row in open.filter(|row| row.planned.kind == PoseKind::Identification) {
-            with_all.measure(&at(row.planned.configuration.clone()));
-        }
-        prediction.with_all = Some(with_all.error());
+        let start = Forecast::new(&arm, &parameters, &fresh(profile)?, sigma);
+        let mut prediction = Self { sigma, start: Some(start), fewest: fewest?, ..Self::default() };
+        prediction.restart(session);
         Some(prediction)
     }
 
-    /// The same with the samples of `session`, which has one more than before or others.
-    pub(super) fn follow(&mut self, session: &Session) {
-        let known = self.forecast.as_ref().map(|(_, known)| *known);
-        let now = session.counted_of(PoseKind::Identification).count();
-        match session.counted_of(PoseKind::Identification).last() {
-            Some(last) if known.is_some_and(|known| known + 1 == now) => {
-                self.append(&at(session.configuration_of(last)));
+    /// Predicts again from all samples of a session with the same robot.
+    pub(super) fn restart(&mut self, session: &Session) {
+        self.curve.clear();
+        self.forecast = self.start.clone().map(|start| (start, 0));
+        for place in measured(session) {
+            self.append(&place);
+        }
+        self.with_all = self.forecast.clone().map(|(mut with_all, _)| {
+            let open = session.open_rows().filter_map(|row| session.rows.get(row));
+            for row in open.filter(|row| row.planned.kind == PoseKind::Identification) {
+                with_all.measure(&at(row.planned.configuration.clone()));
             }
-            _ => *self = Self::of(session, Some(self.fewest)),
+            with_all.error()
+        });
+    }
+
+    /// The same with the measurement of this number, which `session` has as its last one.
+    pub(super) fn follow(&mut self, session: &Session, number: u64) {
+        let counted = || session.counted_of(PoseKind::Identification);
+        let Some(last) = counted().last().filter(|last| last.noted.number == number) else { return };
+        if self.forecast.as_ref().is_some_and(|(_, known)| known + 1 == counted().count()) {
+            self.append(&at(session.configuration_of(last)));
+        } else {
+            self.restart(session);
         }
     }
 
