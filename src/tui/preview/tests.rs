@@ -61,14 +61,14 @@ fn the_tracker_of_a_session_stands_where_its_readings_say() {
     assert_eq!(scene.beam.unwrap().from, tracker);
     let planned = session.robot.as_ref().unwrap().profile.tracker().position_in_base;
     assert!((planned - tracker).norm() > 0.02, "the test needs one that stands elsewhere: {tracker}");
-    // A tracker measures how far away a point is.
+    // A tracker measures how far away a point is; the scene places it with the nominal arm, which is off by up to 25 mm.
     let result = session.identified.as_deref().unwrap();
     assert!(result.samples.len() > 20);
     for (number, point) in result.samples.iter().zip(&result.points).filter(|(_, point)| !point.rejected) {
         let (x, y, z) = point.at_mm;
         let away = (Point3::new(x, y, z) * 1e-3 - tracker).norm();
         let measured = session.point_of(session.sample(*number).unwrap()).coords.norm();
-        assert!((away - measured).abs() < 0.02, "sample {number}: {away} m instead of {measured} m");
+        assert!((away - measured).abs() < 0.03, "sample {number}: {away} m instead of {measured} m");
     }
     // Before four points are measured it stands as planned.
     let is_sample =

@@ -18,8 +18,11 @@ const UNKNOWN_SIGMA: f64 = 0.05 * MILLIMETRE;
 const DRIFT_FACTOR: f64 = 6.0;
 /// Drift below the repeatability of a robot is not reported (m).
 const REPEATABILITY: f64 = 0.1 * MILLIMETRE;
-/// What arms give way under gravity, which may be more than everything else: without it a soft arm looks mismeasured.
-const GRAVITY: Terms = Terms { compliance: true, tilt: false, harmonics: false, curves: None };
+/// Errors of joints that arms with stated masses may show: without them a soft arm looks mismeasured. Where no masses are stated, the
+/// scatter of the points so far has to do.
+const SMOOTH: Terms = Terms { compliance: true, tilt: true, harmonics: true, curves: None };
+/// What the finer curves of joints add to the σ of a coordinate then (m).
+const CURVES: f64 = 0.05 * MILLIMETRE;
 /// Relative difference below which two unit factors are the same.
 const SAME_FACTOR: f64 = 1e-9;
 
@@ -94,11 +97,15 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<D
         rows.iter().filter_map(|row| session.rows.get(*row)).map(|row| row.planned.configuration.clone()).collect();
     let arm = profile.arm();
     let mut parameters = profile.parameters(Level::Geometric);
-    parameters.extend(GRAVITY.parameters(&arm.chain));
+    let mut sigma = stated_sigma(profile);
+    if arm.chain.loads().is_some() {
+        parameters.extend(SMOOTH.parameters(&arm.chain));
+        sigma = sigma.hypot(CURVES);
+    }
     let found = triage(&Triage {
         arm: &arm,
         parameters: &parameters,
-        sigma: stated_sigma(profile),
+        sigma,
         planned: &planned,
         samples: &samples,
         excluded: &excluded,
