@@ -152,7 +152,7 @@ fn the_finished_session_is_what_its_script_makes() {
         let is_same = (made.1 - committed.1).abs() < 1e-6 && (sigma - committed_sigma).abs() < 1e-6;
         assert!(is_same, "{made:?} {committed:?}");
     }
-    let points = |folder: &Path| read(&text(folder, "measurements.csv"), "measurements.csv", &JOINTS).unwrap();
+    let points = |folder: &Path| read(text(folder, "measurements.csv"), "measurements.csv", &JOINTS).unwrap();
     let (made, again) = (points(&made), points(&committed));
     assert_eq!(made.rows.len(), again.rows.len());
     for (made, again) in made.rows.iter().zip(&again.rows) {

@@ -129,11 +129,11 @@ fn joint_curves_and_compliance_are_found_and_told() {
         let found_mean = error.curve.iter().map(|point| point.1).sum::<f64>() / error.curve.len() as f64;
         for (degrees, micro, sigma) in &error.curve {
             let off = (truth.curve(degrees.to_radians()) * 1e6 - true_mean) - (micro - found_mean);
-            inside += usize::from(off.abs() <= 3.0 * sigma + 1.0);
+            inside += u32::from(off.abs() <= 3.0 * sigma + 1.0);
             all_points += 1;
         }
     }
-    assert!(all_points > 200 && inside as f64 > 0.97 * all_points as f64, "{inside} of {all_points}");
+    assert!(all_points > 200 && f64::from(inside) > 0.97 * f64::from(all_points), "{inside} of {all_points}");
     // Formats that know only geometry get a fit of their own.
     let calibration = found.calibration.unwrap();
     let own = calibration.identified_geometry(&profile).unwrap();

@@ -144,7 +144,7 @@ fn measured_tables_of_others_are_read() {
     for (name, rows) in
         [("ur5/grid.csv", 1000), ("ur5/random.csv", 20), ("ur10/series_b.csv", 1495), ("ur10/series_c.csv", 2773)]
     {
-        let table = read(&text(name), name, &[Revolute; 6]).unwrap_or_else(|errors| panic!("{errors}"));
+        let table = read(text(name), name, &[Revolute; 6]).unwrap_or_else(|errors| panic!("{errors}"));
         println!("{name}: {} warnings", table.warnings.len());
         table.warnings.iter().take(3).for_each(|warning| println!("  {warning}"));
         assert_eq!(table.rows.len(), rows);
@@ -156,7 +156,7 @@ fn measured_tables_of_others_are_read() {
     }
     for (name, rows) in [("panda_1", 182), ("panda_2_clean", 497), ("panda_3", 387)] {
         let name = format!("ball_socket/{name}.csv");
-        let read = read_constraints(&text(&name), &name, &[Revolute; 7]).unwrap_or_else(|errors| panic!("{errors}"));
+        let read = read_constraints(text(&name), &name, &[Revolute; 7]).unwrap_or_else(|errors| panic!("{errors}"));
         let Constraints::SharedPoints(points) = read else { panic!("{name}") };
         println!("{name}: {} groups, {} warnings", points.groups.len(), points.warnings.len());
         points.warnings.iter().take(3).for_each(|warning| println!("  {warning}"));

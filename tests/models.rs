@@ -594,7 +594,8 @@ fn a_joint_with_its_correction_added_turns_as_if_it_had_no_error() {
                 .iter()
                 .zip(&meant)
                 .map(|(joint, value)| {
-                    let row = table.iter().find(|(name, at, _)| *name == joint.name && *at == angle).unwrap();
+                    let row =
+                        table.iter().find(|(name, at, _)| *name == joint.name && (*at - angle).abs() < 1e-9).unwrap();
                     value + row.2
                 })
                 .collect();

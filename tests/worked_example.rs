@@ -1,7 +1,7 @@
 //! The worked example of `docs/engineer.md`: the numbers that an integrator checks an implementation against are those of the program,
 //! and the formulas in the document give the loads and angles in it.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fs;
 
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -26,7 +26,7 @@ fn numbers(text: &str) -> Vec<f64> {
 }
 
 /// Coefficients and deviations as they are stated: `NAME VALUE UNIT`.
-fn deviations(document: &str) -> HashMap<ParameterId, f64> {
+fn deviations(document: &str) -> BTreeMap<ParameterId, f64> {
     let block = document.split_once("```text\n").unwrap().1.split_once("```").unwrap().0;
     let words: Vec<&str> = block.split_whitespace().collect();
     let parameter = |words: &[&str]| {

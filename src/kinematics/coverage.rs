@@ -114,7 +114,7 @@ impl JointCoverage {
 pub fn coverage<'a>(
     chain: &KinematicChain,
     ranges: &[(f64, f64)],
-    configurations: impl Iterator<Item = &'a [f64]> + Clone,
+    configurations: &(impl Iterator<Item = &'a [f64]> + Clone),
 ) -> Vec<JointCoverage> {
     let joints = chain.joints().iter().zip(ranges).enumerate();
     joints
@@ -178,7 +178,7 @@ mod tests {
     fn configurations_are_taken_joint_by_joint() {
         let (profile, _) = crate::profile::Profile::parse(crate::profile::builtin("ur5").unwrap(), "").unwrap();
         let configurations = [vec![0.1; 6], vec![-0.5; 6], vec![0.7; 6]];
-        let joints = coverage(profile.chain(), &[(-1.0, 1.0); 6], configurations.iter().map(Vec::as_slice));
+        let joints = coverage(profile.chain(), &[(-1.0, 1.0); 6], &configurations.iter().map(Vec::as_slice));
         assert_eq!(joints.len(), 6);
         assert!(joints.iter().all(|joint| joint.values() == [-0.5, 0.1, 0.7]));
     }

@@ -115,13 +115,9 @@ pub(super) fn write(arm: &CalibratedArm) -> Result<(String, Agreement), ModelErr
     for curve in &curves {
         for value in curve.values() {
             let sigma = curve.summary.at(value).map_or(f64::NAN, |(_, sigma)| sigma);
-            text.push_str(&format!(
-                "{},{},{},{}\n",
-                quoted(&curve.joint.name),
-                value,
-                fixed(curve.correction(value) / MICRORADIAN, DECIMALS),
-                fixed(sigma, 1)
-            ));
+            let correction = fixed(curve.correction(value) / MICRORADIAN, DECIMALS);
+            text += &[quoted(&curve.joint.name), value.to_string(), correction, fixed(sigma, 1)].join(",");
+            text.push('\n');
         }
     }
     let agreement = prove(&text, &curves)?;
@@ -156,7 +152,8 @@ fn prove(text: &str, curves: &[Curve<'_>]) -> Result<Agreement, ModelError> {
         }
         for (_, value, correction) in &of_joint {
             let off = (correction - curve.correction(*value)).abs();
-            if !(off <= ROUNDING) {
+            // What is not a number differs as well.
+            if off.is_nan() || off > ROUNDING {
                 return Err(ModelError::ReadBack(format!("joint {} differs at {value} deg", curve.joint.name)));
             }
         }

@@ -13,7 +13,7 @@ use crate::kinematics::{Arm, ForwardKinematics, JointType, KinematicChain, Param
 use crate::profile::{Profile, Target};
 use crate::session::calibration::Calibration;
 use crate::session::joint_errors::millimetres;
-use crate::session::summary::{JointErrorSummary, SIMULATED, VerdictStatus};
+use crate::session::summary::{JointErrorSummary, SIMULATED, SelectionSummary, VerdictStatus};
 use crate::units::{to_deg, to_mm};
 
 /// A format of a model. The comments on the values are the help of `--format`.
@@ -147,24 +147,17 @@ fn cautions(calibration: &Calibration) -> Vec<String> {
 
 /// What the formats of geometry lose of a calibration with errors of joints.
 fn lost(calibration: &Calibration) -> String {
-    let mut text = "geometry only, identified without the errors of the joints".to_owned();
-    let selection = calibration.selection.as_ref();
-    let alone = selection.and_then(|selection| {
+    let of_selection = |selection: &SelectionSummary| {
         let geometry = selection.candidates.iter().find(|candidate| candidate.terms.is_geometry())?;
-        Some((geometry.left_out_rms_mm, selection.left_rms_mm))
-    });
-    if let Some((geometry, whole)) = alone {
-        text.push_str(&format!(
-            ": at poses left out in turn it is {} mm rms off, the whole model {} mm",
-            millimetres(geometry),
-            millimetres(whole)
-        ));
-    }
+        let (geometry, whole) = (millimetres(geometry.left_out_rms_mm), millimetres(selection.left_rms_mm));
+        Some(format!(": at poses left out in turn it is {geometry} mm rms off, the whole model {whole} mm"))
+    };
+    let alone = calibration.selection.as_ref().and_then(of_selection).unwrap_or_default();
     let apart = calibration.workspace.as_ref().and_then(|workspace| workspace.beside_geometry_rms_mm);
-    if let Some(apart) = apart {
-        text.push_str(&format!("; over the whole range of the joints the two are {} mm rms apart", millimetres(apart)));
-    }
-    text
+    let apart = apart.map_or_else(String::new, |apart| {
+        format!("; over the whole range of the joints the two are {} mm rms apart", millimetres(apart))
+    });
+    format!("geometry only, identified without the errors of the joints{alone}{apart}")
 }
 
 /// Constants of the last of `joints` links that the data determine only in combination with others.

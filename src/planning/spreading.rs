@@ -281,7 +281,7 @@ mod tests {
         assert!(after.condition_number <= (1.0 + SLACK + 1e-9) * before.condition_number);
         let largest = |places: &[Place]| -> Vec<f64> {
             let configurations = places.iter().map(|place| place.configuration.as_slice());
-            let joints = coverage(&arm.chain, ranges.ranges(), configurations);
+            let joints = coverage(&arm.chain, ranges.ranges(), &configurations);
             joints.iter().map(|joint| joint.largest_gap().size() / joint.even_gap(50).max(SMALL)).collect()
         };
         let (before, after) = (largest(&chosen), largest(&moved));

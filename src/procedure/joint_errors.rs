@@ -172,10 +172,15 @@ pub(super) fn summaries(profile: &Profile, problem: &Problem<'_>, found: &Identi
         if parameters.terms.is_empty() || chain.joints()[joint].joint_type != JointType::Revolute {
             return None;
         }
-        let steps = ((high - low) / STEP).ceil().max(1.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most a turn, and at least one step"
+        )]
+        let steps = ((high - low) / STEP).ceil().clamp(1.0, 1e4) as usize;
         let micro = |value: f64| (value / MICRORADIAN * 10.0).round() / 10.0 + 0.0;
-        let curve = (0..=steps as usize).map(|index| {
-            let value = low + (high - low) * index as f64 / steps;
+        let curve = (0..=steps).map(|index| {
+            let value = low + (high - low) * index as f64 / steps as f64;
             let (error, sigma) = parameters.curve(value);
             ((to_deg(value) * 1e3).round() / 1e3 + 0.0, micro(error), micro(sigma))
         });

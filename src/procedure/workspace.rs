@@ -107,7 +107,7 @@ impl<'a> Workspace<'a> {
     /// A warning that blocks acceptance where the prediction is beyond a limit, or beyond the nominal arm's own error.
     pub(super) fn warning(&self, profile: &Profile, verification: Option<&VerificationSummary>) -> Option<Warning> {
         let nominal = verification.and_then(|verification| Some(verification.nominal.position_mm?.rms));
-        let beyond = self.beyond(profile.acceptance(), nominal.or(self.nominal.map(to_mm)))?;
+        let beyond = self.beyond(profile.acceptance(), nominal.or_else(|| self.nominal.map(to_mm)))?;
         let WorkspaceSummary { rms_mm, p95_mm, .. } = self.summary;
         let joint = self.worst_joint().map_or_else(String::new, |worst| worst.words(profile));
         let message = format!(
@@ -142,7 +142,7 @@ impl<'a> Workspace<'a> {
         let poses = measured.len().min(POSES_OF_A_JOINT);
         let picked: Vec<&Place> = (0..poses).map(|index| measured[index * measured.len() / poses]).collect();
         (0..self.ranges.len())
-            .filter_map(|joint| {
+            .map(|joint| {
                 let (low, high) = self.ranges[joint];
                 let value = |index: usize| low + (high - low) * index as f64 / (VALUES_OF_A_JOINT - 1) as f64;
                 let places: Vec<Place> = (0..VALUES_OF_A_JOINT)
@@ -162,7 +162,7 @@ impl<'a> Workspace<'a> {
                 let range =
                     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
                 let at = value(index / poses.max(1));
-                Some(WorstJoint { joint, measured: range, largest, at })
+                WorstJoint { joint, measured: range, largest, at }
             })
             .max_by(|a, b| a.largest.total_cmp(&b.largest))
     }

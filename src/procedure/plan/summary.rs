@@ -99,7 +99,7 @@ impl Planner<'_> {
     fn joint_gaps(&self, pool: &[Candidate], set: &[usize]) -> Vec<JointGapSummary> {
         let configurations = set.iter().filter_map(|index| pool.get(*index)).map(|kept| kept.configuration.as_slice());
         let joints = self.arm.chain.joints().iter();
-        let covered = joints.zip(coverage(&self.arm.chain, &self.limits, configurations));
+        let covered = joints.zip(coverage(&self.arm.chain, &self.limits, &configurations));
         covered
             .map(|(joint, coverage)| {
                 let quantity = joint.joint_type.quantity();
