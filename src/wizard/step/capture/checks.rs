@@ -101,6 +101,9 @@ fn by_distance(cx: &Cx<'_>, noted: &MeasuredText, profile: &Profile) -> Option<D
     if arm.chain.loads().is_some() {
         parameters.extend(SMOOTH.parameters(&arm.chain));
         sigma = sigma.hypot(CURVES);
+        for sample in &mut samples {
+            sample.sigma = sample.sigma.map(|own| own.hypot(CURVES));
+        }
     }
     let found = triage(&Triage {
         arm: &arm,
