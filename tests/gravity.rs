@@ -2,18 +2,16 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use crate::support::derivatives::assert_derivatives;
 use crate::support::paper_case::seeded;
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use trupose::kinematics::{
-    Arm, Convention, ForwardKinematics, GRAVITY, IdentificationJacobian, JointTerm, JointType, KinematicChain,
-    LinkMass, Loads, ParameterId, Place,
+    Arm, Convention, ForwardKinematics, GRAVITY, JointTerm, JointType, KinematicChain, LinkMass, Loads, ParameterId,
+    Place,
 };
 use trupose::profile::{Masses, Mounting, Profile, builtin, builtin_names};
-
-/// Difference quotients with this step are good to about its square times the size of the arm.
-const STEP: f64 = 1e-6;
 
 fn profile(name: &str) -> Profile {
     Profile::parse(builtin(name).unwrap(), name).unwrap().0
@@ -76,16 +74,7 @@ fn derivatives_by_the_terms_of_joints_match_difference_quotients() {
             let target = Point3::new(0.03, -0.02, 0.09);
             let arm = Arm { chain, targets: vec![target] }.with(deviations).unwrap();
             let place = Place { configuration: random_configuration(&arm.chain, &mut rng), target: 0 };
-            let mut rows = vec![0.0; 3 * ids.len()];
-            let point = IdentificationJacobian::new(&ids).at(&arm.prepared(), &place, &mut rows);
-            assert!((point - arm.point_in_base(&place)).norm() < 1e-13);
-            for (column, id) in ids.iter().enumerate() {
-                let at = |step: f64| arm.with([(*id, step)]).unwrap().point_in_base(&place);
-                let quotient = (at(STEP) - at(-STEP)) / (2.0 * STEP);
-                let analytic = Vector3::new(rows[column], rows[ids.len() + column], rows[2 * ids.len() + column]);
-                let error = (quotient - analytic).norm();
-                assert!(error < 1e-8, "{} {id} at {place:?}: {quotient} against {analytic}", profile.name());
-            }
+            assert_derivatives(profile.name(), &arm, &ids, &place);
         }
     }
 }
