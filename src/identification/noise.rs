@@ -19,6 +19,8 @@ const PRIOR_VALUES: f64 = 6.0;
 const EXPECTED: f64 = 20.0 * MICROMETRE;
 /// No arm repeats better than this (m), however good the instrument is.
 const REPEATABILITY: f64 = 10.0 * MICROMETRE;
+/// A variance far below what any instrument sees (m²).
+const NEGLIGIBLE: f64 = 1e-6 * SMALLEST_SIGMA * SMALLEST_SIGMA;
 /// Residuals never confirm less than this part of a promised variance.
 const LEAST_CONFIRMED: f64 = 1e-4;
 /// Median of the square norm of three standard normal numbers.
@@ -219,7 +221,7 @@ impl Scatter {
     pub(crate) fn normalised(&self, determined: f64) -> Option<f64> {
         let freedom = self.values - determined;
         let is_stated = self.residuals.iter().all(|residual| residual.variance > 0.0);
-        (freedom >= 1.0 && is_stated).then(|| (self.chi_square(0.0, 1.0, Estimation::Efficient) / freedom).sqrt())
+        (freedom >= 1.0 && is_stated).then(|| (self.chi_square(0.0, Estimation::Efficient) / freedom).sqrt())
     }
 
     /// Standard deviation of one reading (m) at some noise.
@@ -232,10 +234,8 @@ impl Scatter {
     /// and if there is less, only a part of the promised one is confirmed.
     pub(crate) fn noise(&self, at: &Noise, determined: f64, estimation: Estimation) -> Noise {
         let target = (self.values - determined).max(0.0) + PRIOR_VALUES;
-        let sum = |pose: f64| self.chi_square(pose, 1.0, estimation) + self.prior(pose);
-        // Far below what any instrument sees.
-        let smallest = SMALLEST_SIGMA.powi(2) * 1e-6;
-        let as_promised = sum(smallest);
+        let sum = |pose: f64| self.chi_square(pose, estimation) + self.prior(pose);
+        let as_promised = sum(NEGLIGIBLE);
         if as_promised <= target {
             // By an upper bound, one standard deviation of the sum above it: chance alone makes no instrument better. Outliers
             // among the residuals say nothing about that.
@@ -245,22 +245,17 @@ impl Scatter {
             return Noise { pose: 0.0, confirmed, ..*at };
         }
         let largest = self.residuals.iter().map(|residual| residual.square).fold(self.expected, f64::max);
-        let (mut low, mut high) = (smallest, largest * PRIOR_VALUES * self.values.max(1.0));
-        while high / low > 1.0 + 1e-9 {
-            let middle = (low * high).sqrt();
-            *(if sum(middle) > target { &mut low } else { &mut high }) = middle;
-        }
-        Noise { pose: (low * high).sqrt(), confirmed: 1.0, ..*at }
+        let pose = variance_where(largest * PRIOR_VALUES * self.values.max(1.0), |pose| sum(pose) > target);
+        Noise { pose, confirmed: 1.0, ..*at }
     }
 
     fn prior(&self, pose: f64) -> f64 {
         PRIOR_VALUES * self.expected / (pose + self.reading)
     }
 
-    fn chi_square(&self, pose: f64, confirmed: f64, estimation: Estimation) -> f64 {
-        let normalised = |residual: &Residual| {
-            residual.square / (residual.poses * pose + confirmed * residual.variance).max(f64::MIN_POSITIVE)
-        };
+    fn chi_square(&self, pose: f64, estimation: Estimation) -> f64 {
+        let normalised =
+            |residual: &Residual| residual.square / (residual.poses * pose + residual.variance).max(f64::MIN_POSITIVE);
         match estimation {
             Estimation::Efficient => self.residuals.iter().map(normalised).sum(),
             Estimation::Robust => {
@@ -357,15 +352,19 @@ pub(crate) fn shot_variance(problem: &Problem<'_>, groups: &Groups, stated: f64,
         let chi: f64 = squares.iter().map(|(square, own)| square / (own + shot)).sum();
         chi + PRIOR_VALUES * expected / (own + shot) - values - PRIOR_VALUES
     };
-    let smallest = SMALLEST_SIGMA.powi(2) * 1e-6;
-    if excess(smallest) <= 0.0 {
+    if excess(NEGLIGIBLE) <= 0.0 {
         return 0.0;
     }
     let total: f64 = squares.iter().map(|(square, _)| square).sum();
-    let (mut low, mut high) = (smallest, total + PRIOR_VALUES * expected);
+    variance_where(total + PRIOR_VALUES * expected, |shot| excess(shot) > 0.0)
+}
+
+/// The variance (m²) between a negligible one and `high` up to which residuals are too large, by bisection of its logarithm.
+fn variance_where(mut high: f64, are_too_large: impl Fn(f64) -> bool) -> f64 {
+    let mut low = NEGLIGIBLE;
     while high / low > 1.0 + 1e-9 {
         let middle = (low * high).sqrt();
-        *(if excess(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+        *(if are_too_large(middle) { &mut low } else { &mut high }) = middle;
     }
     (low * high).sqrt()
 }
