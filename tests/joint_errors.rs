@@ -193,6 +193,21 @@ fn two_joints_that_moved_say_nothing_about_the_others() {
     assert!(says("poor_data") && says("workspace"), "{:?}", found.summary.warnings);
 }
 
+#[test]
+fn asking_for_terms_and_ruling_them_out_is_an_error() {
+    let table = "sessions/soochow-example/measurements.csv";
+    for (asked, ruled_out) in [
+        (["--terms", "curves"], ["--prior", "none"]),
+        (["--level", "full"], ["--weighting", "uniform"]),
+        (["--level", "full"], ["--iterations", "1"]),
+    ] {
+        let start = ["identify", "--profile", "soochow", "--measurements", table];
+        let output = trupose(&[&start[..], &asked[..], &ruled_out[..]].concat());
+        assert_eq!(output.status.code(), Some(2), "{asked:?} {ruled_out:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("rule out the errors of joints"));
+    }
+}
+
 /// Runs the program and reads its JSON object.
 fn json(arguments: &[&str]) -> Value {
     let output = trupose(&[arguments, &["--json"]].concat());

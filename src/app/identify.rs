@@ -86,6 +86,12 @@ pub(super) fn run_request<O: Write, E: Write>(
     recording: Option<&Path>,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
+    if request.settings.contradict_terms() {
+        return Err(Failure::new(ExitStatus::Usage, "these settings rule out the errors of joints that are asked for")
+            .hint(
+                "leave out '--prior none', '--weighting uniform' and '--iterations 1', or '--terms' and '--level full'",
+            ));
+    }
     let mut progress = Progress::new(&mut console.err);
     let mut identified = identify(request, &mut |stage| {
         progress.identifying(stage);

@@ -69,10 +69,8 @@ impl EstimationSettings {
     /// The errors of joints to choose from, in groups from simple to rich; none where the geometry stays alone. They need the prior,
     /// weights with the covariance, and more than the paper's single step.
     pub(crate) fn candidates(&self) -> Vec<Vec<Terms>> {
-        let has_candidates =
-            self.prior == Prior::Expected && self.weighting == Weighting::Covariance && self.iterations > 1;
         match (&self.terms, self.level) {
-            _ if !has_candidates => Vec::new(),
+            _ if !self.can_have_terms() => Vec::new(),
             (Some(groups), _) => vec![Terms::of_groups(groups)],
             (None, Level::Offsets | Level::Geometric) => Vec::new(),
             (None, Level::Auto) => Terms::candidates(),
@@ -81,6 +79,15 @@ impl EstimationSettings {
                 vec![Terms::of_groups(&all)]
             }
         }
+    }
+
+    fn can_have_terms(&self) -> bool {
+        self.prior == Prior::Expected && self.weighting == Weighting::Covariance && self.iterations > 1
+    }
+
+    /// Whether these settings ask for errors of joints and rule them out at the same time.
+    pub fn contradict_terms(&self) -> bool {
+        (self.terms.is_some() || self.level == Level::Full) && !self.can_have_terms()
     }
 
     /// The free parameters of the geometry at the chosen level.
