@@ -46,6 +46,15 @@ fn a_plan_comes_with_its_figures_and_an_objective_with_its_price() {
     assert!((0.8..1.0).contains(&number(&balanced, "d_efficiency")));
     assert!((number(&balanced, "predicted_rms_mm") - 0.01 * error(&balanced)).abs() < 1e-9);
     assert!(number(&balanced, "elapsed_s") > 0.0 && number(&balanced, "condition_number_raw") > 1000.0);
+    // Errors of the joints come on top, and every joint's range is filled as far as so few poses can.
+    let with_joint_errors = number(&balanced, "predicted_level3_rms_mm");
+    assert!(with_joint_errors > number(&balanced, "predicted_rms_mm") && with_joint_errors < 0.5, "{with_joint_errors}");
+    let gaps = balanced["joint_gaps"].as_array().unwrap();
+    assert_eq!(gaps.len(), 6);
+    for gap in gaps {
+        let (gap, even) = (number(gap, "largest_gap"), number(gap, "even_gap"));
+        assert!(gap >= even && gap < 4.0 * even, "{gaps:?}");
+    }
     let poses = balanced["poses"].as_array().unwrap();
     let of_kind = |kind: &str| poses.iter().filter(|pose| pose["kind"] == kind).count();
     assert_eq!((of_kind("identification"), of_kind("verification"), of_kind("home")), (30, 8, 2));
