@@ -48,7 +48,10 @@ fn a_plan_comes_with_its_figures_and_an_objective_with_its_price() {
     assert!(number(&balanced, "elapsed_s") > 0.0 && number(&balanced, "condition_number_raw") > 1000.0);
     // Errors of the joints come on top, and every joint's range is filled as far as so few poses can.
     let with_joint_errors = number(&balanced, "predicted_level3_rms_mm");
-    assert!(with_joint_errors > number(&balanced, "predicted_rms_mm") && with_joint_errors < 0.5, "{with_joint_errors}");
+    assert!(
+        with_joint_errors > number(&balanced, "predicted_rms_mm") && with_joint_errors < 0.5,
+        "{with_joint_errors}"
+    );
     let gaps = balanced["joint_gaps"].as_array().unwrap();
     assert_eq!(gaps.len(), 6);
     for gap in gaps {

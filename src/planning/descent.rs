@@ -22,10 +22,14 @@ const KICKED: usize = 3;
 /// where the predicted error is limited: those after them bring nothing that lasts.
 const CHUNK: usize = 64;
 const ENOUGH: usize = 64;
+/// Sets of up to so many poses look at whole windows.
+const FULL_WINDOWS: usize = 100;
 /// Tries to find a replacement that the limit allows.
 const KICK_TRIES: usize = 20;
 /// What a shortfall of one costs in the prediction stage, as a share of the predicted error.
 const SHORTFALL_PRICE: f64 = 0.05;
+/// The prediction stage ends where a sweep lowers the cost by less than this share.
+const SETTLED: f64 = 1e-3;
 /// An exchange must lower the cost by this share, lest rounding errors keep it going round.
 const NEGLIGIBLE: f64 = 1e-12;
 
@@ -164,7 +168,8 @@ impl<'a> Descent<'a> {
             target,
             stage,
             sweeps: settings.sweeps_of(stage),
-            window: settings.window.max(1),
+            // A sweep over a larger set has more visits.
+            window: settings.window.min(settings.window * FULL_WINDOWS / settings.poses.max(1)).max(1),
             fixed: settings.required.len(),
             rng,
             pool,
@@ -188,12 +193,17 @@ impl<'a> Descent<'a> {
         let mut interrupted = false;
         let mut unmoved = 0;
         for sweep in 1..=self.sweeps {
+            let before = self.best.cost;
             let threshold = first_threshold * (1.0 - sweep as f64 / self.sweeps as f64);
             let Some(moved) = self.sweep(threshold, keep_going) else {
                 interrupted = true;
                 break;
             };
             progress(&Progress { start, stage: self.stage, sweep, figures: self.best.figures(self.information) });
+            // The reference of the next stage need not be exact.
+            if self.stage == Stage::Prediction && sweep > 1 && self.best.cost > (1.0 - SETTLED) * before {
+                break;
+            }
             // Nothing is left only when every place has seen the whole pool.
             unmoved = if moved { 0 } else { unmoved + self.window };
             if unmoved >= self.pool.len() {
@@ -271,7 +281,11 @@ impl<'a> Descent<'a> {
     ) -> Option<Exchange> {
         let mut best: Option<Exchange> = None;
         let mut bar = bar;
+        let least = unfilled.map_or(0.0, |unfilled| unfilled.least);
         with_each(self.information, others, window, |entering, merit| {
+            if self.target.cost(&merit, least) >= bar {
+                return;
+            }
             let shortfall = shortfall_with(unfilled, entering);
             let cost = self.target.cost(&merit, shortfall);
             if cost < bar {
@@ -303,11 +317,10 @@ impl<'a> Descent<'a> {
         let mut judged = 0;
         let enough = if self.target.limit.is_finite() { ENOUGH } else { usize::MAX };
         let fills = |candidate: &usize| shortfall_with(unfilled, *candidate) <= self.target.largest_shortfall;
-        let window: Vec<usize> = window.iter().copied().filter(fills).collect();
-        let hopeful = vacancy.shortlist(&window, bar);
-        for hopeful in hopeful.chunks(CHUNK) {
+        for hopeful in vacancy.shortlist(window, bar).chunks(CHUNK) {
             let mut allowed = Vec::new();
-            with_each(self.information, others, hopeful, |candidate, merit| {
+            let hopeful: Vec<usize> = hopeful.iter().copied().filter(fills).collect();
+            with_each(self.information, others, &hopeful, |candidate, merit| {
                 let shortfall = shortfall_with(unfilled, candidate);
                 if self.target.allows(&merit, shortfall) {
                     allowed.push((candidate, merit, shortfall));

@@ -63,6 +63,8 @@ pub(super) struct Unfilled<'a> {
     joints: Vec<UnfilledJoint<'a>>,
     /// Of the set as it is.
     pub(super) shortfall: f64,
+    /// No candidate brings it below this.
+    pub(super) least: f64,
 }
 
 #[derive(Debug)]
@@ -83,8 +85,9 @@ impl<'a> Unfilled<'a> {
         let count = filling.joints.len().max(1) as f64;
         let joints: Vec<UnfilledJoint<'_>> =
             filling.joints.iter().map(|joint| UnfilledJoint::new(joint, set, poses, count)).collect();
-        let shortfall = joints.iter().map(UnfilledJoint::shortfall).sum();
-        Self { joints, shortfall }
+        let shortfall: f64 = joints.iter().map(UnfilledJoint::shortfall).sum();
+        let least = (shortfall - joints.iter().map(UnfilledJoint::largest_gain).sum::<f64>()).max(0.0);
+        Self { joints, shortfall, least }
     }
 
     /// The shortfall with `candidate` in the set.
@@ -116,6 +119,12 @@ impl<'a> UnfilledJoint<'a> {
 
     fn shortfall(&self) -> f64 {
         self.ends.windows(2).map(|ends| self.excess(ends[1] - ends[0])).sum()
+    }
+
+    /// By how much one angle can lower the shortfall at best: in the middle of a gap.
+    fn largest_gain(&self) -> f64 {
+        let gain = |gap: f64| self.excess(gap) - 2.0 * self.excess(0.5 * gap);
+        self.ends.windows(2).map(|ends| gain(ends[1] - ends[0])).fold(0.0, f64::max)
     }
 
     /// By how much the angle of `candidate` lowers the shortfall.
@@ -156,6 +165,7 @@ mod tests {
                 with.push(candidate);
                 let scratch = filling.shortfall(&with);
                 assert!((unfilled.with(candidate) - scratch).abs() < 1e-9 * (1.0 + scratch), "{count} {candidate}");
+                assert!(unfilled.least <= scratch + 1e-9 * (1.0 + scratch), "{count} {candidate}");
             }
         }
     }
