@@ -16,11 +16,16 @@
 //! **Line ends.** CR LF for controllers whose own tools write it (ABB, KUKA, FANUC, Yaskawa, Stäubli), LF for URScript and YAML.
 //! All text is ASCII; other characters in names are replaced.
 
+pub mod configuration;
 mod error;
 mod fanuc;
 mod inform;
 mod krl;
+#[allow(dead_code, reason = "the readers that fill these types follow")]
+pub mod motion;
 mod names;
+#[allow(dead_code, reason = "the readers that use it follow")]
+mod orientation;
 mod rapid;
 pub mod rewrite;
 mod ros;
