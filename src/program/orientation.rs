@@ -52,12 +52,8 @@ impl Orientation {
                 }
                 UnitQuaternion::from_quaternion(quaternion)
             }
-            (Self::Zyx, &[a, b, c]) => {
-                UnitQuaternion::from_euler_angles(from_deg(c), from_deg(b), from_deg(a))
-            }
-            (Self::FixedXyz, &[w, p, r]) => {
-                UnitQuaternion::from_euler_angles(from_deg(w), from_deg(p), from_deg(r))
-            }
+            (Self::Zyx, &[a, b, c]) => UnitQuaternion::from_euler_angles(from_deg(c), from_deg(b), from_deg(a)),
+            (Self::FixedXyz, &[w, p, r]) => UnitQuaternion::from_euler_angles(from_deg(w), from_deg(p), from_deg(r)),
             (Self::MovingXyz, &[x, y, z]) => {
                 // About moving axes x, y, z: the inverse of the rotation about the fixed axes by the negative angles.
                 UnitQuaternion::from_euler_angles(-from_deg(x), -from_deg(y), -from_deg(z)).inverse()
@@ -129,9 +125,8 @@ fn fixed_angles(rotation: &UnitQuaternion<f64>, near: [f64; 3]) -> [f64; 3] {
         let (x, z) = (r[(2, 1)].atan2(r[(2, 2)]), r[(1, 0)].atan2(r[(0, 0)]));
         [[x, y, z], [x + PI, PI - y, z + PI]]
     };
-    let distance = |angles: &[f64; 3]| -> f64 {
-        angles.iter().zip(near).map(|(angle, near)| wrapped(angle - near).abs()).sum()
-    };
+    let distance =
+        |angles: &[f64; 3]| -> f64 { angles.iter().zip(near).map(|(angle, near)| wrapped(angle - near).abs()).sum() };
     let [first, second] = angles;
     let chosen = if distance(&second) + 1e-9 < distance(&first) { second } else { first };
     // An angle that was within half a turn stays there: controllers may refuse more.
@@ -155,13 +150,8 @@ mod tests {
 
     use super::*;
 
-    const ALL: [Orientation; 5] = [
-        Orientation::Quaternion,
-        Orientation::Zyx,
-        Orientation::FixedXyz,
-        Orientation::MovingXyz,
-        Orientation::Vector,
-    ];
+    const ALL: [Orientation; 5] =
+        [Orientation::Quaternion, Orientation::Zyx, Orientation::FixedXyz, Orientation::MovingXyz, Orientation::Vector];
 
     #[test]
     fn notations_agree_with_the_manuals() {
