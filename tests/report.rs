@@ -12,7 +12,7 @@ use trupose::procedure::deliver::{data_files, files, reports};
 use trupose::profile::builtin;
 use trupose::report::identification_text;
 use trupose::session::journal::{Entry, IdentifiedText, Journal, Line, PointErrorText};
-use trupose::session::set_up::About;
+use trupose::session::set_up::{About, PayloadText};
 use trupose::session::sha256;
 use trupose::session::state::Session;
 use trupose::session::summary::{
@@ -572,6 +572,17 @@ fn errors_of_joints_have_a_part_of_their_own() {
     assert!(printed.lines().all(|line| line.chars().count() <= 80), "{printed}");
     let drawn = printed.lines().find(|line| line.contains("-180 ·")).unwrap();
     assert!(drawn.contains('█') && drawn.ends_with("180 deg"), "{drawn}");
+}
+
+#[test]
+fn what_the_flange_carried_is_stated() {
+    let mut session = calibrated();
+    assert!(text(&report(&session).1).contains("\nPayload: not stated\n"));
+    session.payload = Some(PayloadText { mass_kg: 2.5, centre_mm: (0.0, 0.0, 60.0) });
+    let (json, html) = report(&session);
+    let stated = "2.5 kg, centre (0, 0, 60) mm in the flange";
+    assert!(text(&html).contains(&format!("\nPayload: {stated}\n")));
+    assert_eq!(json["payload"], stated);
 }
 
 #[test]

@@ -72,6 +72,9 @@ pub struct Details {
     pub instrument: Option<String>,
     /// Position of the SMR on the flange, in words.
     pub target: Option<String>,
+    /// What the flange carried, in words; none if neither the session nor the profile states it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub payload: Option<String>,
     /// Temperature over the samples that count.
     pub temperature: Option<TemperaturePart>,
     /// Numbers of samples by kind.

@@ -10,7 +10,7 @@ use super::simulation::Simulation;
 use super::wire::LinkChoice;
 use crate::kinematics::LinkMass;
 use crate::text::names;
-use crate::units::{INCH, MICROMETRE, MILLIMETRE};
+use crate::units::{INCH, MICROMETRE, MILLIMETRE, to_mm};
 
 /// A step of the wizard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -171,6 +171,12 @@ pub struct PayloadText {
 impl PayloadText {
     /// Heaviest payload (kg): arms that carry more do not exist.
     pub const HEAVIEST: f64 = 5000.0;
+
+    /// The record of a mass on the flange.
+    pub fn of(mass: LinkMass) -> Self {
+        let [x, y, z] = mass.centre.coords.map(|value| (to_mm(value) * 1e6).round() / 1e6).into();
+        Self { mass_kg: mass.mass, centre_mm: (x, y, z) }
+    }
 
     /// The mass on the flange.
     pub fn mass(&self) -> LinkMass {

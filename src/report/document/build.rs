@@ -13,7 +13,7 @@ use crate::kinematics::ForwardKinematics;
 use crate::report::text::found;
 use crate::session::journal::{instrument_text, target_text};
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{InstrumentChoice, TargetChoice};
+use crate::session::set_up::{InstrumentChoice, PayloadText, TargetChoice};
 use crate::session::sha256;
 use crate::session::state::{Robot, Sample, Session};
 use crate::session::summary::{IdentificationSummary, ParameterSummary, SIMULATED};
@@ -52,6 +52,7 @@ impl Document {
                 instrument_text(instrument) + &identities.collect::<String>()
             }),
             target: target(session),
+            payload: payload(session),
             temperature: temperature(session),
             counts: counts(session),
             parameter_notes: parameters.iter().map(|parameter| note(parameter, session)).collect(),
@@ -137,6 +138,17 @@ fn target(session: &Session) -> Option<String> {
             format!("as the profile says: {} at ({x:.3}, {y:.3}, {z:.3}) mm in the flange{known}", first.name)
         }
     })
+}
+
+/// What the flange carried: as stated in the session, else as the profile says.
+fn payload(session: &Session) -> Option<String> {
+    match session.payload {
+        Some(stated) => Some(stated.to_string()),
+        None => {
+            let of_profile = session.robot.as_ref()?.profile.payload()?;
+            Some(format!("as the profile says: {}", PayloadText::of(of_profile)))
+        }
+    }
 }
 
 fn temperature(session: &Session) -> Option<TemperaturePart> {

@@ -63,6 +63,7 @@ pub(super) fn section(document: &Document) -> String {
         ("Place and conditions", given(&report.about.site)),
         ("Instrument", instrument),
         ("Reflector (SMR)", report.target.as_deref().map_or_else(|| "as the profile says".to_owned(), escape)),
+        ("Payload", report.payload.as_deref().map_or_else(|| "not stated".to_owned(), escape)),
         ("Measured", measured(report)),
         ("Identified", result.map_or_else(|| "not yet".to_owned(), |result| time(&result.provenance.created))),
         ("Temperature", temperature(report.temperature)),
