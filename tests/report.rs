@@ -582,7 +582,7 @@ fn what_the_flange_carried_is_stated() {
     let (json, html) = report(&session);
     let stated = "2.5 kg, centre (0, 0, 60) mm in the flange";
     assert!(text(&html).contains(&format!("\nPayload: {stated}\n")));
-    assert_eq!(json["payload"], stated);
+    assert_eq!(json["report"]["payload"], stated);
 }
 
 #[test]
