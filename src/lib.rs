@@ -30,6 +30,7 @@ pub mod compensation;
 pub mod error;
 pub mod geometry;
 pub mod identification;
+pub mod inverse;
 pub mod kinematics;
 pub mod link;
 pub mod model;

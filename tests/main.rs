@@ -18,6 +18,7 @@ mod docs;
 mod estimation;
 mod example;
 mod gravity;
+mod inverse;
 mod joint_errors;
 mod kinematics;
 mod lines;
