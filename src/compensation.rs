@@ -1,19 +1,22 @@
-//! Compensation: the joint values to command so that the real arm reaches what the nominal one would have reached.
+//! Compensation: what to command so that the real arm reaches what the nominal one would have reached.
 //!
-//! The identified arm is inverted numerically: damped least squares from the intended configuration (Levenberg 1944,
-//! Marquardt 1963; Wampler 1986 for arms), on position and orientation of a point of the tool together, an angle counted as the
-//! arc it makes at 1 m. Corrections are small, so two or three steps do. A joint that would pass its limit is held there and
-//! the others continue without it. If the orientation cannot be reached with small corrections (near a singularity), only the
-//! position is reached and the result says so; if the position cannot be reached either, nothing is commanded.
+//! The identified arm is inverted numerically from the intended configuration, on position and orientation of a point of the tool
+//! together (see [`inverse`](crate::inverse)). Corrections are small, so two or three steps do. A joint that would pass its limit is
+//! held there and the others continue without it. If the orientation cannot be reached with small corrections (near a singularity), only
+//! the position is reached and the result says so; if the position cannot be reached either, nothing is commanded.
+//!
+//! A controller that gets a pose instead of joint values inverts its own nominal arm, in the configuration that the program states. So
+//! what it gets is the pose that the nominal arm has at the corrected joint values, and these must be in the same configuration.
 //!
 //! No files, no profiles, no randomness but from a seed.
 
 use std::f64::consts::PI;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector6};
+use nalgebra::{Isometry3, Point3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use crate::inverse::{self, Found, Held, InverseKinematics, Posture, Search, distance};
 use crate::kinematics::{ForwardKinematics, KinematicChain};
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, Quantity};
 
@@ -88,6 +91,12 @@ pub enum Status {
     OutOfReach,
     /// Nothing: the intended configuration is itself beyond the limit of these joints (from 0).
     BeyondLimit(Vec<usize>),
+    /// Nothing: the nominal arm does not reach the pose in the configuration that is stated.
+    NotInConfiguration,
+    /// Nothing: several branches reach the pose, and what is stated does not tell which is meant.
+    Ambiguous,
+    /// Nothing: the corrected joint values are in another configuration than the one that is stated.
+    OtherConfiguration,
 }
 
 impl Status {
@@ -105,6 +114,9 @@ impl Status {
             Self::Singular => "singular",
             Self::OutOfReach => "out_of_reach",
             Self::BeyondLimit(_) => "beyond_limit",
+            Self::NotInConfiguration => "not_in_configuration",
+            Self::Ambiguous => "ambiguous",
+            Self::OtherConfiguration => "other_configuration",
         }
     }
 }
@@ -124,11 +136,51 @@ pub struct Compensated {
     pub status: Status,
 }
 
+/// A pose for a tool in a configuration, as programs state it.
+#[derive(Clone, Copy)]
+pub struct PoseGoal<'g> {
+    /// Where the tool is to be (m).
+    pub base_from_tool: Isometry3<f64>,
+    /// The tool in the flange (m).
+    pub flange_from_tool: Isometry3<f64>,
+    /// Whether a configuration of the nominal arm is the one that is stated.
+    pub is_meant: &'g dyn Fn(Option<&Posture>, &[f64]) -> bool,
+    /// A configuration of the intended branch, where one is known: of several that could be meant the nearest one is.
+    pub near: Option<&'g [f64]>,
+}
+
+impl std::fmt::Debug for PoseGoal<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("PoseGoal")
+            .field("base_from_tool", &self.base_from_tool)
+            .field("flange_from_tool", &self.flange_from_tool)
+            .field("near", &self.near)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The pose to command so that the real arm brings its tool to a [`PoseGoal`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseCommand {
+    /// Configuration that the nominal arm would take for the goal ((rad) or (m)).
+    pub meant: Vec<f64>,
+    /// Configuration that it takes for the command.
+    pub command: Vec<f64>,
+    /// The pose to command (m).
+    pub base_from_tool: Isometry3<f64>,
+    /// Remaining distance between the identified arm at `command` and the goal (m).
+    pub position_error: f64,
+    /// Remaining orientation error (rad).
+    pub angle_error: f64,
+}
+
 /// Inverts the identified arm.
 #[derive(Clone, Debug)]
 pub struct Compensator<'a> {
     nominal: Side<'a>,
     identified: Side<'a>,
+    inverse: InverseKinematics<'a>,
     quantities: Vec<Quantity>,
     limits: Vec<Option<(f64, f64)>>,
     settings: Settings,
@@ -141,31 +193,43 @@ struct Side<'a> {
     flange_from_tool: Isometry3<f64>,
 }
 
-impl Side<'_> {
+impl<'a> Side<'a> {
+    fn new(arm: &'a ToolArm) -> Self {
+        Self { arm: ForwardKinematics::new(&arm.chain), flange_from_tool: arm.flange_from_tool }
+    }
+
     fn base_from_tool(&self, q: &[f64]) -> Isometry3<f64> {
         self.arm.base_from_flange(q) * self.flange_from_tool
     }
+
+    fn with_tool(&self, flange_from_tool: Isometry3<f64>) -> Self {
+        Self { flange_from_tool, ..self.clone() }
+    }
+
+    /// The goal of a search for a pose of the tool, or for its position only.
+    fn goal(&self, base_from_tool: &Isometry3<f64>, with_angle: bool) -> inverse::Goal {
+        let flange_from_tool = self.flange_from_tool;
+        if with_angle {
+            inverse::Goal::Tool { base_from_tool: *base_from_tool, flange_from_tool }
+        } else {
+            inverse::Goal::Point {
+                in_base: Point3::from(base_from_tool.translation.vector),
+                in_flange: Point3::from(flange_from_tool.translation.vector),
+            }
+        }
+    }
 }
 
-/// The result of a search.
-#[derive(Clone, Debug)]
-struct Found {
-    q: Vec<f64>,
-    position: f64,
-    angle: f64,
-    held: Vec<usize>,
-}
-
-/// Largest number of steps; a search that converges needs a handful.
-const MOST_STEPS: usize = 60;
 /// Number of starts of the search for a Cartesian goal, whose branch is not known.
 const STARTS: usize = 60;
 /// Below this share of the tolerance a search stops.
 const FINE: f64 = 1e-4;
-/// How much further than a limit a configuration may be by rounding (rad, m).
-const ROUNDING: f64 = 1e-9;
 /// Range of a joint without limits, to both sides (rad, m).
 const UNLIMITED: (f64, f64) = (PI, 1.0);
+/// Two configurations are one if no joint differs by more (rad, m).
+const SAME: f64 = 1e-5;
+/// How much farther the second branch must be than the nearest one, so that the nearest is meant (rad).
+const CLEARLY: f64 = 20.0 * DEGREE;
 
 impl<'a> Compensator<'a> {
     /// Prepares two arms with the same joints. `limits` are pendant values ((rad) or (m)), one entry per joint.
@@ -175,36 +239,114 @@ impl<'a> Compensator<'a> {
         limits: &[Option<(f64, f64)>],
         settings: Settings,
     ) -> Self {
-        let side =
-            |arm: &'a ToolArm| Side { arm: ForwardKinematics::new(&arm.chain), flange_from_tool: arm.flange_from_tool };
         let dof = nominal.chain.dof();
+        let limits: Vec<_> = (0..dof).map(|index| limits.get(index).copied().flatten()).collect();
         Self {
-            nominal: side(nominal),
-            identified: side(identified),
+            nominal: Side::new(nominal),
+            identified: Side::new(identified),
+            inverse: InverseKinematics::new(&nominal.chain, &limits),
             quantities: nominal.chain.joints().iter().map(|joint| joint.joint_type.quantity()).collect(),
-            limits: (0..dof).map(|index| limits.get(index).copied().flatten()).collect(),
+            limits,
             settings,
         }
+    }
+
+    /// The inverse kinematics of the nominal arm.
+    pub const fn inverse(&self) -> &InverseKinematics<'a> {
+        &self.inverse
+    }
+
+    /// The pose in the base (m) of a tool that the identified arm carries, at a configuration.
+    pub fn identified_pose(&self, q: &[f64], flange_from_tool: &Isometry3<f64>) -> Isometry3<f64> {
+        self.identified.arm.base_from_flange(q) * flange_from_tool
     }
 
     /// The command for a goal.
     pub fn solve(&self, goal: &Goal) -> Compensated {
         match goal {
             Goal::Configuration(meant) => {
-                let beyond = self.beyond(meant);
-                if !beyond.is_empty() || meant.len() != self.limits.len() {
-                    return Self::unreached(meant, Status::BeyondLimit(beyond));
+                if meant.len() != self.limits.len() {
+                    return Self::unreached(meant, Status::BeyondLimit(Vec::new()));
                 }
-                self.correct(meant, &self.nominal.base_from_tool(meant), !self.settings.position_only)
+                let meant = self.inverse.turned_into_limits(meant);
+                let beyond = self.inverse.beyond(&meant);
+                if !beyond.is_empty() {
+                    return Self::unreached(&meant, Status::BeyondLimit(beyond));
+                }
+                let goal = self.nominal.base_from_tool(&meant);
+                self.correct(&self.identified, &meant, &goal, !self.settings.position_only, None)
             }
-            Goal::Pose { base_from_tool, near } => {
-                self.reach(base_from_tool, !self.settings.position_only, near.as_deref())
+            Goal::Pose { base_from_tool, near } if self.settings.position_only => {
+                self.reach(base_from_tool, false, near.as_deref())
             }
+            Goal::Pose { base_from_tool, near } => self.reach(base_from_tool, true, near.as_deref()),
             Goal::Position { point_in_base, near } => {
-                let pose = Isometry3::from_parts(Translation3::from(point_in_base.coords), UnitQuaternion::identity());
+                let pose = Isometry3::translation(point_in_base.x, point_in_base.y, point_in_base.z);
                 self.reach(&pose, false, near.as_deref())
             }
         }
+    }
+
+    /// The pose to command for a pose that is stated with its configuration.
+    ///
+    /// # Errors
+    /// The reason why there is none: it never [is usable](Status::is_usable).
+    pub fn solve_pose(&self, goal: &PoseGoal<'_>) -> Result<PoseCommand, Status> {
+        let meant = self.taken(goal)?;
+        let identified = self.identified.with_tool(goal.flange_from_tool);
+        // The controller holds the redundant joint where it is; so the correction does.
+        let done = self.correct(&identified, &meant, &goal.base_from_tool, true, self.inverse.held_of(&meant));
+        match done.status {
+            Status::Reached => {}
+            Status::PositionOnly => return Err(Status::Singular),
+            status => return Err(status),
+        }
+        // The controller inverts the nominal arm for the written pose; it must end at these very joint values.
+        let base_from_tool = self.nominal.arm.base_from_flange(&done.command) * goal.flange_from_tool;
+        let taken = self.taken(&PoseGoal { base_from_tool, ..*goal });
+        let is_same = self.inverse.posture(&meant) == self.inverse.posture(&done.command)
+            && taken.is_ok_and(|taken| distance(&taken, &done.command) < SAME);
+        if !is_same {
+            return Err(Status::OtherConfiguration);
+        }
+        Ok(PoseCommand {
+            base_from_tool,
+            meant,
+            command: done.command,
+            position_error: done.position_error,
+            angle_error: done.angle_error,
+        })
+    }
+
+    /// The configuration that the nominal arm takes for a pose.
+    ///
+    /// # Errors
+    /// No configuration, or several branches of which none is clearly meant.
+    pub fn taken(&self, goal: &PoseGoal<'_>) -> Result<Vec<f64>, Status> {
+        let base_from_flange = goal.base_from_tool * goal.flange_from_tool.inverse();
+        let is_meant = |q: &[f64]| (goal.is_meant)(self.inverse.posture(q).as_ref(), q);
+        if let Some(near) = goal.near
+            && (!self.inverse.is_closed() || near.len() != self.limits.len())
+        {
+            let found = self.inverse.nearest(&base_from_flange, near).ok_or(Status::NotInConfiguration)?;
+            return if is_meant(&found) { Ok(found) } else { Err(Status::NotInConfiguration) };
+        }
+        let all = self.inverse.solutions(&base_from_flange);
+        if all.is_empty() {
+            return Err(Status::OutOfReach);
+        }
+        let mut meant: Vec<Vec<f64>> = all.into_iter().filter(|q| is_meant(q)).collect();
+        // Among full turns of one branch the nearest to zero, where nothing else is known.
+        let zero = vec![0.0; self.limits.len()];
+        let near = goal.near.unwrap_or(&zero);
+        meant.sort_by(|a, b| distance(a, near).total_cmp(&distance(b, near)));
+        let Some(first) = meant.first() else { return Err(Status::NotInConfiguration) };
+        let posture = self.inverse.posture(first);
+        let rival = meant.iter().find(|q| self.inverse.posture(q) != posture);
+        let is_clear = rival.is_none_or(|rival| {
+            goal.near.is_some_and(|near| distance(rival, near) > distance(first, near) + CLEARLY)
+        });
+        if is_clear { Ok(first.clone()) } else { Err(Status::Ambiguous) }
     }
 
     fn unreached(meant: &[f64], status: Status) -> Compensated {
@@ -221,19 +363,27 @@ impl<'a> Compensator<'a> {
     fn reach(&self, goal: &Isometry3<f64>, with_angle: bool, near: Option<&[f64]>) -> Compensated {
         let middle: Vec<f64> = self.ranges().map(|(low, high)| f64::midpoint(low, high)).collect();
         let first = near.filter(|near| near.len() == middle.len()).unwrap_or(&middle);
+        if with_angle && self.inverse.is_closed() {
+            let flange = goal * self.nominal.flange_from_tool.inverse();
+            if let Some(meant) = self.inverse.nearest(&flange, first) {
+                return self.correct(&self.identified, &meant, goal, true, None);
+            }
+        }
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut best: Option<Found> = None;
+        let search = self.search(&self.nominal);
+        let nominal_goal = self.nominal.goal(goal, with_angle);
         for start in 0..STARTS {
             let q: Vec<f64> = if start == 0 {
                 first.to_vec()
             } else {
                 self.ranges().map(|(low, high)| if low < high { random.random_range(low..high) } else { low }).collect()
             };
-            let mut found = self.search(&self.nominal, &self.clamped(&q), goal, with_angle);
-            self.unwind(&mut found.q, first);
-            let is_reached = self.is_reached(&found, with_angle);
+            let mut found = search.from(&self.clamped(&q), &nominal_goal);
+            self.inverse.unwind(&mut found.q, first);
+            let is_reached = self.is_reached(&found);
             let is_better = best.as_ref().is_none_or(|best| {
-                let before = (self.is_reached(best, with_angle), distance(&best.q, first));
+                let before = (self.is_reached(best), distance(&best.q, first));
                 if is_reached == before.0 {
                     if is_reached { distance(&found.q, first) < before.1 } else { found.position < best.position }
                 } else {
@@ -249,11 +399,11 @@ impl<'a> Compensator<'a> {
             }
         }
         let Some(best) = best else { return Self::unreached(first, Status::OutOfReach) };
-        if self.is_reached(&best, with_angle) {
-            return self.correct(&best.q, goal, with_angle);
+        let corrected = self.correct(&self.identified, &best.q, goal, with_angle, None);
+        if self.is_reached(&best) {
+            return corrected;
         }
         // A goal that the nominal arm just misses may still be reached by the real one.
-        let corrected = self.correct(&best.q, goal, with_angle);
         if corrected.status == Status::Reached {
             return Compensated { meant: None, ..corrected };
         }
@@ -261,26 +411,15 @@ impl<'a> Compensator<'a> {
         Compensated { meant: None, status, ..corrected }
     }
 
-    /// Full turns that bring a configuration nearer to another one, within the limits.
-    fn unwind(&self, q: &mut [f64], near: &[f64]) {
-        for (index, ((value, near), quantity)) in q.iter_mut().zip(near).zip(&self.quantities).enumerate() {
-            if *quantity == Quantity::Angle && self.is_uncoupled(index) {
-                let turned = *value - 2.0 * PI * ((*value - near) / (2.0 * PI)).round();
-                if self.limits.get(index).copied().flatten().is_none_or(|(low, high)| (low..=high).contains(&turned)) {
-                    *value = turned;
-                }
-            }
-        }
-    }
-
-    /// Whether a full turn of this joint's pendant value turns no other joint.
-    fn is_uncoupled(&self, index: usize) -> bool {
-        let joints = self.nominal.arm.chain().joints();
-        joints.iter().all(|joint| joint.coupling.get(index).is_none_or(|coefficient| *coefficient == 0.0))
-    }
-
     /// Moves the identified arm to the goal, from the intended configuration.
-    fn correct(&self, meant: &[f64], goal: &Isometry3<f64>, with_angle: bool) -> Compensated {
+    fn correct(
+        &self,
+        identified: &Side<'a>,
+        meant: &[f64],
+        goal: &Isometry3<f64>,
+        with_angle: bool,
+        held: Option<Held>,
+    ) -> Compensated {
         let result = |found: Found, status: Status| Compensated {
             meant: Some(meant.to_vec()),
             command: found.q,
@@ -288,15 +427,16 @@ impl<'a> Compensator<'a> {
             angle_error: found.angle,
             status,
         };
-        let full = self.search(&self.identified, meant, goal, with_angle);
+        let search = Search { held, ..self.search(identified) };
+        let full = search.from(meant, &identified.goal(goal, with_angle));
         let is_small = self.is_small(&full.q, meant);
-        if self.is_reached(&full, with_angle) && is_small {
+        if self.is_reached(&full) && is_small {
             return result(full, Status::Reached);
         }
         if with_angle {
-            let mut position = self.search(&self.identified, meant, goal, false);
-            if self.is_reached(&position, false) && self.is_small(&position.q, meant) {
-                position.angle = self.identified.base_from_tool(&position.q).rotation.angle_to(&goal.rotation);
+            let mut position = search.from(meant, &identified.goal(goal, false));
+            if self.is_reached(&position) && self.is_small(&position.q, meant) {
+                position.angle = identified.base_from_tool(&position.q).rotation.angle_to(&goal.rotation);
                 return result(position, Status::PositionOnly);
             }
         }
@@ -310,9 +450,13 @@ impl<'a> Compensator<'a> {
         result(full, status)
     }
 
-    fn is_reached(&self, found: &Found, with_angle: bool) -> bool {
-        found.position <= self.settings.position_tolerance
-            && (!with_angle || found.angle <= self.settings.angle_tolerance)
+    fn search<'s>(&'s self, side: &'s Side<'a>) -> Search<'s, 'a> {
+        let fine = FINE * self.settings.position_tolerance.min(self.settings.angle_tolerance);
+        Search { arm: &side.arm, limits: &self.limits, held: None, fine }
+    }
+
+    fn is_reached(&self, found: &Found) -> bool {
+        found.position <= self.settings.position_tolerance && found.angle <= self.settings.angle_tolerance
     }
 
     fn is_small(&self, q: &[f64], meant: &[f64]) -> bool {
@@ -323,96 +467,6 @@ impl<'a> Compensator<'a> {
             };
             (q - meant).abs() <= largest
         })
-    }
-
-    /// Damped least squares with held joints.
-    fn search(&self, side: &Side<'_>, start: &[f64], goal: &Isometry3<f64>, with_angle: bool) -> Found {
-        let rows = if with_angle { 6 } else { 3 };
-        let error_at = |q: &[f64]| {
-            let pose = side.base_from_tool(q);
-            let position = goal.translation.vector - pose.translation.vector;
-            let turn = if with_angle {
-                (goal.rotation * pose.rotation.inverse()).scaled_axis()
-            } else {
-                nalgebra::Vector3::zeros()
-            };
-            Vector6::new(position.x, position.y, position.z, turn.x, turn.y, turn.z)
-        };
-        let point = Point3::from(side.flange_from_tool.translation.vector);
-        let mut q = start.to_vec();
-        let mut error = error_at(&q);
-        let mut held: Vec<usize> = Vec::new();
-        let mut damping = 1e-9;
-        for _ in 0..MOST_STEPS {
-            let fine = FINE * self.settings.position_tolerance.min(self.settings.angle_tolerance);
-            if error.norm() < fine {
-                break;
-            }
-            let jacobian = side.arm.configuration_jacobian(&q, &point).matrix;
-            let step = Self::step(&jacobian, &error, rows, &held, damping);
-            let mut trial = q.clone();
-            let mut newly_held = Vec::new();
-            for (index, (value, step)) in trial.iter_mut().zip(step.iter()).enumerate() {
-                *value += step;
-                if let Some((low, high)) = self.limits.get(index).copied().flatten()
-                    && !(low..=high).contains(value)
-                {
-                    *value = value.clamp(low, high);
-                    newly_held.push(index);
-                }
-            }
-            let trial_error = error_at(&trial);
-            if trial_error.norm() < error.norm() {
-                let gain = 1.0 - trial_error.norm() / error.norm();
-                q = trial;
-                error = trial_error;
-                damping = (damping * 0.1).max(1e-12);
-                if gain < 1e-9 {
-                    break;
-                }
-            } else if !newly_held.iter().all(|index| held.contains(index)) {
-                held.extend(newly_held);
-            } else {
-                damping *= 30.0;
-                if damping > 1e3 {
-                    break;
-                }
-            }
-        }
-        let at_limit = (0..q.len()).filter(|&index| self.is_at_limit(index, &q));
-        let held = at_limit.collect();
-        let position = error.fixed_rows::<3>(0).norm();
-        Found { position, angle: error.fixed_rows::<3>(3).norm(), held, q }
-    }
-
-    fn is_at_limit(&self, index: usize, q: &[f64]) -> bool {
-        let limits = self.limits.get(index).copied().flatten();
-        let near = |value: f64, limit: f64| (value - limit).abs() < ROUNDING;
-        q.get(index).zip(limits).is_some_and(|(value, (low, high))| near(*value, low) || near(*value, high))
-    }
-
-    /// `(JᵀJ + λ I)⁻¹ Jᵀ e` over the joints that are free.
-    fn step(
-        jacobian: &Matrix6xX<f64>,
-        error: &Vector6<f64>,
-        rows: usize,
-        held: &[usize],
-        damping: f64,
-    ) -> DVector<f64> {
-        let n = jacobian.ncols();
-        let jacobian = jacobian.rows(0, rows);
-        let error = error.rows(0, rows);
-        let mut normal: DMatrix<f64> = jacobian.tr_mul(&jacobian);
-        let mut right: DVector<f64> = jacobian.tr_mul(&error);
-        for &index in held {
-            normal.row_mut(index).fill(0.0);
-            normal.column_mut(index).fill(0.0);
-            right[index] = 0.0;
-        }
-        for index in 0..n {
-            normal[(index, index)] += damping;
-        }
-        normal.cholesky().map_or_else(|| DVector::zeros(n), |cholesky| cholesky.solve(&right))
     }
 
     fn ranges(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
@@ -434,18 +488,4 @@ impl<'a> Compensator<'a> {
         let pairs = q.iter().zip(&self.limits);
         pairs.map(|(value, limits)| limits.map_or(*value, |(low, high)| value.clamp(low, high))).collect()
     }
-
-    /// Joints whose value is beyond its limits or not a number.
-    fn beyond(&self, q: &[f64]) -> Vec<usize> {
-        let inside = |value: f64, limits: Option<(f64, f64)>| {
-            value.is_finite() && limits.is_none_or(|(low, high)| (low - ROUNDING..=high + ROUNDING).contains(&value))
-        };
-        let pairs = q.iter().zip(&self.limits).enumerate();
-        pairs.filter(|(_, (value, limits))| !inside(**value, **limits)).map(|(index, _)| index).collect()
-    }
-}
-
-/// Largest difference of two configurations.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }

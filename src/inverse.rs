@@ -135,7 +135,7 @@ impl<'a> InverseKinematics<'a> {
         if near.len() != self.limits.len() {
             return None;
         }
-        let held = self.redundant().map(|joint| Held { joint, value: near[joint] });
+        let held = self.held_of(near);
         let mut best: Option<Vec<f64>> = None;
         let mut consider = |q: Vec<f64>| {
             let is_nearer = best.as_ref().is_none_or(|best| distance(&q, near) < distance(best, near));
@@ -234,6 +234,12 @@ impl<'a> InverseKinematics<'a> {
             })
         };
         joints[index].joint_type == JointType::Revolute && joints.iter().all(is_whole)
+    }
+
+    /// The joint that an arm with seven axes holds to stay near a configuration.
+    pub fn held_of(&self, near: &[f64]) -> Option<Held> {
+        let joint = self.redundant()?;
+        Some(Held { joint, value: *near.get(joint)? })
     }
 
     fn redundant(&self) -> Option<usize> {
