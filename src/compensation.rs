@@ -343,9 +343,8 @@ impl<'a> Compensator<'a> {
         let Some(first) = meant.first() else { return Err(Status::NotInConfiguration) };
         let posture = self.inverse.posture(first);
         let rival = meant.iter().find(|q| self.inverse.posture(q) != posture);
-        let is_clear = rival.is_none_or(|rival| {
-            goal.near.is_some_and(|near| distance(rival, near) > distance(first, near) + CLEARLY)
-        });
+        let is_clear = rival
+            .is_none_or(|rival| goal.near.is_some_and(|near| distance(rival, near) > distance(first, near) + CLEARLY));
         if is_clear { Ok(first.clone()) } else { Err(Status::Ambiguous) }
     }
 

@@ -69,9 +69,12 @@ fn the_nearest_solution_keeps_the_branch_and_the_redundant_joint() {
         let forward = ForwardKinematics::new(profile.chain());
         for q in configurations(profile.chain(), &limits, 60) {
             // Near, with the redundant joint where it is.
-            let near: Vec<f64> = (0..q.len())
-                .map(|joint| if q.len() == 7 && joint == 2 { q[joint] } else { q[joint] + random.random_range(-0.02..0.02) })
-                .collect();
+            let near: Vec<f64> =
+                (0..q.len())
+                    .map(|joint| {
+                        if q.len() == 7 && joint == 2 { q[joint] } else { q[joint] + random.random_range(-0.02..0.02) }
+                    })
+                    .collect();
             let found = inverse.nearest(&forward.base_from_flange(&q), &near).unwrap();
             assert!(distance(&found, &near) < 0.02 + 1e-6 || distance(&found, &q) < 1e-6, "{name} {q:?} {found:?}");
         }
@@ -96,7 +99,8 @@ fn an_arm_that_is_nearly_of_a_family_is_solved_exactly() {
                 joint
             })
             .collect();
-        let chain = KinematicChain::new(Convention::Standard, *profile.chain().base(), joints, *profile.chain().flange());
+        let chain =
+            KinematicChain::new(Convention::Standard, *profile.chain().base(), joints, *profile.chain().flange());
         let chain = chain.unwrap();
         let inverse = InverseKinematics::new(&chain, &limits);
         let forward = ForwardKinematics::new(&chain);

@@ -178,7 +178,9 @@ fn reason(done: &Compensated, joints: &[Joint]) -> String {
         Status::Singular => format!("not reached: near a singularity the corrections become too large; {left}"),
         Status::OutOfReach => "not reached: it is out of reach of this arm".to_owned(),
         Status::BeyondLimit(held) => format!("not reached: {} has a target beyond its limit", names(held)),
-        Status::NotInConfiguration => "not reached: the arm does not reach it in the configuration that is stated".to_owned(),
+        Status::NotInConfiguration => {
+            "not reached: the arm does not reach it in the configuration that is stated".to_owned()
+        }
         Status::Ambiguous => "its configuration is not stated, and several reach it".to_owned(),
         Status::OtherConfiguration => "the corrected target would be in another configuration".to_owned(),
     }

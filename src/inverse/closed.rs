@@ -84,7 +84,9 @@ impl Form {
             let axis = six.direction.into_inner();
             let goal = turned * axis;
             let part = four.direction.dot(&goal);
-            let Some(fifths) = angles_of_part(&five.direction, &axis, &four.direction, part, self.slack) else { continue };
+            let Some(fifths) = angles_of_part(&five.direction, &axis, &four.direction, part, self.slack) else {
+                continue;
+            };
             for fifth in fifths {
                 let bent = five.turn(fifth).rotation;
                 let fourth = angle_about(&four.direction, &(bent * axis), &goal);
