@@ -4,7 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use crate::session::plan_summary::PlanSummary;
-use crate::text::wrapped;
+use crate::text::{fixed, wrapped};
 use crate::tui::glyphs::shortened;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
@@ -101,7 +101,14 @@ fn in_short(figures: &PlanFigures, summary: Option<&PlanSummary>) -> Vec<(Role, 
         lines.push((Role::Dim, format!("{:<SHORT_NAMES$} {:.1}, {error:.4}", "", best.conditions.best)));
     }
     lines.extend(figures.plan.minutes.map(|minutes| line("time", &time(minutes))));
+    lines.extend(summary.and_then(largest_gap).map(|gap| line("gap", &gap)));
     lines
+}
+
+/// The largest gap between neighbouring values of a joint: in between, its error curve is not measured.
+fn largest_gap(summary: &PlanSummary) -> Option<String> {
+    let gap = summary.joint_gaps.iter().max_by(|one, other| one.largest_gap.total_cmp(&other.largest_gap))?;
+    Some(format!("{} {} of {}", fixed(gap.largest_gap, 1), gap.unit, gap.joint))
 }
 
 /// The figures compared with random sets of the same size, the median and the best one.
@@ -122,7 +129,7 @@ fn compared(figures: &PlanFigures, summary: &PlanSummary, condition: f64, sigma:
         (Role::Plain, row(&format!("predicted, {unit}"), of_error)),
     ];
     lines.extend(figures.plan.minutes.map(|minutes| named("time", &format!("about {}", time(minutes)))));
-    lines.push(named("D-efficiency", &format!("at least {:.0} % of the best", 100.0 * summary.d_efficiency)));
+    lines.extend(largest_gap(summary).map(|gap| named("largest gap", &gap)));
     let (weak, warnings) = (summary.weak_parameters.len(), summary.warnings.len());
     if weak + warnings > 0 {
         lines.push((Role::Warn, format!("weak parameters {weak}, warnings {warnings}: press Tab")));

@@ -4,7 +4,8 @@ use super::*;
 use crate::planning::{Figures, ObservabilityIndices, Score, Spread, Yardstick};
 use crate::session::journal::PlanText;
 use crate::session::plan_summary::{
-    CandidateSummary, PlanSummary, RejectionSummary, SCHEMA, TimeSummary, TradeOffSummary, WeakParameterSummary,
+    CandidateSummary, JointGapSummary, PlanSummary, RejectionSummary, SCHEMA, TimeSummary, TradeOffSummary,
+    WeakParameterSummary,
 };
 use crate::session::set_up::Step;
 use crate::session::summary::{Provenance, Warning};
@@ -49,7 +50,16 @@ fn summary() -> PlanSummary {
         sigma_mm: Some(0.015),
         predicted_rms_mm: Some(0.0102),
         predicted_level3_rms_mm: None,
-        joint_gaps: Vec::new(),
+        joint_gaps: [("J1", 4.5), ("J5", 5.8)]
+            .map(|(joint, largest_gap)| JointGapSummary {
+                joint: joint.to_owned(),
+                unit: "deg".to_owned(),
+                largest_gap,
+                from: 38.1,
+                to: 38.1 + largest_gap,
+                even_gap: 2.4,
+            })
+            .to_vec(),
         predicted_verification_rms_mm: Some(0.028),
         random: Yardstick {
             sets: 200,
