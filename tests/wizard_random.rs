@@ -318,6 +318,8 @@ impl Cell {
             shots: request.shots,
             temperature: Some(20.0),
             configuration: if self.chance(10) { Some(vec![0.1; self.pick(8)]) } else { None },
+            joint_scatter: None,
+            remarks: Vec::new(),
             seconds: if self.chance(5) { 0.1 * MILLIMETRE } else { 10.0 },
         }
     }

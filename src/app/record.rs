@@ -138,6 +138,8 @@ fn measured(row: usize, kind: PoseKind, named: &NamedSample, types: &[JointType]
         target: sample.at.target,
         joints: to_edge(&sample.at.configuration, types),
         reported_joints: None,
+        reported_scatter: None,
+        reported_count: None,
         xyz_mm: to_xyz_mm(&sample.point, 9),
         factor: None,
         sigma_mm: sample.sigma.map(to_mm),
@@ -146,6 +148,7 @@ fn measured(row: usize, kind: PoseKind, named: &NamedSample, types: &[JointType]
         temperature_degc: named.temperature,
         seconds: 0.0,
         predicted_error_sigma: None,
+        remarks: Vec::new(),
         findings: Vec::new(),
     }
 }

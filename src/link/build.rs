@@ -110,7 +110,11 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
         }
         WireProtocol::Ndi => {
             let options: NdiOptions = read(options)?;
-            Ok(Box::new(NdiProtocol::new(options)?))
+            let protocol = NdiProtocol::new(options)?;
+            Ok(Box::new(match address.route {
+                Route::Serial { speed, .. } => protocol.on_serial_line(speed),
+                Route::Tcp { .. } | Route::Listen { .. } | Route::Udp { .. } => protocol,
+            }))
         }
     }
 }
@@ -162,6 +166,21 @@ pub(super) fn rehearsal_options(protocol: WireProtocol) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_value_in_the_table_of_options_is_accepted() {
+        let document = include_str!("../../docs/links.md");
+        for option in ["unit", "separator", "decimal_sign", "checksum"] {
+            let row = document.lines().find_map(|line| line.strip_prefix(&format!("| `{option}` | "))).unwrap();
+            let values = row.split(" | ").next().unwrap().split('`').skip(1).step_by(2);
+            let values: Vec<&str> = values.filter(|value| !value.starts_with('*')).collect();
+            assert!(values.len() > 1, "{option}");
+            for value in values {
+                let options: Result<AsciiOptions, _> = read(Some(&format!("({option}: {value})")));
+                assert!(options.is_ok(), "{option}: {value}: {options:?}");
+            }
+        }
+    }
 
     #[test]
     fn the_options_of_a_rehearsal_as_text_are_those_of_its_simulator() {

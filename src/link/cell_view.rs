@@ -139,14 +139,7 @@ impl CellView {
         let mut positions = self.current_request().map_or_else(Vec::new, |request| self.cell.actual_joints(&request));
         // The controller reports six joints, whatever the arm.
         positions.resize(JOINTS, 0.0);
-        let mut speeds = vec![0.0; JOINTS];
-        if let (Some(_), Some(motion), Some(request)) = (self.progress(), &self.motion, &self.request) {
-            let seconds = motion.takes.as_secs_f64().max(1e-3);
-            for ((speed, to), from) in speeds.iter_mut().zip(&request.configuration).zip(&motion.from) {
-                *speed = (to - from) / seconds;
-            }
-        }
-        JointState { positions, speeds: Some(speeds), controller_time: self.clock.now().as_secs_f64(), stopped: None }
+        JointState { controller_time: self.clock.now().as_secs_f64(), ..JointState::at(positions) }
     }
 }
 

@@ -22,6 +22,7 @@ pub mod lines;
 pub mod ndi;
 pub mod outbox;
 pub mod receive_buffer;
+pub mod rest;
 pub mod rtde;
 
 use std::fmt::Debug;
@@ -52,6 +53,11 @@ pub trait Protocol: Send + Debug {
     /// The next bytes to send.
     fn next_output(&mut self) -> Option<Vec<u8>>;
 
+    /// The next change of the serial line, due once everything to send has been sent. Only protocols of serial lines have any.
+    fn next_line_change(&mut self) -> Option<LineChange> {
+        None
+    }
+
     /// The next event.
     fn next_event(&mut self) -> Option<ProtocolEvent>;
 
@@ -62,6 +68,15 @@ pub trait Protocol: Send + Debug {
     fn shows_live(&self) -> bool {
         false
     }
+}
+
+/// A change of a serial line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineChange {
+    /// Sets the speed of this side (baud).
+    Speed(u32),
+    /// Sends a break, which some instruments take as a reset.
+    Break,
 }
 
 /// An event of a protocol.
@@ -128,8 +143,12 @@ pub struct Shot {
     pub pressure: Option<f64>,
     /// Relative humidity (%).
     pub humidity: Option<f64>,
-    /// Remark of the instrument on this point, such as a name or `accuracy not guaranteed`.
-    pub remark: Option<String>,
+    /// Number of the measurement, where the instrument counts them: a new number proves that the point is new, even if it equals
+    /// the previous one.
+    pub sequence: Option<u32>,
+    /// Remarks of the instrument on this point: warnings, such as `the accuracy is not guaranteed`, and information, such as a
+    /// name.
+    pub remarks: Vec<Status>,
     /// The bytes from which the point was read.
     pub raw: Vec<u8>,
 }
@@ -151,23 +170,38 @@ impl Shot {
             temperature: None,
             pressure: None,
             humidity: None,
-            remark: None,
+            sequence: None,
+            remarks: Vec::new(),
             raw: Vec::new(),
         }
+    }
+
+    /// Adds a remark.
+    #[must_use]
+    pub fn with_remark(mut self, severity: Severity, text: impl Into<String>) -> Self {
+        self.remarks.push(Status { severity, text: text.into() });
+        self
     }
 }
 
 /// Joint state of a robot at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointState {
-    /// Joint values (rad).
+    /// Joint values (rad, sliding joints m).
     pub positions: Vec<f64>,
-    /// Joint speeds (rad/s), if the controller reports them.
-    pub speeds: Option<Vec<f64>>,
     /// Time by the controller's clock (s).
     pub controller_time: f64,
-    /// Why the robot is stopped, such as a protective stop; `None` if it is not.
+    /// A state in which nothing is measured even if the robot is at rest, such as a protective stop.
     pub stopped: Option<String>,
+    /// A state that is kept with the measurement, such as a reduced mode.
+    pub remark: Option<String>,
+}
+
+impl JointState {
+    /// Joint values without any further information.
+    pub const fn at(positions: Vec<f64>) -> Self {
+        Self { positions, controller_time: 0.0, stopped: None, remark: None }
+    }
 }
 
 /// Severity of a status message.
@@ -215,6 +249,8 @@ pub enum Failure {
     Foreign(String),
     /// The reading cannot be a measured point.
     Unusable(String),
+    /// The point equals the previous one exactly. A real instrument hardly ever repeats every digit; one that is stuck does.
+    Repeated,
     /// The received data cannot be read.
     Garbled(String),
     /// Another program uses the instrument.
@@ -250,22 +286,20 @@ impl Failure {
             Self::Settings(why) => format!("{subject} has a wrong setting: {why}"),
             Self::Scaled(scale) => {
                 format!(
-                    "{subject} multiplies its points by the scale {scale} of its transformation, so all distances would be wrong"
+                    "{subject} multiplies its points by the scale {scale}, so all distances would be wrong"
                 )
             }
             Self::Foreign(why) => format!("this does not look like the selected instrument: {why}"),
             Self::Unusable(why) => format!("the reading is not a measurement: {why}"),
+            Self::Repeated => "the reading is not a measurement: identical to the previous point to the last digit, so it is \
+                               not a new measurement"
+                .to_owned(),
             Self::Garbled(why) => format!("cannot read the data from {subject}: {why}"),
             Self::InUse(why) => format!("{subject} is in use by another program ({why})"),
             Self::Unreachable(why) => format!("no connection: {why}"),
             Self::Disconnected(why) => format!("the connection was lost: {why}"),
             Self::TooEarly(why) => format!("the shot was requested too early: {why}"),
         }
-    }
-
-    /// The point equals the previous one exactly. A real instrument never repeats every digit; one that is stuck does.
-    pub fn repeated() -> Self {
-        Self::Unusable("identical to the previous point to the last digit, so it is not a new measurement".to_owned())
     }
 
     /// Advice for the operator.
@@ -281,9 +315,9 @@ impl Failure {
             }
             Self::Refused(_) => "check the instrument's own display",
             Self::Settings(_) => "correct the setting at the instrument, or reconnect and let the set-up do it",
-            Self::Scaled(_) => "set the scale of the instrument's transformation to 1, then reconnect",
+            Self::Scaled(_) => "set the scale of the instrument (transformation, map projection, ppm) to 1, then reconnect",
             Self::Foreign(_) => "check the kind of instrument and the port, and that it is switched on; then reconnect",
-            Self::Unusable(_) => "measure again; if this persists, check the beam and the settings of the instrument",
+            Self::Unusable(_) | Self::Repeated => "measure again; if this persists, check the beam and the settings of the instrument",
             Self::Garbled(_) => "check the baud rate, the line ending and the selected kind of instrument",
             Self::InUse(_) => "close the other program, then reconnect",
             Self::Unreachable(_) => {
@@ -298,15 +332,15 @@ impl Failure {
     pub const fn controller_hint(&self) -> &'static str {
         match self {
             Self::Silent { .. } => {
-                "check that the controller is switched on, that the network is connected and that the port is that of RTDE, 30004"
+                "check that the controller is switched on, that the network is connected and that the port is right (RTDE: 30004)"
             }
-            Self::Refused(_) => "the controller needs PolyScope 3.4 or newer; check its version on the pendant",
+            Self::Refused(_) => "check the version, the options and the user of the controller's interface; then reconnect",
             Self::Garbled(_) | Self::Foreign(_) => {
-                "check the controller's address and the port of RTDE, 30004; then reconnect"
+                "check the controller's address, the protocol and its port (RTDE: 30004); then reconnect"
             }
-            Self::InUse(_) => "close the other program that uses RTDE of this controller, then reconnect",
+            Self::InUse(_) => "close the other program that uses this interface of the controller, then reconnect",
             Self::Unreachable(_) => {
-                "check address and network, that the controller is switched on and that its security settings allow RTDE"
+                "check address and network, that the controller is switched on and that its security settings allow this interface"
             }
             Self::Disconnected(_) => "check the network; the link reconnects automatically",
             Self::NoTarget(_)
@@ -315,12 +349,13 @@ impl Failure {
             | Self::Settings(_)
             | Self::Scaled(_)
             | Self::Unusable(_)
+            | Self::Repeated
             | Self::TooEarly(_) => "check the state of the robot on the pendant, then try again",
         }
     }
 
     /// Whether an immediate retry may succeed.
     pub const fn is_transient(&self) -> bool {
-        matches!(self, Self::Unstable(_) | Self::NotReady(_))
+        matches!(self, Self::Unstable(_) | Self::NotReady(_) | Self::Repeated)
     }
 }

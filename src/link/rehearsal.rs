@@ -24,7 +24,6 @@ const SPEEDUP: Speedup = Speedup(20);
 pub struct Rehearsal {
     view: SharedView,
     wired: Wired,
-    has_robot: bool,
     /// Stops the servers.
     stop: Arc<AtomicBool>,
 }
@@ -39,7 +38,6 @@ impl Rehearsal {
         let view = SharedView::new(CellView::new(cell, Advance::OnRequest));
         let stop = Arc::new(AtomicBool::new(false));
         let mut choice = LinkChoice::default();
-        let mut has_robot = false;
         let start = |protocol: WireProtocol, is_serial: bool| {
             let endpoint = if is_serial { Endpoint::PseudoTerminal } else { Endpoint::Loopback };
             // The time stamps of the controller order its joint values and the moves of the robot, so its clock runs in real time.
@@ -60,7 +58,6 @@ impl Rehearsal {
                 return Err(LinkError::SetUp("a rehearsal has one instrument and at most one robot".to_owned()));
             }
             if protocol.is_robot() {
-                has_robot = true;
                 choice.robot = Some(address);
             } else {
                 choice.address = address;
@@ -74,7 +71,7 @@ impl Rehearsal {
         }
         let before_shot = view.clone();
         let wired = Wired::new(&choice, log)?.simulated(Box::new(move || before_shot.lock().advance()));
-        Ok(Self { view, wired, has_robot, stop })
+        Ok(Self { view, wired, stop })
     }
 }
 
@@ -103,9 +100,6 @@ impl Link for Rehearsal {
         let mut reading = self.wired.measure(request, keep_going)?;
         // Time is virtual, as without wires.
         reading.seconds = self.view.lock().cell.time(request, reading.shots);
-        if !self.has_robot {
-            reading.configuration = None;
-        }
         Ok(reading)
     }
 

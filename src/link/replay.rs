@@ -133,6 +133,8 @@ impl Link for Replay {
             shots: 1,
             temperature: row.temperature,
             configuration: Some(row.configuration.clone()),
+            joint_scatter: None,
+            remarks: Vec::new(),
             seconds: SECONDS,
         })
     }

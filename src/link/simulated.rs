@@ -289,6 +289,8 @@ impl Link for SimulatedCell {
             shots: count,
             temperature: None,
             configuration: None,
+            joint_scatter: None,
+            remarks: Vec::new(),
             seconds: self.time(request, count),
         })
     }

@@ -17,7 +17,7 @@ mod writes;
 
 use std::fmt::Debug;
 
-use super::protocol::{JointState, Moment, Shot};
+use super::protocol::{JointState, LineChange, Moment, Shot};
 
 /// The source of a simulated instrument's measurements.
 pub trait PointSource: Send + Debug {
@@ -35,6 +35,9 @@ pub trait PointSource: Send + Debug {
 pub trait Simulator: Send + Debug {
     /// Starts a new connection.
     fn accept(&mut self, now: Moment);
+
+    /// Handles a change of the serial line by the other side.
+    fn change_line(&mut self, _change: LineChange, _now: Moment) {}
 
     /// Takes bytes from the other side.
     fn feed(&mut self, bytes: &[u8], source: &mut dyn PointSource, now: Moment);

@@ -53,7 +53,7 @@ struct Scene {
 impl Stage {
     fn new() -> Self {
         let positions = vec![0.1, -1.2, 1.3, -0.4, 0.5, -0.6];
-        let joints = JointState { positions, speeds: Some(vec![0.0; 6]), controller_time: 0.0, stopped: None };
+        let joints = JointState::at(positions);
         Self(Arc::new(Mutex::new(Scene { shots: 0, joints, turns: 0.0, sigma: 5e-6, clock: Stopwatch::start() })))
     }
 

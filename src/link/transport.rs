@@ -6,12 +6,15 @@ use std::time::{Duration, Instant};
 
 use serialport::SerialPort;
 
+use super::protocol::LineChange;
 use crate::session::wire::Route;
 
 /// Timeout of a connection attempt.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Timeout of a write; a peer that does not read counts as lost.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Duration of a break on a serial line.
+const BREAK: Duration = Duration::from_millis(250);
 /// Largest datagram (bytes).
 const MAX_DATAGRAM: usize = 65_536;
 
@@ -28,6 +31,14 @@ pub(super) trait Transport: Send {
     /// # Errors
     /// The connection is closed or broken, or the peer does not read.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Changes a serial line; other transports have none.
+    ///
+    /// # Errors
+    /// The port does not accept the change.
+    fn change_line(&mut self, _change: LineChange) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// Connects. `keep_going` can cancel the wait for a client.
@@ -70,6 +81,18 @@ impl Transport for Serial {
         self.0.set_timeout(WRITE_TIMEOUT)?;
         self.0.write_all(bytes)?;
         self.0.flush()
+    }
+
+    fn change_line(&mut self, change: LineChange) -> io::Result<()> {
+        match change {
+            LineChange::Speed(speed) => self.0.set_baud_rate(speed)?,
+            LineChange::Break => {
+                self.0.set_break()?;
+                std::thread::sleep(BREAK);
+                self.0.clear_break()?;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! After a loss the whole set-up runs again. A measurement in progress has failed and is never resumed.
 
+use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -9,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use super::protocol::rtde::RestDetector;
+use super::protocol::rest::RestDetector;
 use super::protocol::{Failure, Identity, JointState, Protocol, ProtocolEvent, Shot, Status};
 use super::transport::{self, Stopwatch, Transport};
 use crate::session::wire::{Route, WireAddress, WireProtocol};
@@ -22,6 +23,8 @@ const FIRST_BACK_OFF: Duration = Duration::from_millis(500);
 const LONGEST_BACK_OFF: Duration = Duration::from_secs(10);
 /// Most events that wait for the owner of the wire. Live points are not among them.
 const EVENT_BACKLOG: usize = 256;
+/// Most joint states that wait for the owner of the wire: those of 40 s at the highest frequency.
+const JOINT_BACKLOG: usize = 1024;
 /// Most bytes per read.
 const CHUNK: usize = 16 * 1024;
 
@@ -64,8 +67,12 @@ pub(super) struct Wire {
     commands: SyncSender<Command>,
     pub(super) events: Receiver<WireEvent>,
     pub(super) monitor: WireMonitor,
+    joints: JointQueue,
     stop: Arc<AtomicBool>,
 }
+
+/// Joint states of the robot with the time of their arrival since the start of the wire, oldest first.
+type JointQueue = Arc<Mutex<VecDeque<(Duration, JointState)>>>;
 
 /// Read access to the latest values of a wire, also while the wire is in use elsewhere.
 #[derive(Clone, Debug)]
@@ -96,6 +103,7 @@ impl Wire {
         let (commands, received) = sync_channel(4);
         let (sender, events) = sync_channel(EVENT_BACKLOG);
         let latest = Arc::new(Mutex::new(Latest::default()));
+        let joints = JointQueue::default();
         let stop = Arc::new(AtomicBool::new(false));
         let clock = Stopwatch::start();
         let name = format!("link-{}", address.protocol);
@@ -106,6 +114,7 @@ impl Wire {
             received,
             sender,
             latest,
+            joints: Arc::clone(&joints),
             stop: Arc::clone(&stop),
             clock,
             log,
@@ -113,7 +122,7 @@ impl Wire {
             has_answered: false,
         };
         thread::Builder::new().name(name).spawn(move || worker.run())?;
-        Ok(Self { commands, events, monitor, stop })
+        Ok(Self { commands, events, monitor, joints, stop })
     }
 
     /// Requests a shot; `false` if the thread has ended or its command queue is full.
@@ -128,6 +137,11 @@ impl Wire {
 
     pub(super) fn latest(&self) -> Latest {
         self.monitor.latest()
+    }
+
+    /// All joint states since the last call, with the time of their arrival.
+    pub(super) fn take_joints(&self) -> VecDeque<(Duration, JointState)> {
+        std::mem::take(&mut *self.joints.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Time since the start of the wire.
@@ -182,6 +196,7 @@ struct Worker {
     received: Receiver<Command>,
     sender: SyncSender<WireEvent>,
     latest: Arc<Mutex<Latest>>,
+    joints: JointQueue,
     stop: Arc<AtomicBool>,
     clock: Stopwatch,
     log: Option<RawLog>,
@@ -256,6 +271,9 @@ impl Worker {
             self.log_bytes("out", &bytes);
             transport.write(&bytes).map_err(|error| disconnected(&error))?;
         }
+        while let Some(change) = self.protocol.next_line_change() {
+            transport.change_line(change).map_err(|error| disconnected(&error))?;
+        }
         let now = self.clock.now();
         let until = self.protocol.next_deadline().map_or(READ_TIMEOUT, |deadline| deadline.saturating_sub(now));
         let read = transport.read(buffer, until.min(READ_TIMEOUT)).map_err(|error| disconnected(&error));
@@ -306,6 +324,12 @@ impl Worker {
             }
             ProtocolEvent::Joints(state) => {
                 let is_still = self.rest_detector.feed(&state);
+                let mut joints = self.joints.lock().unwrap_or_else(PoisonError::into_inner);
+                if joints.len() == JOINT_BACKLOG {
+                    joints.pop_front();
+                }
+                joints.push_back((now, state.clone()));
+                drop(joints);
                 let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
                 (latest.joints, latest.is_still) = (Some((now, state)), is_still);
                 return Ok(());

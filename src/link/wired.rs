@@ -7,11 +7,12 @@ use std::time::Duration;
 use nalgebra::{Point3, Vector3};
 
 use super::cell_view::check_joints;
-use super::protocol::{CONTROLLER, Failure, Identity, JointState, Severity, Shot, known_sigma};
+use super::protocol::rest::{JointMean, JointWatch, Unrest};
+use super::protocol::{CONTROLLER, Failure, Identity, Severity, Shot, Status, known_sigma};
 use super::wire::{Latest, RawLog, Wire, WireEvent, WireMonitor};
 use super::{Link, LinkError, LinkEvent, build};
 use crate::profile::Profile;
-use crate::session::reading::{LiveReading, MeasureRequest, Reading};
+use crate::session::reading::{JointScatter, LiveReading, MeasureRequest, Reading, Remark};
 use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
 use crate::units::to_mm;
 
@@ -29,8 +30,8 @@ const SIMULATED_RETRY_PAUSE: Duration = Duration::from_millis(100);
 const REST_TIMEOUT: Duration = Duration::from_secs(20);
 /// Longest wait until a simulated robot is at rest.
 const SIMULATED_REST_TIMEOUT: Duration = Duration::from_secs(2);
-/// Joint changes up to this during a measurement do not count as motion (rad).
-const REST_TOLERANCE: f64 = 1e-4;
+/// Longest wait for a joint state after the last shot; slow controllers report once per second.
+const NEWER_JOINTS_TIMEOUT: Duration = Duration::from_secs(3);
 /// Age up to which a value counts as current.
 const MAX_AGE: Duration = Duration::from_secs(1);
 /// Interval at which a wait checks whether it was cancelled.
@@ -64,12 +65,23 @@ pub struct Wired {
     events: Vec<LinkEvent>,
     /// Standard deviations stated for the latest shots (m), newest last.
     sigmas: VecDeque<f64>,
-    /// The previous point: an instrument that is stuck repeats it.
-    previous_point: Option<Point3<f64>>,
+    /// The previous point with its number, if it has one: an instrument that is stuck repeats it.
+    previous_point: Option<(Point3<f64>, Option<u32>)>,
     /// Set for a simulated instrument.
     before_shot: Option<BeforeShot>,
     /// For a simulated robot: joint values before this time belong to its previous position (s, controller's clock).
     robot_since: f64,
+    joints: JointRecord,
+}
+
+/// Joint values of the measurement in progress.
+#[derive(Debug, Default)]
+struct JointRecord {
+    watch: JointWatch,
+    /// Start of the measurement, by the clock of the robot's wire.
+    since: Duration,
+    /// Arrival of the latest state of the measurement, by the same clock.
+    latest: Option<Duration>,
 }
 
 /// Called before each triggered shot.
@@ -118,7 +130,7 @@ impl Wired {
     }
 
     /// An instrument on a wire that was started already.
-    pub(super) const fn over(address: String, instrument: Wire, robot: Option<Wire>) -> Self {
+    pub(super) fn over(address: String, instrument: Wire, robot: Option<Wire>) -> Self {
         Self {
             instrument,
             address,
@@ -131,6 +143,7 @@ impl Wired {
             previous_point: None,
             before_shot: None,
             robot_since: f64::NEG_INFINITY,
+            joints: JointRecord::default(),
         }
     }
 
@@ -171,6 +184,12 @@ impl Wired {
                     }
                     WireEvent::Status(status) => self.events.push(LinkEvent::Notice(format!("robot: {}", status.text))),
                     WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_) => {}
+                }
+            }
+            for (at, state) in robot.take_joints() {
+                if at >= self.joints.since && state.controller_time > self.robot_since {
+                    self.joints.latest = Some(at);
+                    self.joints.watch.feed(&state);
                 }
             }
         }
@@ -230,43 +249,50 @@ impl Wired {
         Ok(())
     }
 
-    /// Waits until the robot is at rest and returns its joint values; `None` without a robot. Values received before this call do
-    /// not count.
-    fn joints_at_rest(&mut self, keep_going: &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, LinkError> {
-        if self.robot.is_none() {
-            return Ok(None);
-        }
-        let rest = if self.before_shot.is_some() { SIMULATED_REST_TIMEOUT } else { REST_TIMEOUT };
-        let until = self.instrument.now() + rest;
-        let since = self.robot.as_ref().map_or(Duration::ZERO, Wire::now);
+    /// Waits until the robot is at rest, if there is one. Values received before this call do not count.
+    fn await_rest(&mut self, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        let Some(robot) = &self.robot else { return Ok(()) };
+        self.joints = JointRecord { since: robot.now(), ..JointRecord::default() };
+        let limit = if self.before_shot.is_some() { SIMULATED_REST_TIMEOUT } else { REST_TIMEOUT };
+        let until = self.instrument.now() + limit;
         loop {
-            let Some(robot) = &self.robot else { return Ok(None) };
-            let (latest, now) = (robot.latest(), robot.now());
-            let is_current = |(at, state): &(Duration, JointState)| {
-                *at >= since && now.saturating_sub(*at) <= MAX_AGE && state.controller_time > self.robot_since
-            };
-            let current = latest.joints.filter(is_current);
-            if let Some((_, state)) = &current {
-                if let Some(why) = &state.stopped {
-                    return Err(LinkError::Robot(format!("it is stopped: {why}")));
-                }
-                if latest.is_still {
-                    return Ok(Some(state.positions.clone()));
-                }
-            }
-            if !keep_going() {
-                return Err(LinkError::Cancelled);
+            match self.joints.watch.joints() {
+                Ok(_) => return Ok(()),
+                Err(why @ Unrest::Stopped(_)) => return Err(unrest(why)),
+                Err(Unrest::NotYetAtRest | Unrest::Moved) => {}
             }
             if self.instrument.now() > until {
-                return Err(if current.is_some() {
-                    LinkError::Robot(format!("it is still moving after {} s", rest.as_secs()))
-                } else {
-                    LinkError::Controller(joints_timeout(rest))
+                return Err(match self.joints.latest {
+                    Some(_) => LinkError::Robot(format!("it is still moving after {} s", limit.as_secs())),
+                    None => LinkError::Controller(joints_timeout(limit)),
                 });
             }
-            drop(self.drain(JOINT_POLL_INTERVAL));
-            self.check_up()?;
+            self.await_joint_states(keep_going)?;
         }
+    }
+
+    /// Waits until a joint state has arrived that is newer than the last shot: a robot that moved during it would otherwise go
+    /// unnoticed.
+    fn await_newer_joints(&mut self, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        let Some(robot) = &self.robot else { return Ok(()) };
+        let end = robot.now();
+        let until = self.instrument.now() + NEWER_JOINTS_TIMEOUT;
+        while self.joints.latest.is_none_or(|latest| latest < end) {
+            if self.instrument.now() > until {
+                return Err(LinkError::Controller(joints_timeout(NEWER_JOINTS_TIMEOUT)));
+            }
+            self.await_joint_states(keep_going)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for further joint states for a moment.
+    fn await_joint_states(&mut self, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        if !keep_going() {
+            return Err(LinkError::Cancelled);
+        }
+        drop(self.drain(JOINT_POLL_INTERVAL));
+        self.check_up()
     }
 
     /// Fails if either link is down. A measurement must not be queued meanwhile: it would fire unexpectedly after the reconnect.
@@ -333,10 +359,11 @@ impl Wired {
             return Err(Failure::Unstable(format!("its stated sigma is {sigma:.3} mm, usually {usual:.3} mm")));
         }
         check_possible(&point)?;
-        if self.previous_point == Some(point) {
-            return Err(Failure::repeated());
+        let numbered = (point, shot.sequence);
+        if self.previous_point == Some(numbered) {
+            return Err(Failure::Repeated);
         }
-        self.previous_point = Some(point);
+        self.previous_point = Some(numbered);
         self.sigmas.extend(sigma);
         while self.sigmas.len() > SIGMA_HISTORY {
             self.sigmas.pop_front();
@@ -404,19 +431,17 @@ impl Link for Wired {
         // Discard late answers to earlier triggers.
         drop(self.drain(Duration::ZERO));
         self.check_up()?;
-        let joints = self.joints_at_rest(keep_going)?;
+        self.await_rest(keep_going)?;
         if self.before_shot.is_none() {
             self.pause(Duration::try_from_secs_f64(request.settle).unwrap_or_default(), keep_going)?;
         }
         let count = request.shots.max(1);
         let shots = (0..count).map(|_| self.shot(keep_going)).collect::<Result<Vec<Shot>, _>>()?;
-        if let (Some(before), Some(after)) = (&joints, self.joints_at_rest(keep_going)?) {
-            let moved = before.iter().zip(&after).any(|(before, after)| (before - after).abs() > REST_TOLERANCE);
-            if moved {
-                return Err(LinkError::Robot("it moved during the measurement".to_owned()));
-            }
-        }
-        let reading = mean(&shots, joints, self.instrument.now().saturating_sub(began).as_secs_f64());
+        self.await_newer_joints(keep_going)?;
+        let joints = if self.robot.is_some() { Some(self.joints.watch.joints().map_err(unrest)?) } else { None };
+        let mut reading = mean(&shots, joints, self.instrument.now().saturating_sub(began).as_secs_f64());
+        let of_robot = self.joints.watch.remarks().iter().map(|text| format!("robot: {text}"));
+        reading.remarks.extend(of_robot.map(|text| Remark { text, is_warning: false }));
         Ok(reading)
     }
 
@@ -548,8 +573,17 @@ pub(super) fn no_robot(address: &WireAddress) -> String {
     format!("'{address}' is not a robot controller; use '{}'", WireProtocol::ROBOT_ADDRESS)
 }
 
+/// Why the joint values of a measurement cannot be used, as an error.
+fn unrest(why: Unrest) -> LinkError {
+    LinkError::Robot(match why {
+        Unrest::NotYetAtRest => "it has not come to rest".to_owned(),
+        Unrest::Moved => "it moved during the measurement".to_owned(),
+        Unrest::Stopped(state) => format!("it is stopped: {state}"),
+    })
+}
+
 /// The mean of shots with its scatter, and its σ where every shot states one.
-fn mean(shots: &[Shot], configuration: Option<Vec<f64>>, seconds: f64) -> Reading {
+fn mean(shots: &[Shot], joints: Option<&JointMean>, seconds: f64) -> Reading {
     let count = shots.len().max(1) as f64;
     let mean = shots.iter().map(|shot| shot.point.coords).sum::<Vector3<f64>>() / count;
     let square = shots.iter().map(|shot| (shot.point.coords - mean).norm_squared()).sum::<f64>() / count;
@@ -562,7 +596,30 @@ fn mean(shots: &[Shot], configuration: Option<Vec<f64>>, seconds: f64) -> Readin
         scatter: (shots.len() > 1).then(|| square.sqrt()),
         shots: u32::try_from(shots.len()).unwrap_or(u32::MAX),
         temperature: shots.iter().find_map(|shot| shot.temperature),
-        configuration,
+        configuration: joints.map(|joints| joints.mean.clone()),
+        joint_scatter: joints.and_then(|joints| Some(JointScatter { sigma: joints.scatter()?, count: joints.count })),
+        remarks: remarks(shots),
         seconds,
     }
+}
+
+/// The remarks on shots, each once; of some that concerns only a part of the shots, with their number.
+fn remarks(shots: &[Shot]) -> Vec<Remark> {
+    let mut found: Vec<(&Status, usize)> = Vec::new();
+    for status in shots.iter().flat_map(|shot| &shot.remarks) {
+        match found.iter_mut().find(|(known, _)| *known == status) {
+            Some((_, count)) => *count += 1,
+            None => found.push((status, 1)),
+        }
+    }
+    let all = shots.len();
+    let text = |status: &Status, count: usize| match count {
+        count if count == all => status.text.clone(),
+        count => format!("{} ({count} of {all} shots)", status.text),
+    };
+    let remark = |(status, count): (&Status, usize)| Remark {
+        text: text(status, count),
+        is_warning: status.severity == Severity::Warning,
+    };
+    found.into_iter().map(remark).collect()
 }

@@ -34,8 +34,29 @@ pub struct Reading {
     pub temperature: Option<f64>,
     /// Pendant joint values that the robot itself reported (rad, sliding joints m).
     pub configuration: Option<Vec<f64>>,
+    /// Scatter of these values, if the robot reported them several times.
+    pub joint_scatter: Option<JointScatter>,
+    /// Remarks of the instrument and the robot on this reading.
+    pub remarks: Vec<Remark>,
     /// Duration (s), motion and settling included.
     pub seconds: f64,
+}
+
+/// Scatter of the joint values that a robot at rest reported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointScatter {
+    /// Standard deviation of a single value of each joint (rad, sliding joints m).
+    pub sigma: Vec<f64>,
+    /// Number of values that were averaged.
+    pub count: u32,
+}
+
+/// Remark of the instrument or the robot on a reading.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Remark {
+    pub text: String,
+    /// Whether the operator has to see it; other remarks are only kept.
+    pub is_warning: bool,
 }
 
 /// Live reading of a link.

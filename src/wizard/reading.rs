@@ -158,7 +158,17 @@ fn quoted(text: &str) -> String {
 
 /// A reading from typed coordinates.
 pub(super) const fn typed(point: Point3<f64>) -> Reading {
-    Reading { point, sigma: None, scatter: None, shots: 1, temperature: None, configuration: None, seconds: 0.0 }
+    Reading {
+        point,
+        sigma: None,
+        scatter: None,
+        shots: 1,
+        temperature: None,
+        configuration: None,
+        joint_scatter: None,
+        remarks: Vec::new(),
+        seconds: 0.0,
+    }
 }
 
 /// Why a reading is not a measurement at all.

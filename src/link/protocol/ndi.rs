@@ -5,6 +5,7 @@
 
 mod codes;
 mod driver;
+mod line;
 mod options;
 mod set_up;
 mod tools;
@@ -15,6 +16,7 @@ pub use codes::failure_of_error;
 pub use driver::NdiProtocol;
 pub use options::NdiOptions;
 pub use options::ReplyFormat;
+pub use tools::Positions;
 pub use tools::Tool;
 pub use tools::ToolState;
 pub use tools::decode_bx;

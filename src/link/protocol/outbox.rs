@@ -1,7 +1,8 @@
 //! Bounded queues for the events and outputs of a protocol: neither a peer that floods the wire or never reads, nor a slow
 //! owner, can fill the memory.
 //!
-//! - A new live point or joint state replaces the queued one, because only the current value matters.
+//! - A new live point replaces the queued one, because only the current value matters.
+//! - Only the newest joint states are kept; they are averaged, so there are many.
 //! - Only the newest offered points are kept.
 //! - For each severity, the first and the newest status messages are kept and those in between are dropped: the first ones
 //!   name the cause, the newest describe the current state. Information never displaces warnings. Of a repeated message, the
@@ -12,6 +13,9 @@
 use std::collections::VecDeque;
 
 use super::{Failure, ProtocolEvent, Severity, Status};
+
+/// Most joint states in the queue: more than one read of a wire brings at the highest frequency.
+pub const MAX_JOINTS: usize = 64;
 
 /// Most offered points in the queue.
 pub const MAX_OFFERED: usize = 32;
@@ -46,7 +50,9 @@ impl Outbox {
     pub fn push(&mut self, event: ProtocolEvent) {
         match &event {
             ProtocolEvent::Live(_) => self.events.retain(|other| !matches!(other, ProtocolEvent::Live(_))),
-            ProtocolEvent::Joints(_) => self.events.retain(|other| !matches!(other, ProtocolEvent::Joints(_))),
+            ProtocolEvent::Joints(_) => {
+                self.drop_excess(0, MAX_JOINTS, |other| matches!(other, ProtocolEvent::Joints(_)));
+            }
             ProtocolEvent::Offered(_) => {
                 self.drop_excess(0, MAX_OFFERED, |other| matches!(other, ProtocolEvent::Offered(_)));
             }

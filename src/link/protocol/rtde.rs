@@ -1,20 +1,18 @@
 //! Universal Robots real-time data exchange over TCP, port 30004: the measured joint values of the controller.
 //!
-//! The set-up requests version 2 of the protocol, the version of the controller and five values, then starts the stream. From
-//! then on every packet is a [`ProtocolEvent::Joints`]; a silent stream counts as lost. Nothing is ever written to the robot.
-//! There are no shots: a trigger is refused.
+//! The set-up requests version 2 of the protocol, the version of the controller and four values, then starts the stream. A
+//! controller that does not know one of the optional values is asked again without it. From then on every packet is a
+//! [`ProtocolEvent::Joints`]; a silent stream counts as lost. Nothing is ever written to the robot. There are no shots: a
+//! trigger is refused.
 
 pub mod mode;
 pub mod packet;
-mod rest;
 #[cfg(test)]
 mod tests;
 
 use std::time::Duration;
 
-pub use rest::RestDetector;
-
-use self::packet::{Framer, Packet, Record, TextMessage, encode, packet_type, request_version, set_up_outputs};
+use self::packet::{Field, Framer, Packet, Record, TextMessage, encode, packet_type, request_version, set_up_outputs};
 use super::excerpt::excerpt;
 use super::outbox::Outbox;
 use super::{Failure, Identity, JointState, Moment, Protocol, ProtocolEvent, Severity};
@@ -27,6 +25,12 @@ pub const MAX_FREQUENCY: f64 = 25.0;
 
 /// Lowest frequency (Hz).
 pub const MIN_FREQUENCY: f64 = 1.0;
+
+/// Joint values that differ by more than this from all zeros cannot become zeros within one packet (rad).
+const DROPOUT: f64 = 0.05;
+
+/// Most consecutive packets of zeros that count as a dropout of the controller.
+const MAX_DROPOUTS: u32 = 25;
 
 /// Options of the robot's stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,8 +73,16 @@ pub struct Rtde {
     phase: Phase,
     name: String,
     recipe: u8,
-    /// Robot mode and safety status of the previous packet.
-    modes: Option<(i32, i32)>,
+    /// Values of the recipe.
+    fields: Vec<Field>,
+    /// Robot mode of the previous packet.
+    robot_mode: Option<i32>,
+    /// Safety status of the previous packet.
+    safety_status: Option<i32>,
+    /// Joint values of the previous packet (rad).
+    previous: Option<[f64; 6]>,
+    /// Consecutive packets of zeros.
+    dropouts: u32,
     /// Start of the current wait.
     since: Moment,
 }
@@ -87,7 +99,11 @@ impl Rtde {
             phase: Phase::Off,
             name: String::new(),
             recipe: 0,
-            modes: None,
+            fields: Vec::new(),
+            robot_mode: None,
+            safety_status: None,
+            previous: None,
+            dropouts: 0,
             since: Moment::ZERO,
         }
     }
@@ -117,20 +133,19 @@ impl Rtde {
                 self.ask(Phase::ControllerVersion, request, now);
             }
             (Phase::ProtocolVersion, Packet::ProtocolVersion(false)) => {
-                let text = "version 2 of the interface; update the software of the controller";
+                let text = "version 2 of the interface, which PolyScope has from 3.4 on; update the software of the controller";
                 self.lose(Failure::Refused(text.to_owned()));
             }
             (Phase::ControllerVersion, Packet::ControllerVersion([major, minor, fix, build])) => {
                 self.name = format!("Universal Robots controller, version {major}.{minor}.{fix}.{build}");
-                let names = Record::FIELDS.map(|(name, _)| name);
-                self.ask(Phase::Outputs, set_up_outputs(self.options.frequency, &names), now);
+                self.fields = Record::FIELDS.to_vec();
+                self.ask_for_fields(now);
             }
             (Phase::Outputs, Packet::Outputs { recipe, types }) => self.take_types(recipe, &types, now),
             (Phase::Start, Packet::Started(true)) => {
                 self.phase = Phase::Data;
                 self.since = now;
-                let checked = vec![format!("joint values: rad, {} Hz", self.options.frequency)];
-                let identity = Identity { name: self.name.clone(), checked, ..Identity::default() };
+                let identity = self.identity();
                 self.outbox.push(ProtocolEvent::Ready(identity));
             }
             (Phase::Start, Packet::Started(false)) => {
@@ -150,15 +165,45 @@ impl Rtde {
         self.outbox.report(severity, format!("{}: {}", message.source, message.text));
     }
 
-    /// Checks that every requested value is available with the expected type.
+    /// Requests the values of the recipe.
+    fn ask_for_fields(&mut self, now: Moment) {
+        let names: Vec<&str> = self.fields.iter().map(|field| field.name()).collect();
+        self.ask(Phase::Outputs, set_up_outputs(self.options.frequency, &names), now);
+    }
+
+    fn identity(&self) -> Identity {
+        let reported: Vec<&str> = self.fields.iter().map(|field| field.name()).collect();
+        let has = |field: Field| self.fields.contains(&field);
+        let mut notes = Vec::new();
+        if !has(Field::SafetyStatus) && !has(Field::SafetyMode) {
+            notes.push("this controller does not report its safety state: whether the robot is at rest is judged by its joints alone".to_owned());
+        }
+        Identity {
+            name: self.name.clone(),
+            checked: vec![
+                format!("joint values: rad, {} Hz", self.options.frequency),
+                format!("values of the controller: {}", reported.join(", ")),
+            ],
+            notes,
+            ..Identity::default()
+        }
+    }
+
+    /// Checks that every requested value is available with the expected type, and adapts the request to older controllers.
     fn take_types(&mut self, recipe: u8, types: &[String], now: Moment) {
-        let in_use: Vec<&str> = refused(types, "IN_USE");
-        let not_found = refused(types, "NOT_FOUND");
+        let in_use = self.refused(types, "IN_USE");
+        let not_found = self.refused(types, "NOT_FOUND");
+        let missing = |field: &&Field| field.is_required();
         if !in_use.is_empty() {
-            self.lose(Failure::InUse(format!("another program uses {}", in_use.join(", "))));
+            self.lose(Failure::InUse(format!("another program uses {}", names(&in_use))));
+        } else if let Some(field) = not_found.iter().find(missing) {
+            self.lose(Failure::Refused(format!("the controller does not know {}", field.name())));
         } else if !not_found.is_empty() {
-            self.lose(Failure::Refused(format!("the controller does not know {}", not_found.join(", "))));
-        } else if types.iter().ne(Record::FIELDS.iter().map(|(_, kind)| kind)) {
+            // Every further request is shorter or has an older value, so this ends.
+            let older = |field: &Field| if not_found.contains(field) { field.older() } else { Some(*field) };
+            self.fields = self.fields.iter().filter_map(older).collect();
+            self.ask_for_fields(now);
+        } else if types.iter().ne(self.fields.iter().map(|field| field.kind())) {
             let types = excerpt(&types.join(","));
             self.lose(Failure::Garbled(format!("unexpected types of the values: {types}")));
         } else {
@@ -167,9 +212,16 @@ impl Rtde {
         }
     }
 
+    /// The values that were refused with this word in place of a type.
+    fn refused(&self, types: &[String], word: &str) -> Vec<Field> {
+        let pairs = self.fields.iter().zip(types);
+        pairs.filter(|(_, kind)| *kind == word).map(|(field, _)| *field).collect()
+    }
+
     fn take_data(&mut self, values: &[u8], now: Moment) {
-        let Some(record) = Record::decode(values) else {
-            let text = format!("a data packet has {} bytes of values instead of {}", values.len(), Record::SIZE);
+        let Some(record) = Record::decode(&self.fields, values) else {
+            let size = Record::size(&self.fields);
+            let text = format!("a data packet has {} bytes of values instead of {size}", values.len());
             self.lose(Failure::Garbled(text));
             return;
         };
@@ -179,27 +231,46 @@ impl Rtde {
             self.outbox.report(Severity::Warning, "the controller reported a joint value that is not a finite number");
             return;
         }
-        let is_normal = record.safety_status == mode::SAFETY_NORMAL;
+        if self.is_dropout(&record.actual_q) {
+            self.outbox.report(Severity::Warning, "the controller reported zeros in place of its joint values");
+            return;
+        }
+        let safety = record.safety_status.filter(|status| *status != mode::SAFETY_NORMAL);
+        let forbidding = safety.filter(|status| mode::forbids_measuring(*status));
         self.outbox.push(ProtocolEvent::Joints(JointState {
             positions: record.actual_q.to_vec(),
-            speeds: Some(record.actual_qd.to_vec()),
             controller_time: record.timestamp,
-            stopped: (!is_normal).then(|| mode::safety_status(record.safety_status)),
+            stopped: forbidding.map(mode::safety_status),
+            remark: safety.filter(|_| forbidding.is_none()).map(mode::safety_status),
         }));
+    }
+
+    /// Whether these are zeros that controllers are known to send now and then in place of the joint values. A robot that stays
+    /// there is really at zero.
+    fn is_dropout(&mut self, positions: &[f64; 6]) -> bool {
+        let is_zero = positions.iter().all(|value| *value == 0.0);
+        let was_elsewhere = self.previous.is_some_and(|previous| previous.iter().any(|value| value.abs() > DROPOUT));
+        if is_zero && was_elsewhere && self.dropouts < MAX_DROPOUTS {
+            self.dropouts += 1;
+            return true;
+        }
+        self.dropouts = 0;
+        self.previous = Some(*positions);
+        false
     }
 
     /// Reports changes of the modes, and at the start any unusual ones.
     fn watch_modes(&mut self, record: &Record) {
-        let usual = (mode::MODE_RUNNING, mode::SAFETY_NORMAL);
-        let (robot_mode, safety_status) =
-            self.modes.replace((record.robot_mode, record.safety_status)).unwrap_or(usual);
-        if robot_mode != record.robot_mode {
-            self.outbox.report(Severity::Info, format!("robot mode: {}", mode::robot_mode(record.robot_mode)));
+        if let Some(robot_mode) = record.robot_mode
+            && self.robot_mode.replace(robot_mode).unwrap_or(mode::MODE_RUNNING) != robot_mode
+        {
+            self.outbox.report(Severity::Info, format!("robot mode: {}", mode::robot_mode(robot_mode)));
         }
-        if safety_status != record.safety_status {
-            let is_normal = record.safety_status == mode::SAFETY_NORMAL;
-            let severity = if is_normal { Severity::Info } else { Severity::Warning };
-            self.outbox.report(severity, format!("safety status: {}", mode::safety_status(record.safety_status)));
+        if let Some(status) = record.safety_status
+            && self.safety_status.replace(status).unwrap_or(mode::SAFETY_NORMAL) != status
+        {
+            let severity = if mode::forbids_measuring(status) { Severity::Warning } else { Severity::Info };
+            self.outbox.report(severity, format!("safety status: {}", mode::safety_status(status)));
         }
     }
 
@@ -210,10 +281,9 @@ impl Rtde {
     }
 }
 
-/// Names of the values that were refused with this word in place of a type.
-fn refused(types: &[String], word: &str) -> Vec<&'static str> {
-    let pairs = Record::FIELDS.iter().zip(types);
-    pairs.filter(|(_, kind)| *kind == word).map(|((name, _), _)| *name).collect()
+fn names(fields: &[Field]) -> String {
+    let names: Vec<&str> = fields.iter().map(|field| field.name()).collect();
+    names.join(", ")
 }
 
 impl Default for Rtde {

@@ -160,6 +160,10 @@ impl<P: Protocol, S: Simulator> Bench<P, S> {
                 }
                 self.sent.push(bytes);
             }
+            while let Some(change) = self.protocol.next_line_change() {
+                has_moved = true;
+                self.simulator.change_line(change, self.now);
+            }
             if let Some(output) = self.simulator.next_output() {
                 has_moved = true;
                 if let Some(event) = self.deliver(output) {

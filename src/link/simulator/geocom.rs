@@ -20,6 +20,15 @@ const MEASURING: Duration = Duration::from_millis(1500);
 /// Time from any other request to its answer.
 const ANSWERING: Duration = Duration::from_millis(30);
 
+/// Most decimals of a number.
+const MOST_DECIMALS: usize = 15;
+
+/// Correction for the air (ppm).
+const AIR_PPM: f64 = 8.4;
+
+/// Scale of a map projection or a height (ppm).
+const SCALE_PPM: f64 = 400.0;
+
 /// Longest accepted request (bytes).
 const MAX_RECEIVED: usize = 4096;
 
@@ -43,6 +52,12 @@ faults! {
         Silent "silent" "No answer.",
         DisconnectMidLine "disconnect-mid-line" "The connection is closed in the middle of the answer.",
         Noise "noise" "Noise, as at a wrong baud rate, instead of the answer.",
+        EmptyAnswer "empty-answer" "Success without any values.",
+        CorrectionsChanged "corrections-changed" "Another program sets 50 ppm before the measurement.",
+        Scaled "scaled" "Multiplies distances by a scale of 400 ppm. Occasion: a connection.",
+        FewDecimals "few-decimals" "Rounds to 3 decimals and does not accept another number. Occasion: a connection.",
+        OldSoftware "old-software" "Does not know decimals and corrections. Occasion: a connection.",
+        Unnumbered "unnumbered" "Answers without transaction numbers. Occasion: a connection.",
         Asleep "asleep" "Asleep when connected; the request that wakes it is lost. Occasion: a connection.",
         Echo "echo" "Echoes the request before its answer, as some Bluetooth adapters do. Occasion: a request.",
         Dead "dead" "No answer, as from an instrument that is switched off. Occasion: a request.",
@@ -60,7 +75,7 @@ enum Occasion {
 impl GeocomFault {
     const fn occasion(self) -> Occasion {
         match self {
-            Self::Asleep => Occasion::Connection,
+            Self::Asleep | Self::Scaled | Self::FewDecimals | Self::OldSoftware | Self::Unnumbered => Occasion::Connection,
             Self::Echo | Self::Dead => Occasion::Request,
             _ => Occasion::Measurement,
         }
@@ -73,9 +88,14 @@ pub struct GeocomSimulator {
     faults: FaultPlan<GeocomFault>,
     received: Vec<u8>,
     is_asleep: bool,
+    /// What is unusual about this connection.
+    unusual: Option<GeocomFault>,
+    decimals: usize,
+    /// Correction for the air (ppm).
+    air: f64,
     edm_mode: String,
     prism_constant: String,
-    last_polar: String,
+    last_polar: [f64; 3],
     late: Option<Vec<u8>>,
     schedule: Schedule,
 }
@@ -86,9 +106,12 @@ impl GeocomSimulator {
             faults: FaultPlan::new(faults),
             received: Vec::new(),
             is_asleep: false,
+            unusual: None,
+            decimals: MOST_DECIMALS,
+            air: AIR_PPM,
             edm_mode: "2".to_owned(),
             prism_constant: "-0.0344".to_owned(),
-            last_polar: "0.1,1.5,2.5".to_owned(),
+            last_polar: [0.1, 1.5, 2.5],
             late: None,
             schedule: Schedule::default(),
         }
@@ -120,13 +143,56 @@ impl GeocomSimulator {
             return self.measure(&request, with_crc, source, now);
         }
         let (transport, code, parameters) = self.ordinary(&request);
-        let answer = encode_reply(transport, request.transaction, code, &parameters, with_crc);
+        let answer = encode_reply(transport, self.number(&request), code, &parameters, with_crc);
         self.send(now + ANSWERING, ended(&answer));
+    }
+
+    /// Transaction number of the answer to a request.
+    fn number(&self, request: &Request) -> u16 {
+        if self.unusual == Some(GeocomFault::Unnumbered) { 0 } else { request.transaction }
+    }
+
+    /// Scale that is applied to distances (ppm).
+    fn scale(&self) -> f64 {
+        if self.unusual == Some(GeocomFault::Scaled) { SCALE_PPM } else { 0.0 }
+    }
+
+    /// A number as it is sent: rounded, without trailing zeros.
+    fn number_text(&self, value: f64) -> String {
+        let text = format!("{value:.*}", self.decimals);
+        let short = text.trim_end_matches('0');
+        if short.ends_with('.') { format!("{short}0") } else { short.to_owned() }
     }
 
     /// Transport result, return code and parameters of a request that is not a measurement.
     fn ordinary(&mut self, request: &Request) -> (u32, u32, String) {
+        let is_old = self.unusual == Some(GeocomFault::OldSoftware);
         let parameters = match request.rpc {
+            107 | 108 | 2126 | 2151 if is_old => return (3080, 0, String::new()),
+            107 => {
+                let digits = request.parameters.trim().parse().ok().filter(|digits| *digits <= MOST_DECIMALS);
+                match digits {
+                    Some(digits) if self.unusual != Some(GeocomFault::FewDecimals) => self.decimals = digits,
+                    _ => return (0, 2, String::new()),
+                }
+                String::new()
+            }
+            108 => self.decimals.to_string(),
+            2126 => {
+                let prism = self.prism_constant.parse().unwrap_or(0.0);
+                format!("{},{}", self.number_text(self.air + self.scale()), self.number_text(prism))
+            }
+            2151 => self.number_text(self.air),
+            // What clients ask about date, station, height, power, orientation and motors does not matter here.
+            2009 => "0.0,0.0,0.0,0.0".to_owned(),
+            2011 => "0.0".to_owned(),
+            5008 => "2020,'01','01','00','00','00'".to_owned(),
+            5011 => "20".to_owned(),
+            5035 => "5,2".to_owned(),
+            5039 => "90,0,1".to_owned(),
+            2007 | 9030 => "1".to_owned(),
+            2014 => "1,1,1,1".to_owned(),
+            2082 | 2107 | 2116 => self.angles_or_coordinates(request.rpc),
             0 | 2008 | 9037 | 18005 => String::new(),
             110 => "1,50,3".to_owned(),
             2020 => {
@@ -141,7 +207,7 @@ impl GeocomSimulator {
             }
             2026 => "0".to_owned(),
             5003 => "362541".to_owned(),
-            5004 => "\"TS30, simulated\"".to_owned(),
+            5004 => "\"TS30 SIMULATED\"".to_owned(),
             _ => return (3080, 0, String::new()),
         };
         (0, 0, parameters)
@@ -149,29 +215,35 @@ impl GeocomSimulator {
 
     fn measure(&mut self, request: &Request, with_crc: bool, source: &mut dyn PointSource, now: Moment) {
         let fault = self.faults.occasion(|fault| fault.occasion() == Occasion::Measurement);
-        let before = self.last_polar.clone();
+        let before = self.polar_text();
+        if fault == Some(GeocomFault::CorrectionsChanged) {
+            self.air = 50.0;
+        }
         let is_measured =
             !matches!(fault, Some(GeocomFault::Busy | GeocomFault::TransportTimeout | GeocomFault::StaleRepeat));
         let shot = if is_measured { source.shot() } else { None };
         if let Some(shot) = &shot {
             self.last_polar = polar(shot);
+            self.last_polar[2] *= 1.0 + self.scale() * 1e-6;
         }
-        let mode = if request.rpc == 17017 { ",2" } else { "" };
+        let current = self.polar_text();
+        let mode = if request.rpc == 17017 && fault != Some(GeocomFault::EmptyAnswer) { ",2" } else { "" };
         let (transport, code, numbers) = match fault {
             Some(GeocomFault::TransportTimeout) => (3077, 0, String::new()),
             Some(GeocomFault::Busy) => (0, 1293, before),
             Some(GeocomFault::AngleOnly) => (0, 1285, before),
             Some(GeocomFault::NoTarget) => (0, 8710, "0,0,0".to_owned()),
             Some(GeocomFault::LicenceMissing) => (0, 27, "0,0,0".to_owned()),
-            Some(GeocomFault::AccuracyNotGuaranteed) => (0, 1284, self.last_polar.clone()),
-            Some(GeocomFault::NoFullCorrection) => (0, 1283, self.last_polar.clone()),
+            Some(GeocomFault::AccuracyNotGuaranteed) => (0, 1284, current),
+            Some(GeocomFault::NoFullCorrection) => (0, 1283, current),
+            Some(GeocomFault::EmptyAnswer) => (0, 0, String::new()),
             Some(GeocomFault::StaleRepeat) => (0, 0, before),
             Some(GeocomFault::NotANumber) => (0, 0, "nan,1.5,inf".to_owned()),
             _ if shot.is_none() => (0, 1285, before),
-            _ => (0, 0, self.last_polar.clone()),
+            _ => (0, 0, current),
         };
         let shift = u16::from(fault == Some(GeocomFault::WrongTransaction)) * 7;
-        let transaction = request.transaction.wrapping_add(shift);
+        let transaction = self.number(request).wrapping_add(shift);
         let answer = encode_reply(transport, transaction, code, &format!("{numbers}{mode}"), with_crc);
         self.answer(&answer, fault, request, now + MEASURING);
     }
@@ -199,6 +271,22 @@ impl GeocomSimulator {
         }
     }
 
+    /// The latest horizontal angle, zenith angle and slope distance.
+    fn polar_text(&self) -> String {
+        self.last_polar.map(|value| self.number_text(value)).join(",")
+    }
+
+    /// Both angles, or the coordinates, of the latest measurement.
+    fn angles_or_coordinates(&self, rpc: u32) -> String {
+        let [horizontal, zenith, distance] = self.last_polar;
+        if rpc == 2107 {
+            return [horizontal, zenith].map(|value| self.number_text(value)).join(",");
+        }
+        let level = distance * zenith.sin();
+        let coordinates = [level * horizontal.sin(), level * horizontal.cos(), distance * zenith.cos()];
+        coordinates.map(|value| self.number_text(value)).join(",")
+    }
+
     fn send(&mut self, at: Moment, bytes: Vec<u8>) {
         self.send_late(at);
         self.schedule.send(at, bytes);
@@ -221,12 +309,12 @@ fn ended(text: &str) -> Vec<u8> {
     format!("{text}\r\n").into_bytes()
 }
 
-/// Horizontal angle, zenith angle (rad) and slope distance (m), written to better than a nanometre.
-fn polar(shot: &Shot) -> String {
+/// Horizontal angle, zenith angle (rad) and slope distance (m).
+fn polar(shot: &Shot) -> [f64; 3] {
     let point = shot.point.coords;
     let horizontal = point.x.atan2(point.y).rem_euclid(TAU);
     let zenith = point.x.hypot(point.y).atan2(point.z);
-    format!("{horizontal:.15},{zenith:.15},{:.12}", point.norm())
+    [horizontal, zenith, point.norm()]
 }
 
 impl Simulator for GeocomSimulator {
@@ -236,6 +324,9 @@ impl Simulator for GeocomSimulator {
         self.late = None;
         let fault = self.faults.occasion(|fault| fault.occasion() == Occasion::Connection);
         self.is_asleep = fault == Some(GeocomFault::Asleep);
+        self.decimals = if fault == Some(GeocomFault::FewDecimals) { 3 } else { MOST_DECIMALS };
+        self.air = AIR_PPM;
+        self.unusual = fault;
     }
 
     fn feed(&mut self, bytes: &[u8], source: &mut dyn PointSource, now: Moment) {

@@ -10,6 +10,7 @@ use super::PointSource;
 use super::Simulator;
 use super::fault::{FaultPlan, Planned, faults};
 use super::schedule::{Schedule, halves};
+use crate::link::protocol::LineChange;
 use crate::link::protocol::Moment;
 use crate::link::protocol::ndi::Frame;
 use crate::link::protocol::ndi::FrameDecoder;
@@ -20,6 +21,12 @@ const FRAMES_PER_SECOND: f64 = 60.0;
 
 /// Time from a command to its reply.
 const ANSWERING: Duration = Duration::from_millis(4);
+
+/// Duration of a slow start of hardware.
+const STARTING: Duration = Duration::from_secs(6);
+
+/// Duration of a reset.
+const RESETTING: Duration = Duration::from_secs(2);
 
 /// Delay of a late reply, longer than the driver waits.
 const LATE: Duration = Duration::from_millis(2500);
@@ -51,6 +58,11 @@ faults! {
         Silent "silent" "No reply.",
         Reset "reset" "`RESET`, as after switching off and on.",
         DisconnectMidPacket "disconnect-mid-packet" "The connection is closed in the middle of the reply.",
+        PartlyOutOfVolume "partly-out-of-volume" "The tool is partly outside the measurement volume.",
+        OutOfVolume "out-of-volume" "The tool is not seen because it is outside the measurement volume.",
+        Infrared "infrared" "Too much infrared light around the tracker.",
+        HardwareFailure "hardware-failure" "The tracker reports a failure of its hardware.",
+        SlowStart "slow-start" "Takes 6 s for `INIT`, `PINIT` and `TSTART`. Occasion: a command.",
         InitialisationFails "initialisation-fails" "`INIT` fails. Occasion: `INIT`.",
     }
 }
@@ -63,6 +75,16 @@ struct Pose {
     origin_mm: [f64; 3],
 }
 
+/// A serial line.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    /// Speed of the tracker (baud).
+    own: u32,
+    /// Speed of the other side (baud).
+    peer: u32,
+    resets: u32,
+}
+
 /// A simulated tracker that measures the tip of a tool.
 #[derive(Debug)]
 pub struct NdiSimulator {
@@ -70,6 +92,8 @@ pub struct NdiSimulator {
     tip: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
     decoder: FrameDecoder,
+    /// The serial line, if it is one.
+    line: Option<Line>,
     is_initialised: bool,
     is_enabled: bool,
     is_tracking: bool,
@@ -86,6 +110,7 @@ impl NdiSimulator {
             tip: Vector3::from(tip_mm) * 1e-3,
             rotation: UnitQuaternion::from_euler_angles(0.4, -0.7, 1.1),
             decoder: FrameDecoder::default(),
+            line: None,
             is_initialised: false,
             is_enabled: false,
             is_tracking: false,
@@ -94,9 +119,46 @@ impl NdiSimulator {
         }
     }
 
+    /// Puts the tracker on a serial line at this speed, opened by the other side at `peer` (baud).
+    #[cfg(test)]
+    pub fn on_serial_line(mut self, speed: u32, peer: u32) -> Self {
+        self.line = Some(Line { own: speed, peer, resets: 0 });
+        self
+    }
+
+    /// Speed of its serial line (baud).
+    #[cfg(test)]
+    pub fn speed(&self) -> Option<u32> {
+        self.line.map(|line| line.own)
+    }
+
+    /// Number of resets by a break on its serial line.
+    #[cfg(test)]
+    pub fn resets(&self) -> u32 {
+        self.line.map_or(0, |line| line.resets)
+    }
+
     /// Bytes of an incomplete command.
     pub const fn pending(&self) -> usize {
         self.decoder.pending()
+    }
+
+    /// Sets the speed of the serial line by the number of `COMM`; the answer still has the old one.
+    fn set_speed(&mut self, parameters: &str) -> String {
+        let speed = match parameters {
+            "00000" => 9600,
+            "10000" => 14_400,
+            "20000" => 19_200,
+            "30000" => 38_400,
+            "40000" => 57_600,
+            "50000" => 115_200,
+            "60000" => 921_600,
+            _ => return "ERROR06".to_owned(),
+        };
+        if let Some(line) = &mut self.line {
+            line.own = speed;
+        }
+        "OKAY".to_owned()
     }
 
     fn command(&mut self, command: &str, source: &mut dyn PointSource, now: Moment) {
@@ -104,9 +166,20 @@ impl NdiSimulator {
             "INIT:" => self.initialise(),
             // The only reply that clients do not parse, so it marks the tracker as simulated.
             "APIREV:" => "G.003.001 SIMULATED".to_owned(),
-            "PHSR:02" if !self.is_initialised => format!("01{HANDLE:02X}001"),
-            "PHSR:03" if self.is_initialised && !self.is_enabled => format!("01{HANDLE:02X}011"),
-            "PHSR:02" | "PHSR:03" => "00".to_owned(),
+            "PHSR:00" => self.handles(true, "001"),
+            "PHSR:01" => "00".to_owned(),
+            "PHSR:02" => self.handles(!self.is_initialised, "001"),
+            "PHSR:03" => self.handles(self.is_initialised && !self.is_enabled, "011"),
+            "PHSR:04" => self.handles(self.is_enabled, "031"),
+            // What clients ask about the tool and the version, load as its definition, or let sound.
+            "PHINF:0A0001" => format!("02000000NDI         001000000012{}", if self.is_enabled { "1" } else { "0" }),
+            "PHF:0A" => "OKAY".to_owned(),
+            _ if command.starts_with("COMM:") => self.set_speed(command.trim_start_matches("COMM:")),
+            "VER:0" | "VER:3" | "VER:4" | "VER:5" => "Polaris Control Firmware SIMULATED\nNDI S/N: P7-00001\nFreeze Tag: 024".to_owned(),
+            _ if command.starts_with("PHRQ:") => format!("{HANDLE:02X}"),
+            _ if command.starts_with("PVWR:0A") => "OKAY".to_owned(),
+            _ if command.starts_with("BEEP:") => "1".to_owned(),
+            _ if command.starts_with("GET:") => format!("{}=0", command.trim_start_matches("GET:")),
             "PINIT:0A" => {
                 self.is_initialised = true;
                 "OKAY".to_owned()
@@ -124,11 +197,22 @@ impl NdiSimulator {
                 self.is_tracking = false;
                 "OKAY".to_owned()
             }
-            "TX:0001" | "BX:0001" if self.is_tracking => return self.position(command == "BX:0001", source, now),
-            "TX:0001" | "BX:0001" => "ERROR0C".to_owned(),
+            "TX:0001" | "BX:0001" | "TX:0801" | "BX:0801" | "TX:" | "BX:" if self.is_tracking => {
+                return self.position(command.starts_with("BX"), source, now);
+            }
+            "TX:0001" | "BX:0001" | "TX:0801" | "BX:0801" | "TX:" | "BX:" => "ERROR0C".to_owned(),
             _ => "ERROR01".to_owned(),
         };
-        self.schedule.send(now + ANSWERING, encode_text(&reply));
+        let takes = match self.faults.occasion(|fault| fault == NdiFault::SlowStart) {
+            Some(_) if ["INIT:", "PINIT:0A", "TSTART:"].contains(&command) => STARTING,
+            _ => ANSWERING,
+        };
+        self.schedule.send(now + takes, encode_text(&reply));
+    }
+
+    /// The list of port handles, if it has one.
+    fn handles(&self, has_one: bool, status: &str) -> String {
+        if has_one { format!("01{HANDLE:02X}{status}") } else { "00".to_owned() }
     }
 
     fn initialise(&mut self) -> String {
@@ -143,7 +227,8 @@ impl NdiSimulator {
 
     /// Replies with the pose of the tool in the frame at this time.
     fn position(&mut self, is_binary: bool, source: &mut dyn PointSource, now: Moment) {
-        let fault = self.faults.occasion(|fault| fault != NdiFault::InitialisationFails);
+        let is_of_position = |fault| !matches!(fault, NdiFault::InitialisationFails | NdiFault::SlowStart);
+        let fault = self.faults.occasion(is_of_position);
         let frame = match (fault, self.last) {
             (Some(NdiFault::FrozenFrame), Some((frame, _))) => frame,
             _ => frame_at(now),
@@ -153,7 +238,7 @@ impl NdiSimulator {
             _ => self.observe(source),
         };
         self.last = Some((frame, pose));
-        let pose = pose.filter(|_| fault != Some(NdiFault::Missing)).map(|pose| with_fault(pose, fault));
+        let pose = pose.filter(|_| !matches!(fault, Some(NdiFault::Missing | NdiFault::OutOfVolume))).map(|pose| with_fault(pose, fault));
         let bytes =
             if is_binary { binary_reply(pose, frame, fault) } else { encode_text(&text_reply(pose, frame, fault)) };
         self.reply(bytes, fault, now + ANSWERING);
@@ -212,6 +297,24 @@ fn with_bad_crc(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
+/// Status bits of the port: occupied, initialised, enabled.
+const fn port_status(fault: Option<NdiFault>) -> u32 {
+    match fault {
+        Some(NdiFault::OutOfVolume) => 0x71,
+        Some(NdiFault::PartlyOutOfVolume) => 0xb1,
+        _ => 0x31,
+    }
+}
+
+/// Status bits of the tracker.
+const fn system_status(fault: Option<NdiFault>) -> u16 {
+    match fault {
+        Some(NdiFault::Infrared) => 0x0002,
+        Some(NdiFault::HardwareFailure) => 0x0010,
+        _ => 0,
+    }
+}
+
 fn text_reply(pose: Option<Pose>, frame: u32, fault: Option<NdiFault>) -> String {
     let transform = match (pose, fault) {
         (_, Some(NdiFault::Disabled)) => "DISABLED".to_owned(),
@@ -224,7 +327,7 @@ fn text_reply(pose: Option<Pose>, frame: u32, fault: Option<NdiFault>) -> String
         }
     };
     let extra = if matches!(fault, Some(NdiFault::WrongBody | NdiFault::WrongLength)) { "00" } else { "" };
-    format!("01{HANDLE:02X}{transform}00000031{frame:08X}\n{extra}0000")
+    format!("01{HANDLE:02X}{transform}{:08X}{frame:08X}\n{extra}{:04X}", port_status(fault), system_status(fault))
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the format has single precision")]
@@ -239,9 +342,9 @@ fn binary_reply(pose: Option<Pose>, frame: u32, fault: Option<NdiFault>) -> Vec<
             body.extend(values.flat_map(|value| (value as f32).to_le_bytes()));
         }
     }
-    body.extend(0x31_u32.to_le_bytes());
+    body.extend(port_status(fault).to_le_bytes());
     body.extend(frame.to_le_bytes());
-    body.extend([0, 0]);
+    body.extend(system_status(fault).to_le_bytes());
     if fault == Some(NdiFault::WrongBody) {
         body.extend([0; 5]);
     }
@@ -254,12 +357,30 @@ fn binary_reply(pose: Option<Pose>, frame: u32, fault: Option<NdiFault>) -> Vec<
 }
 
 impl Simulator for NdiSimulator {
+    fn change_line(&mut self, change: LineChange, now: Moment) {
+        let Some(line) = &mut self.line else { return };
+        match change {
+            LineChange::Speed(speed) => line.peer = speed,
+            LineChange::Break => {
+                (line.own, line.resets) = (9600, line.resets + 1);
+                (self.is_initialised, self.is_enabled, self.is_tracking) = (false, false, false);
+                self.decoder.resync();
+                self.schedule.clear();
+                self.schedule.send(now + RESETTING, encode_text("RESET"));
+            }
+        }
+    }
+
     fn accept(&mut self, _now: Moment) {
         self.decoder.resync();
         self.schedule.clear();
     }
 
     fn feed(&mut self, bytes: &[u8], source: &mut dyn PointSource, now: Moment) {
+        // At another speed nothing legible arrives.
+        if self.line.is_some_and(|line| line.peer != line.own) {
+            return;
+        }
         for &byte in bytes {
             match self.decoder.push(byte) {
                 Some(Frame::Text(command)) => self.command(&command, source, now),

@@ -1,13 +1,17 @@
 //! A simulated Universal Robots controller: the other end of [`crate::link::protocol::rtde`].
 //!
-//! It provides the time, the joint values and speeds, the robot mode and the safety status; every other name is not found. A
-//! robot with fewer than six joints is padded with zeros, and of one with more the first six are reported. Like a real
-//! controller it closes the connection of a client that does not read.
+//! It knows the output variables of the manufacturer's guide with their types, so that clients of others connect to it. The
+//! time, the joint values and speeds, the robot mode and the safety state have meaningful values; all others are zero. A robot
+//! with fewer than six joints is padded with zeros, and of one with more the first six are reported. Like a real controller it
+//! closes the connection of a client that does not read.
 
+mod outputs;
 #[cfg(test)]
 mod tests;
 
 use std::time::Duration;
+
+use outputs::Kind;
 
 use super::fault::{FaultPlan, Planned, faults};
 use super::writes::Writes;
@@ -21,12 +25,20 @@ faults! {
     pub RtdeFault {
         Drip "drip" "Sends every byte in its own write. Occasion: a connection.",
         OldProtocol "old-protocol" "Refuses version 2 of the protocol. Occasion: a connection.",
-        NotFound "not-found" "Does not know the joint speeds. Occasion: setting up the outputs.",
-        InUse "in-use" "Reports that the joint speeds are in use. Occasion: setting up the outputs.",
-        WrongType "wrong-type" "Announces integers as the joint speeds. Occasion: setting up the outputs.",
+        NotFound "not-found" "Does not know the joint values. Occasion: setting up the outputs.",
+        NoSafetyStatus "no-safety-status" "Does not know the safety status, like PolyScope before 3.10 and 5.4. Occasion: setting up the outputs.",
+        NoModes "no-modes" "Knows neither robot mode nor safety mode nor safety status. Occasion: setting up the outputs.",
+        InUse "in-use" "Reports that the joint values are in use. Occasion: setting up the outputs.",
+        WrongType "wrong-type" "Announces integers as the joint values. Occasion: setting up the outputs.",
         StartRefused "start-refused" "Does not start the stream. Occasion: starting it.",
         TextFlood "text-flood" "Sends 1000 different messages before the data.",
         ProtectiveStop "protective-stop" "Reports a protective stop.",
+        Reduced "reduced" "Reports the reduced mode.",
+        Safeguard "safeguard" "Reports a safeguard stop: a person is in the cell.",
+        EnablingSwitch "enabling-switch" "Reports that the enabling switch is released.",
+        EncoderNoise "encoder-noise" "Adds noise of 17 to 29 µrad to each joint, as recorded from real encoders at rest.",
+        NoisySpeeds "noisy-speeds" "Reports joint speeds of ±0.0015 rad/s at rest.",
+        Dropout "dropout" "Reports zeros in place of the joint values.",
         PowerOff "power-off" "Reports that the power is off.",
         Moving "moving" "Reports that the first joint turns at 0.2 rad/s.",
         NotFinite "not-finite" "Reports a joint value that is not a number.",
@@ -49,32 +61,23 @@ const FLOOD: usize = 1000;
 /// Speed of the moving joint (rad/s).
 const SPEED: f64 = 0.2;
 
+/// Safety status of the reduced mode.
+const SAFETY_REDUCED: i32 = 2;
+
 /// Safety status of a protective stop.
 const SAFETY_PROTECTIVE_STOP: i32 = 3;
+
+/// Safety status of a safeguard stop.
+const SAFETY_SAFEGUARD: i32 = 5;
+
+/// Safety status while the enabling switch is released.
+const SAFETY_ENABLING_SWITCH: i32 = 13;
 
 /// Robot mode without power.
 const MODE_POWER_OFF: i32 = 3;
 
-/// Values that the controller provides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Field {
-    Timestamp,
-    ActualQ,
-    ActualQd,
-    RobotMode,
-    SafetyStatus,
-}
-
-impl Field {
-    /// Name, type and field of each value.
-    const ALL: [(&'static str, &'static str, Self); 5] = [
-        ("timestamp", "DOUBLE", Self::Timestamp),
-        ("actual_q", "VECTOR6D", Self::ActualQ),
-        ("actual_qd", "VECTOR6D", Self::ActualQd),
-        ("robot_mode", "INT32", Self::RobotMode),
-        ("safety_status", "INT32", Self::SafetyStatus),
-    ];
-}
+/// Standard deviation of each encoder at rest (rad), as recorded from two real controllers.
+const ENCODER_NOISE: [f64; 6] = [17e-6, 20e-6, 29e-6, 25e-6, 22e-6, 19e-6];
 
 /// Values of one data packet.
 #[derive(Clone, Copy, Debug)]
@@ -87,15 +90,17 @@ struct Report {
 }
 
 impl Report {
-    /// A value as bytes.
-    fn bytes(&self, field: Field) -> Vec<u8> {
+    /// An output variable as bytes.
+    fn bytes(&self, name: &str, kind: Kind) -> Vec<u8> {
         let numbers = |values: &[f64]| values.iter().flat_map(|value| value.to_be_bytes()).collect();
-        match field {
-            Field::Timestamp => numbers(&[self.time]),
-            Field::ActualQ => numbers(&self.positions),
-            Field::ActualQd => numbers(&self.speeds),
-            Field::RobotMode => self.robot_mode.to_be_bytes().to_vec(),
-            Field::SafetyStatus => self.safety_status.to_be_bytes().to_vec(),
+        match name {
+            "timestamp" => numbers(&[self.time]),
+            "actual_q" | "target_q" => numbers(&self.positions),
+            "actual_qd" => numbers(&self.speeds),
+            "robot_mode" => self.robot_mode.to_be_bytes().to_vec(),
+            "safety_status" | "safety_mode" => self.safety_status.to_be_bytes().to_vec(),
+            "speed_scaling" | "target_speed_fraction" => numbers(&[1.0]),
+            _ => vec![0; kind.size()],
         }
     }
 }
@@ -106,12 +111,15 @@ pub struct RtdeSimulator {
     faults: FaultPlan<RtdeFault>,
     framer: Framer,
     writes: Writes,
-    fields: Vec<Field>,
+    /// Names and types of the recipe.
+    fields: Vec<(String, Kind)>,
     interval: Duration,
     next_data: Option<Moment>,
     is_connected: bool,
     /// Angle by which a fault has turned the first joint (rad).
     travel: f64,
+    /// State of the sequence of noise.
+    noise: u64,
 }
 
 impl RtdeSimulator {
@@ -126,6 +134,7 @@ impl RtdeSimulator {
             next_data: None,
             is_connected: false,
             travel: 0.0,
+            noise: 1,
         }
     }
 
@@ -171,19 +180,23 @@ impl RtdeSimulator {
         let names = String::from_utf8_lossy(names);
         let mut fields = Vec::new();
         let mut types = Vec::new();
-        for name in names.split(',') {
-            let known = Field::ALL.iter().find(|(known, ..)| *known == name.trim());
-            fields.extend(known.map(|(.., field)| *field));
-            types.push(known.map_or("NOT_FOUND", |(_, kind, _)| *kind));
+        for name in names.split(',').map(str::trim) {
+            let kind = outputs::kind(name);
+            fields.extend(kind.map(|kind| (name.to_owned(), kind)));
+            types.push(kind.map_or("NOT_FOUND", Kind::name));
         }
-        for (fault, answer) in
-            [(RtdeFault::NotFound, "NOT_FOUND"), (RtdeFault::InUse, "IN_USE"), (RtdeFault::WrongType, "VECTOR6INT32")]
-        {
-            if self.faults.strikes(fault)
-                && let Some(speeds) = fields.iter().position(|field| *field == Field::ActualQd)
-                && let Some(kind) = types.get_mut(speeds)
-            {
-                *kind = answer;
+        const JOINTS: &[&str] = &["actual_q"];
+        const MODES: &[&str] = &["robot_mode", "safety_mode", "safety_status"];
+        for (fault, affected, answer) in [
+            (RtdeFault::NotFound, JOINTS, "NOT_FOUND"),
+            (RtdeFault::NoSafetyStatus, &["safety_status"], "NOT_FOUND"),
+            (RtdeFault::NoModes, MODES, "NOT_FOUND"),
+            (RtdeFault::InUse, JOINTS, "IN_USE"),
+            (RtdeFault::WrongType, JOINTS, "VECTOR6INT32"),
+        ] {
+            if self.faults.strikes(fault) {
+                let refused = names.split(',').zip(&mut types).filter(|(name, _)| affected.contains(&name.trim()));
+                refused.for_each(|(_, kind)| *kind = answer);
             }
         }
         let is_known = !types.iter().any(|kind| ["NOT_FOUND", "IN_USE"].contains(kind));
@@ -202,7 +215,7 @@ impl RtdeSimulator {
         let mut report = Report {
             time: now.as_secs_f64(),
             positions: six(&state.positions),
-            speeds: six(state.speeds.as_deref().unwrap_or_default()),
+            speeds: [0.0; 6],
             robot_mode: MODE_RUNNING,
             safety_status: if state.stopped.is_some() { SAFETY_PROTECTIVE_STOP } else { SAFETY_NORMAL },
         };
@@ -211,11 +224,29 @@ impl RtdeSimulator {
             report.speeds[0] = SPEED;
         }
         report.positions[0] += self.travel;
+        if self.faults.strikes(RtdeFault::EncoderNoise) {
+            for (position, sigma) in report.positions.iter_mut().zip(ENCODER_NOISE) {
+                *position += sigma * self.normal();
+            }
+        }
+        if self.faults.strikes(RtdeFault::NoisySpeeds) {
+            report.speeds = std::array::from_fn(|_| 0.0015 * self.normal().clamp(-1.0, 1.0));
+        }
+        if self.faults.strikes(RtdeFault::Dropout) {
+            report.positions = [0.0; 6];
+        }
         if self.faults.strikes(RtdeFault::NotFinite) {
             report.positions[5] = f64::NAN;
         }
-        if self.faults.strikes(RtdeFault::ProtectiveStop) {
-            report.safety_status = SAFETY_PROTECTIVE_STOP;
+        for (fault, status) in [
+            (RtdeFault::Reduced, SAFETY_REDUCED),
+            (RtdeFault::Safeguard, SAFETY_SAFEGUARD),
+            (RtdeFault::EnablingSwitch, SAFETY_ENABLING_SWITCH),
+            (RtdeFault::ProtectiveStop, SAFETY_PROTECTIVE_STOP),
+        ] {
+            if self.faults.strikes(fault) {
+                report.safety_status = status;
+            }
         }
         if self.faults.strikes(RtdeFault::PowerOff) {
             report.robot_mode = MODE_POWER_OFF;
@@ -223,11 +254,23 @@ impl RtdeSimulator {
         report
     }
 
+    /// Next number of a fixed sequence that is nearly standard normal: a sum of twelve even ones.
+    fn normal(&mut self) -> f64 {
+        let mut even = || {
+            // Marsaglia 2003.
+            self.noise ^= self.noise << 13;
+            self.noise ^= self.noise >> 7;
+            self.noise ^= self.noise << 17;
+            (self.noise >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| even()).sum::<f64>() - 6.0
+    }
+
     fn send_data(&mut self, source: &mut dyn PointSource, now: Moment) {
         let report = self.report(source, now);
         let recipe = if self.faults.strikes(RtdeFault::WrongRecipe) { RECIPE + 1 } else { RECIPE };
         let mut content = vec![recipe];
-        content.extend(self.fields.iter().flat_map(|field| report.bytes(*field)));
+        content.extend(self.fields.iter().flat_map(|(name, kind)| report.bytes(name, *kind)));
         if self.faults.strikes(RtdeFault::TextFlood) {
             (0..FLOOD).for_each(|number| self.send_text(&format!("message {number}")));
         }

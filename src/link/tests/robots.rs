@@ -50,6 +50,35 @@ fn a_robot_that_moves_while_it_is_measured_spoils_the_point() {
 }
 
 #[test]
+fn a_robot_with_a_person_in_the_cell_is_measured_and_its_state_is_kept() {
+    for (fault, words) in [
+        ("reduced@1x*", "robot: reduced (2)"),
+        ("safeguard@1x*", "robot: safeguard stop (5)"),
+        ("enabling-switch@1x*", "robot: enabling switch released (13)"),
+    ] {
+        let reading = bench(&[fault]).measure().unwrap();
+        assert_eq!(reading.remarks.iter().map(|remark| remark.text.as_str()).collect::<Vec<_>>(), [words]);
+    }
+}
+
+#[test]
+fn joint_angles_are_the_mean_of_all_packets_with_their_scatter() {
+    let mut bench = bench(&["encoder-noise@1x*", "noisy-speeds@1x*"]);
+    let stood = bench.stage.lock().joints.positions.clone();
+    let mut error: f64 = 0.0;
+    for _ in 0..3 {
+        let reading = bench.measure().unwrap();
+        let scatter = reading.joint_scatter.unwrap();
+        assert!(scatter.count >= 13, "{}", scatter.count);
+        assert!(scatter.sigma.iter().all(|sigma| (5e-6..60e-6).contains(sigma)), "{:?}", scatter.sigma);
+        let told = reading.configuration.unwrap();
+        error = told.iter().zip(&stood).map(|(told, stood)| (told - stood).abs()).fold(error, f64::max);
+    }
+    // Single packets are up to 100 µrad away.
+    assert!(error < 30e-6, "{error}");
+}
+
+#[test]
 fn a_protective_stop_is_said_at_once_and_nothing_is_measured() {
     let mut bench = bench(&[]);
     bench.measure().unwrap();
@@ -104,9 +133,9 @@ fn a_shot_that_is_asked_for_while_the_controller_is_away_is_refused_at_once() {
 #[test]
 fn what_is_wrong_with_the_controller_is_told_with_what_helps() {
     for (fault, part, hint) in [
-        ("old-protocol@1x*", "version 2 of the interface", "PolyScope 3.4"),
+        ("old-protocol@1x*", "version 2 of the interface, which PolyScope has from 3.4 on", "check the version"),
         ("in-use@1x*", "another program", "close the other program"),
-        ("not-found@1x*", "does not know", "PolyScope 3.4"),
+        ("not-found@1x*", "does not know", "check the version"),
     ] {
         let mut bench = Bench::with(WireProtocol::Emscon, &Endpoint::Loopback, &[], Some(&[fault]), None);
         let error = bench.wired.connect().unwrap_err();

@@ -243,6 +243,13 @@ pub struct MeasuredText {
     /// Pendant joint values that the robot reported, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reported_joints: Option<Vec<f64>>,
+    /// Standard deviation of a single reported value of each joint, where several were averaged. Not in journals of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reported_scatter: Option<Vec<f64>>,
+    /// Number of reported values that were averaged. Not in journals of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reported_count: Option<u32>,
     /// Measured point in the tracker frame, as the instrument or the operator gave it.
     pub xyz_mm: (f64, f64, f64),
     /// Factor of the coordinates: they fit only in the other unit that the measurement before was corrected to. Not in
@@ -263,6 +270,9 @@ pub struct MeasuredText {
     /// Predicted RMS position error at fresh poses, per σ, from this sample and all before it, once they determine the arm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_error_sigma: Option<f64>,
+    /// Remarks of the instrument and the robot. Not in journals of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     /// Findings of the checks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<FindingText>,

@@ -63,6 +63,8 @@ fn sample(number: u64) -> MeasuredText {
         target: 1,
         joints: vec![0.1 + 0.2, -1e-9, 180.0],
         reported_joints: Some(vec![f64::MIN_POSITIVE, f64::MAX, -0.0]),
+        reported_scatter: Some(vec![0.001, 0.0, 1e-9]),
+        reported_count: Some(75),
         xyz_mm: (1.0 / 3.0, -2_345.678_901, 1e-300),
         factor: Some(25.4),
         sigma_mm: Some(0.012),
@@ -71,6 +73,7 @@ fn sample(number: u64) -> MeasuredText {
         temperature_degc: Some(-3.5),
         seconds: 11.25,
         predicted_error_sigma: Some(0.71),
+        remarks: vec![TRICKY.to_owned(), "reduced (2)".to_owned()],
         findings: vec![
             FindingText {
                 about: number,
@@ -225,11 +228,14 @@ fn all_entries() -> Vec<Entry> {
     ];
     let bare = MeasuredText {
         reported_joints: None,
+        reported_scatter: None,
+        reported_count: None,
         factor: None,
         sigma_mm: None,
         scatter_mm: None,
         temperature_degc: None,
         predicted_error_sigma: None,
+        remarks: Vec::new(),
         findings: Vec::new(),
         ..sample(1)
     };

@@ -50,6 +50,8 @@ fn sample(number: u64, row: usize) -> Entry {
         target: 0,
         joints: vec![row as f64; 6],
         reported_joints: None,
+        reported_scatter: None,
+        reported_count: None,
         xyz_mm: (number as f64, 0.0, 0.0),
         factor: None,
         sigma_mm: None,
@@ -58,6 +60,7 @@ fn sample(number: u64, row: usize) -> Entry {
         temperature_degc: None,
         seconds: 10.0,
         predicted_error_sigma: None,
+        remarks: Vec::new(),
         findings: Vec::new(),
     })
 }

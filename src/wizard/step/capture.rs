@@ -126,6 +126,7 @@ impl CaptureStep {
         let number = cx.session.measurements + 1;
         let planned = &shown.planned;
         let reported = reading.configuration.as_deref().map(|values| to_edge(values, &robot.joint_types));
+        let scatter = reading.joint_scatter.as_ref();
         let noted = MeasuredText {
             number,
             row,
@@ -134,6 +135,8 @@ impl CaptureStep {
             target: 0,
             joints: to_edge(&planned.configuration, &robot.joint_types),
             reported_joints: reported,
+            reported_scatter: scatter.map(|scatter| to_edge(&scatter.sigma, &robot.joint_types)),
+            reported_count: scatter.map(|scatter| scatter.count),
             xyz_mm: to_xyz_mm(&reading.point, 9),
             factor: None,
             sigma_mm: reading.sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0).map(to_mm),
@@ -145,6 +148,7 @@ impl CaptureStep {
             temperature_degc: reading.temperature,
             seconds: reading.seconds,
             predicted_error_sigma: None,
+            remarks: reading.remarks.iter().map(|remark| remark.text.clone()).collect(),
             findings: Vec::new(),
         };
         let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
@@ -169,7 +173,8 @@ impl CaptureStep {
         }
         let mut noted = noted;
         checks::judge(cx, &mut noted);
-        let remark = not_as_planned(&noted, robot);
+        // Of two messages only the later one would stay on the screen, and a robot at another place matters more.
+        let remark = not_as_planned(&noted, robot).or_else(|| remarked(&noted.pose, reading));
         [Action::Write(vec![self.sample(noted, cx)])].into_iter().chain(remark.map(Action::Say)).collect()
     }
 
@@ -253,6 +258,17 @@ fn not_as_planned(noted: &MeasuredText, robot: &Robot) -> Option<Notice> {
         ))
         .hint("the joint values reported by the robot are used; the planned ones are kept for reference. Remeasure if this was unintended")
     })
+}
+
+/// The message about remarks of the instrument that the operator has to see.
+fn remarked(pose: &str, reading: &Reading) -> Option<Notice> {
+    let warnings: Vec<&str> =
+        reading.remarks.iter().filter(|remark| remark.is_warning).map(|remark| remark.text.as_str()).collect();
+    let notice = || {
+        Notice::attention(format!("pose {pose}: the instrument says: {}", warnings.join("; ")))
+            .hint("the point is kept with this remark; measure again if that may be better")
+    };
+    (!warnings.is_empty()).then(notice)
 }
 
 /// The entry of a reading that is refused.

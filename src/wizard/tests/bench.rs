@@ -112,6 +112,8 @@ pub(super) fn reading(request: &MeasureRequest) -> Reading {
         shots: request.shots,
         temperature: Some(21.5),
         configuration: None,
+        joint_scatter: None,
+        remarks: Vec::new(),
         seconds: 12.0,
     }
 }

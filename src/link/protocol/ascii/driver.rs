@@ -13,6 +13,7 @@ use super::super::Protocol;
 use super::super::ProtocolEvent;
 use super::super::Severity;
 use super::super::Shot;
+use super::super::Status;
 use super::super::error_streak::ErrorStreak;
 use super::super::lines::LineSplitter;
 use super::super::lines::MAX_LINE;
@@ -226,7 +227,7 @@ impl AsciiProtocol {
     fn finish(&mut self, shot: Shot) {
         self.capture = None;
         if self.is_repeat(&shot) {
-            return self.outbox.fail(Failure::repeated());
+            return self.outbox.fail(Failure::Repeated);
         }
         self.previous = Some(shot.point);
         self.outbox.push(ProtocolEvent::Shot(shot));
@@ -460,8 +461,8 @@ fn average(shots: &[Shot]) -> Shot {
     let scatter =
         (shots.iter().map(|shot| (shot.point - mean.point).norm_squared()).sum::<f64>() / (count - 1.0)).sqrt();
     mean.sigma = mean_square_root(shots);
-    let name = last.remark.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
-    mean.remark = Some(format!("{name}mean of {} lines, scatter {:.4} mm", shots.len(), scatter * 1e3));
+    let text = format!("mean of {} lines, scatter {:.4} mm", shots.len(), scatter * 1e3);
+    mean.remarks.push(Status { severity: Severity::Info, text });
     mean.raw = shots.iter().map(|shot| shot.raw.as_slice()).collect::<Vec<_>>().join(&b'\n');
     mean.raw.truncate(MAX_RAW);
     mean

@@ -4,7 +4,9 @@ use nalgebra::Point3;
 use regex::bytes::Regex;
 use thiserror::Error;
 
+use super::super::Severity;
 use super::super::Shot;
+use super::super::Status;
 use super::super::crc::crc16_arc;
 use super::super::crc::nmea_xor;
 use super::super::excerpt::excerpt;
@@ -228,7 +230,8 @@ impl<'line> Fields<'line> {
         shot.sigma = self.stated_sigma(options)?;
         shot.instrument_time =
             self.time.map(|text| time(text, options.decimal_sign)).transpose().map_err(Rejection::Garbled)?;
-        shot.remark = self.name.filter(|name| !name.is_empty()).map(excerpt);
+        let name = self.name.filter(|name| !name.is_empty()).map(excerpt);
+        shot.remarks.extend(name.map(|text| Status { severity: Severity::Info, text }));
         shot.raw = line.to_vec();
         Ok(shot)
     }

@@ -108,7 +108,7 @@ fn the_recommended_line_is_read_whole() {
     let Ok(ParsedLine::Point(shot)) = read(&Preset::Bridge.options(), line) else {
         panic!("{:?}", read(&Preset::Bridge.options(), line));
     };
-    assert_eq!(shot.remark.as_deref(), Some("A7"));
+    assert_eq!(shot.remarks.iter().map(|remark| remark.text.as_str()).collect::<Vec<_>>(), ["A7"]);
     assert_eq!(shot.sigma, Some([0.01, 0.02, 0.03].map(|sigma: f64| sigma * 1e-3)));
     assert_eq!(shot.instrument_time, Some(1_777_890_605.25));
     let invalid = line.replace(",0,2026", ",3,2026");
@@ -310,7 +310,7 @@ fn a_flood_of_lines_keeps_the_queues_short() {
 fn latin_1_names_do_not_spoil_a_line() {
     let parser = LineParser::new(Preset::NameXyz.options()).unwrap();
     match parser.read(b"Pr\xFCfpunkt,1,2,3") {
-        Ok(ParsedLine::Point(shot)) => assert_eq!(shot.remark.as_deref(), Some("Pr\u{fc}fpunkt")),
+        Ok(ParsedLine::Point(shot)) => assert!(shot.remarks.iter().any(|remark| remark.text == "Pr\u{fc}fpunkt"), "{shot:?}"),
         other => panic!("{other:?}"),
     }
 }

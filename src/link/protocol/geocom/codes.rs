@@ -16,6 +16,11 @@ pub(super) const fn is_busy(code: u32) -> bool {
     matches!(code, 13 | 25 | 786 | 1293)
 }
 
+/// Codes of a procedure that the instrument does not have.
+pub(super) const fn is_unknown(code: u32) -> bool {
+    matches!(code, 3080 | 3081)
+}
+
 /// Meaning of a code.
 pub const fn code_in_words(code: u32) -> &'static str {
     match code {
@@ -76,10 +81,10 @@ pub fn failure_of(code: u32) -> Failure {
     match code {
         770 | 818 | 1285 | 1288 | 1289 | 1292 | 1294 | 8704 | 8710 => Failure::NoTarget(text),
         22 | 776 | 1290 | 8708 | 8712 | 8716 => Failure::Unstable(text),
-        6 | 8 | 12 | 13 | 16 | 21 | 25 | 786 | 1293 | 3108 | 3109 => Failure::NotReady(text),
+        6 | 8 | 12 | 13 | 16 | 21 | 25 | 786 | 1293 | 3107..=3109 => Failure::NotReady(text),
         823 | 8711 => Failure::Unusable(text),
         1291 | 8714 | 3110 => Failure::Settings(text),
-        3074..=3107 => Failure::Garbled(text),
+        3074..=3078 | 3093..=3106 => Failure::Garbled(text),
         _ => Failure::Refused(text),
     }
 }

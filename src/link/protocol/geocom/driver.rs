@@ -14,6 +14,7 @@ use super::super::ProtocolEvent;
 use super::super::Reflector;
 use super::super::Severity;
 use super::super::Shot;
+use super::super::Status;
 use super::super::excerpt::excerpt;
 use super::super::outbox::Outbox;
 use super::codes::ACCURACY_NOT_GUARANTEED;
@@ -41,6 +42,24 @@ const ORDINARY: Duration = Duration::from_secs(15);
 /// Idle time after which a keep-alive request is sent.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
+/// Decimals that are requested; instruments round to this number and never send trailing zeros.
+const DECIMALS: u32 = 15;
+
+/// Fewest decimals of which a point is made: 1 µrad and 1 µm.
+const FEWEST_DECIMALS: usize = 6;
+
+/// Remote procedure that reads all corrections of a distance: the total (ppm) and the prism constant (m).
+const CORRECTIONS: u32 = 2126;
+
+/// Largest difference between the total correction and that for the air (ppm).
+const SCALE_TOLERANCE: f64 = 0.5;
+
+/// Corrections that the air can need, from the hottest to the highest place (ppm).
+const POSSIBLE_AIR: std::ops::RangeInclusive<f64> = -70.0..=150.0;
+
+/// Corrections above this are far from the standard atmosphere of the instruments (ppm).
+const SUSPICIOUS_AIR: f64 = 25.0;
+
 /// Note on the accuracy of total stations.
 const ACCURACY: &str = "total stations measure to about 0.5 to 1 mm per point: good for a coarse placement of the base, \
                         not for a full calibration (see the data sheet)";
@@ -56,6 +75,8 @@ pub struct GeocomProtocol {
     outbox: Outbox,
     phase: Phase,
     set_up: SetUpResult,
+    /// Corrections of the distance at the set-up, if the instrument reports them.
+    corrections: Option<Corrections>,
     previous: Option<Point3<f64>>,
 }
 
@@ -96,8 +117,33 @@ struct SetUpResult {
     name: Option<String>,
     release: Option<String>,
     reflector: Option<Reflector>,
+    /// Correction for the air (ppm).
+    air: Option<f64>,
+    corrections: Option<Corrections>,
     checked: Vec<String>,
     warnings: Vec<String>,
+}
+
+/// What the instrument adds to a measured distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Corrections {
+    /// All that is proportional to the distance, for the air and geometric (ppm).
+    total: f64,
+    /// Prism constant (m).
+    prism: f64,
+}
+
+impl Corrections {
+    fn from_parameters(parameters: &[String]) -> Option<Self> {
+        let number = |index: usize| parameters.get(index)?.trim().parse().ok().filter(|value: &f64| value.is_finite());
+        Some(Self { total: number(0)?, prism: number(1)? })
+    }
+}
+
+impl std::fmt::Display for Corrections {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.2} ppm and {:.2} mm", self.total, self.prism * 1e3)
+    }
 }
 
 impl GeocomProtocol {
@@ -106,7 +152,7 @@ impl GeocomProtocol {
         options.validate()?;
         let exchange = Exchange::new(options.checksum);
         let outbox = Outbox::default();
-        Ok(Self { options, exchange, outbox, phase: Phase::Closed, set_up: SetUpResult::default(), previous: None })
+        Ok(Self { options, exchange, outbox, phase: Phase::Closed, set_up: SetUpResult::default(), corrections: None, previous: None })
     }
 
     /// Bytes of an incomplete line.
@@ -188,7 +234,11 @@ impl GeocomProtocol {
         }
         steps.pop();
         if steps.is_empty() {
+            if let Err(failure) = self.set_up.judge_corrections() {
+                return self.lose(failure);
+            }
             self.phase = Phase::Idle { since: now };
+            self.corrections = self.set_up.corrections;
             let identity = std::mem::take(&mut self.set_up).identity();
             return self.outbox.push(ProtocolEvent::Ready(identity));
         }
@@ -197,14 +247,19 @@ impl GeocomProtocol {
     }
 
     fn measure(&mut self, now: Moment) {
-        self.phase = Phase::Measuring { steps: measurement(&self.options) };
+        let mut steps = measurement(&self.options);
+        if self.corrections.is_some() {
+            // Nothing reports that the corrections were changed at the instrument.
+            steps.push(ordinary(CORRECTIONS, String::new(), "reading the corrections of the distance"));
+        }
+        self.phase = Phase::Measuring { steps };
         self.make_step(now);
     }
 
     fn handle_measured(&mut self, outcome: Outcome, mut steps: Vec<Call>, now: Moment) {
         let limit = Duration::from_secs_f64(self.options.timeout_s);
-        let reply = match outcome {
-            Outcome::Reply(_, reply) => reply,
+        let (call, reply) = match outcome {
+            Outcome::Reply(call, reply) => (call, reply),
             Outcome::Busy(_) => {
                 self.phase = Phase::Idle { since: now };
                 return self.outbox.fail(failure_of_outcome(&outcome, limit));
@@ -215,29 +270,58 @@ impl GeocomProtocol {
             }
         };
         steps.pop();
+        if call.rpc == CORRECTIONS
+            && let Err(failure) = self.check_corrections(&reply)
+        {
+            // The set-up judges the new corrections.
+            return self.lose(failure);
+        }
         if reply.code == OK && !steps.is_empty() {
             self.phase = Phase::Measuring { steps };
             return self.make_step(now);
         }
         self.phase = Phase::Idle { since: now };
         let answer = if steps.is_empty() { self.shot(&reply) } else { Err(failure_of(reply.code)) };
-        self.outbox.push(answer.map_or_else(ProtocolEvent::Failed, ProtocolEvent::Shot));
+        match answer {
+            Ok(shot) => self.outbox.push(ProtocolEvent::Shot(shot)),
+            // Another program has changed a setting of the set-up, which sets it again.
+            Err(failure @ Failure::Settings(_)) if reply.code == OK => self.lose(failure),
+            Err(failure) => self.outbox.fail(failure),
+        }
+    }
+
+    /// Compares the corrections with those of the set-up.
+    fn check_corrections(&self, reply: &Reply) -> Result<(), Failure> {
+        let now = Corrections::from_parameters(&reply.parameters).filter(|_| reply.code == OK);
+        match (self.corrections, now) {
+            (Some(before), Some(now)) if before != now => Err(Failure::Settings(format!(
+                "the corrections of the distance were {before} at the set-up and are {now} now"
+            ))),
+            (_, Some(_)) => Ok(()),
+            (_, None) => Err(failure_of(reply.code)),
+        }
     }
 
     fn shot(&mut self, reply: &Reply) -> Result<Shot, Failure> {
         let remark = match reply.code {
+            OK if reply.parameters.is_empty() => {
+                return Err(Failure::Unusable("it reports success but sends no values".to_owned()));
+            }
             OK => None,
-            NO_FULL_CORRECTION | ACCURACY_NOT_GUARANTEED => Some(code_in_words(reply.code).to_owned()),
+            NO_FULL_CORRECTION | ACCURACY_NOT_GUARANTEED => {
+                Some(format!("{} (code {})", code_in_words(reply.code), reply.code))
+            }
             // The numbers that follow an error may belong to an earlier measurement.
             code => return Err(failure_of(code)),
         };
         let (point, face) = point_from_polar(&reply.parameters)?;
         if self.previous == Some(point) {
-            return Err(Failure::repeated());
+            return Err(Failure::Repeated);
         }
         self.previous = Some(point);
         let raw = format!("{},{}", reply.code, reply.parameters.join(",")).into_bytes();
-        Ok(Shot { face: Some(face), remark, raw, ..Shot::bare(point) })
+        let remarks = remark.into_iter().map(|text| Status { severity: Severity::Warning, text }).collect();
+        Ok(Shot { face: Some(face), remarks, raw, ..Shot::bare(point) })
     }
 
     fn lose(&mut self, failure: Failure) {
@@ -260,9 +344,23 @@ fn point_from_polar(parameters: &[String]) -> Result<(Point3<f64>, u8), Failure>
     if !(distance > 0.0 && distance < 1e5) {
         return Err(Failure::Unusable(format!("the distance is {distance} m")));
     }
+    let digits = parameters.iter().take(3).filter_map(|text| decimals(text)).max().unwrap_or(0);
+    if digits < FEWEST_DECIMALS {
+        let text = format!("it sends only {digits} decimals, so that points are rounded; another program has set that");
+        return Err(Failure::Settings(text));
+    }
     let face = if zenith.rem_euclid(TAU) > PI { 2 } else { 1 };
     let (east, north) = (zenith.sin() * horizontal.sin(), zenith.sin() * horizontal.cos());
     Ok((Point3::new(east * distance, north * distance, zenith.cos() * distance), face))
+}
+
+/// Number of decimals of a number; an exponent carries its own precision. `None` without a decimal point.
+fn decimals(text: &str) -> Option<usize> {
+    let text = text.trim();
+    if text.contains(['e', 'E']) {
+        return Some(usize::MAX);
+    }
+    text.split_once('.').map(|(_, digits)| digits.len())
 }
 
 fn failure_of_outcome(outcome: &Outcome, limit: Duration) -> Failure {
@@ -271,6 +369,11 @@ fn failure_of_outcome(outcome: &Outcome, limit: Duration) -> Failure {
         Outcome::TimedOut(call) => Failure::Silent { what: call.what.to_owned(), seconds: limit.as_secs_f64() },
         Outcome::Busy(code) | Outcome::Damaged(Damage::Code(code)) => failure_of(*code),
         Outcome::Damaged(Damage::Line(text)) => Failure::Garbled(text.clone()),
+        Outcome::Damaged(Damage::Unnumbered) => Failure::Refused(
+            "it answers without the number of the request, so that a late answer could not be told from a new one; a newer \
+             version of its software is needed"
+                .to_owned(),
+        ),
     }
 }
 
@@ -290,6 +393,9 @@ fn set_up_calls(options: &GeocomOptions) -> Vec<Call> {
         plain(5003, "asking for the serial number"),
         plain(5004, "asking for the name"),
         plain(110, "asking for the version"),
+        // First of all settings: the others are read with this number of decimals.
+        ordinary(107, DECIMALS.to_string(), "setting the number of decimals"),
+        plain(108, "reading the number of decimals"),
     ];
     if let Some(is_on) = options.target_recognition {
         steps.push(ordinary(18005, u8::from(is_on).to_string(), "setting the target recognition"));
@@ -302,6 +408,8 @@ fn set_up_calls(options: &GeocomOptions) -> Vec<Call> {
         steps.push(ordinary(2024, format!("{:.7}", constant * 1e-3), "setting the prism constant"));
     }
     steps.push(plain(2023, "reading the prism constant"));
+    steps.push(plain(2151, "reading the correction for the air"));
+    steps.push(plain(CORRECTIONS, "reading the corrections of the distance"));
     steps.push(plain(2026, "reading the face"));
     steps.reverse();
     steps
@@ -327,6 +435,10 @@ fn measurement(options: &GeocomOptions) -> Vec<Call> {
 impl SetUpResult {
     fn record(&mut self, call: &Call, reply: &Reply, options: &GeocomOptions) -> Result<(), Failure> {
         let is_write = matches!(call.rpc, 2020 | 2024 | 18005);
+        if reply.code != OK && matches!(call.rpc, 107 | 2151 | CORRECTIONS) {
+            // Older instruments have none of these; what is missing is judged at the end.
+            return Ok(());
+        }
         if reply.code != OK {
             let text = format!("{} failed: {} (code {})", call.what, code_in_words(reply.code), reply.code);
             if is_write {
@@ -343,6 +455,9 @@ impl SetUpResult {
             18005 => {
                 self.checked.push(format!("target recognition: {}", if call.parameters == "1" { "on" } else { "off" }));
             }
+            108 => return self.record_decimals(&first),
+            2151 => self.air = first.parse().ok().filter(|air: &f64| air.is_finite()),
+            CORRECTIONS => self.corrections = Corrections::from_parameters(&reply.parameters),
             2021 => return self.record_edm_mode(&first, options),
             2023 => return self.record_prism(&first, options),
             2026 => self.checked.push(format!("face: {}", if first == "1" { 2 } else { 1 })),
@@ -359,6 +474,40 @@ impl SetUpResult {
             Some(text) if was_set => Err(Failure::Settings(text.clone())),
             _ => Ok(()),
         }
+    }
+
+    fn record_decimals(&mut self, text: &str) -> Result<(), Failure> {
+        let Ok(decimals) = text.parse::<usize>() else {
+            return Err(Failure::Garbled(format!("`{text}` is not a number of decimals")));
+        };
+        if decimals < FEWEST_DECIMALS {
+            return Err(Failure::Settings(format!("it sends only {decimals} decimals and does not accept {DECIMALS}")));
+        }
+        self.checked.push(format!("decimals: {decimals} (read back)"));
+        Ok(())
+    }
+
+    /// Refuses a scale, as of a map projection: it belongs to a survey and not to the distances of a robot. What corrects for the
+    /// air is right.
+    fn judge_corrections(&mut self) -> Result<(), Failure> {
+        let Some(corrections) = self.corrections else {
+            self.warnings.push("the instrument does not report its corrections: make sure at the instrument that no scale, map projection or ppm is set".to_owned());
+            return Ok(());
+        };
+        let scaled = |ppm: f64| Err(Failure::Scaled(1.0 + ppm * 1e-6));
+        match self.air {
+            Some(air) if (corrections.total - air).abs() > SCALE_TOLERANCE => return scaled(corrections.total - air),
+            Some(_) => {}
+            None if !POSSIBLE_AIR.contains(&corrections.total) => return scaled(corrections.total),
+            None if corrections.total.abs() > SUSPICIOUS_AIR => self.warnings.push(format!(
+                "distances are corrected by {:.1} ppm in all, and the instrument does not report how much of it is for the air: \
+                 make sure that no scale or map projection is set",
+                corrections.total
+            )),
+            None => {}
+        }
+        self.checked.push(format!("correction of distances: {:.2} ppm for the air, no scale", corrections.total));
+        Ok(())
     }
 
     fn record_edm_mode(&mut self, text: &str, options: &GeocomOptions) -> Result<(), Failure> {

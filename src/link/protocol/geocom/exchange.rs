@@ -12,6 +12,7 @@ use super::super::lines::Piece;
 use super::super::outbox::Outbox;
 use super::codes::SLEEPING;
 use super::codes::is_busy;
+use super::codes::is_unknown;
 use super::wire::Reply;
 use super::wire::Request;
 use super::wire::decode_reply;
@@ -57,6 +58,8 @@ pub(super) enum Damage {
     Code(u32),
     /// The answer cannot be read.
     Line(String),
+    /// The answer has no transaction number, so that it could belong to any request.
+    Unnumbered,
 }
 
 #[derive(Debug)]
@@ -68,6 +71,8 @@ struct Pending {
     retry_at: Option<Moment>,
     backoff: Backoff,
     resends: u32,
+    /// Whether an answer without a transaction number has arrived.
+    has_unnumbered: bool,
 }
 
 /// Requests and answers on the line to the instrument.
@@ -116,6 +121,7 @@ impl Exchange {
             retry_at: None,
             backoff: Backoff::default(),
             resends: 0,
+            has_unnumbered: false,
         });
         self.send(now, outbox);
     }
@@ -172,6 +178,7 @@ impl Exchange {
         // An instrument that could not read the request cannot repeat its number.
         let is_unnumbered_error = reply.transport != 0 && reply.transaction == 0;
         let is_expected = |number| number == reply.transaction || is_unnumbered_error;
+        pending.has_unnumbered |= reply.transaction == 0;
         if !pending.transaction.is_some_and(is_expected) {
             outbox.report(Severity::Info, format!("discarded a late or foreign answer (number {})", reply.transaction));
             return None;
@@ -179,6 +186,11 @@ impl Exchange {
         pending.transaction = None;
         if reply.transport == SLEEPING {
             return self.back_off(SLEEPING, now);
+        }
+        if is_unknown(reply.transport) {
+            // Asking again cannot help; the caller decides what the missing procedure means.
+            let reply = Reply { code: reply.transport, parameters: Vec::new(), ..reply };
+            return self.pending.take().map(|pending| Outcome::Reply(pending.call, reply));
         }
         if reply.transport != 0 {
             self.is_dirty = true;
@@ -232,7 +244,13 @@ impl Exchange {
             Some(at) if at <= now => self.send(now, outbox),
             None if pending.deadline <= now => {
                 self.is_dirty = true;
-                return self.pending.take().map(|pending| Outcome::TimedOut(pending.call));
+                return self.pending.take().map(|pending| {
+                    if pending.has_unnumbered {
+                        Outcome::Damaged(Damage::Unnumbered)
+                    } else {
+                        Outcome::TimedOut(pending.call)
+                    }
+                });
             }
             _ => {}
         }

@@ -88,7 +88,7 @@ fn ready(options: &GeocomOptions) -> GeocomProtocol {
     let mut protocol = GeocomProtocol::new(options.clone()).unwrap();
     protocol.start(Duration::ZERO);
     while let Some(bytes) = protocol.next_output() {
-        answer(&mut protocol, &bytes, "0,0.0");
+        answer(&mut protocol, &bytes, "0,15");
     }
     assert!(matches!(protocol.next_event(), Some(ProtocolEvent::Ready(_))));
     protocol
@@ -159,7 +159,7 @@ fn what_the_instrument_says_is_shown_without_control_characters_and_short() {
         let is_name = ["%R1Q,5003,", "%R1Q,5004,", "%R1Q,110,", "%R1Q,2021,"]
             .iter()
             .any(|name| bytes.windows(name.len()).any(|window| window == name.as_bytes()));
-        answer(&mut protocol, &bytes, if is_name { &nasty } else { "0,0.0" });
+        answer(&mut protocol, &bytes, if is_name { &nasty } else { "0,15" });
     }
     let Some(ProtocolEvent::Ready(identity)) = protocol.next_event() else { panic!("not ready") };
     let Some(ProtocolEvent::Failed(failure)) = measured(&format!("0,\u{1b}[2J,{},1,2", "9".repeat(1000))) else {

@@ -112,19 +112,26 @@ fn decimal(text: &str) -> Option<u32> {
         .then(|| text.parse().ok())?
 }
 
-/// Splits at commas outside double quotes, and removes the quotes.
+/// Splits at commas outside double quotes, and removes the quotes. A backslash keeps the quote behind it.
 fn split_parameters(text: &str) -> Vec<String> {
     let mut parameters = vec![String::new()];
     let mut is_quoted = false;
-    for character in text.chars() {
-        match character {
-            '"' => is_quoted = !is_quoted,
-            ',' if !is_quoted => parameters.push(String::new()),
-            _ => {
-                if let Some(last) = parameters.last_mut() {
-                    last.push(character);
-                }
+    let mut characters = text.chars().peekable();
+    while let Some(character) = characters.next() {
+        let kept = match character {
+            '"' => {
+                is_quoted = !is_quoted;
+                None
             }
+            ',' if !is_quoted => {
+                parameters.push(String::new());
+                None
+            }
+            '\\' => characters.next_if_eq(&'"').or(Some('\\')),
+            other => Some(other),
+        };
+        if let Some(last) = parameters.last_mut() {
+            last.extend(kept);
         }
     }
     parameters

@@ -8,6 +8,7 @@ use super::super::Failure;
 use super::super::Moment;
 use super::super::Protocol;
 use super::super::ProtocolEvent;
+use super::super::LineChange;
 use super::super::Severity;
 use super::super::Shot;
 use super::super::error_streak::ErrorStreak;
@@ -15,11 +16,14 @@ use super::super::excerpt::excerpt;
 use super::super::outbox::Outbox;
 use super::codes::BAD_CRC;
 use super::codes::failure_of_error;
+use super::line::LineStep;
+use super::line::SerialLine;
 use super::options::NdiOptions;
 use super::options::ReplyFormat;
 use super::set_up::NextStep;
 use super::set_up::SetUp;
 use super::set_up::SetUpStep;
+use super::tools::Positions;
 use super::tools::Tool;
 use super::tools::ToolState;
 use super::tools::decode_bx;
@@ -55,6 +59,9 @@ pub struct NdiProtocol {
     decoder: FrameDecoder,
     outbox: Outbox,
     phase: Phase,
+    /// The serial line, if it is one.
+    line: Option<SerialLine>,
+    line_change: Option<LineChange>,
     set_up: SetUp,
     handle: u8,
     /// The command that was sent or is scheduled.
@@ -68,6 +75,8 @@ pub struct NdiProtocol {
 #[derive(Debug)]
 enum Phase {
     Closed,
+    /// Finding the speed of the serial line.
+    Line(LineStep),
     SetUp(SetUpStep),
     /// Reading live positions.
     Idle,
@@ -85,6 +94,8 @@ struct Pending {
     is_sent: bool,
     /// When it must be sent, or when its answer is overdue.
     at: Moment,
+    /// Time limit of the answer.
+    limit: Duration,
     resends: u32,
     is_damaged: bool,
 }
@@ -100,6 +111,8 @@ impl NdiProtocol {
             decoder: FrameDecoder::default(),
             outbox: Outbox::default(),
             phase: Phase::Closed,
+            line: None,
+            line_change: None,
             set_up: SetUp::default(),
             handle: 0,
             pending: None,
@@ -109,13 +122,20 @@ impl NdiProtocol {
         })
     }
 
+    /// Uses a serial line whose speed is set to this one (baud), whatever speed the instrument has now.
+    #[must_use]
+    pub const fn on_serial_line(mut self, speed: u32) -> Self {
+        self.line = Some(SerialLine::new(speed));
+        self
+    }
+
     /// Bytes of an incomplete message.
     pub const fn pending(&self) -> usize {
         self.decoder.pending()
     }
 
     fn ask_at(&mut self, command: String, at: Moment) {
-        self.pending = Some(Pending { command, is_sent: false, at, resends: 0, is_damaged: false });
+        self.pending = Some(Pending { command, is_sent: false, at, limit: self.timeout, resends: 0, is_damaged: false });
     }
 
     fn ask(&mut self, command: String, now: Moment) {
@@ -129,7 +149,12 @@ impl NdiProtocol {
                 self.decoder.resync();
             }
             pending.is_sent = true;
-            pending.at = now + self.timeout;
+            let slow = match &self.phase {
+                Phase::SetUp(step) => step.slowest(),
+                Phase::Closed | Phase::Line(_) | Phase::Idle | Phase::Shot { .. } => Duration::ZERO,
+            };
+            pending.limit = self.timeout.max(slow);
+            pending.at = now + pending.limit;
             self.outbox.send(encode_text(&pending.command));
         }
     }
@@ -146,7 +171,8 @@ impl NdiProtocol {
             return self.damaged(text, now);
         }
         self.errors.reset();
-        if frame == Frame::Text("RESET".to_owned()) && !matches!(self.phase, Phase::Closed) {
+        let is_reset = frame == Frame::Text("RESET".to_owned());
+        if is_reset && !matches!(self.phase, Phase::Closed | Phase::Line(_)) {
             return self.lose(Failure::Disconnected("the instrument was reset or switched off and on".to_owned()));
         }
         if frame == Frame::Text(format!("ERROR{BAD_CRC:02X}")) && self.send_again(now) {
@@ -168,6 +194,8 @@ impl NdiProtocol {
         }
         match (std::mem::replace(&mut self.phase, Phase::Closed), error) {
             (Phase::Closed, _) => {}
+            // Even an error shows that the speed is right.
+            (Phase::Line(step), _) => self.next_line_step(self.line.map(|line| line.answered(step)), now),
             (Phase::SetUp(step), Some(code)) if !step.is_optional() => self.lose(failure_of_error(code)),
             (Phase::SetUp(step), error) => self.next_step(step, frame, error.is_some(), now),
             (Phase::Idle, _) => {
@@ -180,6 +208,37 @@ impl NdiProtocol {
                 self.check_for_new_frame(frame, now);
             }
         }
+    }
+
+    /// Does the next step on the serial line; without one, the set-up begins.
+    fn next_line_step(&mut self, next: Option<Option<LineStep>>, now: Moment) {
+        let Some(line) = self.line else { return self.begin_set_up(now) };
+        let Some(step) = next.flatten() else {
+            // Whatever the speed was, from now on it is the one that was asked for.
+            self.line_change = Some(LineChange::Speed(line.speed()));
+            self.phase = Phase::SetUp(SetUpStep::Initialise);
+            return self.ask_at(SetUpStep::Initialise.command(), now + DRAIN);
+        };
+        self.line_change = line.change_before(step);
+        self.phase = Phase::Line(step);
+        match line.command(step) {
+            Some(command) => self.ask_at(command, now + DRAIN),
+            None => {
+                // After a break the instrument reports its reset without a command.
+                let limit = LineStep::RESET_LIMIT;
+                self.ask_at(String::new(), now + limit);
+                if let Some(pending) = &mut self.pending {
+                    (pending.is_sent, pending.limit, pending.resends) = (true, limit, MAX_RESENDS);
+                }
+            }
+        }
+    }
+
+    fn begin_set_up(&mut self, now: Moment) {
+        let first = SetUpStep::Initialise;
+        let command = first.command();
+        self.phase = Phase::SetUp(first);
+        self.ask(command, now);
     }
 
     fn next_step(&mut self, step: SetUpStep, frame: &Frame, is_error: bool, now: Moment) {
@@ -211,16 +270,16 @@ impl NdiProtocol {
     }
 
     fn live(&mut self, frame: &Frame) {
-        if let Ok(tool) = self.tool(frame)
-            && let Ok(shot) = self.shot(&tool, frame)
+        if let Ok((tool, positions)) = self.tool(frame)
+            && let Ok(shot) = self.shot(&tool, &positions, frame)
         {
             self.outbox.push(ProtocolEvent::Live(shot));
         }
     }
 
     fn check_for_new_frame(&mut self, frame: &Frame, now: Moment) {
-        let tool = match self.tool(frame) {
-            Ok(tool) => tool,
+        let (tool, positions) = match self.tool(frame) {
+            Ok(found) => found,
             Err(failure) => return self.fail(failure, now),
         };
         let Phase::Shot { deadline, to_skip, frame_at_trigger } = &mut self.phase else {
@@ -236,7 +295,7 @@ impl NdiProtocol {
             let is_new = tool.frame != reference && tool.frame.wrapping_sub(reference) < u32::MAX / 2;
             let has_no_frame = matches!(tool.state, ToolState::Disabled | ToolState::Unoccupied);
             if is_new || has_no_frame {
-                let answer = self.shot(&tool, frame);
+                let answer = self.shot(&tool, &positions, frame);
                 self.rest(now);
                 return self.outbox.push(answer.map_or_else(ProtocolEvent::Failed, ProtocolEvent::Shot));
             }
@@ -247,21 +306,29 @@ impl NdiProtocol {
         self.ask_at(self.position_command(), now + POLL);
     }
 
-    fn tool(&self, frame: &Frame) -> Result<Tool, Failure> {
-        let tools = match frame {
+    /// The chosen tool, and all that came with it.
+    fn tool(&self, frame: &Frame) -> Result<(Tool, Positions), Failure> {
+        let positions = match frame {
             Frame::Text(text) => decode_tx(text),
             Frame::Binary(body) => decode_bx(body),
             Frame::Damaged(text) => Err(text.clone()),
         };
-        let tools = tools.map_err(Failure::Garbled)?;
-        let mine = tools.into_iter().find(|tool| tool.handle == self.handle);
-        mine.ok_or_else(|| Failure::Settings(format!("tool {:02X} is not in the reply", self.handle)))
+        let positions = positions.map_err(Failure::Garbled)?;
+        let mine = positions.tools.iter().find(|tool| tool.handle == self.handle).cloned();
+        let mine = mine.ok_or_else(|| Failure::Settings(format!("tool {:02X} is not in the reply", self.handle)))?;
+        Ok((mine, positions))
     }
 
-    fn shot(&self, tool: &Tool, frame: &Frame) -> Result<Shot, Failure> {
+    fn shot(&self, tool: &Tool, positions: &Positions, frame: &Frame) -> Result<Shot, Failure> {
         let handle = tool.handle;
+        if positions.has_failed() {
+            return Err(Failure::Refused("it reports a failure of its hardware".to_owned()));
+        }
         let (quaternion, origin, error) = match &tool.state {
             ToolState::Seen { quaternion, origin, error } => (*quaternion, *origin, *error),
+            ToolState::Missing if tool.is_out_of_volume() => {
+                return Err(Failure::NoTarget(format!("tool {handle:02X} is outside the measurement volume")));
+            }
             ToolState::Missing => return Err(Failure::NoTarget(format!("tool {handle:02X} is not seen"))),
             ToolState::Disabled => return Err(Failure::Settings(format!("tool {handle:02X} is disabled"))),
             ToolState::Unoccupied => return Err(Failure::NoTarget(format!("no tool at port {handle:02X}"))),
@@ -273,8 +340,10 @@ impl NdiProtocol {
             Frame::Binary(body) => body.clone(),
             Frame::Damaged(_) => Vec::new(),
         };
-        let remark = Some(format!("frame {}, marker fit {:.4} mm", tool.frame, error * 1e3));
-        Ok(Shot { remark, raw, ..Shot::bare(point) })
+        let shot = Shot { sequence: Some(tool.frame), raw, ..Shot::bare(point) };
+        let shot = shot.with_remark(Severity::Info, format!("marker fit {:.4} mm", error * 1e3));
+        let flags = tool.flags().chain(positions.flags());
+        Ok(flags.fold(shot, |shot, flag| shot.with_remark(Severity::Warning, flag)))
     }
 
     fn damaged(&mut self, text: String, now: Moment) {
@@ -313,6 +382,17 @@ impl NdiProtocol {
         self.unanswered = self.unanswered.saturating_add(1);
         match self.phase {
             Phase::Closed => {}
+            Phase::Line(step) => match self.line.and_then(|line| line.unanswered(step)) {
+                Some(next) => {
+                    self.decoder.resync();
+                    self.owed = 0;
+                    self.next_line_step(Some(Some(next)), now);
+                }
+                None => {
+                    self.line_change = self.line.map(|line| LineChange::Speed(line.speed()));
+                    self.lose(failure);
+                }
+            },
             Phase::SetUp(_) => self.lose(failure),
             Phase::Idle if self.unanswered >= MAX_UNANSWERED => self.lose(failure),
             Phase::Idle => {
@@ -346,12 +426,13 @@ impl NdiProtocol {
 
     fn time_out(&mut self, now: Moment) {
         let what = match &self.phase {
+            Phase::Line(_) => "trying the speeds of the serial line".to_owned(),
             Phase::SetUp(step) => format!("waiting for the answer to {}", step.command()),
             _ => "waiting for a position".to_owned(),
         };
-        self.pending = None;
+        let limit = self.pending.take().map_or(self.timeout, |pending| pending.limit);
         self.owed = (self.owed + 1).min(MAX_OWED);
-        self.give_up(Failure::Silent { what, seconds: self.timeout.as_secs_f64() }, now);
+        self.give_up(Failure::Silent { what, seconds: limit.as_secs_f64() }, now);
     }
 }
 
@@ -371,10 +452,11 @@ impl Protocol for NdiProtocol {
         self.owed = 0;
         self.unanswered = 0;
         self.errors.reset();
-        let first = SetUpStep::Initialise;
-        let command = first.command();
-        self.phase = Phase::SetUp(first);
-        self.ask(command, now);
+        self.pending = None;
+        self.line_change = None;
+        // A short question first: the set-up allows more time than a device that is not a tracker should cost.
+        self.phase = Phase::Line(LineStep::AtSpeed);
+        self.ask(LineStep::PROBE.to_owned(), now);
     }
 
     fn feed(&mut self, bytes: &[u8], now: Moment) {
@@ -422,6 +504,10 @@ impl Protocol for NdiProtocol {
 
     fn next_output(&mut self) -> Option<Vec<u8>> {
         self.outbox.next_output()
+    }
+
+    fn next_line_change(&mut self) -> Option<LineChange> {
+        self.line_change.take()
     }
 
     fn next_event(&mut self) -> Option<ProtocolEvent> {

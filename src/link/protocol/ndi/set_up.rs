@@ -1,18 +1,33 @@
 //! The set-up: from a new connection to tracking.
 
+use std::time::Duration;
+
 use super::super::Failure;
 use super::super::Identity;
 use super::super::excerpt::excerpt;
 use super::options::NdiOptions;
 use super::options::ReplyFormat;
 
+/// Most rounds in which tools are looked for.
+const MOST_ROUNDS: u32 = 4;
+
 /// Steps of the set-up, in order.
 #[derive(Clone, Debug)]
 pub(super) enum SetUpStep {
     Initialise,
     Version,
-    FindTools,
-    InitialiseTool(u8, Vec<u8>),
+    /// Lists the handles that other programs have left.
+    FindStale,
+    FreeHandle(u8, Vec<u8>),
+    FindTools {
+        /// Number of earlier rounds: a tool with two faces shows its second only after the first was initialised.
+        round: u32,
+    },
+    InitialiseTool {
+        handle: u8,
+        left: Vec<u8>,
+        round: u32,
+    },
     FindInitialised,
     EnableTool(u8, Vec<u8>),
     StartTracking,
@@ -37,8 +52,10 @@ impl SetUpStep {
         match self {
             Self::Initialise => "INIT:".to_owned(),
             Self::Version => "APIREV:".to_owned(),
-            Self::FindTools => "PHSR:02".to_owned(),
-            Self::InitialiseTool(handle, _) => format!("PINIT:{handle:02X}"),
+            Self::FindStale => "PHSR:01".to_owned(),
+            Self::FreeHandle(handle, _) => format!("PHF:{handle:02X}"),
+            Self::FindTools { .. } => "PHSR:02".to_owned(),
+            Self::InitialiseTool { handle, .. } => format!("PINIT:{handle:02X}"),
             Self::FindInitialised => "PHSR:03".to_owned(),
             Self::EnableTool(handle, _) => format!("PENA:{handle:02X}D"),
             Self::StartTracking => "TSTART:".to_owned(),
@@ -47,7 +64,20 @@ impl SetUpStep {
 
     /// Whether an error at this step can be ignored.
     pub(super) const fn is_optional(&self) -> bool {
-        matches!(self, Self::Version)
+        matches!(self, Self::Version | Self::FindStale | Self::FreeHandle(..))
+    }
+
+    /// Longest usual duration of the step. The clients of others allow 5 to 7 s for what starts hardware.
+    pub(super) const fn slowest(&self) -> Duration {
+        match self {
+            Self::Initialise | Self::InitialiseTool { .. } | Self::StartTracking => Duration::from_secs(10),
+            Self::Version
+            | Self::FindStale
+            | Self::FreeHandle(..)
+            | Self::FindTools { .. }
+            | Self::FindInitialised
+            | Self::EnableTool(..) => Duration::ZERO,
+        }
     }
 }
 
@@ -67,12 +97,18 @@ impl SetUp {
             }
             SetUpStep::Version => {
                 self.version = (!reply.is_empty()).then(|| excerpt(reply));
-                SetUpStep::FindTools
+                SetUpStep::FindStale
             }
-            SetUpStep::FindTools => initialise_next(handles(reply)?),
-            SetUpStep::InitialiseTool(_, left) => {
+            SetUpStep::FindStale if reply.is_empty() => SetUpStep::FindTools { round: 0 },
+            SetUpStep::FindStale => free_next(handles(reply)?),
+            SetUpStep::FreeHandle(_, left) => free_next(left),
+            SetUpStep::FindTools { round } => match initialise_next(handles(reply)?, round) {
+                Some(step) if round < MOST_ROUNDS => step,
+                _ => SetUpStep::FindInitialised,
+            },
+            SetUpStep::InitialiseTool { left, round, .. } => {
                 okay(reply)?;
-                initialise_next(left)
+                initialise_next(left, round).unwrap_or(SetUpStep::FindTools { round: round + 1 })
             }
             SetUpStep::FindInitialised => self.enable_next(handles(reply)?)?,
             SetUpStep::EnableTool(handle, left) => {
@@ -132,8 +168,14 @@ impl SetUp {
     }
 }
 
-fn initialise_next(mut left: Vec<u8>) -> SetUpStep {
-    left.pop().map_or(SetUpStep::FindInitialised, |handle| SetUpStep::InitialiseTool(handle, left))
+/// Initialises the next of these tools; `None` if none is left.
+fn initialise_next(mut left: Vec<u8>, round: u32) -> Option<SetUpStep> {
+    let handle = left.pop()?;
+    Some(SetUpStep::InitialiseTool { handle, left, round })
+}
+
+fn free_next(mut left: Vec<u8>) -> SetUpStep {
+    left.pop().map_or(SetUpStep::FindTools { round: 0 }, |handle| SetUpStep::FreeHandle(handle, left))
 }
 
 fn okay(reply: &str) -> Result<(), Failure> {

@@ -93,21 +93,23 @@ fn memory_is_bounded() {
 #[test]
 fn a_text_reply_gives_every_tool() {
     let seen = "0A+10000-00000+00000+00000-012345+006789-123456+00250";
-    let text = format!("03{seen}0000003100000ABC\n0BMISSING0000003100000ABC\n0CDISABLED0000000000000000\n0000");
+    let text = format!("03{seen}000000B100000ABC\n0BMISSING0000007100000ABC\n0CDISABLED0000000000000000\n0000");
+    assert_eq!(decode_tx(&text.replace("\n0000", "\n0012")).unwrap().system, 0x12);
     let origin = Point3::new(-0.12345, 0.06789, -1.23456);
-    let tools = decode_tx(&text).unwrap();
+    let tools = decode_tx(&text).unwrap().tools;
     match tools.as_slice() {
         [
-            Tool { handle: 0x0A, state: ToolState::Seen { quaternion, origin: found, error }, frame: 0xABC },
-            Tool { handle: 0x0B, state: ToolState::Missing, frame: 0xABC },
-            Tool { handle: 0x0C, state: ToolState::Disabled, frame: 0 },
+            Tool { handle: 0x0A, state: ToolState::Seen { quaternion, origin: found, error }, frame: 0xABC, port: 0xB1 },
+            Tool { handle: 0x0B, state: ToolState::Missing, frame: 0xABC, port: 0x71 },
+            Tool { handle: 0x0C, state: ToolState::Disabled, frame: 0, port: 0 },
         ] => {
+            assert_eq!(tools.iter().map(|tool| tool.flags().count()).collect::<Vec<_>>(), [1, 1, 0]);
             assert!((found - origin).norm() < 1e-12 && (error - 25e-6).abs() < 1e-12);
             assert!((quaternion[0] - 1.0).abs() < 1e-12);
         }
         other => panic!("{other:?}"),
     }
-    assert_eq!(decode_tx("010AUNOCCUPIED\n0000").unwrap()[0].state, ToolState::Unoccupied);
+    assert_eq!(decode_tx("010AUNOCCUPIED\n0000").unwrap().tools[0].state, ToolState::Unoccupied);
     let cut = text.strip_suffix('0').unwrap();
     for bad in [cut, &format!("{text}0"), "", "01", "010A", "FF0000", "010AMISSING00000031\n0000"] {
         assert!(decode_tx(bad).is_err(), "{bad}");
@@ -136,13 +138,13 @@ fn a_binary_reply_is_read_with_and_without_what_instruments_leave_out() {
             origin: Point3::new(1.5e-3, -2.5e-3, 1.024),
             error: 0.25e-3,
         };
-        let tools = decode_bx(&body(1, &values, true, has_system_status)).unwrap();
-        assert_eq!(tools, [Tool { handle: 10, state: seen, frame: 7 }]);
-        let tools = decode_bx(&body(2, &[], true, has_system_status)).unwrap();
-        assert_eq!(tools, [Tool { handle: 10, state: ToolState::Missing, frame: 7 }]);
-        for (has_frame, frame) in [(true, 7), (false, 0)] {
-            let tools = decode_bx(&body(4, &[], has_frame, has_system_status)).unwrap();
-            assert_eq!(tools, [Tool { handle: 10, state: ToolState::Disabled, frame }]);
+        let tools = decode_bx(&body(1, &values, true, has_system_status)).unwrap().tools;
+        assert_eq!(tools, [Tool { handle: 10, state: seen, frame: 7, port: 0x31 }]);
+        let tools = decode_bx(&body(2, &[], true, has_system_status)).unwrap().tools;
+        assert_eq!(tools, [Tool { handle: 10, state: ToolState::Missing, frame: 7, port: 0x31 }]);
+        for (has_frame, frame, port) in [(true, 7, 0x31), (false, 0, 0)] {
+            let tools = decode_bx(&body(4, &[], has_frame, has_system_status)).unwrap().tools;
+            assert_eq!(tools, [Tool { handle: 10, state: ToolState::Disabled, frame, port }]);
         }
     }
     let whole = body(1, &values, true, true);

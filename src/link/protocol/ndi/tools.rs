@@ -19,6 +19,68 @@ pub struct Tool {
     pub state: ToolState,
     /// Number of the frame.
     pub frame: u32,
+    /// Status bits of the port.
+    pub port: u32,
+}
+
+/// Tools of one reply.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Positions {
+    /// The tools in the order of the reply.
+    pub tools: Vec<Tool>,
+    /// Status bits of the instrument; 0 if the reply has none.
+    pub system: u16,
+}
+
+/// The tool is outside the measurement volume.
+const OUT_OF_VOLUME: u32 = 1 << 6;
+
+/// Status bits of a port that concern the quality of its position.
+const PORT_FLAGS: [(u32, &str); 5] = [
+    (OUT_OF_VOLUME, "the tool is outside the measurement volume"),
+    (1 << 7, "the tool is partly outside the measurement volume"),
+    (1 << 8, "the position is limited by the algorithm"),
+    (1 << 9, "infrared light disturbs the tool"),
+    (1 << 12, "the position could not be processed fully"),
+];
+
+/// The instrument reports that its hardware has failed.
+const HARDWARE_FAILURE: u16 = 1 << 4;
+
+/// Status bits of the instrument that concern the quality of all positions.
+const SYSTEM_FLAGS: [(u16, &str); 6] = [
+    (1 << 0, "synchronisation error of the instrument"),
+    (1 << 1, "too much infrared light around the instrument"),
+    (1 << 2, "error in the internal data of the instrument"),
+    (1 << 3, "the instrument recovered from an error"),
+    (1 << 5, "the hardware of the instrument has changed"),
+    (1 << 9, "the instrument is outside its temperature range"),
+];
+
+impl Tool {
+    /// Whether the tool is outside the measurement volume.
+    pub(super) const fn is_out_of_volume(&self) -> bool {
+        self.port & OUT_OF_VOLUME != 0
+    }
+
+    /// Warnings of its port.
+    pub(super) fn flags(&self) -> impl Iterator<Item = &'static str> {
+        let port = self.port;
+        PORT_FLAGS.into_iter().filter(move |(bit, _)| port & bit != 0).map(|(_, words)| words)
+    }
+}
+
+impl Positions {
+    /// Whether the instrument reports that its hardware has failed.
+    pub(super) const fn has_failed(&self) -> bool {
+        self.system & HARDWARE_FAILURE != 0
+    }
+
+    /// Warnings of the instrument.
+    pub(super) fn flags(&self) -> impl Iterator<Item = &'static str> {
+        let system = self.system;
+        SYSTEM_FLAGS.into_iter().filter(move |(bit, _)| system & bit != 0).map(|(_, words)| words)
+    }
 }
 
 /// Position of a tool, or why there is none.
@@ -64,15 +126,15 @@ pub(super) fn tip_in_instrument(
 }
 
 /// Reads the text of a `TX 0001` reply without its CRC.
-pub fn decode_tx(text: &str) -> Result<Vec<Tool>, String> {
+pub fn decode_tx(text: &str) -> Result<Positions, String> {
     let mut rest = Cursor { rest: text };
     let count = rest.hexadecimal(2)?;
     let mut tools = Vec::new();
     for _ in 0..count {
         tools.push(tx_tool(&mut rest)?);
     }
-    rest.hexadecimal(4)?;
-    if rest.rest.is_empty() { Ok(tools) } else { Err(format!("{} characters too many", rest.rest.len())) }
+    let system = u16::try_from(rest.hexadecimal(4)?).unwrap_or_default();
+    if rest.rest.is_empty() { Ok(Positions { tools, system }) } else { Err(format!("{} characters too many", rest.rest.len())) }
 }
 
 fn tx_tool(rest: &mut Cursor<'_>) -> Result<Tool, String> {
@@ -93,11 +155,11 @@ fn tx_tool(rest: &mut Cursor<'_>) -> Result<Tool, String> {
     };
     // An empty port has no frame number.
     let has_frame = !rest.rest.starts_with('\n');
-    let frame = if has_frame { rest.hexadecimal(8).and_then(|_status| rest.hexadecimal(8))? } else { 0 };
+    let (port, frame) = if has_frame { (rest.hexadecimal(8)?, rest.hexadecimal(8)?) } else { (0, 0) };
     if !word(rest, "\n") {
         return Err(format!("the line of tool {handle:02X} does not end"));
     }
-    Ok(Tool { handle, state, frame })
+    Ok(Tool { handle, state, frame, port })
 }
 
 fn tx_transform(rest: &mut Cursor<'_>) -> Result<ToolState, String> {
@@ -145,20 +207,21 @@ impl<'text> Cursor<'text> {
 ///
 /// Instruments differ in two ways, which the length tells apart: whether a disabled tool has a status and a frame number, and
 /// whether the system status follows the tools.
-pub fn decode_bx(body: &[u8]) -> Result<Vec<Tool>, String> {
+pub fn decode_bx(body: &[u8]) -> Result<Positions, String> {
     bx_tools(body, true).or_else(|error| bx_tools(body, false).map_err(|_other| error))
 }
 
-fn bx_tools(body: &[u8], has_disabled_frame: bool) -> Result<Vec<Tool>, String> {
+fn bx_tools(body: &[u8], has_disabled_frame: bool) -> Result<Positions, String> {
     let mut rest = body;
     let [count] = take_bytes(&mut rest)?;
     let mut tools = Vec::new();
     for _ in 0..count {
         tools.push(bx_tool(&mut rest, has_disabled_frame)?);
     }
-    match rest.len() {
-        0 | 2 => Ok(tools),
-        more => Err(format!("the length is wrong: {more} bytes too many")),
+    match *rest {
+        [] => Ok(Positions { tools, system: 0 }),
+        [low, high] => Ok(Positions { tools, system: u16::from_le_bytes([low, high]) }),
+        _ => Err(format!("the length is wrong: {} bytes too many", rest.len())),
     }
 }
 
@@ -171,13 +234,9 @@ fn bx_tool(rest: &mut &[u8], has_disabled_frame: bool) -> Result<Tool, String> {
         other => return Err(format!("tool {handle:02X} has the unknown status {other}")),
     };
     let has_frame = has_disabled_frame || state != ToolState::Disabled;
-    let frame = if has_frame {
-        let _port_status: [u8; 4] = take_bytes(rest)?;
-        u32::from_le_bytes(take_bytes(rest)?)
-    } else {
-        0
-    };
-    Ok(Tool { handle, state, frame })
+    let mut number = || take_bytes(rest).map(u32::from_le_bytes);
+    let (port, frame) = if has_frame { (number()?, number()?) } else { (0, 0) };
+    Ok(Tool { handle, state, frame, port })
 }
 
 fn bx_transform(rest: &mut &[u8]) -> Result<ToolState, String> {

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::super::{Failure, Identity, JointState, ProtocolEvent, Severity, Shot, Status};
-use super::{MAX_FIRST_STATUSES, MAX_NEWEST_STATUSES, MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES, Outbox};
+use super::{MAX_FIRST_STATUSES, MAX_JOINTS, MAX_NEWEST_STATUSES, MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES, Outbox};
 
 /// A flood.
 const MANY: u32 = 1000;
@@ -13,7 +13,7 @@ fn shot(x: u32) -> Shot {
 }
 
 fn joints(controller_time: f64) -> ProtocolEvent {
-    ProtocolEvent::Joints(JointState { positions: Vec::new(), speeds: None, controller_time, stopped: None })
+    ProtocolEvent::Joints(JointState { controller_time, ..JointState::at(Vec::new()) })
 }
 
 fn said(severity: Severity, text: &impl ToString) -> ProtocolEvent {
@@ -40,9 +40,12 @@ fn of_live_points_the_newest_is_kept_behind_what_came_before_it() {
 }
 
 #[test]
-fn of_joint_states_the_newest_is_kept_and_live_points_are_none_of_their_business() {
+fn of_joint_states_the_newest_are_kept_for_their_mean_and_live_points_are_none_of_their_business() {
     let events = kept([joints(1.0), ProtocolEvent::Live(shot(1)), joints(2.0), joints(3.0)]);
-    assert_eq!(events, [ProtocolEvent::Live(shot(1)), joints(3.0)]);
+    assert_eq!(events, [joints(1.0), ProtocolEvent::Live(shot(1)), joints(2.0), joints(3.0)]);
+    let events = kept((0..MANY).map(|number| joints(f64::from(number))));
+    let first = MANY - u32::try_from(MAX_JOINTS).unwrap();
+    assert_eq!(events, (first..MANY).map(|number| joints(f64::from(number))).collect::<Vec<_>>());
 }
 
 #[test]

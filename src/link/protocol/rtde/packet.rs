@@ -223,54 +223,114 @@ fn split_text(bytes: &[u8]) -> Option<(String, &[u8])> {
     Some((printable(String::from_utf8_lossy(text).trim()), rest))
 }
 
-/// The requested values, in order.
+/// A value of the stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Field {
+    /// Time by the controller's clock.
+    Timestamp,
+    /// Measured joint values.
+    ActualQ,
+    /// Robot mode.
+    RobotMode,
+    /// Safety status; controllers have it since 3.10 and 5.4.
+    SafetyStatus,
+    /// Safety mode, with the same numbers, of older controllers.
+    SafetyMode,
+}
+
+impl Field {
+    /// Name in requests.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Timestamp => "timestamp",
+            Self::ActualQ => "actual_q",
+            Self::RobotMode => "robot_mode",
+            Self::SafetyStatus => "safety_status",
+            Self::SafetyMode => "safety_mode",
+        }
+    }
+
+    /// Type that controllers announce.
+    pub const fn kind(self) -> &'static str {
+        match self {
+            Self::Timestamp => "DOUBLE",
+            Self::ActualQ => "VECTOR6D",
+            Self::RobotMode | Self::SafetyStatus | Self::SafetyMode => "INT32",
+        }
+    }
+
+    /// Encoded size (bytes).
+    const fn size(self) -> usize {
+        match self {
+            Self::Timestamp => 8,
+            Self::ActualQ => 6 * 8,
+            Self::RobotMode | Self::SafetyStatus | Self::SafetyMode => 4,
+        }
+    }
+
+    /// Whether the link is of no use without this value.
+    pub const fn is_required(self) -> bool {
+        matches!(self, Self::Timestamp | Self::ActualQ)
+    }
+
+    /// The value that older controllers have instead.
+    pub const fn older(self) -> Option<Self> {
+        match self {
+            Self::SafetyStatus => Some(Self::SafetyMode),
+            _ => None,
+        }
+    }
+}
+
+/// Values of one data packet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
     /// Time by the controller's clock (s).
     pub timestamp: f64,
     /// Joint values (rad).
     pub actual_q: [f64; 6],
-    /// Joint speeds (rad/s).
-    pub actual_qd: [f64; 6],
-    /// Robot mode, see [`super::mode`].
-    pub robot_mode: i32,
-    /// Safety status, see [`super::mode`].
-    pub safety_status: i32,
+    /// Robot mode, see [`super::mode`]; `None` if the controller does not report it.
+    pub robot_mode: Option<i32>,
+    /// Safety status or mode, see [`super::mode`]; `None` if the controller does not report it.
+    pub safety_status: Option<i32>,
 }
 
 impl Record {
-    /// Names of the values with their types.
-    pub const FIELDS: [(&'static str, &'static str); 5] = [
-        ("timestamp", "DOUBLE"),
-        ("actual_q", "VECTOR6D"),
-        ("actual_qd", "VECTOR6D"),
-        ("robot_mode", "INT32"),
-        ("safety_status", "INT32"),
-    ];
+    /// The values to request first.
+    pub const FIELDS: [Field; 4] = [Field::Timestamp, Field::ActualQ, Field::RobotMode, Field::SafetyStatus];
 
-    /// Encoded size of all values (bytes).
-    pub const SIZE: usize = 13 * 8 + 2 * 4;
+    /// Encoded size of these values (bytes).
+    pub fn size(fields: &[Field]) -> usize {
+        fields.iter().map(|field| field.size()).sum()
+    }
 
-    /// Decodes the values; `None` if the size is wrong.
-    pub fn decode(values: &[u8]) -> Option<Self> {
-        if values.len() != Self::SIZE {
+    /// Decodes the values of a recipe; `None` if the size is wrong.
+    pub fn decode(fields: &[Field], values: &[u8]) -> Option<Self> {
+        if values.len() != Self::size(fields) {
             return None;
         }
-        let (numbers, integers) = values.split_at_checked(13 * 8)?;
-        let number =
-            |index: usize| numbers.as_chunks::<8>().0.get(index).map_or(f64::NAN, |field| f64::from_be_bytes(*field));
-        let integer = |index: usize| integers.as_chunks::<4>().0.get(index).map(|field| i32::from_be_bytes(*field));
-        Some(Self {
-            timestamp: number(0),
-            actual_q: std::array::from_fn(|joint| number(1 + joint)),
-            actual_qd: std::array::from_fn(|joint| number(7 + joint)),
-            robot_mode: integer(0)?,
-            safety_status: integer(1)?,
-        })
+        let nowhere = f64::NAN;
+        let mut record =
+            Self { timestamp: nowhere, actual_q: [nowhere; 6], robot_mode: None, safety_status: None };
+        let mut rest = values;
+        for field in fields {
+            let (value, after) = rest.split_at_checked(field.size())?;
+            rest = after;
+            let numbers = value.as_chunks::<8>().0;
+            let number = |index: usize| numbers.get(index).map_or(nowhere, |bytes| f64::from_be_bytes(*bytes));
+            let integer = value.first_chunk::<4>().map(|bytes| i32::from_be_bytes(*bytes));
+            match field {
+                Field::Timestamp => record.timestamp = number(0),
+                Field::ActualQ => record.actual_q = std::array::from_fn(number),
+                Field::RobotMode => record.robot_mode = integer,
+                Field::SafetyStatus | Field::SafetyMode => record.safety_status = integer,
+            }
+        }
+        Some(record)
     }
 
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
-        self.timestamp.is_finite() && self.actual_q.iter().chain(&self.actual_qd).all(|value| value.is_finite())
+        self.timestamp.is_finite() && self.actual_q.iter().all(|value| value.is_finite())
     }
 }

@@ -3,9 +3,11 @@
 use std::time::Duration;
 
 use super::packet::{
-    Framer, Packet, PacketError, Record, TextMessage, encode, packet_type, request_version, set_up_outputs,
+    Field, Framer, Packet, PacketError, Record, TextMessage, encode, packet_type, request_version, set_up_outputs,
 };
-use super::{RestDetector, Rtde, RtdeOptions};
+use super::{Rtde, RtdeOptions};
+use crate::link::protocol::outbox::MAX_JOINTS;
+use crate::link::protocol::rest::RestDetector;
 use crate::link::protocol::{Failure, JointState, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::fuzz::{Bounds, assert_hangs_up_once, fuzz_protocol, fuzz_simulator};
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
@@ -86,22 +88,25 @@ fn packets_that_cannot_be_are_errors() {
     {
         assert!(matches!(Packet::decode(kind, content), Err(PacketError::Short { .. })), "{kind}");
     }
-    assert_eq!(Record::decode(&[0; Record::SIZE - 1]), None);
-    assert_eq!(Record::decode(&[0; Record::SIZE + 1]), None);
+    assert_eq!(Record::decode(&Record::FIELDS, &[0; 63]), None);
+    assert_eq!(Record::decode(&Record::FIELDS, &[0; 65]), None);
 }
 
 #[test]
 fn values_stand_in_the_order_in_which_they_were_asked_for() {
-    let mut bytes: Vec<u8> = (0..13).flat_map(|number| f64::from(number).to_be_bytes()).collect();
+    let mut bytes: Vec<u8> = (0..7).flat_map(|number| f64::from(number).to_be_bytes()).collect();
     bytes.extend([0, 0, 0, 7, 0xff, 0xff, 0xff, 0xfe]);
     let expected = Record {
         timestamp: 0.0,
         actual_q: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
-        actual_qd: [7.0, 8.0, 9.0, 10.0, 11.0, 12.0],
-        robot_mode: 7,
-        safety_status: -2,
+        robot_mode: Some(7),
+        safety_status: Some(-2),
     };
-    assert_eq!(Record::decode(&bytes), Some(expected));
+    assert_eq!(Record::decode(&Record::FIELDS, &bytes), Some(expected));
+    let without_mode = [Field::ActualQ, Field::SafetyMode, Field::Timestamp];
+    let bytes = [&bytes[8..56], &[0, 0, 0, 5], &1.5_f64.to_be_bytes()].concat();
+    let expected = Record { timestamp: 1.5, robot_mode: None, safety_status: Some(5), ..expected };
+    assert_eq!(Record::decode(&without_mode, &bytes), Some(expected));
 }
 
 #[test]
@@ -112,7 +117,7 @@ fn the_stream_brings_the_joints_of_the_robot_at_the_frequency_that_was_asked_for
     assert_eq!((events.len(), states.len()), (50, 50));
     for state in states {
         assert_eq!(state.positions, bench.cell.joints.positions);
-        assert_eq!((state.speeds.as_deref(), &state.stopped), (Some(&[0.0; 6][..]), &None));
+        assert_eq!((&state.stopped, &state.remark), (&None, &None));
     }
     let name = "Universal Robots controller, version 5.11.0.108";
     let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!() };
@@ -142,14 +147,15 @@ fn refusals_end_the_set_up_with_the_reason_and_a_new_connection_is_good() {
     let cases = [
         (
             RtdeFault::OldProtocol,
-            "the instrument refused: version 2 of the interface; update the software of the controller",
+            "the instrument refused: version 2 of the interface, which PolyScope has from 3.4 on; update the software of the \
+             controller",
         ),
-        (RtdeFault::NotFound, "the instrument refused: the controller does not know actual_qd"),
-        (RtdeFault::InUse, "the instrument is in use by another program (another program uses actual_qd)"),
+        (RtdeFault::NotFound, "the instrument refused: the controller does not know actual_q"),
+        (RtdeFault::InUse, "the instrument is in use by another program (another program uses actual_q)"),
         (
             RtdeFault::WrongType,
             "cannot read the data from the instrument: unexpected types of the values: \
-             DOUBLE,VECTOR6D,VECTOR6INT32,INT32,INT32",
+             DOUBLE,VECTOR6INT32,INT32,INT32",
         ),
         (RtdeFault::StartRefused, "the instrument refused: the controller does not start the stream"),
     ];
@@ -174,7 +180,7 @@ fn faults_of_the_stream_lose_the_link_and_a_new_connection_is_good() {
         ),
         (
             RtdeFault::ShortData,
-            "cannot read the data from the instrument: a data packet has 108 bytes of values instead of 112",
+            "cannot read the data from the instrument: a data packet has 60 bytes of values instead of 64",
         ),
     ];
     for (fault, words) in cases {
@@ -229,42 +235,72 @@ fn drip_and_a_flood_of_messages_change_nothing() {
 
 #[test]
 fn a_robot_is_at_rest_half_a_second_after_it_stopped() {
-    let mut bench = ready(&[Planned::from(RtdeFault::Moving, 11, 10)]);
+    let mut bench = ready(&[Planned::from(RtdeFault::Moving, 11, 10), Planned::always(RtdeFault::NoisySpeeds)]);
     let events = bench.run_for(Duration::from_secs(3));
     let mut rest_detector = RestDetector::default();
     let states = joints(&events);
     let rests: Vec<bool> = states.iter().map(|state| rest_detector.feed(state)).collect();
-    // 25 Hz: ten states at rest, ten moving, the first at rest again is number 20, and 13 intervals are more than 0.5 s.
-    assert_eq!(rests.iter().position(|rest| *rest), Some(33));
-    assert!(rests[33..].iter().all(|rest| *rest));
+    // 25 Hz: ten states at rest, ten moving, number 19 is the first that stays, and 13 intervals are more than 0.5 s.
+    assert_eq!(rests.iter().position(|rest| *rest), Some(32));
+    assert!(rests[32..].iter().all(|rest| *rest));
     assert!((states[74].positions[0] - states[0].positions[0] - 10.0 * 0.2 * 0.04).abs() < 1e-12);
 }
 
 #[test]
-fn nobody_says_rest_without_speeds_across_a_gap_or_in_a_stop() {
-    let state = |time: f64| JointState {
-        positions: vec![0.0; 6],
-        speeds: Some(vec![9e-4; 6]),
-        controller_time: time,
-        stopped: None,
+fn states_with_a_person_in_the_cell_can_be_measured_and_are_kept_as_a_remark() {
+    for (fault, words) in [
+        (RtdeFault::Reduced, "reduced (2)"),
+        (RtdeFault::Safeguard, "safeguard stop (5)"),
+        (RtdeFault::EnablingSwitch, "enabling switch released (13)"),
+    ] {
+        let mut bench = ready(&[Planned::always(fault)]);
+        let events = bench.run_for(Duration::from_secs(1));
+        for state in joints(&events) {
+            assert_eq!((&state.stopped, state.remark.as_deref()), (&None, Some(words)));
+        }
+        let said = format!("safety status: {words}");
+        assert!(events.iter().any(|event| matches!(event, ProtocolEvent::Status(status) if status.text == said)));
+    }
+    for (status, forbidden) in (0..30).zip([
+        false, false, false, true, false, false, true, true, true, true, false, false, false, false, false, true, false,
+        false, false, false, true, false, false, false, false, false, false, false, false, false,
+    ]) {
+        assert_eq!(super::mode::forbids_measuring(status), forbidden, "{status}");
+    }
+}
+
+#[test]
+fn older_controllers_are_asked_for_less_and_their_safety_mode_serves_as_well() {
+    let asked = |bench: &RtdeBench| {
+        let text: Vec<String> = bench.sent.iter().map(|sent| String::from_utf8_lossy(sent).into_owned()).collect();
+        text.iter().filter_map(|sent| Some(sent[sent.find("timestamp")?..].to_owned())).collect::<Vec<_>>()
     };
-    let feed = |states: &[JointState]| {
-        let mut rest_detector = RestDetector::default();
-        states.iter().map(|state| rest_detector.feed(state)).collect::<Vec<_>>()
-    };
-    assert_eq!(feed(&[state(1.0), state(1.25), state(1.5)]), [false, false, true]);
-    assert_eq!(feed(&[state(1.0), state(1.75), state(2.0)]), [false; 3], "gap");
-    assert_eq!(feed(&[state(5.0), state(5.4), state(1.0), state(1.4)]), [false; 4], "clock");
-    let bad = |change: fn(&mut JointState)| {
-        let mut middle = state(1.25);
-        change(&mut middle);
-        feed(&[state(1.0), middle, state(1.5)])
-    };
-    assert_eq!(bad(|state| state.speeds = None), [false; 3]);
-    assert_eq!(bad(|state| state.speeds = Some(Vec::new())), [false; 3]);
-    assert_eq!(bad(|state| state.speeds = Some(vec![0.0, -0.001])), [false; 3]);
-    assert_eq!(bad(|state| state.speeds = Some(vec![f64::NAN])), [false; 3]);
-    assert_eq!(bad(|state| state.stopped = Some("stop".to_owned())), [false; 3]);
+    let mut old = ready(&[Planned::always(RtdeFault::NoSafetyStatus), Planned::always(RtdeFault::Reduced)]);
+    let first = "timestamp,actual_q,robot_mode,safety_status";
+    assert_eq!(asked(&old), [first, "timestamp,actual_q,robot_mode,safety_mode"]);
+    let events = old.run_for(Duration::from_secs(1));
+    assert!(joints(&events).iter().all(|state| state.remark.as_deref() == Some("reduced (2)")), "{events:?}");
+    let mut bench = bench(&[Planned::always(RtdeFault::NoModes), Planned::always(RtdeFault::Safeguard)]);
+    let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!() };
+    assert_eq!(asked(&bench), [first, "timestamp,actual_q,safety_mode", "timestamp,actual_q"]);
+    assert!(identity.notes.iter().any(|note| note.contains("does not report its safety state")), "{identity:?}");
+    assert_eq!(identity.checked[1], "values of the controller: timestamp, actual_q");
+    let events = bench.run_for(Duration::from_secs(1));
+    assert_eq!(joints(&events).len(), 25);
+}
+
+#[test]
+fn zeros_between_joint_values_are_dropped_and_a_robot_at_zero_is_believed() {
+    let mut bench = ready(&[Planned::from(RtdeFault::Dropout, 10, 3)]);
+    let events = bench.run_for(Duration::from_secs(1));
+    let here = &bench.cell.joints.positions;
+    assert_eq!(joints(&events).len(), 22);
+    assert!(joints(&events).iter().all(|state| state.positions == *here), "{events:?}");
+    let mut bench = ready(&[Planned::from(RtdeFault::Dropout, 10, u32::MAX)]);
+    let events = bench.run_for(Duration::from_secs(3));
+    let states = joints(&events);
+    assert_eq!(states.len(), 75 - 25);
+    assert!(states[49].positions.iter().all(|value| *value == 0.0));
 }
 
 /// A set-up, some data, and a trigger that is refused.
@@ -303,15 +339,15 @@ fn splits_change_nothing_of_faults() {
 }
 
 #[test]
-fn ten_thousand_packets_in_one_feed_leave_the_newest() {
+fn ten_thousand_packets_in_one_feed_leave_the_newest_ones() {
     let stream = tape().bytes();
     let mut rtde = Rtde::default();
     rtde.start(START);
     rtde.feed(&stream, START);
-    let data = stream[stream.len() - 116..].repeat(10_000);
+    let data = stream[stream.len() - 68..].repeat(10_000);
     rtde.feed(&data, START);
     let events = std::iter::from_fn(|| rtde.next_event()).count();
-    assert!(rtde.pending() == 0 && events <= 5, "{} {events}", rtde.pending());
+    assert!(rtde.pending() == 0 && events <= MAX_JOINTS + 5, "{} {events}", rtde.pending());
 }
 
 #[test]

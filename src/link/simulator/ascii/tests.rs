@@ -120,7 +120,7 @@ fn a_stream_is_averaged_over_lines_after_the_trigger() {
     let shot = shot(&mut bench);
     let mean = (0..4).map(|n| MockCell::point(before + n).coords).sum::<nalgebra::Vector3<f64>>() / 4.0;
     assert!((shot.point.coords - mean).norm() < 1e-9);
-    assert!(shot.remark.is_some_and(|remark| remark.starts_with("mean of 4 lines")));
+    assert!(shot.remarks.iter().any(|remark| remark.text.starts_with("mean of 4 lines")), "{shot:?}");
 }
 
 /// What a polled shot with the fault says; `None`: it succeeds all the same.

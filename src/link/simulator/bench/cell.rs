@@ -45,8 +45,7 @@ impl MockCell {
 impl Default for MockCell {
     fn default() -> Self {
         let positions = vec![0.1, -1.2, 1.3, -0.4, 0.5, -0.6];
-        let joints = JointState { positions, speeds: Some(vec![0.0; 6]), controller_time: 0.0, stopped: None };
-        Self { shots: 0, has_beam: true, sigma: Some([4e-6, 5e-6, 6e-6]), joints }
+        Self { shots: 0, has_beam: true, sigma: Some([4e-6, 5e-6, 6e-6]), joints: JointState::at(positions) }
     }
 }
 

@@ -66,7 +66,7 @@ fn a_point_comes_back_by_every_way_of_measuring() {
 #[test]
 fn the_set_up_says_who_answers_and_what_it_cannot_do() {
     let identity = identity(&mut unconnected(&GeocomOptions::default(), []));
-    assert_eq!(identity.name, "TS30, simulated, serial number 362541, GeoCOM 1.50.3");
+    assert_eq!(identity.name, "TS30 SIMULATED, serial number 362541, GeoCOM 1.50.3");
     assert!(identity.notes.iter().any(|text| text.contains("0.5 to 1 mm")));
     assert!(identity.checked.iter().any(|text| text == "prism constant: -34.40 mm (read back)"), "{identity:?}");
     assert_eq!(identity.reflector.map(|reflector| reflector.offset), Some(-0.0344));
@@ -84,9 +84,16 @@ fn what_is_set_is_read_back() {
     assert_eq!(
         identity.checked.get(2..),
         Some(
-            ["target recognition: on", "EDM mode: 7 (read back)", "prism constant: -17.50 mm (read back)", "face: 1"]
-                .map(str::to_owned)
-                .as_slice()
+            [
+                "decimals: 15 (read back)",
+                "target recognition: on",
+                "EDM mode: 7 (read back)",
+                "prism constant: -17.50 mm (read back)",
+                "face: 1",
+                "correction of distances: 8.40 ppm for the air, no scale",
+            ]
+            .map(str::to_owned)
+            .as_slice()
         )
     );
 }
@@ -111,6 +118,9 @@ const fn expected(fault: GeocomFault) -> Option<&'static str> {
         GeocomFault::LicenceMissing => "licence is missing",
         GeocomFault::StaleRepeat => "identical to the previous point",
         GeocomFault::NotANumber => "angle",
+        GeocomFault::EmptyAnswer => "success but sends no values",
+        GeocomFault::CorrectionsChanged => "",
+        GeocomFault::Scaled | GeocomFault::FewDecimals | GeocomFault::OldSoftware | GeocomFault::Unnumbered => return None,
         GeocomFault::DisconnectMidLine | GeocomFault::Dead => "",
     })
 }
@@ -118,6 +128,10 @@ const fn expected(fault: GeocomFault) -> Option<&'static str> {
 #[test]
 fn every_fault_is_said_and_passes() {
     for &fault in GeocomFault::ALL.iter().filter(|fault| **fault != GeocomFault::Dead) {
+        // Tested on its own: it shows at the measurement after it.
+        if fault == GeocomFault::CorrectionsChanged {
+            continue;
+        }
         let from = if fault == GeocomFault::Asleep { 1 } else { 2 };
         let mut bench = bench([Planned::at(fault, from)]);
         shot(&mut bench);
@@ -126,7 +140,7 @@ fn every_fault_is_said_and_passes() {
             (None, Some(ProtocolEvent::Shot(shot))) => {
                 assert!((shot.point - bench.cell.newest()).norm() < 1e-9, "{fault}");
                 let is_doubtful = matches!(fault, GeocomFault::AccuracyNotGuaranteed | GeocomFault::NoFullCorrection);
-                assert_eq!(shot.remark.is_some(), is_doubtful, "{fault}");
+                assert_eq!(!shot.remarks.is_empty(), is_doubtful, "{fault}");
             }
             (Some(text), Some(ProtocolEvent::Failed(failure))) => {
                 assert!(failure.to_string().contains(text), "{fault}: {failure}");
@@ -137,6 +151,58 @@ fn every_fault_is_said_and_passes() {
         shot(&mut bench);
         shot(&mut bench);
     }
+}
+
+#[test]
+fn a_scale_refuses_the_link() {
+    let mut bench = unconnected(&GeocomOptions::default(), [Planned::once(GeocomFault::Scaled)]);
+    let Some(ProtocolEvent::Lost(failure @ Failure::Scaled(_))) = bench.settle().pop() else { panic!() };
+    assert!(failure.to_string().contains("by the scale 1.0004"), "{failure}");
+    assert!(failure.hint().contains("map projection"), "{}", failure.hint());
+    identity(&mut bench);
+    shot(&mut bench);
+}
+
+#[test]
+fn a_station_that_rounds_is_refused_in_the_set_up_and_at_a_shot() {
+    let mut bench = unconnected(&GeocomOptions::default(), [Planned::once(GeocomFault::FewDecimals)]);
+    let Some(ProtocolEvent::Lost(failure)) = bench.settle().pop() else { panic!() };
+    assert!(failure.to_string().contains("only 3 decimals"), "{failure}");
+    identity(&mut bench);
+    // Another program sets fewer decimals afterwards.
+    bench.simulator_gets(b"%R1Q,107,1:3\r\n");
+    let Some(ProtocolEvent::Lost(Failure::Settings(text))) = bench.shoot().pop() else { panic!() };
+    assert!(text.contains("corrections"), "{text}");
+    // The next set-up sets them again.
+    identity(&mut bench);
+    shot(&mut bench);
+}
+
+#[test]
+fn corrections_that_another_program_changes_refuse_the_next_shot() {
+    let mut bench = bench([Planned::once(GeocomFault::CorrectionsChanged)]);
+    shot(&mut bench);
+    let Some(ProtocolEvent::Lost(Failure::Settings(text))) = bench.shoot().pop() else { panic!() };
+    assert_eq!(text, "the corrections of the distance were 8.40 ppm and -34.40 mm at the set-up and are 50.00 ppm and -34.40 mm now");
+    identity(&mut bench);
+    shot(&mut bench);
+}
+
+#[test]
+fn a_station_that_cannot_tell_its_corrections_is_warned_of() {
+    let mut bench = unconnected(&GeocomOptions::default(), [Planned::once(GeocomFault::OldSoftware)]);
+    let warnings = identity(&mut bench).warnings.join("; ");
+    assert!(warnings.contains("does not report its corrections"), "{warnings}");
+    assert!(warnings.contains("reading the number of decimals failed"), "{warnings}");
+    shot(&mut bench);
+}
+
+#[test]
+fn answers_without_numbers_are_said_to_be_so() {
+    let mut bench = unconnected(&GeocomOptions::default(), [Planned::once(GeocomFault::Unnumbered)]);
+    let Some(ProtocolEvent::Lost(failure)) = bench.settle().pop() else { panic!() };
+    assert!(failure.to_string().contains("without the number of the request"), "{failure}");
+    identity(&mut bench);
 }
 
 #[test]
@@ -222,7 +288,7 @@ fn a_broken_beam_gives_no_point() {
 
 fn conversation(checksum: bool) -> GeocomBench {
     let faults =
-        GeocomFault::ALL.iter().filter(|fault| !matches!(fault, GeocomFault::DisconnectMidLine | GeocomFault::Dead));
+        GeocomFault::ALL.iter().filter(|fault| !matches!(fault, GeocomFault::DisconnectMidLine | GeocomFault::Dead | GeocomFault::CorrectionsChanged));
     let faults = faults.zip(2..).map(|(&fault, at)| Planned::at(fault, at));
     let mut bench = unconnected(&GeocomOptions { checksum, ..GeocomOptions::default() }, faults);
     identity(&mut bench);

@@ -9,7 +9,9 @@ use super::super::fault::Planned;
 use super::NdiFault;
 use super::NdiSimulator;
 use crate::link::protocol::Failure;
+use crate::link::protocol::Protocol as _;
 use crate::link::protocol::ProtocolEvent;
+use crate::link::protocol::Severity;
 use crate::link::protocol::Shot;
 use crate::link::protocol::ndi::MAX_TEXT;
 use crate::link::protocol::ndi::NdiOptions;
@@ -113,13 +115,21 @@ const fn expected(fault: NdiFault, reply: ReplyFormat) -> &'static str {
         (NdiFault::LateReply | NdiFault::Cut | NdiFault::Silent, _) | (NdiFault::WrongLength, ReplyFormat::Binary) => {
             "no answer from the instrument for 2 s while waiting for a position"
         }
-        (NdiFault::Halves, _) => "",
+        (NdiFault::OutOfVolume, _) => "tool 0A is outside the measurement volume",
+        (NdiFault::HardwareFailure, _) => "failure of its hardware",
+        (NdiFault::Halves | NdiFault::PartlyOutOfVolume | NdiFault::Infrared, _) => "",
         (NdiFault::FrozenFrame, _) => "there is no new frame",
         (NdiFault::NotANumber, ReplyFormat::Text) => "not a signed number",
         (NdiFault::NotANumber, ReplyFormat::Binary) => "is out of range",
         (NdiFault::NoRotation, _) => "rotation of the tool is invalid",
         (NdiFault::Origin, _) => "0, 0, 0",
-        (NdiFault::Reset | NdiFault::DisconnectMidPacket | NdiFault::InitialisationFails, _) => "lost",
+        (
+            NdiFault::Reset
+            | NdiFault::DisconnectMidPacket
+            | NdiFault::InitialisationFails
+            | NdiFault::SlowStart,
+            _,
+        ) => "lost",
     }
 }
 
@@ -155,7 +165,9 @@ fn faulty_shot(fault: NdiFault, reply: ReplyFormat, times: u32) {
 #[test]
 fn every_fault_is_said_and_passes() {
     for reply in BOTH {
-        for &fault in NdiFault::ALL.iter().filter(|fault| **fault != NdiFault::InitialisationFails) {
+        let of_positions =
+            |fault: &&NdiFault| !matches!(fault, NdiFault::InitialisationFails | NdiFault::SlowStart);
+        for &fault in NdiFault::ALL.iter().filter(of_positions) {
             for times in [1, 2, 4] {
                 faulty_shot(fault, reply, times);
             }
@@ -182,6 +194,63 @@ fn a_lasting_fault_is_said_in_its_words() {
 }
 
 #[test]
+fn what_the_flags_say_is_a_remark_on_the_point() {
+    for reply in BOTH {
+        for (fault, words) in [
+            (NdiFault::PartlyOutOfVolume, "the tool is partly outside the measurement volume"),
+            (NdiFault::Infrared, "too much infrared light around the instrument"),
+        ] {
+            let mut bench = bench(reply, [Planned::always(fault)]);
+            let Some(ProtocolEvent::Shot(shot)) = bench.shoot().pop() else { panic!("{fault}") };
+            let warnings: Vec<&str> = shot
+                .remarks
+                .iter()
+                .filter(|remark| remark.severity == Severity::Warning)
+                .map(|remark| remark.text.as_str())
+                .collect();
+            assert_eq!(warnings, [words], "{reply:?}");
+        }
+    }
+}
+
+#[test]
+fn hardware_that_starts_slowly_is_waited_for() {
+    let mut bench = bench(ReplyFormat::Binary, [Planned::always(NdiFault::SlowStart)]);
+    assert!(bench.elapsed() > Duration::from_secs(18));
+    shoot(&mut bench, ReplyFormat::Binary);
+}
+
+/// A bench on a serial line: the wanted speed, and the one of the instrument.
+fn serial(wanted: u32, instrument: u32) -> NdiBench {
+    let protocol = NdiProtocol::new(options(ReplyFormat::Binary)).unwrap().on_serial_line(wanted);
+    Bench::new(protocol, NdiSimulator::new(TIP_MM, []).on_serial_line(instrument, wanted))
+}
+
+#[test]
+fn a_serial_line_gets_the_wanted_speed_whatever_it_was() {
+    for (wanted, instrument, resets) in
+        [(115_200, 115_200, 0), (115_200, 9600, 0), (9600, 9600, 0), (115_200, 57_600, 1), (9600, 115_200, 1)]
+    {
+        let mut bench = serial(wanted, instrument);
+        let events = bench.settle();
+        assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))), "{wanted} {instrument}: {events:?}");
+        assert_eq!(bench.simulator.speed(), Some(wanted));
+        assert_eq!(bench.simulator.resets(), resets, "a reset unloads the tools: {wanted} {instrument}");
+        shoot(&mut bench, ReplyFormat::Binary);
+    }
+}
+
+#[test]
+fn a_serial_line_without_an_instrument_is_given_up() {
+    let mut bench = serial(115_200, 9600);
+    bench.unplug();
+    bench.protocol.start(bench.now);
+    let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
+    assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))), "{events:?}");
+    assert!(bench.elapsed() < Duration::from_secs(20), "{:?}", bench.elapsed());
+}
+
+#[test]
 fn a_silent_instrument_is_lost_when_idle() {
     let mut bench = bench(ReplyFormat::Binary, [Planned::from(NdiFault::Silent, 2, 1000)]);
     let events = bench.run_for(Duration::from_secs(30));
@@ -202,7 +271,13 @@ fn a_cancelled_shot_is_swallowed() {
 
 fn conversation(reply: ReplyFormat) -> NdiBench {
     let is_left_out = |fault: NdiFault| {
-        matches!(fault, NdiFault::DisconnectMidPacket | NdiFault::Reset | NdiFault::InitialisationFails)
+        matches!(
+            fault,
+            NdiFault::DisconnectMidPacket
+                | NdiFault::Reset
+                | NdiFault::InitialisationFails
+                | NdiFault::SlowStart
+        )
     };
     let faults = NdiFault::ALL.iter().filter(|fault| !is_left_out(**fault)).zip(1..);
     let mut bench = bench(reply, faults.map(|(&fault, at)| Planned::at(fault, 4 * at)));

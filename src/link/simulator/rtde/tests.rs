@@ -39,3 +39,37 @@ fn unknown_names_are_not_found_and_nothing_starts() {
     assert_eq!(ask(&mut simulator, &[0, 3, b'S']), Some(Output::Bytes(vec![0, 4, b'S', 0])));
     assert_eq!(ask(&mut simulator, &[0, 0]), Some(Output::Close));
 }
+
+/// The recipe that the receiving client of a public library asks for unless it is told otherwise.
+const FULL_RECIPE: &str = "timestamp,target_q,target_qd,target_qdd,target_current,target_moment,actual_q,actual_qd,\
+    actual_current,joint_control_output,actual_TCP_pose,actual_TCP_speed,actual_TCP_force,target_TCP_pose,\
+    target_TCP_speed,actual_digital_input_bits,joint_temperatures,actual_execution_time,robot_mode,joint_mode,safety_mode,\
+    safety_status,actual_tool_accelerometer,speed_scaling,target_speed_fraction,actual_momentum,actual_main_voltage,\
+    actual_robot_voltage,actual_robot_current,actual_joint_voltage,actual_digital_output_bits,runtime_state,\
+    robot_status_bits,safety_status_bits,standard_analog_input0,standard_analog_input1,standard_analog_output0,\
+    standard_analog_output1,payload,payload_cog,payload_inertia,ft_raw_wrench,output_bit_registers0_to_31,\
+    output_bit_registers32_to_63,output_bit_register_64,output_int_register_0,output_double_register_47";
+
+#[test]
+fn the_full_recipe_of_other_clients_is_known_and_has_the_announced_size() {
+    let mut simulator = RtdeSimulator::new(Vec::new());
+    simulator.accept(Moment::ZERO);
+    let content = [&125_f64.to_be_bytes()[..], FULL_RECIPE.as_bytes()].concat();
+    let request = encode(packet_type::CONTROL_PACKAGE_SETUP_OUTPUTS, &content);
+    let Some(Output::Bytes(answer)) = ask(&mut simulator, &request) else { panic!() };
+    let types = String::from_utf8(answer[4..].to_vec()).unwrap();
+    let size = |kind: &str| match kind {
+        "BOOL" => 1,
+        "INT32" | "UINT32" => 4,
+        "UINT64" | "DOUBLE" => 8,
+        "VECTOR3D" | "VECTOR6INT32" => 24,
+        "VECTOR6D" => 48,
+        other => panic!("{other}"),
+    };
+    let expected: usize = types.split(',').map(size).sum();
+    assert_eq!(types.split(',').count(), FULL_RECIPE.split(',').count());
+    ask(&mut simulator, &[0x00, 0x03, 0x53]);
+    simulator.tick(&mut MockCell::default(), Duration::from_millis(8));
+    let Some(Output::Bytes(data)) = simulator.next_output() else { panic!() };
+    assert_eq!(data.len(), 4 + expected);
+}

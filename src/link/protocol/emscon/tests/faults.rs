@@ -294,7 +294,7 @@ fn a_scale_of_the_tracker_ends_the_set_up_and_a_shift_is_a_warning() {
     let failure = failure(&events);
     assert_eq!(*failure, Failure::Scaled(1.0001));
     assert!(failure.to_string().contains("scale 1.0001"), "{failure}");
-    assert!(failure.hint().contains("set the scale of the instrument's transformation to 1"), "{}", failure.hint());
+    assert!(failure.hint().contains("map projection, ppm) to 1"), "{}", failure.hint());
     let mut moved = bench(&[Planned::once(EmsconFault::Moved)]);
     let events = moved.settle();
     let Some(ProtocolEvent::Ready(identity)) = events.last() else { panic!("{events:?}") };
