@@ -285,15 +285,15 @@ impl Failure {
             Self::Refused(why) => format!("{subject} refused: {why}"),
             Self::Settings(why) => format!("{subject} has a wrong setting: {why}"),
             Self::Scaled(scale) => {
-                format!(
-                    "{subject} multiplies its points by the scale {scale}, so all distances would be wrong"
-                )
+                format!("{subject} multiplies its points by the scale {scale}, so all distances would be wrong")
             }
             Self::Foreign(why) => format!("this does not look like the selected instrument: {why}"),
             Self::Unusable(why) => format!("the reading is not a measurement: {why}"),
-            Self::Repeated => "the reading is not a measurement: identical to the previous point to the last digit, so it is \
+            Self::Repeated => {
+                "the reading is not a measurement: identical to the previous point to the last digit, so it is \
                                not a new measurement"
-                .to_owned(),
+                    .to_owned()
+            }
             Self::Garbled(why) => format!("cannot read the data from {subject}: {why}"),
             Self::InUse(why) => format!("{subject} is in use by another program ({why})"),
             Self::Unreachable(why) => format!("no connection: {why}"),
@@ -315,9 +315,13 @@ impl Failure {
             }
             Self::Refused(_) => "check the instrument's own display",
             Self::Settings(_) => "correct the setting at the instrument, or reconnect and let the set-up do it",
-            Self::Scaled(_) => "set the scale of the instrument (transformation, map projection, ppm) to 1, then reconnect",
+            Self::Scaled(_) => {
+                "set the scale of the instrument (transformation, map projection, ppm) to 1, then reconnect"
+            }
             Self::Foreign(_) => "check the kind of instrument and the port, and that it is switched on; then reconnect",
-            Self::Unusable(_) | Self::Repeated => "measure again; if this persists, check the beam and the settings of the instrument",
+            Self::Unusable(_) | Self::Repeated => {
+                "measure again; if this persists, check the beam and the settings of the instrument"
+            }
             Self::Garbled(_) => "check the baud rate, the line ending and the selected kind of instrument",
             Self::InUse(_) => "close the other program, then reconnect",
             Self::Unreachable(_) => {
@@ -334,7 +338,9 @@ impl Failure {
             Self::Silent { .. } => {
                 "check that the controller is switched on, that the network is connected and that the port is right (RTDE: 30004)"
             }
-            Self::Refused(_) => "check the version, the options and the user of the controller's interface; then reconnect",
+            Self::Refused(_) => {
+                "check the version, the options and the user of the controller's interface; then reconnect"
+            }
             Self::Garbled(_) | Self::Foreign(_) => {
                 "check the controller's address, the protocol and its port (RTDE: 30004); then reconnect"
             }

@@ -47,7 +47,9 @@ impl RestDetector {
             self.states.clear();
         }
         self.states.push_back((time, state.positions.clone()));
-        while self.states.len() > FEWEST_STATES && self.states.get(1).is_some_and(|(second, _)| time - second >= DURATION) {
+        while self.states.len() > FEWEST_STATES
+            && self.states.get(1).is_some_and(|(second, _)| time - second >= DURATION)
+        {
             self.states.pop_front();
         }
         self.is_at_rest()
@@ -59,7 +61,9 @@ impl RestDetector {
     }
 
     fn is_at_rest(&self) -> bool {
-        let (Some((first, positions)), Some((last, _))) = (self.states.front(), self.states.back()) else { return false };
+        let (Some((first, positions)), Some((last, _))) = (self.states.front(), self.states.back()) else {
+            return false;
+        };
         self.states.len() >= FEWEST_STATES
             && last - first >= DURATION
             && (0..positions.len()).all(|joint| self.is_joint_at_rest(joint))
@@ -204,7 +208,8 @@ mod tests {
     #[test]
     fn the_noise_of_encoders_is_rest_and_a_slow_creep_is_not() {
         let mut detector = RestDetector::default();
-        let rests: Vec<bool> = (0..500).map(|n| detector.feed(&state(n, vec![1.0 + noise(n), -2.0 + noise(n + 5)]))).collect();
+        let rests: Vec<bool> =
+            (0..500).map(|n| detector.feed(&state(n, vec![1.0 + noise(n), -2.0 + noise(n + 5)]))).collect();
         assert_eq!(rests.iter().position(|rest| *rest), Some(13));
         assert!(rests[13..].iter().all(|rest| *rest));
         let mut detector = RestDetector::default();

@@ -75,7 +75,9 @@ enum Occasion {
 impl GeocomFault {
     const fn occasion(self) -> Occasion {
         match self {
-            Self::Asleep | Self::Scaled | Self::FewDecimals | Self::OldSoftware | Self::Unnumbered => Occasion::Connection,
+            Self::Asleep | Self::Scaled | Self::FewDecimals | Self::OldSoftware | Self::Unnumbered => {
+                Occasion::Connection
+            }
             Self::Echo | Self::Dead => Occasion::Request,
             _ => Occasion::Measurement,
         }

@@ -175,7 +175,9 @@ impl NdiSimulator {
             "PHINF:0A0001" => format!("02000000NDI         001000000012{}", if self.is_enabled { "1" } else { "0" }),
             "PHF:0A" => "OKAY".to_owned(),
             _ if command.starts_with("COMM:") => self.set_speed(command.trim_start_matches("COMM:")),
-            "VER:0" | "VER:3" | "VER:4" | "VER:5" => "Polaris Control Firmware SIMULATED\nNDI S/N: P7-00001\nFreeze Tag: 024".to_owned(),
+            "VER:0" | "VER:3" | "VER:4" | "VER:5" => {
+                "Polaris Control Firmware SIMULATED\nNDI S/N: P7-00001\nFreeze Tag: 024".to_owned()
+            }
             _ if command.starts_with("PHRQ:") => format!("{HANDLE:02X}"),
             _ if command.starts_with("PVWR:0A") => "OKAY".to_owned(),
             _ if command.starts_with("BEEP:") => "1".to_owned(),
@@ -238,7 +240,9 @@ impl NdiSimulator {
             _ => self.observe(source),
         };
         self.last = Some((frame, pose));
-        let pose = pose.filter(|_| !matches!(fault, Some(NdiFault::Missing | NdiFault::OutOfVolume))).map(|pose| with_fault(pose, fault));
+        let pose = pose
+            .filter(|_| !matches!(fault, Some(NdiFault::Missing | NdiFault::OutOfVolume)))
+            .map(|pose| with_fault(pose, fault));
         let bytes =
             if is_binary { binary_reply(pose, frame, fault) } else { encode_text(&text_reply(pose, frame, fault)) };
         self.reply(bytes, fault, now + ANSWERING);

@@ -152,7 +152,15 @@ impl GeocomProtocol {
         options.validate()?;
         let exchange = Exchange::new(options.checksum);
         let outbox = Outbox::default();
-        Ok(Self { options, exchange, outbox, phase: Phase::Closed, set_up: SetUpResult::default(), corrections: None, previous: None })
+        Ok(Self {
+            options,
+            exchange,
+            outbox,
+            phase: Phase::Closed,
+            set_up: SetUpResult::default(),
+            corrections: None,
+            previous: None,
+        })
     }
 
     /// Bytes of an incomplete line.

@@ -5,10 +5,10 @@ use std::time::Duration;
 use nalgebra::Vector3;
 
 use super::super::Failure;
+use super::super::LineChange;
 use super::super::Moment;
 use super::super::Protocol;
 use super::super::ProtocolEvent;
-use super::super::LineChange;
 use super::super::Severity;
 use super::super::Shot;
 use super::super::error_streak::ErrorStreak;
@@ -135,7 +135,8 @@ impl NdiProtocol {
     }
 
     fn ask_at(&mut self, command: String, at: Moment) {
-        self.pending = Some(Pending { command, is_sent: false, at, limit: self.timeout, resends: 0, is_damaged: false });
+        self.pending =
+            Some(Pending { command, is_sent: false, at, limit: self.timeout, resends: 0, is_damaged: false });
     }
 
     fn ask(&mut self, command: String, now: Moment) {

@@ -99,7 +99,12 @@ fn a_text_reply_gives_every_tool() {
     let tools = decode_tx(&text).unwrap().tools;
     match tools.as_slice() {
         [
-            Tool { handle: 0x0A, state: ToolState::Seen { quaternion, origin: found, error }, frame: 0xABC, port: 0xB1 },
+            Tool {
+                handle: 0x0A,
+                state: ToolState::Seen { quaternion, origin: found, error },
+                frame: 0xABC,
+                port: 0xB1,
+            },
             Tool { handle: 0x0B, state: ToolState::Missing, frame: 0xABC, port: 0x71 },
             Tool { handle: 0x0C, state: ToolState::Disabled, frame: 0, port: 0 },
         ] => {

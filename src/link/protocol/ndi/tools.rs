@@ -134,7 +134,11 @@ pub fn decode_tx(text: &str) -> Result<Positions, String> {
         tools.push(tx_tool(&mut rest)?);
     }
     let system = u16::try_from(rest.hexadecimal(4)?).unwrap_or_default();
-    if rest.rest.is_empty() { Ok(Positions { tools, system }) } else { Err(format!("{} characters too many", rest.rest.len())) }
+    if rest.rest.is_empty() {
+        Ok(Positions { tools, system })
+    } else {
+        Err(format!("{} characters too many", rest.rest.len()))
+    }
 }
 
 fn tx_tool(rest: &mut Cursor<'_>) -> Result<Tool, String> {

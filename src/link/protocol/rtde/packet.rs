@@ -310,8 +310,7 @@ impl Record {
             return None;
         }
         let nowhere = f64::NAN;
-        let mut record =
-            Self { timestamp: nowhere, actual_q: [nowhere; 6], robot_mode: None, safety_status: None };
+        let mut record = Self { timestamp: nowhere, actual_q: [nowhere; 6], robot_mode: None, safety_status: None };
         let mut rest = values;
         for field in fields {
             let (value, after) = rest.split_at_checked(field.size())?;

@@ -262,8 +262,8 @@ fn states_with_a_person_in_the_cell_can_be_measured_and_are_kept_as_a_remark() {
         assert!(events.iter().any(|event| matches!(event, ProtocolEvent::Status(status) if status.text == said)));
     }
     for (status, forbidden) in (0..30).zip([
-        false, false, false, true, false, false, true, true, true, true, false, false, false, false, false, true, false,
-        false, false, false, true, false, false, false, false, false, false, false, false, false,
+        false, false, false, true, false, false, true, true, true, true, false, false, false, false, false, true,
+        false, false, false, false, true, false, false, false, false, false, false, false, false, false,
     ]) {
         assert_eq!(super::mode::forbids_measuring(status), forbidden, "{status}");
     }

@@ -120,7 +120,9 @@ const fn expected(fault: GeocomFault) -> Option<&'static str> {
         GeocomFault::NotANumber => "angle",
         GeocomFault::EmptyAnswer => "success but sends no values",
         GeocomFault::CorrectionsChanged => "",
-        GeocomFault::Scaled | GeocomFault::FewDecimals | GeocomFault::OldSoftware | GeocomFault::Unnumbered => return None,
+        GeocomFault::Scaled | GeocomFault::FewDecimals | GeocomFault::OldSoftware | GeocomFault::Unnumbered => {
+            return None;
+        }
         GeocomFault::DisconnectMidLine | GeocomFault::Dead => "",
     })
 }
@@ -183,7 +185,10 @@ fn corrections_that_another_program_changes_refuse_the_next_shot() {
     let mut bench = bench([Planned::once(GeocomFault::CorrectionsChanged)]);
     shot(&mut bench);
     let Some(ProtocolEvent::Lost(Failure::Settings(text))) = bench.shoot().pop() else { panic!() };
-    assert_eq!(text, "the corrections of the distance were 8.40 ppm and -34.40 mm at the set-up and are 50.00 ppm and -34.40 mm now");
+    assert_eq!(
+        text,
+        "the corrections of the distance were 8.40 ppm and -34.40 mm at the set-up and are 50.00 ppm and -34.40 mm now"
+    );
     identity(&mut bench);
     shot(&mut bench);
 }
@@ -287,8 +292,9 @@ fn a_broken_beam_gives_no_point() {
 }
 
 fn conversation(checksum: bool) -> GeocomBench {
-    let faults =
-        GeocomFault::ALL.iter().filter(|fault| !matches!(fault, GeocomFault::DisconnectMidLine | GeocomFault::Dead | GeocomFault::CorrectionsChanged));
+    let faults = GeocomFault::ALL.iter().filter(|fault| {
+        !matches!(fault, GeocomFault::DisconnectMidLine | GeocomFault::Dead | GeocomFault::CorrectionsChanged)
+    });
     let faults = faults.zip(2..).map(|(&fault, at)| Planned::at(fault, at));
     let mut bench = unconnected(&GeocomOptions { checksum, ..GeocomOptions::default() }, faults);
     identity(&mut bench);

@@ -123,13 +123,9 @@ const fn expected(fault: NdiFault, reply: ReplyFormat) -> &'static str {
         (NdiFault::NotANumber, ReplyFormat::Binary) => "is out of range",
         (NdiFault::NoRotation, _) => "rotation of the tool is invalid",
         (NdiFault::Origin, _) => "0, 0, 0",
-        (
-            NdiFault::Reset
-            | NdiFault::DisconnectMidPacket
-            | NdiFault::InitialisationFails
-            | NdiFault::SlowStart,
-            _,
-        ) => "lost",
+        (NdiFault::Reset | NdiFault::DisconnectMidPacket | NdiFault::InitialisationFails | NdiFault::SlowStart, _) => {
+            "lost"
+        }
     }
 }
 
@@ -165,8 +161,7 @@ fn faulty_shot(fault: NdiFault, reply: ReplyFormat, times: u32) {
 #[test]
 fn every_fault_is_said_and_passes() {
     for reply in BOTH {
-        let of_positions =
-            |fault: &&NdiFault| !matches!(fault, NdiFault::InitialisationFails | NdiFault::SlowStart);
+        let of_positions = |fault: &&NdiFault| !matches!(fault, NdiFault::InitialisationFails | NdiFault::SlowStart);
         for &fault in NdiFault::ALL.iter().filter(of_positions) {
             for times in [1, 2, 4] {
                 faulty_shot(fault, reply, times);
@@ -273,10 +268,7 @@ fn conversation(reply: ReplyFormat) -> NdiBench {
     let is_left_out = |fault: NdiFault| {
         matches!(
             fault,
-            NdiFault::DisconnectMidPacket
-                | NdiFault::Reset
-                | NdiFault::InitialisationFails
-                | NdiFault::SlowStart
+            NdiFault::DisconnectMidPacket | NdiFault::Reset | NdiFault::InitialisationFails | NdiFault::SlowStart
         )
     };
     let faults = NdiFault::ALL.iter().filter(|fault| !is_left_out(**fault)).zip(1..);

@@ -53,24 +53,65 @@ pub(super) fn kind(name: &str) -> Option<Kind> {
         }
     }
     Some(match name {
-        "timestamp" | "actual_execution_time" | "speed_scaling" | "target_speed_fraction" | "actual_momentum"
-        | "actual_main_voltage" | "actual_robot_voltage" | "actual_robot_current" | "standard_analog_input0"
-        | "standard_analog_input1" | "standard_analog_output0" | "standard_analog_output1" | "io_current"
-        | "euromap67_24V_voltage" | "euromap67_24V_current" | "tool_analog_input0" | "tool_analog_input1"
-        | "tool_output_current" | "tool_temperature" | "tcp_force_scalar" | "payload" => Kind::Double,
-        "target_q" | "target_qd" | "target_qdd" | "target_current" | "target_moment" | "actual_q" | "actual_qd"
-        | "actual_qdd" | "actual_current" | "actual_current_window" | "joint_control_output" | "actual_TCP_pose"
-        | "actual_TCP_speed" | "actual_TCP_force" | "target_TCP_pose" | "target_TCP_speed" | "joint_temperatures"
-        | "actual_joint_voltage" | "payload_inertia" | "ft_raw_wrench" | "tcp_offset" | "actual_current_as_torque" => {
-            Kind::Vector6
-        }
+        "timestamp"
+        | "actual_execution_time"
+        | "speed_scaling"
+        | "target_speed_fraction"
+        | "actual_momentum"
+        | "actual_main_voltage"
+        | "actual_robot_voltage"
+        | "actual_robot_current"
+        | "standard_analog_input0"
+        | "standard_analog_input1"
+        | "standard_analog_output0"
+        | "standard_analog_output1"
+        | "io_current"
+        | "euromap67_24V_voltage"
+        | "euromap67_24V_current"
+        | "tool_analog_input0"
+        | "tool_analog_input1"
+        | "tool_output_current"
+        | "tool_temperature"
+        | "tcp_force_scalar"
+        | "payload" => Kind::Double,
+        "target_q"
+        | "target_qd"
+        | "target_qdd"
+        | "target_current"
+        | "target_moment"
+        | "actual_q"
+        | "actual_qd"
+        | "actual_qdd"
+        | "actual_current"
+        | "actual_current_window"
+        | "joint_control_output"
+        | "actual_TCP_pose"
+        | "actual_TCP_speed"
+        | "actual_TCP_force"
+        | "target_TCP_pose"
+        | "target_TCP_speed"
+        | "joint_temperatures"
+        | "actual_joint_voltage"
+        | "payload_inertia"
+        | "ft_raw_wrench"
+        | "tcp_offset"
+        | "actual_current_as_torque" => Kind::Vector6,
         "actual_tool_accelerometer" | "elbow_position" | "elbow_velocity" | "payload_cog" => Kind::Vector3,
         "joint_mode" => Kind::Vector6Int,
         "robot_mode" | "safety_mode" | "safety_status" | "tool_output_voltage" => Kind::Int32,
         "actual_digital_input_bits" | "actual_digital_output_bits" => Kind::Uint64,
-        "runtime_state" | "robot_status_bits" | "safety_status_bits" | "analog_io_types" | "euromap67_input_bits"
-        | "euromap67_output_bits" | "tool_mode" | "tool_analog_input_types" | "output_bit_registers0_to_31"
-        | "output_bit_registers32_to_63" | "input_bit_registers0_to_31" | "input_bit_registers32_to_63"
+        "runtime_state"
+        | "robot_status_bits"
+        | "safety_status_bits"
+        | "analog_io_types"
+        | "euromap67_input_bits"
+        | "euromap67_output_bits"
+        | "tool_mode"
+        | "tool_analog_input_types"
+        | "output_bit_registers0_to_31"
+        | "output_bit_registers32_to_63"
+        | "input_bit_registers0_to_31"
+        | "input_bit_registers32_to_63"
         | "script_control_line" => Kind::Uint32,
         _ => return None,
     })
