@@ -229,7 +229,7 @@ const UNLIMITED: (f64, f64) = (PI, 1.0);
 /// Two configurations are one if no joint differs by more (rad, m).
 const SAME: f64 = 1e-5;
 /// How much farther the second branch must be than the nearest one, so that the nearest is meant (rad).
-const CLEARLY: f64 = 20.0 * DEGREE;
+const CLEARLY: f64 = 5.0 * DEGREE;
 
 impl<'a> Compensator<'a> {
     /// Prepares two arms with the same joints. `limits` are pendant values ((rad) or (m)), one entry per joint.
@@ -331,18 +331,17 @@ impl<'a> Compensator<'a> {
             let found = self.inverse.nearest(&base_from_flange, near).ok_or(Status::NotInConfiguration)?;
             return if is_meant(&found) { Ok(found) } else { Err(Status::NotInConfiguration) };
         }
-        let all = self.inverse.solutions(&base_from_flange);
-        if all.is_empty() {
-            return Err(Status::OutOfReach);
-        }
-        let mut meant: Vec<Vec<f64>> = all.into_iter().filter(|q| is_meant(q)).collect();
         // Among full turns of one branch the nearest to zero, where nothing else is known.
         let zero = vec![0.0; self.limits.len()];
         let near = goal.near.unwrap_or(&zero);
+        let mut meant = self.inverse.meant(&base_from_flange, near, &is_meant);
         meant.sort_by(|a, b| distance(a, near).total_cmp(&distance(b, near)));
-        let Some(first) = meant.first() else { return Err(Status::NotInConfiguration) };
+        let Some(first) = meant.first() else {
+            let is_reachable = !self.inverse.solutions(&base_from_flange).is_empty();
+            return Err(if is_reachable { Status::NotInConfiguration } else { Status::OutOfReach });
+        };
         let posture = self.inverse.posture(first);
-        let rival = meant.iter().find(|q| self.inverse.posture(q) != posture);
+        let rival = meant.iter().skip(1).find(|q| self.inverse.posture(q) != posture);
         let is_clear = rival
             .is_none_or(|rival| goal.near.is_some_and(|near| distance(rival, near) > distance(first, near) + CLEARLY));
         if is_clear { Ok(first.clone()) } else { Err(Status::Ambiguous) }

@@ -130,6 +130,30 @@ impl<'a> InverseKinematics<'a> {
         all
     }
 
+    /// The solution of each branch that is meant and, among full turns, nearest to a configuration.
+    pub fn meant(
+        &self,
+        base_from_flange: &Isometry3<f64>,
+        near: &[f64],
+        is_meant: &dyn Fn(&[f64]) -> bool,
+    ) -> Vec<Vec<f64>> {
+        let branches = match &self.form {
+            Some(_) => self.branches(base_from_flange),
+            None => self.searched(base_from_flange, self.held_of(near)),
+        };
+        let of_branch = |mut q: Vec<f64>| {
+            self.unwind(&mut q, near);
+            if self.is_within(&q) && is_meant(&q) {
+                return Some(q);
+            }
+            let mut turned = Vec::new();
+            self.turned(&q, &mut turned);
+            let meant = turned.into_iter().filter(|q| is_meant(q));
+            meant.min_by(|a, b| distance(a, near).total_cmp(&distance(b, near)))
+        };
+        branches.into_iter().filter_map(of_branch).collect()
+    }
+
     /// The solution nearest to a configuration: its branch, full turns and, for an arm with seven axes, its third joint.
     pub fn nearest(&self, base_from_flange: &Isometry3<f64>, near: &[f64]) -> Option<Vec<f64>> {
         if near.len() != self.limits.len() {

@@ -21,6 +21,7 @@ mod recorder;
 mod renderer;
 mod rrd;
 mod style;
+mod targets;
 
 use std::path::{Path, PathBuf};
 
@@ -30,6 +31,7 @@ pub use file::{FILE_NAME, Written, rebuild, remove_old_parts, write};
 pub use live::Live;
 pub use read::{is_recording, read};
 pub use recorder::{Recorder, RecordingEvent};
+pub use targets::{DrawnTarget, write_targets};
 
 use crate::session::journal::JournalError;
 use crate::store::StoreError;

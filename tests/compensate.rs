@@ -149,8 +149,17 @@ fn limits_singularities_and_reach_are_told_apart() {
     let held = solve(&tight, &Goal::Configuration(away.to_vec()));
     assert!(matches!(held.status, Status::PositionOnly) || held.status == Status::AtLimit(vec![1]), "{held:?}");
     assert!((held.command[1] - away[1]).abs() < 1e-6 || held.status == Status::PositionOnly);
-    let beyond = solve(&limits, &Goal::Configuration(vec![0.0, 0.0, 7.0, 0.0, f64::NAN, 0.0]));
+    let mut narrow = limits.clone();
+    narrow[2] = Some((-1.0, 1.0));
+    let beyond = solve(&narrow, &Goal::Configuration(vec![0.0, 0.0, 3.0, 0.0, f64::NAN, 0.0]));
     assert_eq!(beyond.status, Status::BeyondLimit(vec![2, 4]));
+    // Beyond it by a full turn only: the same place.
+    let mut turned = away.to_vec();
+    turned[2] -= 2.0 * std::f64::consts::PI;
+    narrow[2] = Some((-2.0, 2.0));
+    let turned = solve(&narrow, &Goal::Configuration(turned));
+    assert_eq!(turned.status, Status::Reached);
+    assert!((turned.command[2] - free.command[2]).abs() < 1e-9);
     // Wrist straight: axes 4 and 6 in line. The orientation would need a large turn of both, the position does not.
     let straight = solve(&limits, &Goal::Configuration(vec![0.3, -1.2, 1.4, -1.0, 1e-4, 0.2]));
     assert_eq!(straight.status, Status::PositionOnly, "{straight:?}");
@@ -199,11 +208,11 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
         (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
     };
     let (code, out, err) =
-        run("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,20,-30,40,50,60\nb,0,0,0,0,400,0\n", &[]);
+        run("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,10,20,-30,40,50,60\nb,0,0,0,0,170,0\n", &[]);
     assert_eq!(code, 1, "{out}{err}");
     let lines: Vec<&str> = out.lines().collect();
-    assert_eq!(lines[0], "pose,status,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,left_mm,left_deg");
-    assert!(lines[1].starts_with("a,reached,") && lines[2] == "b,beyond_limit,,,,,,,,", "{out}");
+    assert_eq!(lines[0], "pose,status,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,left_mm,left_deg,moved_mm,moved_deg");
+    assert!(lines[1].starts_with("a,reached,") && lines[2] == "b,beyond_limit,,,,,,,,,,", "{out}");
     assert!(err.contains("pose b (line 3): not reached: J5 has a target beyond its limit"), "{err}");
     assert!(err.contains("1 of 2 targets reached"), "{err}");
     let commanded: Vec<f64> = lines[1].split(',').skip(2).take(6).map(|cell| cell.parse().unwrap()).collect();
@@ -233,7 +242,7 @@ fn a_table_of_targets_becomes_a_table_of_commands() {
     let (code, _, err) = run(joints, &["--target", "smr"]);
     assert!(code == 0 && !err.contains("theta6 (0."), "{err}");
     // Of many the first are named.
-    let beyond: Vec<String> = (0..50).map(|row| format!("p{row},0,0,0,0,400,0")).collect();
+    let beyond: Vec<String> = (0..50).map(|row| format!("p{row},0,0,0,0,170,0")).collect();
     let table = format!("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n{}\n", beyond.join("\n"));
     let (code, _, err) = run(&table, &[]);
     assert!(code == 1 && err.contains("pose p19 ") && !err.contains("pose p20 "), "{err}");

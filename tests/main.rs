@@ -11,6 +11,7 @@
 mod support;
 
 mod architecture;
+mod cartesian;
 mod cell;
 mod cli;
 mod compensate;

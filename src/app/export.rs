@@ -49,10 +49,15 @@ pub(super) fn run<O: Write, E: Write>(args: &ExportArgs, console: &mut Console<O
 }
 
 /// The arm of a calibration file. Prints the reasons not to apply it.
-pub(super) fn calibrated_arm<O: Write, E: Write>(
+fn calibrated_arm<O: Write, E: Write>(path: &Path, console: &mut Console<O, E>) -> Result<CalibratedArm, Failure> {
+    calibration(path, console).map(|(_, arm)| arm)
+}
+
+/// A calibration file and its arm. Prints the reasons not to apply it.
+pub(super) fn calibration<O: Write, E: Write>(
     path: &Path,
     console: &mut Console<O, E>,
-) -> Result<CalibratedArm, Failure> {
+) -> Result<(Calibration, CalibratedArm), Failure> {
     let file = path.display().to_string();
     let text = load::text(path)?;
     let calibration = Calibration::parse(&text).map_err(|error| {
@@ -65,7 +70,7 @@ pub(super) fn calibrated_arm<O: Write, E: Write>(
     for caution in &arm.cautions {
         console.remark(&format!("WARNING: {caution}"));
     }
-    Ok(arm)
+    Ok((calibration, arm))
 }
 
 /// `trupose profile import-urdf`.

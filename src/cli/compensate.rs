@@ -15,8 +15,8 @@ pub struct CompensateArgs {
     /// Calibration to apply (calibration.ron)
     #[arg(long, value_name = "RON")]
     pub calibration: PathBuf,
-    /// Targets: joint values, or positions with roll, pitch, yaw; CSV with units in the column names
-    #[arg(long, value_name = "CSV", required_unless_present = "program", conflicts_with = "program")]
+    /// Targets: joint values, or positions with an orientation; CSV with units in the column names
+    #[arg(long, value_name = "CSV", required_unless_present_any = ["program", "stream"], conflicts_with_all = ["program", "stream"])]
     pub targets: Option<PathBuf>,
     /// Robot program whose joint targets are corrected; everything else in it is kept
     #[arg(long, value_name = "FILE", requires = "dialect")]
@@ -30,6 +30,18 @@ pub struct CompensateArgs {
     /// File for the table of commands, or the program [default: print it]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Answer targets one by one: JSON lines on the standard input, one answer per line on the standard output
+    #[arg(long, conflicts_with_all = ["program", "out", "json"])]
+    pub stream: bool,
+    /// Largest predicted error of the identified arm at which a target is still corrected
+    #[arg(long, value_name = "MM", default_value_t = 2.0, value_parser = positive)]
+    pub largest_uncertainty_mm: f64,
+    /// Write a picture of the targets, nominal and corrected, for the Rerun viewer
+    #[arg(long, value_name = "RRD", conflicts_with = "stream")]
+    pub record: Option<PathBuf>,
+    /// Print what happened to each target as JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
     /// Reach the position only and ignore the orientation
     #[arg(long)]
     pub position_only: bool,
@@ -84,4 +96,11 @@ pub struct ImportUrdfArgs {
     /// File for the profile [default: print it]
     #[arg(long, value_name = "RON")]
     pub out: Option<PathBuf>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err(format!("'{text}' is not a positive number")),
+    }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Point3, SMatrix, Vector3};
 
 use super::Identification;
-use crate::kinematics::{Arm, FreeParameter, IdentificationJacobian, ParameterId, Place};
+use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, IdentificationJacobian, ParameterId, Place};
 
 /// Coordinates of a rigid motion.
 const MOTIONS: usize = 6;
@@ -130,6 +130,11 @@ impl Forecast {
         let n = self.ids.len();
         let mut rows = vec![0.0; 3 * n];
         let point = IdentificationJacobian::new(&self.ids).at(&self.arm.prepared(), place, &mut rows);
+        self.columns(&rows, &point)
+    }
+
+    fn columns(&self, rows: &[f64], point: &Point3<f64>) -> DMatrix<f64> {
+        let n = self.ids.len();
         let motion = motion(&point.coords);
         let mut derivatives = DMatrix::zeros(n + MOTIONS, 2 * AXES);
         for axis in 0..AXES {
@@ -155,6 +160,18 @@ impl Forecast {
         weighted.columns_mut(0, AXES).copy_from(&(gain.columns(0, AXES) * inverse));
         self.square -= (&self.fresh * &gain).dot(&weighted);
         self.covariance.gemm(-1.0, &weighted, &gain.transpose(), 1.0);
+    }
+
+    /// Root mean square position error predicted for a point of the flange at a configuration (m), in the frame that the
+    /// measured places define.
+    pub fn error_at(&self, q: &[f64], point_in_flange: &Point3<f64>) -> f64 {
+        let mut rows = vec![0.0; 3 * self.ids.len()];
+        let forward = ForwardKinematics::new(&self.arm.chain);
+        // Of no measured target: its coordinates are known.
+        let point = IdentificationJacobian::new(&self.ids).evaluate(&forward, q, usize::MAX, point_in_flange, &mut rows);
+        let derivatives = self.columns(&rows, &point);
+        let gain = &self.covariance * &derivatives;
+        derivatives.dot(&gain).max(0.0).sqrt()
     }
 
     /// Root mean square position error predicted at the fresh places (m).

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use jiff::Timestamp;
 use rerun::SerializedComponentBatch;
 use rerun::external::re_build_info::CrateVersion;
 use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
@@ -35,6 +36,16 @@ pub(super) fn encode(lines: &[Line], purpose: Purpose) -> Result<Vec<u8>, Record
         None => Vec::new(),
     };
     messages.extend(store_messages(&identity.recording(), drawn.rows, &mut ids));
+    encoded(messages)
+}
+
+/// Returns the bytes of a recording of these rows, without a layout.
+pub(super) fn encode_rows(store: &StoreId, time: Timestamp, rows: Vec<Row>) -> Result<Vec<u8>, RecordingError> {
+    let mut ids = Ids { time: nanoseconds(time).unsigned_abs(), next: 0 };
+    encoded(store_messages(store, rows, &mut ids))
+}
+
+fn encoded(messages: Vec<ChunkResult<LogMsg>>) -> Result<Vec<u8>, RecordingError> {
     let mut bytes = Vec::new();
     Encoder::encode_into(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, messages, &mut bytes)
         .map_err(|error| RecordingError::library("encoding the recording", error))?;

@@ -5,8 +5,15 @@
 //! pose,x_mm,y_mm,z_mm[,roll_deg,pitch_deg,yaw_deg][,q1_deg,…]      Cartesian targets
 //! ```
 //!
-//! Roll, pitch and yaw turn about the fixed axes x, y and z, as in URDF; without them the orientation is free. Joint values
-//! beside a Cartesian target say which branch (elbow, wrist) is meant. Units as in all tables: `mm`, `m`, `um`, `in`, `deg`, `rad`.
+//! Roll, pitch and yaw turn about the fixed axes x, y and z, as in URDF; other forms of orientation are recognised by their names
+//! (see `orientation`), and without any the orientation is free. Joint values beside a Cartesian target say which branch (elbow, wrist)
+//! is meant. Other columns are kept. Units as in all tables: `mm`, `m`, `um`, `in`, `deg`, `rad`.
+
+mod orientation;
+
+use nalgebra::UnitQuaternion;
+
+use orientation::Orientation;
 
 use super::table::{self, Defect, Header, Measure, NumberColumn, Numbers, Shape, TableErrors, TableProblem, decode};
 use crate::kinematics::JointType;
@@ -16,12 +23,12 @@ use crate::kinematics::JointType;
 pub enum TargetGoal {
     /// A pendant configuration (rad), sliding joints (m).
     Configuration(Vec<f64>),
-    /// A point of the tool in the base (m), its roll, pitch, yaw (rad) if they matter, and a configuration of the branch meant.
+    /// A point of the tool in the base (m), its orientation if it matters, and a configuration of the branch meant.
     Cartesian {
         /// Position (m).
         position: [f64; 3],
-        /// Roll, pitch, yaw (rad).
-        roll_pitch_yaw: Option<[f64; 3]>,
+        /// Orientation of the tool in the base; free without it.
+        orientation: Option<UnitQuaternion<f64>>,
         /// Pendant configuration nearby.
         near: Option<Vec<f64>>,
     },
@@ -35,6 +42,16 @@ pub struct TargetRow {
     pub pose: String,
     /// What is to be reached.
     pub goal: TargetGoal,
+    /// Cells of the columns that are not read, as written.
+    pub extra: Vec<String>,
+}
+
+/// A table of targets.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Targets {
+    pub rows: Vec<TargetRow>,
+    /// Names of the columns that are not read, as written.
+    pub extra: Vec<String>,
 }
 
 /// Column of a table of commands, which must not be compensated again.
@@ -44,7 +61,7 @@ const COMMANDS: &str = "status";
 ///
 /// # Errors
 /// All defects of the table together.
-pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Result<Vec<TargetRow>, TableErrors> {
+pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Result<Targets, TableErrors> {
     let (text, mut problems) = decode(content.as_ref(), file)?;
     let rows = if problems.is_empty() { rows(&text, joints, &mut problems) } else { None };
     if problems.is_empty() {
@@ -56,7 +73,7 @@ pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Resu
     }
 }
 
-fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> Option<Vec<TargetRow>> {
+fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> Option<Targets> {
     let table = table::split(text, Shape::Named, problems);
     if table.records.is_empty() && problems.is_empty() {
         problems.push(Defect::NoRows.of_table());
@@ -68,18 +85,22 @@ fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> O
     }
     let mut header = Header::new(names, problems)?;
     let pose = header.text("pose");
-    let (point, angles) = (["x", "y", "z"], ["roll", "pitch", "yaw"]);
-    let is_cartesian = point.iter().chain(&angles).any(|name| header.has_quantity(name));
-    let has_angles = angles.iter().any(|name| header.has_quantity(name));
+    let axes = ["x", "y", "z"];
+    let orientation = Orientation::find(&mut header, problems);
+    let is_cartesian = axes.iter().any(|name| header.has_quantity(name)) || orientation.is_some();
     let has_joints = !is_cartesian || header.has_quantity("q1");
-    let mut columns = |names: [&str; 3], measure: Measure, are_there: bool| -> Vec<NumberColumn> {
-        let names = names.into_iter().filter(|_| are_there);
-        names.filter_map(|name| header.required(name, measure, problems)).collect()
-    };
-    let point = columns(point, Measure::Length, is_cartesian);
-    let angles = columns(angles, Measure::Angle, has_angles);
+    let point: Vec<NumberColumn> = axes
+        .into_iter()
+        .filter(|_| is_cartesian)
+        .filter_map(|name| header.required(name, Measure::Length, problems))
+        .collect();
     let joints = if has_joints { header.joints("", joints, problems) } else { Vec::new() };
+    let of_orientation = orientation.iter().flat_map(|orientation| &orientation.columns);
+    let used: Vec<usize> =
+        point.iter().chain(&joints).chain(of_orientation).map(|column| column.index).chain(pose).collect();
     let names = header.finish(problems);
+    let is_extra = |index: &usize| !used.contains(index);
+    let extra: Vec<usize> = (0..names.len()).filter(is_extra).collect();
     let mut numbers = Numbers::new(&names, table.decimal_comma);
     let mut rows = Vec::with_capacity(table.records.len());
     for (index, record) in table.records.iter().enumerate() {
@@ -88,20 +109,29 @@ fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> O
         let mut values = |columns: &[NumberColumn]| -> Vec<f64> {
             columns.iter().filter_map(|&column| numbers.required(record, column, problems)).collect()
         };
-        let (point, angles, q) = (values(&point), values(&angles), values(&joints));
+        let (point, q) = (values(&point), values(&joints));
+        let turn = orientation.as_ref().map(|orientation| (orientation, values(&orientation.columns)));
+        let is_complete = problems.len() == before;
+        let turn = turn.filter(|_| is_complete).map(|(orientation, values)| orientation.rotation(&values));
+        let turn = turn.transpose().unwrap_or_else(|defect| {
+            problems.push(defect.at(record.line));
+            None
+        });
         let goal = match point[..] {
             [x, y, z] => TargetGoal::Cartesian {
                 position: [x, y, z],
-                roll_pitch_yaw: <[f64; 3]>::try_from(angles).ok(),
+                orientation: turn,
                 near: (!q.is_empty()).then_some(q),
             },
             _ => TargetGoal::Configuration(q),
         };
+        let kept = extra.iter().map(|&index| record.cells.get(index).cloned().unwrap_or_default()).collect();
         if problems.len() == before {
-            rows.push(TargetRow { line: record.line, pose: name, goal });
+            rows.push(TargetRow { line: record.line, pose: name, goal, extra: kept });
         }
     }
-    Some(rows)
+    let extra = extra.iter().filter_map(|&index| names.get(index).cloned()).collect();
+    Some(Targets { rows, extra })
 }
 
 /// A name of an output table, in quotation marks where it needs them.

@@ -107,6 +107,33 @@ pub enum Defect {
         /// Units of the quantity.
         allowed: Vec<&'static str>,
     },
+    /// Columns that look like an orientation that is not read.
+    #[error(
+        "{} like an orientation, but not one that is read; to leave it free by mistake would turn the tool. Rename or remove {}. Orientations are {}",
+        named(columns, "looks", "look"),
+        if columns.len() == 1 { "it" } else { "them" },
+        read.join("; ")
+    )]
+    UnknownOrientation {
+        /// Their names.
+        columns: Vec<String>,
+        /// The forms that are read.
+        read: Vec<&'static str>,
+    },
+    /// Two forms of orientation in one table.
+    #[error("the table gives the orientation twice: {}; remove one", forms.join(", and "))]
+    SeveralOrientations {
+        /// The forms that were found.
+        forms: Vec<&'static str>,
+    },
+    /// Numbers that are no rotation.
+    #[error("{name} is no rotation: {reason}")]
+    NoRotation {
+        /// What the numbers are.
+        name: &'static str,
+        /// What is wrong.
+        reason: String,
+    },
     /// Neither of the two tables of direct distances.
     #[error(
         "the columns are neither those of a socket table (position, socket, joints) nor those of a table of lengths \

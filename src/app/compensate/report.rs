@@ -1,0 +1,95 @@
+//! What happened to each target: for people, and as JSON.
+
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+use crate::text::decimal;
+use crate::units::{to_deg, to_mm};
+
+/// A target and its correction.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct TargetReport {
+    pub(super) line: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) name: Option<String>,
+    pub(super) status: &'static str,
+    /// Why it is not corrected, or only in part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reason: Option<String>,
+    #[serde(flatten)]
+    pub(super) moved: Option<Moved>,
+    /// Predicted error of the identified arm there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) uncertainty_mm: Option<f64>,
+}
+
+/// By how much a command differs from its target: the tool of the nominal arm, from one to the other.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Moved {
+    pub(super) moved_mm: f64,
+    pub(super) moved_deg: f64,
+}
+
+impl Moved {
+    pub(super) fn between(meant: &Isometry3<f64>, commanded: &Isometry3<f64>) -> Self {
+        Self {
+            moved_mm: to_mm((commanded.translation.vector - meant.translation.vector).norm()),
+            moved_deg: to_deg(commanded.rotation.angle_to(&meant.rotation)),
+        }
+    }
+}
+
+/// The result of a table or a program.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct Report {
+    pub(super) targets: Vec<TargetReport>,
+    pub(super) corrected: usize,
+    pub(super) left: usize,
+    /// Moves between corrected targets, with the largest deviation of the path.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) paths: Vec<PathReport>,
+    /// Files that were written.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) written: Vec<String>,
+}
+
+/// A linear or circular move between corrected targets.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct PathReport {
+    pub(super) line: usize,
+    /// Largest distance of the tool from where the nominal arm would have had it, with the targets corrected and without.
+    pub(super) corrected_mm: f64,
+    pub(super) uncorrected_mm: f64,
+}
+
+impl Report {
+    /// The largest and the mean move, the largest predicted error and the worst path, in one line each.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let moved: Vec<&Moved> = self.targets.iter().filter_map(|target| target.moved.as_ref()).collect();
+        let mut lines = Vec::new();
+        if !moved.is_empty() {
+            let mean = moved.iter().map(|moved| moved.moved_mm).sum::<f64>() / moved.len() as f64;
+            let largest = moved.iter().map(|moved| moved.moved_mm).fold(0.0, f64::max);
+            let turned = moved.iter().map(|moved| moved.moved_deg).fold(0.0, f64::max);
+            lines.push(format!(
+                "targets moved by {} mm on average, {} mm and {} deg at most",
+                decimal(mean, 3),
+                decimal(largest, 3),
+                decimal(turned, 3)
+            ));
+        }
+        let uncertainties = self.targets.iter().filter_map(|target| target.uncertainty_mm);
+        if let Some(largest) = uncertainties.max_by(f64::total_cmp) {
+            lines.push(format!("the arm is known within +-{} mm at these targets (predicted, rms)", decimal(largest, 3)));
+        }
+        if let Some(worst) = self.paths.iter().max_by(|a, b| a.corrected_mm.total_cmp(&b.corrected_mm)) {
+            lines.push(format!(
+                "between the targets of linear and circular moves the path deviates by {} mm at most (line {}; {} mm without compensation)",
+                decimal(worst.corrected_mm, 3),
+                worst.line,
+                decimal(worst.uncorrected_mm, 3)
+            ));
+        }
+        lines
+    }
+}
