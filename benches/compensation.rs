@@ -13,11 +13,12 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use nalgebra::Isometry3;
-use trupose::compensation::{Compensator, Goal, Settings, ToolArm};
+use nalgebra::{Isometry3, Vector3};
+use trupose::compensation::{Compensator, Goal, PoseGoal, Settings, ToolArm};
+use trupose::inverse::Posture;
 use trupose::kinematics::ForwardKinematics;
 use trupose::model::proof::configurations;
-use trupose::profile::{Level, Profile, builtin};
+use trupose::profile::{Level, Profile, builtin, builtin_names};
 
 const TARGETS: usize = 1000;
 /// The best of so many turns counts: what is slower waited for something else.
@@ -30,6 +31,41 @@ fn seconds(work: impl FnOnce()) -> f64 {
     let begin = Instant::now();
     work();
     begin.elapsed().as_secs_f64()
+}
+
+/// Cartesian targets with tools, in the configuration that a program states: inverted, corrected, and inverted again as a controller does.
+fn measure_poses(name: &str) {
+    let profile = Profile::parse(builtin(name).unwrap(), name).unwrap().0;
+    let free = profile.parameters(Level::default());
+    let deviations =
+        free.iter().zip([0.5, -0.5].into_iter().cycle()).map(|(free, half)| (free.id, half * free.expected));
+    let arm = |chain| ToolArm { chain, flange_from_tool: Isometry3::identity() };
+    let (nominal, identified) = (arm(profile.chain().clone()), arm(profile.arm().with(deviations).unwrap().chain));
+    let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
+    let compensator = Compensator::new(&nominal, &identified, &limits, Settings::default());
+    let forward = ForwardKinematics::new(profile.chain());
+    let planning: Vec<_> = profile.joints().iter().map(|range| range.planning_limits).collect();
+    let flange_from_tool = Isometry3::new(Vector3::new(0.1, -0.02, 0.2), Vector3::new(0.3, 1.0, -0.4));
+    let targets = configurations(profile.chain(), &planning, TARGETS);
+    let poses: Vec<_> = targets.iter().map(|q| forward.base_from_flange(q) * flange_from_tool).collect();
+    let solve = |(q, pose): (&Vec<f64>, &Isometry3<f64>)| {
+        let posture = compensator.inverse().posture(q);
+        let is_meant = |other: Option<&Posture>, turned: &[f64]| {
+            other == posture.as_ref() && turned.iter().zip(q).all(|(turned, q)| (turned - q).abs() < 0.3)
+        };
+        let goal = PoseGoal { base_from_tool: *pose, flange_from_tool, is_meant: &is_meant, near: Some(q) };
+        compensator.solve_pose(black_box(&goal))
+    };
+    let usable = targets.iter().zip(&poses).filter(|target| solve(*target).is_ok()).count();
+    let mut solving = f64::INFINITY;
+    for _ in 0..TURNS {
+        solving = solving.min(seconds(|| {
+            for target in targets.iter().zip(&poses) {
+                drop(black_box(solve(target)));
+            }
+        }));
+    }
+    println!("{name:<20} {usable:>5} of {TARGETS} usable {:>9.0} Cartesian targets/s", TARGETS as f64 / solving);
 }
 
 /// Joint targets within the planning limits, every parameter off by what is expected of it.
@@ -74,5 +110,8 @@ fn main() {
     println!("profile: {}", if cfg!(debug_assertions) { "dev" } else { "release" });
     for name in ["soochow", "ur5e", "franka_panda"] {
         measure(name);
+    }
+    for name in builtin_names().filter(|name| *name != "epson_ls3_b401s") {
+        measure_poses(name);
     }
 }

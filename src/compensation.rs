@@ -334,15 +334,15 @@ impl<'a> Compensator<'a> {
         // Among full turns of one branch the nearest to zero, where nothing else is known.
         let zero = vec![0.0; self.limits.len()];
         let near = goal.near.unwrap_or(&zero);
-        let mut meant = self.inverse.meant(&base_from_flange, near, &is_meant);
+        let mut meant = self.inverse.meant(&base_from_flange, near, goal.is_meant);
         meant.sort_by(|a, b| distance(a, near).total_cmp(&distance(b, near)));
         let Some(first) = meant.first() else {
             let is_reachable = !self.inverse.solutions(&base_from_flange).is_empty();
             return Err(if is_reachable { Status::NotInConfiguration } else { Status::OutOfReach });
         };
-        let posture = self.inverse.posture(first);
-        let rival = meant.iter().skip(1).find(|q| self.inverse.posture(q) != posture);
-        let is_clear = rival
+        // There is one solution of each branch.
+        let is_clear = meant
+            .get(1)
             .is_none_or(|rival| goal.near.is_some_and(|near| distance(rival, near) > distance(first, near) + CLEARLY));
         if is_clear { Ok(first.clone()) } else { Err(Status::Ambiguous) }
     }

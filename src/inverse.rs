@@ -135,7 +135,7 @@ impl<'a> InverseKinematics<'a> {
         &self,
         base_from_flange: &Isometry3<f64>,
         near: &[f64],
-        is_meant: &dyn Fn(&[f64]) -> bool,
+        is_meant: &dyn Fn(Option<&Posture>, &[f64]) -> bool,
     ) -> Vec<Vec<f64>> {
         let branches = match &self.form {
             Some(_) => self.branches(base_from_flange),
@@ -143,12 +143,14 @@ impl<'a> InverseKinematics<'a> {
         };
         let of_branch = |mut q: Vec<f64>| {
             self.unwind(&mut q, near);
-            if self.is_within(&q) && is_meant(&q) {
+            // Full turns leave the posture as it is.
+            let posture = self.posture(&q);
+            if self.is_within(&q) && is_meant(posture.as_ref(), &q) {
                 return Some(q);
             }
             let mut turned = Vec::new();
             self.turned(&q, &mut turned);
-            let meant = turned.into_iter().filter(|q| is_meant(q));
+            let meant = turned.into_iter().filter(|q| is_meant(posture.as_ref(), q));
             meant.min_by(|a, b| distance(a, near).total_cmp(&distance(b, near)))
         };
         branches.into_iter().filter_map(of_branch).collect()

@@ -142,6 +142,7 @@ fn every_form_of_orientation_in_a_table_is_read_or_refused() {
         assert!(code == 2 && out.is_empty() && said.contains(message), "{header}: {code} {out}{err}");
     }
     let (_, _, err) = run("o_deg,a_deg,t_deg", "10,20,30");
+    let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(err.contains("qx, qy, qz, qw (quaternion)") && err.contains("a_deg, b_deg, c_deg (KUKA)"), "{err}");
 }
 
