@@ -40,12 +40,14 @@ fn corrected(name: &str, poses: usize) -> (usize, f64, f64) {
     let (nominal, identified) = (ForwardKinematics::new(&arms[0].chain), ForwardKinematics::new(&arms[1].chain));
     let (mut count, mut position, mut angle) = (0, 0.0_f64, 0.0_f64);
     for _ in 0..poses {
-        let q: Vec<f64> = limits.iter().map(|range| range.map_or(0.0, |(low, high)| random.random_range(low..high))).collect();
+        let q: Vec<f64> =
+            limits.iter().map(|range| range.map_or(0.0, |(low, high)| random.random_range(low..high))).collect();
         let (tool, frame) = (pose(&mut random, 0.2), pose(&mut random, 1.0));
         let meant = nominal.base_from_flange(&q) * tool;
         let posture = compensator.inverse().posture(&q);
         // As a program states it: the branch, and the turns.
-        let is_meant = |other: Option<&Posture>, turned: &[f64]| other == posture.as_ref() && distance(turned, &q) < 0.3;
+        let is_meant =
+            |other: Option<&Posture>, turned: &[f64]| other == posture.as_ref() && distance(turned, &q) < 0.3;
         let goal = PoseGoal { base_from_tool: meant, flange_from_tool: tool, is_meant: &is_meant, near: Some(&q) };
         let Ok(done) = compensator.solve_pose(&goal) else { continue };
         count += 1;
@@ -98,11 +100,14 @@ fn first_command(out: &str) -> Vec<f64> {
 #[test]
 fn every_form_of_orientation_in_a_table_is_read_or_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |header: &str, row: &str| compensated(folder.path(), &format!("pose,x_mm,y_mm,z_mm,{header}\na,900,100,800,{row}\n"), &[]);
+    let run = |header: &str, row: &str| {
+        compensated(folder.path(), &format!("pose,x_mm,y_mm,z_mm,{header}\na,900,100,800,{row}\n"), &[])
+    };
     let (code, out, err) = run("roll_deg,pitch_deg,yaw_deg", "10,160,20");
     assert_eq!(code, 0, "{out}{err}");
     let expected = first_command(&out);
-    let turn = nalgebra::UnitQuaternion::from_euler_angles(10_f64.to_radians(), 160_f64.to_radians(), 20_f64.to_radians());
+    let turn =
+        nalgebra::UnitQuaternion::from_euler_angles(10_f64.to_radians(), 160_f64.to_radians(), 20_f64.to_radians());
     let (q, v, m) = (turn.coords, turn.scaled_axis(), turn.to_rotation_matrix());
     let m = m.matrix();
     let cells = |values: &[f64]| values.iter().map(|value| format!("{value:.12}")).collect::<Vec<_>>().join(",");

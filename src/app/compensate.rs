@@ -142,7 +142,9 @@ fn reason(done: &Compensated, joints: &[Joint]) -> String {
                 to_deg(done.angle_error)
             )
         }
-        Status::AtLimit(_) | Status::Singular => format!("not reached: {}; {left}", status_reason(&done.status, joints)),
+        Status::AtLimit(_) | Status::Singular => {
+            format!("not reached: {}; {left}", status_reason(&done.status, joints))
+        }
         Status::Reached
         | Status::OutOfReach
         | Status::BeyondLimit(_)
@@ -165,7 +167,9 @@ fn status_reason(status: &Status, joints: &[Joint]) -> String {
         Status::OutOfReach => "it is out of reach of this arm".to_owned(),
         Status::BeyondLimit(held) => format!("{} has a target beyond its limit", names(held)),
         Status::NotInConfiguration => "the arm does not reach it in the stated configuration".to_owned(),
-        Status::Ambiguous => "several configurations reach it, and what is stated does not tell which is meant".to_owned(),
+        Status::Ambiguous => {
+            "several configurations reach it, and what is stated does not tell which is meant".to_owned()
+        }
         Status::OtherConfiguration => "the corrected target would be in another configuration".to_owned(),
     }
 }

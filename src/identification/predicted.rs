@@ -168,7 +168,8 @@ impl Forecast {
         let mut rows = vec![0.0; 3 * self.ids.len()];
         let forward = ForwardKinematics::new(&self.arm.chain);
         // Of no measured target: its coordinates are known.
-        let point = IdentificationJacobian::new(&self.ids).evaluate(&forward, q, usize::MAX, point_in_flange, &mut rows);
+        let point =
+            IdentificationJacobian::new(&self.ids).evaluate(&forward, q, usize::MAX, point_in_flange, &mut rows);
         let derivatives = self.columns(&rows, &point);
         let gain = &self.covariance * &derivatives;
         derivatives.dot(&gain).max(0.0).sqrt()

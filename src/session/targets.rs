@@ -118,11 +118,9 @@ fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> O
             None
         });
         let goal = match point[..] {
-            [x, y, z] => TargetGoal::Cartesian {
-                position: [x, y, z],
-                orientation: turn,
-                near: (!q.is_empty()).then_some(q),
-            },
+            [x, y, z] => {
+                TargetGoal::Cartesian { position: [x, y, z], orientation: turn, near: (!q.is_empty()).then_some(q) }
+            }
             _ => TargetGoal::Configuration(q),
         };
         let kept = extra.iter().map(|&index| record.cells.get(index).cloned().unwrap_or_default()).collect();

@@ -10,10 +10,7 @@ use crate::error::Failure;
 use crate::recording::{DrawnTarget, write_targets};
 
 /// Writes the picture of named targets: where the tool is to be, and where the nominal arm has it at the command.
-pub(super) fn write(
-    path: &Path,
-    targets: impl Iterator<Item = (String, [Isometry3<f64>; 2])>,
-) -> Result<(), Failure> {
+pub(super) fn write(path: &Path, targets: impl Iterator<Item = (String, [Isometry3<f64>; 2])>) -> Result<(), Failure> {
     record::check_target(path)?;
     let point = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
     let drawn = targets.map(|(name, [meant, commanded])| DrawnTarget {

@@ -80,7 +80,10 @@ impl Report {
         }
         let uncertainties = self.targets.iter().filter_map(|target| target.uncertainty_mm);
         if let Some(largest) = uncertainties.max_by(f64::total_cmp) {
-            lines.push(format!("the arm is known within +-{} mm at these targets (predicted, rms)", decimal(largest, 3)));
+            lines.push(format!(
+                "the arm is known within +-{} mm at these targets (predicted, rms)",
+                decimal(largest, 3)
+            ));
         }
         if let Some(worst) = self.paths.iter().max_by(|a, b| a.corrected_mm.total_cmp(&b.corrected_mm)) {
             lines.push(format!(

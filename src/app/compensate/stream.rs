@@ -91,7 +91,8 @@ impl Pose {
         };
         let translation = Translation3::from(Vector3::from(self.xyz_mm.map(from_mm)));
         let pose = Isometry3::from_parts(translation, rotation);
-        let is_finite = pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|value| value.is_finite());
+        let is_finite =
+            pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|value| value.is_finite());
         if is_finite { Ok(pose) } else { Err("a pose has a number that is not finite".to_owned()) }
     }
 

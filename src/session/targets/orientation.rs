@@ -123,12 +123,7 @@ impl Orientation {
     }
 
     /// Three turns about axes that the names of the columns tell, in the order of the columns.
-    fn turns(
-        header: &mut Header,
-        lower: &[String],
-        prefix: &str,
-        problems: &mut Vec<TableProblem>,
-    ) -> Option<Self> {
+    fn turns(header: &mut Header, lower: &[String], prefix: &str, problems: &mut Vec<TableProblem>) -> Option<Self> {
         let named = lower.iter().filter_map(|name| {
             let rest = name.strip_prefix(prefix)?;
             let rest = rest.strip_suffix("_deg").or_else(|| rest.strip_suffix("_rad"))?;
