@@ -19,7 +19,7 @@ mod text;
 pub mod wire;
 
 use clap::ValueEnum;
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 pub use builtin::{builtin, builtin_names};
 pub use cell::{Capsule, Instrument, KeepOut, Tracker};
@@ -51,6 +51,8 @@ pub struct Profile {
     mounting: Mounting,
     payload: Option<LinkMass>,
     joints: Vec<JointRange>,
+    joint_aliases: Vec<Vec<String>>,
+    base_from_world: Isometry3<f64>,
     beta_joints: Vec<usize>,
     fixed_parameters: Vec<ParameterId>,
     targets: Vec<Target>,
@@ -171,6 +173,17 @@ impl Profile {
     /// Limits and speeds, one entry per joint of the chain.
     pub fn joints(&self) -> &[JointRange] {
         &self.joints
+    }
+
+    /// Further names of each joint, such as those of common URDFs, from base to flange.
+    pub fn joint_aliases(&self) -> &[Vec<String>] {
+        &self.joint_aliases
+    }
+
+    /// The frame in which the controller gives Cartesian positions, in the base of the arm. They differ where a maker puts its
+    /// origin on axis 2.
+    pub const fn base_from_world(&self) -> &Isometry3<f64> {
+        &self.base_from_world
     }
 
     /// Masses of the arm.

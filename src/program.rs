@@ -19,12 +19,12 @@
 pub mod configuration;
 mod error;
 mod fanuc;
+mod findings;
 mod inform;
 mod krl;
-#[allow(dead_code, reason = "the readers that fill these types follow")]
+mod lexer;
 pub mod motion;
 mod names;
-#[allow(dead_code, reason = "the readers that use it follow")]
 mod orientation;
 mod rapid;
 pub mod rewrite;
@@ -71,33 +71,48 @@ names!(Dialect {
 });
 
 impl Dialect {
-    /// Name in messages.
-    const fn title(self) -> &'static str {
+    /// The table of languages.
+    const fn language(self) -> &'static Language {
         match self {
-            Self::Rapid => "RAPID",
-            Self::Krl => "KRL",
-            Self::Fanuc => "FANUC TP",
-            Self::Urscript => "URScript",
-            Self::Val3 => "VAL3",
-            Self::Inform => "INFORM",
-            Self::Ros => "ROS",
-        }
-    }
-
-    /// How to load or start the program, if that is not obvious.
-    const fn advice(self) -> Option<&'static str> {
-        match self {
-            Self::Rapid => Some("To start: program pointer to this routine. It has its own name, not 'main'."),
-            Self::Krl => Some("With external axes: add E1 to E6 to every PTP."),
-            Self::Urscript => Some("In PolyScope: load it in a Script node, then call the function."),
-            Self::Val3 => Some("Add the .dtx and the .pgx to an application."),
-            Self::Ros => {
-                Some("The arm must be at the first point before this is sent. Enter the joint names of the URDF here.")
-            }
-            Self::Fanuc | Self::Inform => None,
+            Self::Rapid => &rapid::LANGUAGE,
+            Self::Krl => &krl::LANGUAGE,
+            Self::Fanuc => &fanuc::LANGUAGE,
+            Self::Urscript => &urscript::LANGUAGE,
+            Self::Val3 => &val3::LANGUAGE,
+            Self::Inform => &inform::LANGUAGE,
+            Self::Ros => &ros::LANGUAGE,
         }
     }
 }
+
+/// Everything that differs between the languages.
+struct Language {
+    /// Name in messages.
+    title: &'static str,
+    /// How to load or start the program, if that is not obvious.
+    advice: Option<&'static str>,
+    /// How joint values are counted, for an arm without and with coupled joints.
+    convention: [&'static str; 2],
+    write: fn(&mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>,
+    read: fn(&findings::Source<'_>) -> Result<motion::Scan, ProgramError>,
+    digits: Digits,
+}
+
+/// Decimals of corrected numbers: enough for 1 µm and 1 µrad where the controller stores them.
+#[derive(Clone, Copy, Debug)]
+struct Digits {
+    joint: usize,
+    /// Of coordinates.
+    length: usize,
+    /// Of angles or parts of a quaternion.
+    turn: usize,
+    /// The controller stores exactly these; elsewhere a number keeps the digits that it had, if they were more.
+    are_fixed: bool,
+}
+
+/// The usual convention of controllers in degrees.
+const AS_ON_PENDANT: [&str; 2] =
+    ["Joint values as on the pendant, in degrees.", "Joint values as on the pendant, in degrees, couplings included."];
 
 /// The arm for which the program is written.
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +125,8 @@ pub struct Robot<'a> {
     pub max_speeds: &'a [Option<f64>],
     /// Encoder pulses per degree of each joint; only INFORM needs it.
     pub pulses_per_degree: &'a [Option<f64>],
+    /// Further names of each joint, such as those of common URDFs; only ROS uses them.
+    pub joint_aliases: &'a [Vec<String>],
 }
 
 /// How the program waits while a pose is measured.
@@ -186,15 +203,7 @@ pub fn write(
         return Err(ProgramError::Dwell { dwell });
     }
     let mut job = Job { dialect, robot, poses, options, largest_rounding: 0.0 };
-    let files = match dialect {
-        Dialect::Rapid => rapid::write(&mut job),
-        Dialect::Krl => krl::write(&mut job),
-        Dialect::Fanuc => fanuc::write(&mut job),
-        Dialect::Urscript => urscript::write(&mut job),
-        Dialect::Val3 => val3::write(&mut job),
-        Dialect::Inform => inform::write(&mut job),
-        Dialect::Ros => ros::write(&mut job),
-    }?;
+    let files = (dialect.language().write)(&mut job)?;
     Ok(Program { files, largest_rounding: job.largest_rounding })
 }
 
@@ -277,25 +286,14 @@ impl Job<'_> {
             },
         ];
         lines.extend(self.options.dangers.iter().map(|danger| format!("DANGER: {}", names::ascii(danger))));
-        lines.extend(self.dialect.advice().map(str::to_owned));
+        lines.extend(self.dialect.language().advice.map(str::to_owned));
         lines.iter().flat_map(|line| wrapped(line, width)).collect()
     }
 
     fn convention(&self) -> &'static str {
         let is_coupled = self.robot.chain.joints().iter().any(|joint| joint.coupling.iter().any(|c| *c != 0.0));
-        match (self.dialect, is_coupled) {
-            (Dialect::Ros, true) => {
-                "Joint values are those of a URDF, each link against the one before: coupled joints are NOT as on the \
-                 pendant. Radians."
-            }
-            (Dialect::Ros | Dialect::Urscript, _) => "Joint values as on the pendant, but in radians.",
-            (Dialect::Inform, _) => "Joint values are encoder pulses; see the plan for degrees.",
-            (Dialect::Fanuc, true) => {
-                "Joint values as on the pendant, in degrees: J3 is the slope of the forearm, coupled to J2."
-            }
-            (_, true) => "Joint values as on the pendant, in degrees, couplings included.",
-            (_, false) => "Joint values as on the pendant, in degrees.",
-        }
+        let [usual, coupled] = self.dialect.language().convention;
+        if is_coupled { coupled } else { usual }
     }
 
     /// Label of a pose in comments, such as `pose 12, verification`.

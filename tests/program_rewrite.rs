@@ -2,7 +2,8 @@
 
 use jiff::civil::date;
 use trupose::profile::{Profile, builtin};
-use trupose::program::rewrite::{Scan, rewrite, scan};
+use trupose::program::motion::{Command, Companion, Goal, ReadOptions, Scan, Target};
+use trupose::program::rewrite::{rewrite, scan};
 use trupose::program::{Dialect, Options, Pause, ProgramError, Robot, write};
 use trupose::session::plan::{PlannedPose, PoseKind};
 
@@ -26,6 +27,7 @@ impl Arm {
             chain: self.profile.chain(),
             max_speeds: &self.speeds,
             pulses_per_degree: &self.pulses,
+            joint_aliases: &[],
         }
     }
 }
@@ -57,7 +59,8 @@ fn poses(shift: f64) -> Vec<PlannedPose> {
     degrees.iter().enumerate().map(row).collect()
 }
 
-fn written(dialect: Dialect, arm: &Arm, shift: f64) -> Vec<u8> {
+/// The file with the positions, and how to read it: together with the moves, where they are in another file.
+fn written(dialect: Dialect, arm: &Arm, shift: f64) -> (Vec<u8>, ReadOptions) {
     let options = Options {
         name: "cal".to_owned(),
         pause: Pause::Dwell(3.0),
@@ -66,46 +69,59 @@ fn written(dialect: Dialect, arm: &Arm, shift: f64) -> Vec<u8> {
         dangers: Vec::new(),
     };
     let program = write(dialect, &arm.robot(), &poses(shift), &options).unwrap();
-    program.files[0].text.clone().into_bytes()
+    let companion = |file: &trupose::program::ProgramFile| Companion {
+        name: file.file_name.clone(),
+        text: file.text.clone().into_bytes(),
+    };
+    let companions = program.files[1..].iter().map(companion).collect();
+    (program.files[0].text.clone().into_bytes(), ReadOptions { companions, ..ReadOptions::default() })
+}
+
+fn joints(target: &Target) -> Vec<f64> {
+    match &target.goal {
+        Goal::Joints(joints) => joints.clone(),
+        Goal::Pose(pose) => panic!("{pose:?}"),
+    }
 }
 
 fn found(dialect: Dialect, arm: &str, text: &str) -> Scan {
-    scan(dialect, &Arm::new(arm).robot(), None, text.as_bytes()).unwrap()
+    scan(dialect, &Arm::new(arm).robot(), &ReadOptions::default(), text.as_bytes()).unwrap()
 }
 
 #[test]
 fn targets_of_every_dialect_are_read_and_replaced_as_the_writer_would_have_written_them() {
     for (dialect, name, tolerance) in ARMS {
         let arm = Arm::new(name);
-        let text = written(dialect, &arm, 0.0);
-        let found = scan(dialect, &arm.robot(), None, &text).unwrap();
+        let (text, options) = written(dialect, &arm, 0.0);
+        let found = scan(dialect, &arm.robot(), &options, &text).unwrap();
         // A dwell of ROS is the same point again.
         let each = if dialect == Dialect::Ros { 2 } else { 1 };
         assert_eq!(found.targets.len(), 3 * each, "{dialect}");
         assert_eq!(found.left, [], "{dialect}");
         for (target, pose) in found.targets.iter().step_by(each).zip(poses(0.0)) {
-            for (read, meant) in target.configuration.iter().zip(pose.configuration) {
+            for (read, meant) in joints(target).into_iter().zip(pose.configuration) {
                 assert!((read - meant).abs() < tolerance, "{dialect}: {read} {meant}");
             }
         }
-        let same: Vec<_> = found.targets.iter().map(|target| Some(target.configuration.clone())).collect();
+        let same: Vec<_> = found.targets.iter().map(|target| Some(Command::Joints(joints(target)))).collect();
         assert!(
             rewrite(dialect, &arm.robot(), &text, &found, &same).unwrap() == text,
             "{dialect}: the same targets change the program"
         );
         let none = vec![None; found.targets.len()];
         assert!(rewrite(dialect, &arm.robot(), &text, &found, &none).unwrap() == text, "{dialect}");
-        let moved: Vec<_> = poses(0.25).into_iter().flat_map(|pose| vec![Some(pose.configuration); each]).collect();
+        let moved: Vec<_> =
+            poses(0.25).into_iter().flat_map(|pose| vec![Some(Command::Joints(pose.configuration)); each]).collect();
         let corrected = rewrite(dialect, &arm.robot(), &text, &found, &moved).unwrap();
-        let again = scan(dialect, &arm.robot(), None, &corrected).unwrap();
+        let again = scan(dialect, &arm.robot(), &options, &corrected).unwrap();
         for (target, pose) in again.targets.iter().step_by(each).zip(poses(0.25)) {
-            for (read, meant) in target.configuration.iter().zip(pose.configuration) {
+            for (read, meant) in joints(target).into_iter().zip(pose.configuration) {
                 assert!((read - meant).abs() < tolerance, "{dialect}: {read} {meant}");
             }
         }
         if dialect != Dialect::Ros {
             // Times of a ROS trajectory depend on the moves; all others are what the writer writes.
-            assert!(corrected == written(dialect, &arm, 0.25), "{dialect}: {}", String::from_utf8_lossy(&corrected));
+            assert!(corrected == written(dialect, &arm, 0.25).0, "{dialect}: {}", String::from_utf8_lossy(&corrected));
         }
     }
 }
@@ -114,13 +130,16 @@ fn targets_of_every_dialect_are_read_and_replaced_as_the_writer_would_have_writt
 fn bytes_that_are_no_utf8_stay() {
     let arm = Arm::new("kuka_kr6_r900");
     let text = b"; M\xfcller\r\nPTP {A1 1,A2 -90,A3 90,A4 0,A5 10,A6 0} ; Gr\xfc\xdfe {A1 3}\r\n".to_vec();
-    let found = scan(Dialect::Krl, &arm.robot(), None, &text).unwrap();
+    let found = scan(Dialect::Krl, &arm.robot(), &ReadOptions::default(), &text).unwrap();
     assert_eq!((found.targets.len(), found.left.len()), (1, 0));
     let command = [0.5, -90.25, 90.0, 0.0, 10.0, 0.0].map(f64::to_radians).to_vec();
-    let corrected = rewrite(Dialect::Krl, &arm.robot(), &text, &found, &[Some(command)]).unwrap();
+    let corrected = rewrite(Dialect::Krl, &arm.robot(), &text, &found, &[Some(Command::Joints(command))]).unwrap();
     let expected = b"; M\xfcller\r\nPTP {A1 0.50000,A2 -90.25000,A3 90.00000,A4 0.00000,A5 10.00000,A6 0.00000} ; Gr\xfc\xdfe {A1 3}\r\n";
     assert_eq!(corrected, expected);
-    assert_eq!(scan(Dialect::Krl, &arm.robot(), None, b"P\0T\0").unwrap_err(), ProgramError::NotText);
+    assert_eq!(
+        scan(Dialect::Krl, &arm.robot(), &ReadOptions::default(), b"P\0T\0").unwrap_err(),
+        ProgramError::NotText
+    );
 }
 
 #[test]
@@ -145,7 +164,7 @@ fn what_is_no_joint_target_is_left_and_named() {
             "kuka_kr6_r900",
             "PTP {A1 10}\nPTP_REL {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\nDECL E6AXIS XP1={E6AXIS: A1 1,A2 -90,A3 90,A4 0,A5 10,A6 0,E1 0}",
             1,
-            vec![1, 2, 3],
+            vec![1, 2, 4],
         ),
         (
             Dialect::Fanuc,
@@ -158,13 +177,13 @@ fn what_is_no_joint_target_is_left_and_named() {
             Dialect::Urscript,
             "ur5e",
             "q1=[0,-1.5,1,0,1,0]\nq2=[1,2,3]\nother=[0,0,0,0,0,0]\nmovej(q1,a=1)\nmovej([0,d2r(90),0,0,0,0])\nmovel(p[1,2,3,4,5,6])\nmovej(get_inverse_kin(p))\n# movej([0,0,0,0,0,0])\nmovej(q2)",
-            1,
-            vec![2, 5, 6, 7],
+            3,
+            vec![7, 9],
         ),
         (
             Dialect::Val3,
             "staubli_tx2_60",
-            "<Value key=\"0\" x=\"1\" y=\"2\" z=\"3\" rx=\"0\" ry=\"0\" rz=\"0\" />\n<!-- <Value j1=\"1\" j2=\"1\" j3=\"1\" j4=\"1\" j5=\"1\" j6=\"1\"/> -->\n<Value key=\"1\" j1=\"a\" j2=\"1\" j3=\"1\" j4=\"1\" j5=\"1\" j6=\"1\"/>",
+            "<Data name=\"p\" type=\"pointRx\"><Value key=\"0\" x=\"1\" y=\"2\" z=\"3\" rx=\"0\" ry=\"0\" rz=\"0\" /></Data>\n<!-- <Value j1=\"1\" j2=\"1\" j3=\"1\" j4=\"1\" j5=\"1\" j6=\"1\"/> -->\n<Data name=\"j\" type=\"jointRx\"><Value key=\"1\" j1=\"a\" j2=\"1\" j3=\"1\" j4=\"1\" j5=\"1\" j6=\"1\"/></Data>",
             0,
             vec![1, 3],
         ),
@@ -187,12 +206,16 @@ fn what_is_no_joint_target_is_left_and_named() {
         let lines: Vec<usize> = scan.left.iter().map(|left| left.line).collect();
         assert_eq!((scan.targets.len(), lines), (targets, left), "{dialect}: {text}\n{scan:?}");
         if dialect == Dialect::Ros {
-            assert_eq!(scan.targets[0].configuration, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+            assert_eq!(joints(&scan.targets[0]), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         }
     }
     let arm = Arm::new("ur5e");
     let text = b"joint_names: [elbow, a, b, c, d, e]\npoints:\n";
-    assert!(matches!(scan(Dialect::Ros, &arm.robot(), None, text).unwrap_err(), ProgramError::JointNames { .. }));
+    assert!(matches!(
+        scan(Dialect::Ros, &arm.robot(), &ReadOptions::default(), text).unwrap_err(),
+        ProgramError::JointNames { .. }
+    ));
     let names = ["a", "b", "elbow", "c", "d", "e"].map(str::to_owned);
-    assert!(scan(Dialect::Ros, &arm.robot(), Some(&names), text).is_ok());
+    let options = ReadOptions { joint_names: Some(names.to_vec()), ..ReadOptions::default() };
+    assert!(scan(Dialect::Ros, &arm.robot(), &options, text).is_ok());
 }

@@ -30,6 +30,7 @@ impl Arm {
             chain: self.profile.chain(),
             max_speeds: &self.max_speeds,
             pulses_per_degree: &self.pulses_per_degree,
+            joint_aliases: &[],
         }
     }
 }

@@ -57,8 +57,13 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
     }
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
     let pulses: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
-    let robot =
-        Robot { profile: profile.name(), chain: profile.chain(), max_speeds: &max_speeds, pulses_per_degree: &pulses };
+    let robot = Robot {
+        profile: profile.name(),
+        chain: profile.chain(),
+        max_speeds: &max_speeds,
+        pulses_per_degree: &pulses,
+        joint_aliases: profile.joint_aliases(),
+    };
     let options = Options {
         name: args.name.clone(),
         pause: if args.acknowledge { Pause::Acknowledge } else { Pause::Dwell(args.dwell_s) },

@@ -48,6 +48,7 @@ const FIELDS: &[&str] = &[
     "source",
     "convention",
     "base",
+    "controller_world",
     "joints",
     "flange",
     "weight_kg",
@@ -89,6 +90,7 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
         choice(ast, &choices, findings)
     });
     let base = top.get_or("base", Isometry3::identity(), |ast| pose(ast, "'base'", findings));
+    let world = top.get_or("controller_world", Isometry3::identity(), |ast| pose(ast, "'controller_world'", findings));
     let flange = top.get_or("flange", Isometry3::identity(), |ast| pose(ast, "'flange'", findings));
     let joints = top
         .require("joints", "[(name: \"J1\", type: Revolute, ...), ...]", findings)
@@ -114,6 +116,7 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let spans: Vec<_> = joints.iter().map(|joint| joint.span).collect();
     let links: Vec<_> = joints.iter().map(|joint| (joint.mass, joint.span)).collect();
     let masses = masses::masses(&top, &links, findings);
+    let joint_aliases = joints.iter().map(|joint| joint.aliases.clone()).collect();
     let (chain_joints, joint_ranges, has_beta) = unzipped(joints);
     let chain = match KinematicChain::new(convention?, base?, chain_joints, flange?) {
         Ok(chain) => chain,
@@ -132,6 +135,8 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
         mounting: mounting?,
         payload,
         joints: joint_ranges,
+        joint_aliases,
+        base_from_world: world?,
         beta_joints,
         fixed_parameters: fixed_parameters?,
         targets: targets?,

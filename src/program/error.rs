@@ -42,7 +42,7 @@ pub enum ProgramError {
     /// An arm with too many or too few joints.
     #[error(
         "{} programs are written for arms with {}, and this one has {joints}; choose the dialect of its controller",
-        dialect.title(), joint_range(*least, *most)
+        dialect.language().title, joint_range(*least, *most)
     )]
     JointCount {
         dialect: Dialect,
@@ -52,7 +52,7 @@ pub enum ProgramError {
         most: usize,
     },
     /// A sliding joint in a dialect that does not support it.
-    #[error("{} programs are written for arms whose joints all turn, and '{joint}' slides", dialect.title())]
+    #[error("{} programs are written for arms whose joints all turn, and '{joint}' slides", dialect.language().title)]
     SlidingJoint { dialect: Dialect, joint: String },
     /// Pulses per degree are unknown.
     #[error(
@@ -79,6 +79,9 @@ pub enum ProgramError {
     /// The program is not plain text.
     #[error("the program contains zero bytes, so it is binary or UTF-16; export it as plain text")]
     NotText,
+    /// The program is compressed.
+    #[error("the program is compressed; a .urp file is one: export the program as .script, or unpack it with gzip")]
+    Compressed,
     /// The trajectory is for other joints.
     #[error("the trajectory has the joints {}; the arm has {}; name the joints of the trajectory in the order from base to flange", found.join(", "), expected.join(", "))]
     JointNames {

@@ -4,9 +4,23 @@
 //! at most eight characters for old controllers, remarks at most 32. `UF` and `UT` are required by the format but have no effect
 //! on joint positions.
 
+mod reader;
+
 use super::names::{ascii, identifier};
-use super::{CRLF, Job, ProgramError, ProgramFile};
+use super::{AS_ON_PENDANT, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 use crate::kinematics::JointType;
+
+pub(super) const LANGUAGE: Language = Language {
+    title: "FANUC TP",
+    advice: None,
+    convention: [
+        AS_ON_PENDANT[0],
+        "Joint values as on the pendant, in degrees: J3 is the slope of the forearm, coupled to J2.",
+    ],
+    write,
+    read: reader::read,
+    digits: Digits { joint: 3, length: 3, turn: 3, are_fixed: true },
+};
 
 /// Decimals of a TP position.
 const DECIMALS: usize = 3;
@@ -14,7 +28,7 @@ const DECIMALS: usize = 3;
 /// Longest remark (characters).
 const REMARK: usize = 32;
 
-pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(4..=6, true)?;
     let name = identifier(&job.options.name, 8).to_uppercase();
     let mut body: Vec<String> = job.header(REMARK).iter().map(|line| format!("!{line}")).collect();

@@ -4,10 +4,21 @@
 //! numbers: see
 //! [`Program::largest_rounding`](super::Program::largest_rounding).
 
+mod reader;
+
 use super::names::{ascii, identifier};
-use super::{CRLF, Job, ProgramError, ProgramFile};
+use super::{CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 use crate::text::decimal;
 use crate::units::{from_deg, to_deg};
+
+pub(super) const LANGUAGE: Language = Language {
+    title: "INFORM",
+    advice: None,
+    convention: ["Joint values are encoder pulses; see the plan for degrees."; 2],
+    write,
+    read: reader::read,
+    digits: Digits { joint: 4, length: 3, turn: 4, are_fixed: true },
+};
 
 /// Longest job name on old controllers (characters).
 const LONGEST_NAME: usize = 8;
@@ -15,7 +26,7 @@ const LONGEST_NAME: usize = 8;
 /// Longest comment line (characters).
 const REMARK: usize = 32;
 
-pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(1..=8, false)?;
     let sizes = pulses_per_degree(job)?;
     let name = identifier(&job.options.name, LONGEST_NAME).to_uppercase();

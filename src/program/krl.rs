@@ -3,12 +3,23 @@
 //! `WAIT SEC` and `HALT` stop the advance run. Cells with external axes must add `E1` to `E6`: an axis that is missing in the
 //! aggregate keeps its position. Arms with seven axes have another controller, which is programmed in Java.
 
+mod reader;
+
 use super::names::{MAX_NAME, identifier};
-use super::{COMMENT_WIDTH, CRLF, Job, ProgramError, ProgramFile};
+use super::{AS_ON_PENDANT, COMMENT_WIDTH, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
+
+pub(super) const LANGUAGE: Language = Language {
+    title: "KRL",
+    advice: Some("With external axes: add E1 to E6 to every PTP."),
+    convention: AS_ON_PENDANT,
+    write,
+    read: reader::read,
+    digits: Digits { joint: 5, length: 4, turn: 5, are_fixed: false },
+};
 
 const DECIMALS: usize = 5;
 
-pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(6..=6, false)?;
     let name = identifier(&job.options.name, MAX_NAME);
     let mut lines = vec![format!("DEF {name}()")];

@@ -25,14 +25,6 @@ pub(super) enum Orientation {
 const QUATERNION_TOLERANCE: f64 = 0.1;
 
 impl Orientation {
-    /// Number of values of a pose.
-    pub(super) const fn values(self) -> usize {
-        match self {
-            Self::Quaternion => 7,
-            Self::Zyx | Self::FixedXyz | Self::MovingXyz | Self::Vector => 6,
-        }
-    }
-
     const fn length_unit(self) -> f64 {
         match self {
             Self::Vector => 1.0,

@@ -3,14 +3,25 @@
 //! RAPID has no speed in percent for a single move. Full speed is taken as 2500 mm/s and 500 deg/s at the tool, the usual limit
 //! of `vmax` and the value in the predefined speeds, so that 10 % is 250 mm/s.
 
+mod reader;
+
 use super::names::{MAX_NAME, identifier};
-use super::{COMMENT_WIDTH, CRLF, Job, ProgramError, ProgramFile};
+use super::{AS_ON_PENDANT, COMMENT_WIDTH, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 use crate::text::decimal;
+
+pub(super) const LANGUAGE: Language = Language {
+    title: "RAPID",
+    advice: Some("To start: program pointer to this routine. It has its own name, not 'main'."),
+    convention: AS_ON_PENDANT,
+    write,
+    read: reader::read,
+    digits: Digits { joint: 5, length: 4, turn: 8, are_fixed: false },
+};
 
 /// Decimals: RAPID's numbers have 23 bits.
 const DECIMALS: usize = 5;
 
-pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(6..=6, false)?;
     let name = identifier(&job.options.name, MAX_NAME);
     let mut lines = vec![format!("MODULE {name}")];

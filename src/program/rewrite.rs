@@ -1,85 +1,42 @@
-//! Finds and replaces the joint targets of existing robot programs. Everything else stays unchanged, byte by byte.
+//! Finds and replaces the motion targets of existing robot programs. Everything else stays unchanged, byte by byte.
 //!
-//! Nothing is guessed. Unreadable joint targets are reported with their line and left unchanged; so are Cartesian targets, which
-//! do not state a configuration. Values follow the convention of the dialect, as in the programs written by this module.
-
-mod dialects;
-mod scanner;
+//! A value is a target because a motion instruction of the given files uses it, by its type and name, never by its looks.
+//! Whatever is not changed although it looks like a target or a motion uses it is listed with its reason. Joint values follow
+//! the convention of the language, as in the programs written by this module.
 
 use std::ops::Range;
 
-use super::{Dialect, ProgramError, Robot};
+use super::findings::Source;
+pub use super::motion::{Command, Companion, ReadOptions};
+use super::motion::{Form, Goal, Hint, JointUnit, Scan, Slot, Target};
+use super::orientation::Orientation;
+use super::{Dialect, Digits, ProgramError, Robot};
 use crate::text::decimal;
 use crate::units::{from_deg, to_deg};
 
-/// A joint target in a program.
-#[derive(Clone, Debug, PartialEq)]
-pub struct JointTarget {
-    /// Line, from 1.
-    pub line: usize,
-    /// Pendant configuration (rad), sliding joints (m).
-    pub configuration: Vec<f64>,
-    fields: Vec<Range<usize>>,
-}
-
-/// A line that is not changed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LeftAlone {
-    /// Line, from 1.
-    pub line: usize,
-    /// Reason why it is not changed.
-    pub reason: &'static str,
-}
-
-/// Joint targets of a program.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Scan {
-    /// Joint targets in the order of the text.
-    pub targets: Vec<JointTarget>,
-    /// Lines that look like targets but are not changed.
-    pub left: Vec<LeftAlone>,
-}
-
-pub(super) const CARTESIAN: &str = "a Cartesian target; it states no configuration";
-pub(super) const UNREADABLE: &str = "looks like a joint target, but is not a list of plain numbers, one per joint";
-pub(super) const RELATIVE: &str = "a relative move";
-
-/// Finds the joint targets of a program. `joint_names` are the joint names of a ROS trajectory, from base to flange; by default
-/// those of the profile.
+/// Finds the motion targets of a program.
 ///
 /// # Errors
 /// The program is not text, or the arm's values in this dialect are unknown.
-pub fn scan(
-    dialect: Dialect,
-    robot: &Robot<'_>,
-    joint_names: Option<&[String]>,
-    program: &[u8],
-) -> Result<Scan, ProgramError> {
+pub fn scan(dialect: Dialect, robot: &Robot<'_>, options: &ReadOptions, program: &[u8]) -> Result<Scan, ProgramError> {
+    if program.starts_with(&GZIP) {
+        return Err(ProgramError::Compressed);
+    }
     if program.contains(&0) {
         return Err(ProgramError::NotText);
     }
-    let dof = robot.chain.dof();
-    let mut found = dialects::find(dialect, dof, program);
-    let order = if dialect == Dialect::Ros { ros_order(robot, joint_names, program)? } else { (0..dof).collect() };
-    let mut scan = Scan { targets: Vec::new(), left: std::mem::take(&mut found.left) };
-    for target in found.targets {
-        // Reorder the values from the order of the text to that of the arm.
-        let fields: Vec<Range<usize>> = order.iter().filter_map(|index| target.fields.get(*index).cloned()).collect();
-        let values: Option<Vec<f64>> = fields.iter().map(|field| number(program, field)).collect();
-        match values {
-            Some(values) if values.len() == dof && values.iter().all(|value| value.abs() < 1e7) => {
-                let configuration = to_pendant(dialect, robot, &values)?;
-                scan.targets.push(JointTarget { line: target.line, configuration, fields });
-            }
-            _ => scan.left.push(LeftAlone { line: target.line, reason: UNREADABLE }),
-        }
-    }
-    scan.left.sort_by_key(|left| left.line);
-    scan.left.dedup();
+    let source = Source { robot, options, program };
+    let mut scan = (dialect.language().read)(&source)?;
+    scan.hints.extend(offline_system(program));
+    scan.hints.extend(round_numbers(program, &scan.targets));
     Ok(scan)
 }
 
-/// Replaces the configurations of a program. `commands` has one entry per target of the scan; `None` keeps the target.
+/// First bytes of a gzip file, such as the `.urp` files of Universal Robots.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// Replaces the values of targets. `commands` has one entry per target of the scan; `None` keeps the target, and so does a
+/// command of the other kind.
 ///
 /// # Errors
 /// The arm's values in this dialect are unknown.
@@ -88,46 +45,86 @@ pub fn rewrite(
     robot: &Robot<'_>,
     program: &[u8],
     scan: &Scan,
-    commands: &[Option<Vec<f64>>],
+    commands: &[Option<Command>],
 ) -> Result<Vec<u8>, ProgramError> {
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
     for (target, command) in scan.targets.iter().zip(commands) {
-        let Some(command) = command else { continue };
-        for (field, value) in target.fields.iter().zip(from_pendant(dialect, robot, command)?) {
-            let old = program.get(field.clone()).unwrap_or_default();
-            edits.push((field.clone(), written(dialect, old, value)));
+        let values = match (command, target.form) {
+            (Some(Command::Joints(command)), Form::Joints(unit)) if command.len() == target.slots.len() => {
+                from_pendant(unit, robot, command)?
+            }
+            (Some(Command::Pose(pose)), Form::Pose(orientation)) => {
+                let old: Vec<f64> = target.slots.iter().map(|slot| value(program, slot).unwrap_or(0.0)).collect();
+                orientation.write(pose, &old)
+            }
+            (Some(_), Form::Joints(_) | Form::Pose(_)) | (None, _) => continue,
+        };
+        for (index, (slot, value)) in target.slots.iter().zip(values).enumerate() {
+            edits.extend(edit(dialect, program, target.form, index, slot, value));
         }
     }
-    edits.sort_by_key(|(field, _)| field.start);
+    edits.sort_by_key(|(place, _)| place.start);
     let mut text = Vec::with_capacity(program.len() + 8 * edits.len());
     let mut done = 0;
-    for (field, value) in edits {
-        text.extend_from_slice(program.get(done..field.start).unwrap_or_default());
+    for (place, value) in edits {
+        // Two targets never share a number; should a reader ever err, the second edit is dropped.
+        if place.start < done {
+            continue;
+        }
+        text.extend_from_slice(program.get(done..place.start).unwrap_or_default());
         text.extend_from_slice(value.as_bytes());
-        done = field.end;
+        done = place.end;
     }
     text.extend_from_slice(program.get(done..).unwrap_or_default());
     Ok(text)
 }
 
-/// A number with the digits of the dialect, or with those of the old value if it had more; as wide as the old field.
-fn written(dialect: Dialect, old: &[u8], value: f64) -> String {
-    let usual = match dialect {
-        Dialect::Fanuc => 3,
-        Dialect::Rapid | Dialect::Krl | Dialect::Val3 => 5,
-        Dialect::Urscript | Dialect::Ros => 8,
-        Dialect::Inform => 0,
-    };
-    let old_decimals = old.iter().rev().position(|byte| *byte == b'.').unwrap_or(0);
-    let decimals = if dialect == Dialect::Inform { 0 } else { usual.max(old_decimals).min(12) };
-    let blanks = old.iter().take_while(|byte| **byte == b' ').count();
-    let text = decimal(value, decimals);
-    if blanks > 0 { format!("{text:>width$}", width = old.len()) } else { text }
+/// The text that replaces a number.
+fn edit(
+    dialect: Dialect,
+    program: &[u8],
+    form: Form,
+    index: usize,
+    slot: &Slot,
+    value: f64,
+) -> Option<(Range<usize>, String)> {
+    let digits = dialect.language().digits;
+    let decimals = decimals(digits, form, index);
+    if let Some(attribute) = &slot.attribute {
+        let text = decimal(value / slot.scale, decimals);
+        let is_zero = text.parse::<f64>().is_ok_and(|value| value == 0.0);
+        return (!is_zero).then(|| (slot.place.clone(), format!(" {attribute}=\"{text}\"")));
+    }
+    let old = program.get(slot.place.clone()).unwrap_or_default();
+    Some((slot.place.clone(), written(old, value / slot.scale, decimals, digits.are_fixed)))
 }
 
-fn number(program: &[u8], field: &Range<usize>) -> Option<f64> {
-    let text = std::str::from_utf8(program.get(field.clone())?).ok()?;
-    text.trim().parse::<f64>().ok().filter(|value| value.is_finite())
+/// Decimals of the number at this index of a target.
+const fn decimals(digits: Digits, form: Form, index: usize) -> usize {
+    match form {
+        Form::Joints(JointUnit::Pulses) => 0,
+        Form::Joints(JointUnit::Edge | JointUnit::Si | JointUnit::Links) => digits.joint,
+        Form::Pose(_) if index < 3 => digits.length,
+        Form::Pose(_) => digits.turn,
+    }
+}
+
+/// A number with these decimals, or with those of the old value if it had more; as wide as the old field if that begins with
+/// blanks.
+fn written(old: &[u8], value: f64, decimals: usize, are_fixed: bool) -> String {
+    let mantissa = old.split(|byte| matches!(byte, b'e' | b'E')).next().unwrap_or_default();
+    let old_decimals = mantissa.iter().rev().position(|byte| *byte == b'.').unwrap_or(0);
+    let decimals = if are_fixed { decimals } else { decimals.max(old_decimals).min(12) };
+    let text = decimal(value, decimals);
+    let has_blanks = old.first().is_some_and(|byte| *byte == b' ');
+    if has_blanks { format!("{text:>width$}", width = old.len()) } else { text }
+}
+
+/// The value at a slot, in the units of its form.
+fn value(program: &[u8], slot: &Slot) -> Option<f64> {
+    let text = std::str::from_utf8(program.get(slot.place.clone())?).ok()?;
+    let digits: String = text.chars().filter(|c| !c.is_whitespace()).collect();
+    digits.parse::<f64>().ok().map(|value| value * slot.scale)
 }
 
 fn is_coupled(robot: &Robot<'_>) -> bool {
@@ -156,15 +153,16 @@ fn pulses(robot: &Robot<'_>) -> Result<Vec<f64>, ProgramError> {
     }
 }
 
-fn to_pendant(dialect: Dialect, robot: &Robot<'_>, values: &[f64]) -> Result<Vec<f64>, ProgramError> {
+/// Pendant values (rad), sliding joints (m).
+pub(super) fn to_pendant(unit: JointUnit, robot: &Robot<'_>, values: &[f64]) -> Result<Vec<f64>, ProgramError> {
     let joints = robot.chain.joints();
-    Ok(match dialect {
-        Dialect::Rapid | Dialect::Krl | Dialect::Fanuc | Dialect::Val3 => {
+    Ok(match unit {
+        JointUnit::Edge => {
             values.iter().zip(joints).map(|(value, joint)| joint.joint_type.quantity().from_edge(*value)).collect()
         }
-        Dialect::Urscript => values.to_vec(),
-        Dialect::Inform => values.iter().zip(pulses(robot)?).map(|(value, size)| from_deg(value / size)).collect(),
-        Dialect::Ros => {
+        JointUnit::Si => values.to_vec(),
+        JointUnit::Pulses => values.iter().zip(pulses(robot)?).map(|(value, size)| from_deg(value / size)).collect(),
+        JointUnit::Links => {
             // A joint of a URDF turns a link relative to the previous one, so its value includes the coupled ones. Couplings are
             // triangular in all known arms, so this iteration removes one coupling after the other; a wrong result would fail the
             // later check.
@@ -180,15 +178,13 @@ fn to_pendant(dialect: Dialect, robot: &Robot<'_>, values: &[f64]) -> Result<Vec
     })
 }
 
-fn from_pendant(dialect: Dialect, robot: &Robot<'_>, q: &[f64]) -> Result<Vec<f64>, ProgramError> {
+fn from_pendant(unit: JointUnit, robot: &Robot<'_>, q: &[f64]) -> Result<Vec<f64>, ProgramError> {
     let joints = robot.chain.joints();
-    Ok(match dialect {
-        Dialect::Rapid | Dialect::Krl | Dialect::Fanuc | Dialect::Val3 => {
-            q.iter().zip(joints).map(|(q, joint)| joint.joint_type.quantity().to_edge(*q)).collect()
-        }
-        Dialect::Urscript => q.to_vec(),
-        Dialect::Inform => q.iter().zip(pulses(robot)?).map(|(q, size)| (to_deg(*q) * size).round()).collect(),
-        Dialect::Ros => (0..joints.len()).map(|index| link_value(robot, index, q)).collect(),
+    Ok(match unit {
+        JointUnit::Edge => q.iter().zip(joints).map(|(q, joint)| joint.joint_type.quantity().to_edge(*q)).collect(),
+        JointUnit::Si => q.to_vec(),
+        JointUnit::Pulses => q.iter().zip(pulses(robot)?).map(|(q, size)| (to_deg(*q) * size).round()).collect(),
+        JointUnit::Links => (0..joints.len()).map(|index| link_value(robot, index, q)).collect(),
     })
 }
 
@@ -196,16 +192,71 @@ fn link_value(robot: &Robot<'_>, index: usize, q: &[f64]) -> f64 {
     robot.chain.joints().get(index).map_or(0.0, |joint| joint.direction * joint.variable(index, q))
 }
 
-/// For each joint of the arm, its index in the lists of the trajectory.
-fn ros_order(robot: &Robot<'_>, joint_names: Option<&[String]>, program: &[u8]) -> Result<Vec<usize>, ProgramError> {
-    let expected: Vec<String> = joint_names.map_or_else(
-        || robot.chain.joints().iter().map(|joint| super::names::ascii(&joint.name)).collect(),
-        <[String]>::to_vec,
-    );
-    let found = dialects::ros_names(program);
-    let order: Option<Vec<usize>> = expected.iter().map(|name| found.iter().position(|known| known == name)).collect();
-    match order {
-        Some(order) if found.len() == expected.len() => Ok(order),
-        _ => Err(ProgramError::JointNames { found, expected }),
+/// Names of offline programming systems, as they write them into comments and headers.
+const OFFLINE_SYSTEMS: &[&str] = &[
+    "RoboDK",
+    "RobotStudio",
+    "Process Simulate",
+    "RoboGuide",
+    "Robotmaster",
+    "SprutCAM",
+    "KUKA|prc",
+    "KUKA.Sim",
+    "Grasshopper",
+    "HAL Robotics",
+    "TACO",
+    "Delmia",
+    "Visual Components",
+    "MotoSim",
+    "Octopuz",
+    "PowerMill",
+    "Fusion",
+    "hyperMILL",
+    "COMPAS",
+    "MoveIt",
+    "SRS",
+    "FASTSUITE",
+    "Eureka",
+    "Mastercam",
+];
+
+/// Header in which the system that wrote the program names itself (bytes).
+const HEADER: usize = 16 * 1024;
+
+fn offline_system(program: &[u8]) -> Option<Hint> {
+    let header = program.get(..HEADER.min(program.len()))?;
+    let header = super::lexer::latin(header).to_ascii_lowercase();
+    let is_word = |at: usize, name: &str| {
+        let is_letter = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+        let (before, behind) = (header.get(..at), header.get(at + name.len()..));
+        let follows = behind.and_then(|text| text.chars().next());
+        !is_letter(before.and_then(|text| text.chars().next_back())) && !follows.is_some_and(char::is_alphabetic)
+    };
+    OFFLINE_SYSTEMS.iter().find_map(|name| {
+        let lower = name.to_ascii_lowercase();
+        let (at, _) = header.match_indices(&lower).find(|(at, _)| is_word(*at, &lower))?;
+        let line = 1 + header.get(..at)?.bytes().filter(|byte| *byte == b'\n').count();
+        Some(Hint::OfflineSystem { line, name })
+    })
+}
+
+/// Counts whole numbers among the coordinates and joint values that are not zero.
+fn round_numbers(program: &[u8], targets: &[Target]) -> Option<Hint> {
+    let (mut round, mut values) = (0, 0);
+    for target in targets {
+        let (unit, count) = match (&target.goal, target.form) {
+            (Goal::Pose(_), Form::Pose(Orientation::Vector)) => (1e-3, 3),
+            (Goal::Pose(_), _) => (1.0, 3),
+            (Goal::Joints(_), Form::Joints(JointUnit::Edge)) => (1.0, target.slots.len()),
+            (Goal::Joints(_), _) => continue,
+        };
+        for value in target.slots.iter().take(count).filter_map(|slot| value(program, slot)) {
+            let multiple = value / unit;
+            if multiple.abs() > 1e-9 {
+                values += 1;
+                round += usize::from((multiple - multiple.round()).abs() < 1e-6);
+            }
+        }
     }
+    (values > 0).then_some(Hint::RoundNumbers { round, values })
 }

@@ -4,9 +4,25 @@
 //! allow for that. A dwell is written as the same point again, later. The trajectory starts at its first point: the arm must be
 //! there, or a planner must move it there, before it is sent. `joint_names` are those of the profile; a URDF may use others.
 
+mod reader;
+mod yaml;
+
 use super::names::{MAX_NAME, ascii, identifier};
-use super::{COMMENT_WIDTH, Job, LF, Pause, ProgramError, ProgramFile};
+use super::{COMMENT_WIDTH, Digits, Job, LF, Language, Pause, ProgramError, ProgramFile};
 use crate::text::decimal;
+
+pub(super) const LANGUAGE: Language = Language {
+    title: "ROS",
+    advice: Some("The arm must be at the first point before this is sent. Enter the joint names of the URDF here."),
+    convention: [
+        "Joint values as on the pendant, but in radians.",
+        "Joint values are those of a URDF, each link against the one before: coupled joints are NOT as on the \
+         pendant. Radians.",
+    ],
+    write,
+    read: reader::read,
+    digits: Digits { joint: 8, length: 8, turn: 8, are_fixed: false },
+};
 
 const DECIMALS: usize = 8;
 
@@ -16,7 +32,7 @@ const CUBIC_PEAK: f64 = 1.5;
 /// Shortest time of a move (s).
 const LEAST_TIME: f64 = 2.0;
 
-pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     let Pause::Dwell(dwell) = job.options.pause else { return Err(ProgramError::NoOperator) };
     let speeds = speeds(job)?;
     let name = identifier(&job.options.name, MAX_NAME).to_lowercase();

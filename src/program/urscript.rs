@@ -2,10 +2,21 @@
 //!
 //! The file defines one function without calling it. Sent to a controller directly it runs; in a Script node it must be called.
 
+mod reader;
+
 use super::names::{MAX_NAME, identifier};
-use super::{COMMENT_WIDTH, Job, LF, ProgramError, ProgramFile};
+use super::{COMMENT_WIDTH, Digits, Job, LF, Language, ProgramError, ProgramFile};
 use crate::text::decimal;
 use crate::units::DEGREE;
+
+pub(super) const LANGUAGE: Language = Language {
+    title: "URScript",
+    advice: Some("In PolyScope: load it in a Script node, then call the function."),
+    convention: ["Joint values as on the pendant, but in radians."; 2],
+    write,
+    read: reader::read,
+    digits: Digits { joint: 8, length: 8, turn: 8, are_fixed: false },
+};
 
 const DECIMALS: usize = 8;
 
@@ -15,7 +26,7 @@ const FULL_SPEED: f64 = 120.0 * DEGREE;
 /// Acceleration (rad/s²): a third of the pendant's default.
 const ACCELERATION: f64 = 0.5;
 
-pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(6..=6, false)?;
     let name = identifier(&job.options.name, MAX_NAME).to_lowercase();
     let slowest = job.robot.max_speeds.iter().flatten().copied().fold(f64::INFINITY, f64::min);

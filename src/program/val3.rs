@@ -3,15 +3,26 @@
 //! Both files go into an application (its `.pjx` names them). `waitEndMove` empties the queue of moves, so every point is an
 //! exact stop; blending is off in the motion descriptor. The names of variables follow the manufacturer's examples.
 
+mod reader;
+
 use super::names::identifier;
-use super::{COMMENT_WIDTH, CRLF, Job, ProgramError, ProgramFile};
+use super::{AS_ON_PENDANT, COMMENT_WIDTH, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
+
+pub(super) const LANGUAGE: Language = Language {
+    title: "VAL3",
+    advice: Some("Add the .dtx and the .pgx to an application."),
+    convention: AS_ON_PENDANT,
+    write,
+    read: reader::read,
+    digits: Digits { joint: 5, length: 4, turn: 5, are_fixed: false },
+};
 
 const DECIMALS: usize = 5;
 
 /// Longest program name (characters).
 const LONGEST_NAME: usize = 15;
 
-pub(super) fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
+fn write(job: &mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError> {
     job.require_joints(6..=6, false)?;
     let name = identifier(&job.options.name, LONGEST_NAME);
     let data = data(job);

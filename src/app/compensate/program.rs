@@ -8,6 +8,7 @@ use crate::cli::compensate::CompensateArgs;
 use crate::compensation::{Compensator, Goal, Settings, Status};
 use crate::error::{ExitStatus, Failure};
 use crate::model::CalibratedArm;
+use crate::program::motion::{self, Command, ReadOptions};
 use crate::program::{Dialect, ProgramError, Robot, rewrite};
 use crate::store;
 
@@ -23,10 +24,16 @@ pub(super) fn run<O: Write, E: Write>(
     let profile = &arm.profile;
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
     let pulses: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
-    let robot =
-        Robot { profile: profile.name(), chain: profile.chain(), max_speeds: &max_speeds, pulses_per_degree: &pulses };
-    let names = (!args.joint_names.is_empty()).then_some(args.joint_names.as_slice());
-    let scan = rewrite::scan(dialect, &robot, names, &text).map_err(unusable)?;
+    let robot = Robot {
+        profile: profile.name(),
+        chain: profile.chain(),
+        max_speeds: &max_speeds,
+        pulses_per_degree: &pulses,
+        joint_aliases: profile.joint_aliases(),
+    };
+    let joint_names = (!args.joint_names.is_empty()).then(|| args.joint_names.clone());
+    let options = ReadOptions { joint_names, ..ReadOptions::default() };
+    let scan = rewrite::scan(dialect, &robot, &options, &text).map_err(unusable)?;
     let (nominal, identified) = tool_arms(arm, args.target.as_deref())?;
     let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
     let settings = Settings { position_only: args.position_only, ..Settings::default() };
@@ -37,7 +44,12 @@ pub(super) fn run<O: Write, E: Write>(
     let mut notes: Vec<(usize, String)> = Vec::new();
     let mut largest: Vec<f64> = vec![0.0; joints.len()];
     for target in &scan.targets {
-        let done = compensator.solve(&Goal::Configuration(target.configuration.clone()));
+        let motion::Goal::Joints(configuration) = &target.goal else {
+            notes.push((target.line, "left as it is: a Cartesian target".to_owned()));
+            commands.push(None);
+            continue;
+        };
+        let done = compensator.solve(&Goal::Configuration(configuration.clone()));
         if done.status != Status::Reached {
             let kept = if done.status.is_usable() { "" } else { "; left as it is" };
             notes.push((target.line, format!("{}{kept}", reason(&done, joints))));
@@ -49,10 +61,10 @@ pub(super) fn run<O: Write, E: Write>(
         }
         replaced += 1;
         position_only += usize::from(done.status == Status::PositionOnly);
-        for (largest, (command, meant)) in largest.iter_mut().zip(done.command.iter().zip(&target.configuration)) {
+        for (largest, (command, meant)) in largest.iter_mut().zip(done.command.iter().zip(configuration)) {
             *largest = largest.max((command - meant).abs());
         }
-        commands.push(Some(done.command));
+        commands.push(Some(Command::Joints(done.command)));
     }
     let corrected = rewrite::rewrite(dialect, &robot, &text, &scan, &commands).map_err(unusable)?;
     match &args.out {

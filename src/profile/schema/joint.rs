@@ -26,6 +26,7 @@ const FIELDS: &[&str] = &[
     "max_speed_deg_s",
     "max_speed_mm_s",
     "pulses_per_degree",
+    "aliases",
     "mass_kg",
     "centre_mm",
 ];
@@ -34,6 +35,8 @@ const FIELDS: &[&str] = &[
 pub(super) struct DecodedJoint {
     pub(super) joint: Joint,
     pub(super) range: JointRange,
+    /// Further names, as in common URDFs.
+    pub(super) aliases: Vec<String>,
     pub(super) has_beta: bool,
     pub(super) mass: Option<LinkMass>,
     /// Span of its name, as the location of problems of the whole joint.
@@ -80,13 +83,19 @@ pub(super) fn joints(ast: &Ast, findings: &mut Findings<'_>) -> Option<DecodedJo
         let mass = if has_mass { masses::mass(inside, findings).map(Some) } else { Some(None) };
         match (joint, mass, &mut complete) {
             (Some((joint, range)), Some(mass), Some(complete)) => {
+                let aliases = inside.get_or("aliases", Vec::new(), |ast| aliases(ast, findings)).unwrap_or_default();
                 let span = inside.get("name").map_or_else(|| inside.start(), |name| name.span);
-                complete.push(DecodedJoint { joint, range, has_beta, mass, span });
+                complete.push(DecodedJoint { joint, range, aliases, has_beta, mass, span });
             }
             _ => complete = None,
         }
     }
     Some(DecodedJoints { shapes, complete })
+}
+
+/// Further names of a joint.
+fn aliases(ast: &Ast, findings: &mut Findings<'_>) -> Option<Vec<String>> {
+    list(ast, "aliases", findings)?.iter().map(|name| text(name, findings)).collect()
 }
 
 fn joint_names(joints: &[Option<Fields<'_>>], findings: &mut Findings<'_>) -> Vec<Option<String>> {

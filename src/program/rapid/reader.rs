@@ -1,0 +1,743 @@
+//! Reads RAPID: `robtarget` and `jointtarget` data and the motion instructions that use them.
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+
+use nalgebra::Isometry3;
+
+use super::super::ProgramError;
+use super::super::configuration::Configuration;
+use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
+use super::super::lexer::{Kind, Rules, Tokens, Value};
+use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
+use super::super::orientation::Orientation;
+
+const RULES: Rules = Rules { comment: b"!", quotes: b"\"", in_words: b"" };
+
+pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
+    let files: Vec<Tokens<'_>> = source.files().map(|(_, text)| Tokens::new(text, RULES)).collect();
+    let mut module = Module::new(source);
+    for (file, tokens) in files.iter().enumerate() {
+        module.each_statement(tokens, file, Module::declare);
+    }
+    let mut findings = Findings::default();
+    for (file, tokens) in files.iter().enumerate() {
+        module.each_statement(tokens, file, |module, statement| module.find(statement, &mut findings));
+        findings.motions.push(None);
+    }
+    findings.resolve(source)
+}
+
+/// Types that matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Type {
+    Robtarget,
+    Jointtarget,
+    Tooldata,
+    Wobjdata,
+    Other,
+}
+
+impl Type {
+    fn named(name: &str) -> Self {
+        match name.to_ascii_lowercase().as_str() {
+            "robtarget" => Self::Robtarget,
+            "jointtarget" => Self::Jointtarget,
+            "tooldata" => Self::Tooldata,
+            "wobjdata" => Self::Wobjdata,
+            _ => Self::Other,
+        }
+    }
+
+    const fn is_position(self) -> bool {
+        matches!(self, Self::Robtarget | Self::Jointtarget)
+    }
+}
+
+/// Declarations of all files.
+struct Module<'a> {
+    source: &'a Source<'a>,
+    /// Number of each axis of the controller, in the order of the arm.
+    axes: Vec<usize>,
+    types: HashMap<(usize, String), Type>,
+    /// Parameters of routines that are positions.
+    parameters: HashSet<(usize, String)>,
+    tools: HashMap<String, Result<Isometry3<f64>, Reason>>,
+    frames: HashMap<String, Result<Isometry3<f64>, Reason>>,
+    scopes: usize,
+}
+
+/// One instruction or declaration, without the block keywords in front of it.
+struct Statement<'t, 'a> {
+    tokens: &'t Tokens<'a>,
+    file: usize,
+    /// The routine; 0: the module.
+    scope: usize,
+    range: Range<usize>,
+    /// The header of a routine, with its parameters.
+    is_routine: bool,
+}
+
+impl Statement<'_, '_> {
+    fn line(&self) -> usize {
+        self.tokens.line(self.range.start)
+    }
+
+    fn key(&self, at: usize) -> Option<Key> {
+        let name = self.tokens.name(at)?.to_lowercase();
+        Some(Key { scope: self.scope, name, element: String::new() })
+    }
+}
+
+/// Keywords that stand alone in front of an instruction.
+const BLOCKS: &[&str] = &[
+    "endproc",
+    "endmodule",
+    "endif",
+    "endfor",
+    "endwhile",
+    "endtest",
+    "else",
+    "endfunc",
+    "endtrap",
+    "default",
+    "undo",
+    "error",
+    "backward",
+    "endrecord",
+    "local",
+    "task",
+];
+
+impl<'a> Module<'a> {
+    fn new(source: &'a Source<'a>) -> Self {
+        Self {
+            source,
+            axes: axes(source),
+            types: HashMap::new(),
+            parameters: HashSet::new(),
+            tools: HashMap::new(),
+            frames: HashMap::new(),
+            scopes: 0,
+        }
+    }
+
+    /// Calls `work` with every instruction, declaration and routine header.
+    fn each_statement(
+        &mut self,
+        tokens: &Tokens<'a>,
+        file: usize,
+        mut work: impl FnMut(&mut Self, &Statement<'_, 'a>),
+    ) {
+        let mut at = 0;
+        let mut scope = 0;
+        // Routines have the same numbers in both passes.
+        self.scopes = file << 32;
+        while at < tokens.len() {
+            at = tokens.skip_line_ends(at);
+            let Some(word) = tokens.word(at).map(str::to_ascii_lowercase) else {
+                at += 1;
+                continue;
+            };
+            match word.as_str() {
+                "module" | "test" => at = end_of_line(tokens, at),
+                "record" => {
+                    while at < tokens.len() && !tokens.is_word(at, "endrecord") {
+                        at += 1;
+                    }
+                }
+                "proc" | "func" | "trap" => {
+                    let end = (at..tokens.len())
+                        .find(|place| tokens.is(*place, b'(') || line_ends(tokens, *place))
+                        .unwrap_or(tokens.len());
+                    let end = if tokens.is(end, b'(') { tokens.behind(end, tokens.len()) } else { end };
+                    self.scopes += 1;
+                    scope = self.scopes;
+                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: true });
+                    at = end;
+                }
+                "if" | "elseif" | "while" | "for" => at = behind_condition(tokens, at),
+                "case" => {
+                    let colon = (at..tokens.len()).find(|place| tokens.is(*place, b':') || line_ends(tokens, *place));
+                    at = colon.unwrap_or(tokens.len()) + 1;
+                }
+                _ if BLOCKS.contains(&word.as_str()) => {
+                    if matches!(word.as_str(), "endproc" | "endfunc" | "endtrap") {
+                        scope = 0;
+                    }
+                    at += 1;
+                }
+                _ => {
+                    let end = (at..tokens.len()).find(|place| tokens.is(*place, b';')).unwrap_or(tokens.len());
+                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: false });
+                    at = end + 1;
+                }
+            }
+        }
+    }
+
+    /// Notes the type of a variable, and the value of tools and work objects.
+    fn declare(&mut self, statement: &Statement<'_, 'a>) {
+        let (tokens, range) = (statement.tokens, statement.range.clone());
+        if statement.is_routine {
+            for at in range {
+                let (Some(word), Some(name)) = (tokens.word(at), tokens.name(at + 1)) else { continue };
+                let kind = Type::named(word);
+                if kind.is_position() {
+                    self.parameters.insert((statement.scope, name.to_lowercase()));
+                }
+                if kind != Type::Other {
+                    self.types.insert((statement.scope, name.to_lowercase()), kind);
+                }
+            }
+            return;
+        }
+        let Some(declaration) = Declaration::of(statement) else { return };
+        let kind = declaration.kind;
+        let Some(name) = tokens.name(declaration.name).map(|name| name.to_lowercase()) else { return };
+        self.types.insert((statement.scope, name.clone()), kind);
+        let value = declaration.value.map(|range| Value::read(tokens, range, b'['));
+        match (kind, value) {
+            (Type::Tooldata, Some(value)) => {
+                self.tools.insert(name, tool(tokens, &value));
+            }
+            (Type::Wobjdata, Some(value)) => {
+                self.frames.insert(name, frame(tokens, &value));
+            }
+            _ => {}
+        }
+    }
+
+    /// Notes values of positions, and motions.
+    fn find(&self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
+        if statement.is_routine {
+            findings.motions.push(None);
+            return;
+        }
+        let (tokens, range) = (statement.tokens, statement.range.clone());
+        if let Some(declaration) = Declaration::of(statement) {
+            if let Some(value) = declaration.value.filter(|_| declaration.kind.is_position()) {
+                self.define(statement, findings, declaration.name, declaration.kind, value);
+            }
+            return;
+        }
+        let word = tokens.word(range.start).unwrap_or_default().to_ascii_lowercase();
+        let assign = range.clone().find(|at| tokens.is(*at, b':') && tokens.is(at + 1, b'='));
+        let has_arguments = !tokens.is(range.start + 1, b':') && !tokens.is(range.start + 1, b'(');
+        match (Instruction::named(&word).filter(|_| has_arguments), assign) {
+            (Some(instruction), _) => self.motion(statement, findings, &instruction),
+            // The first `:=` of a call belongs to an optional argument.
+            (None, Some(assign)) if !range.clone().take_while(|at| *at < assign).any(|at| tokens.is(at, b'\\')) => {
+                self.assignment(statement, findings, assign);
+            }
+            (None, _) => self.call(statement, findings),
+        }
+    }
+
+    fn kind_of(&self, key: &Key) -> Option<Type> {
+        let local = self.types.get(&(key.scope, key.name.clone()));
+        local.or_else(|| self.types.get(&(0, key.name.clone()))).copied()
+    }
+
+    /// Notes the value of a variable, each element of an array by itself.
+    fn define(
+        &self,
+        statement: &Statement<'_, 'a>,
+        findings: &mut Findings,
+        name_at: usize,
+        kind: Type,
+        value: Range<usize>,
+    ) {
+        let tokens = statement.tokens;
+        let Some(key) = statement.key(name_at) else { return };
+        let Some(name) = tokens.name(name_at) else { return };
+        let line = tokens.line(name_at);
+        let read = Value::read(tokens, value.clone(), b'[');
+        let parts = if kind == Type::Robtarget { 4 } else { 2 };
+        let mut elements = Vec::new();
+        collect(&read, parts, &mut Vec::new(), &mut elements);
+        if elements.is_empty() {
+            elements.push((Vec::new(), &read));
+        }
+        for (index, element) in elements {
+            let content = match kind {
+                Type::Robtarget => self.robtarget(element),
+                _ => self.jointtarget(element),
+            };
+            let indices: Vec<String> = index.iter().map(usize::to_string).collect();
+            let element_text = indices.join(",");
+            let shown = if element_text.is_empty() { name.clone() } else { format!("{name}{{{element_text}}}") };
+            let place = content.as_ref().ok().and_then(|literal| literal.slots.first()).map(|slot| slot.place.start);
+            let line =
+                if element_text.is_empty() { line } else { line_of(tokens, value.clone(), place).unwrap_or(line) };
+            findings.definitions.push(Definition {
+                file: statement.file,
+                line,
+                name: Some(shown),
+                key: Key { element: element_text, ..key.clone() },
+                content,
+                is_quiet: false,
+            });
+        }
+    }
+
+    fn assignment(&self, statement: &Statement<'_, 'a>, findings: &mut Findings, assign: usize) {
+        let (tokens, range) = (statement.tokens, statement.range.clone());
+        let value = tokens.trimmed(assign + 2..range.end);
+        self.other_uses(statement, findings, value.clone(), None);
+        let Some(key) = statement.key(range.start) else { return };
+        let Some(kind) = self.kind_of(&key).filter(|kind| kind.is_position()) else { return };
+        let name = tokens.name(range.start);
+        let is_own = statement.file == 0;
+        if tokens.is(range.start + 1, b'.') {
+            if is_own {
+                findings.leave(statement.line(), name, Reason::Component);
+            }
+            return;
+        }
+        if tokens.is(value.start, b'[') {
+            let element = element(tokens, range.start + 1, assign);
+            let before = findings.definitions.len();
+            self.define(statement, findings, range.start, kind, value);
+            for definition in findings.definitions.iter_mut().skip(before).filter(|_| !element.is_empty()) {
+                definition.name = definition.name.take().map(|name| format!("{name}{{{element}}}"));
+                definition.key.element.clone_from(&element);
+            }
+            return;
+        }
+        match (statement.key(value.start), value.len()) {
+            (Some(original), 1) => findings.copies.push((key, original)),
+            _ if is_own => {
+                let is_offset = tokens.is_word(value.start, "Offs") || tokens.is_word(value.start, "RelTool");
+                findings.leave(statement.line(), name, if is_offset { Reason::Offset } else { Reason::Computed });
+            }
+            _ => {}
+        }
+    }
+
+    /// Notes positions that are handed to a routine.
+    fn call(&self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
+        let routine = statement.tokens.name(statement.range.start);
+        self.other_uses(statement, findings, statement.range.start + 1..statement.range.end, routine);
+    }
+
+    fn other_uses(
+        &self,
+        statement: &Statement<'_, 'a>,
+        findings: &mut Findings,
+        range: Range<usize>,
+        routine: Option<String>,
+    ) {
+        let tokens = statement.tokens;
+        let mut is_offset = false;
+        for at in range {
+            let Some(word) = tokens.word(at) else { continue };
+            if tokens.is(at + 1, b'(') {
+                is_offset = matches!(word.to_ascii_lowercase().as_str(), "offs" | "reltool");
+                continue;
+            }
+            let Some(key) = statement.key(at) else { continue };
+            if !self.kind_of(&key).is_some_and(Type::is_position) {
+                continue;
+            }
+            let reason = match &routine {
+                _ if is_offset => Reason::OffsetBase,
+                Some(routine) => Reason::PassedTo(routine.clone()),
+                None => continue,
+            };
+            findings.other_uses.push(OtherUse { key, reason });
+        }
+    }
+
+    fn motion(&self, statement: &Statement<'_, 'a>, findings: &mut Findings, instruction: &Instruction) {
+        let tokens = statement.tokens;
+        let arguments = Arguments::read(tokens, statement.range.start + 1..statement.range.end);
+        let behind = instruction.first + instruction.points;
+        let tool_at = arguments.tool.or_else(|| {
+            let heads = arguments.heads.iter().enumerate().skip(behind);
+            let is_tool = |head: &Range<usize>| {
+                let name = (head.len() == 1).then(|| statement.key(head.start)).flatten();
+                name.is_some_and(|key| key.name == "tool0" || self.kind_of(&key) == Some(Type::Tooldata))
+            };
+            heads.filter(|(_, head)| is_tool(head)).map(|(index, _)| index).next()
+        });
+        let tool_at = tool_at.or_else(|| {
+            let usual = behind + instruction.tool;
+            (usual < arguments.heads.len()).then_some(usual)
+        });
+        let tool = tool_at.and_then(|index| arguments.heads.get(index)).cloned();
+        let tool = setting(tokens, tool, "tool0", &self.tools);
+        let frame = match arguments.frame.clone() {
+            Some(range) => setting(tokens, Some(range), "wobj0", &self.frames),
+            None => Ok(Setting::Identity),
+        };
+        let mut points = Vec::new();
+        for head in arguments.heads.iter().skip(instruction.first).take(instruction.points) {
+            points.push(self.point(statement, findings, head.clone(), instruction.is_joints));
+        }
+        let Some(point) = points.pop() else { return };
+        findings.motions.push(Some(Motion {
+            file: statement.file,
+            line: statement.line(),
+            way: instruction.way,
+            via: points.pop(),
+            point,
+            tool,
+            frame,
+            configuration: None,
+        }));
+    }
+
+    fn point(
+        &self,
+        statement: &Statement<'_, 'a>,
+        findings: &mut Findings,
+        head: Range<usize>,
+        is_joints: bool,
+    ) -> Point {
+        let tokens = statement.tokens;
+        if tokens.is(head.start, b'[') {
+            let value = Value::read(tokens, head.clone(), b'[');
+            let content = if is_joints { self.jointtarget(&value) } else { self.robtarget(&value) };
+            return findings.here(statement.file, tokens.line(head.start), content);
+        }
+        if tokens.is(head.start, b'*') {
+            return Point::Left { name: None, reason: Reason::Elsewhere };
+        }
+        let Some(key) = statement.key(head.start) else {
+            return Point::Left { name: None, reason: Reason::Computed };
+        };
+        let name = tokens.name(head.start).unwrap_or_default();
+        let is_indexed = tokens.is(head.start + 1, b'{') && tokens.behind(head.start + 1, head.end) == head.end;
+        if head.len() == 1 || is_indexed {
+            if self.parameters.contains(&(key.scope, key.name.clone())) {
+                return Point::Left { name: Some(name), reason: Reason::Computed };
+            }
+            let element = if is_indexed { element(tokens, head.start + 1, head.end) } else { String::new() };
+            return Point::Variable { key: Key { element, ..key }, name };
+        }
+        self.other_uses(statement, findings, head.clone(), None);
+        let is_offset = tokens.is_word(head.start, "Offs") || tokens.is_word(head.start, "RelTool");
+        let reason = if is_offset { Reason::Offset } else { Reason::Computed };
+        Point::Left { name: Some(tokens.source(head)), reason }
+    }
+
+    fn jointtarget(&self, value: &Value) -> Result<Literal, Reason> {
+        let [axes, external] = value.list().unwrap_or_default() else { return Err(Reason::Unreadable) };
+        let (Some(axes), Some(external)) = (axes.numbers(), external.numbers()) else {
+            return Err(Reason::Unreadable);
+        };
+        if axes.len() != 6 || external.len() != 6 {
+            return Err(Reason::Unreadable);
+        }
+        let all: Vec<_> = axes.into_iter().chain(external.first().copied()).collect();
+        let joints = self.source.robot.chain.dof();
+        if self.axes.len() != joints {
+            return Err(Reason::JointCount { found: 6, joints });
+        }
+        let chosen: Vec<_> = self.axes.iter().filter_map(|axis| all.get(*axis)).collect();
+        if chosen.iter().any(|number| number.value >= UNUSED) {
+            return Err(Reason::Incomplete);
+        }
+        Ok(Literal {
+            form: Form::Joints(JointUnit::Edge),
+            slots: chosen.iter().map(|number| Slot::at(number.place.clone())).collect(),
+            numbers: chosen.iter().map(|number| number.value).collect(),
+            configuration: Configuration::Free,
+        })
+    }
+
+    fn robtarget(&self, value: &Value) -> Result<Literal, Reason> {
+        let [position, orientation, configuration, external] = value.list().unwrap_or_default() else {
+            return Err(Reason::Unreadable);
+        };
+        let parts = [position, orientation, configuration, external].map(Value::numbers);
+        let [Some(position), Some(orientation), Some(configuration), Some(external)] = parts else {
+            return Err(Reason::Unreadable);
+        };
+        if [position.len(), orientation.len(), configuration.len(), external.len()] != [3, 4, 4, 6] {
+            return Err(Reason::Unreadable);
+        }
+        if self.source.robot.chain.dof() > 6 {
+            return Err(Reason::ArmAngle);
+        }
+        let is_moved = external.iter().any(|axis| axis.value < UNUSED && axis.value != 0.0);
+        if is_moved && !self.source.options.ignores_external_axes {
+            return Err(Reason::ExternalAxes);
+        }
+        let quarters: Option<Vec<i32>> = configuration.iter().map(|number| whole(number.value)).collect();
+        let Some([cf1, cf4, cf6, cfx]) = quarters.as_deref() else { return Err(Reason::UnknownConfiguration) };
+        let numbers: Vec<_> = position.iter().chain(&orientation).collect();
+        Ok(Literal {
+            form: Form::Pose(Orientation::Quaternion),
+            slots: numbers.iter().map(|number| Slot::at(number.place.clone())).collect(),
+            numbers: numbers.iter().map(|number| number.value).collect(),
+            configuration: Configuration::Rapid { cf1: *cf1, cf4: *cf4, cf6: *cf6, cfx: *cfx },
+        })
+    }
+}
+
+/// From this value on an axis is not used (9E9).
+const UNUSED: f64 = 8e9;
+
+/// A whole number.
+#[expect(clippy::cast_possible_truncation, reason = "checked to be whole and small")]
+fn whole(value: f64) -> Option<i32> {
+    (value.fract() == 0.0 && value.abs() < 1e6).then_some(value as i32)
+}
+
+/// For each joint from base to flange its axis of the controller, from 0. Axis 7 of ABB's seven-axis arms is between the second
+/// and the third, so names with numbers decide; without them, that order counts.
+fn axes(source: &Source<'_>) -> Vec<usize> {
+    let joints = source.robot.chain.joints();
+    if joints.len() != 7 {
+        return if joints.len() == 6 { (0..6).collect() } else { Vec::new() };
+    }
+    let number = |name: &str| {
+        let digits: String = name.chars().filter(char::is_ascii_digit).collect();
+        digits.parse::<usize>().ok().filter(|number| (1..=7).contains(number)).map(|number| number - 1)
+    };
+    let numbers: Option<Vec<usize>> = joints.iter().map(|joint| number(&joint.name)).collect();
+    let is_each_once = |numbers: &Vec<usize>| (0..7).all(|axis| numbers.contains(&axis));
+    numbers.filter(is_each_once).unwrap_or_else(|| vec![0, 1, 6, 2, 3, 4, 5])
+}
+
+/// A declaration with `CONST`, `VAR` or `PERS`.
+struct Declaration {
+    kind: Type,
+    /// Token of the name.
+    name: usize,
+    value: Option<Range<usize>>,
+}
+
+impl Declaration {
+    fn of(statement: &Statement<'_, '_>) -> Option<Self> {
+        let (tokens, range) = (statement.tokens, statement.range.clone());
+        let is_data = ["CONST", "VAR", "PERS"].iter().any(|word| tokens.is_word(range.start, word));
+        if !is_data {
+            return None;
+        }
+        let kind = Type::named(tokens.word(range.start + 1)?);
+        let assign = range.clone().find(|at| tokens.is(*at, b':') && tokens.is(at + 1, b'='));
+        let value = assign.map(|assign| tokens.trimmed(assign + 2..range.end));
+        Some(Self { kind, name: range.start + 2, value })
+    }
+}
+
+/// A motion instruction of RAPID and its options.
+struct Instruction {
+    /// Positional argument with the first point.
+    first: usize,
+    points: usize,
+    way: Way,
+    is_joints: bool,
+    /// Arguments between the last point and the tool.
+    tool: usize,
+}
+
+impl Instruction {
+    /// Knows an instruction by its family and the letters behind it; routines of users are not instructions.
+    fn named(name: &str) -> Option<Self> {
+        const FAMILIES: &[(&str, &[&str], usize)] = &[
+            ("arcmove", &["", "sync"], 2),
+            ("move", &["", "do", "ao", "go", "sync", "std"], 2),
+            ("trigg", &["", "ios"], 3),
+            ("arc", &["", "start", "end", "1", "2", "1start", "2start", "1end", "2end"], 4),
+            ("spotm", &[""], 1),
+            ("spot", &[""], 3),
+            ("search", &[""], 1),
+            ("paint", &[""], 2),
+            ("disp", &[""], 3),
+            ("cap", &[""], 5),
+            ("nut", &[""], 3),
+            ("cut", &[""], 3),
+            ("laser", &["", "start", "end"], 4),
+            ("glue", &[""], 3),
+        ];
+        let (rest, endings, tool) =
+            FAMILIES.iter().find_map(|(family, endings, tool)| Some((name.strip_prefix(family)?, *endings, *tool)))?;
+        let (letters, ending) = match rest.strip_prefix("absj") {
+            Some(ending) => ("absj", ending),
+            None => rest.split_at_checked(1)?,
+        };
+        if !endings.contains(&ending) {
+            return None;
+        }
+        let (way, points, is_joints) = match letters {
+            "absj" => (Way::Joint, 1, true),
+            "j" => (Way::Joint, 1, false),
+            "l" => (Way::Linear, 1, false),
+            "c" => (Way::Circular, 2, false),
+            _ => return None,
+        };
+        let first = if name.starts_with("search") { 2 } else { 0 };
+        let tool = if ending == "ios" { 2 } else { tool };
+        Some(Self { first, points, way, is_joints, tool })
+    }
+}
+
+/// Arguments of an instruction.
+struct Arguments {
+    /// Positional arguments, without the optional ones behind them.
+    heads: Vec<Range<usize>>,
+    /// Index of the tool, known by the `\WObj` behind it.
+    tool: Option<usize>,
+    frame: Option<Range<usize>>,
+}
+
+impl Arguments {
+    fn read(tokens: &Tokens<'_>, range: Range<usize>) -> Self {
+        let mut arguments = Self { heads: Vec::new(), tool: None, frame: None };
+        for part in tokens.split(range) {
+            let option = part.clone().find(|at| tokens.is(*at, b'\\')).unwrap_or(part.end);
+            let head = tokens.trimmed(part.start..option);
+            let is_positional = head.start < head.end;
+            if is_positional {
+                arguments.heads.push(head);
+            }
+            let options = option..part.end;
+            if let Some(at) =
+                options.clone().find(|at| tokens.is(at.wrapping_sub(1), b'\\') && tokens.is_word(*at, "WObj"))
+            {
+                let value = tokens.trimmed(at + 3..part.end);
+                let end = value.clone().find(|at| tokens.is(*at, b'\\')).unwrap_or(value.end);
+                arguments.frame = Some(tokens.trimmed(value.start..end));
+                arguments.tool = is_positional.then(|| arguments.heads.len() - 1);
+            }
+        }
+        arguments
+    }
+}
+
+/// Where the tool or work object of an instruction comes from.
+fn setting(
+    tokens: &Tokens<'_>,
+    range: Option<Range<usize>>,
+    own: &str,
+    known: &HashMap<String, Result<Isometry3<f64>, Reason>>,
+) -> Result<Setting, Reason> {
+    let Some(range) = range else { return Ok(Setting::Named(own.to_owned())) };
+    let name = if range.len() == 1 { tokens.name(range.start).unwrap_or_default() } else { tokens.source(range) };
+    if name.eq_ignore_ascii_case(own) {
+        return Ok(Setting::Identity);
+    }
+    match known.get(&name.to_lowercase()) {
+        Some(Ok(pose)) => Ok(Setting::Known { name, pose: *pose }),
+        Some(Err(reason)) => Err(reason.clone()),
+        None => Ok(Setting::Named(name)),
+    }
+}
+
+/// A pose `[[x,y,z],[q1,q2,q3,q4]]`.
+fn pose(value: &Value) -> Option<Isometry3<f64>> {
+    let [position, orientation] = value.list()? else { return None };
+    let numbers: Vec<f64> =
+        position.numbers()?.iter().chain(&orientation.numbers()?).map(|number| number.value).collect();
+    (numbers.len() == 7).then(|| Orientation::Quaternion.pose(&numbers)).flatten()
+}
+
+fn is_true(tokens: &Tokens<'_>, value: &Value) -> Option<bool> {
+    let Value::Other(range) = value else { return None };
+    match tokens.word(range.start)?.to_ascii_lowercase().as_str() {
+        "true" => Some(true),
+        "false" => Some(false),
+        _ => None,
+    }
+}
+
+/// `tooldata`: `[robhold, tframe, tload]`.
+fn tool(tokens: &Tokens<'_>, value: &Value) -> Result<Isometry3<f64>, Reason> {
+    let [holds, frame, ..] = value.list().unwrap_or_default() else { return Err(Reason::Unreadable) };
+    match is_true(tokens, holds) {
+        Some(true) => pose(frame).ok_or(Reason::Unreadable),
+        Some(false) => Err(Reason::StationaryTool),
+        None => Err(Reason::Unreadable),
+    }
+}
+
+/// `wobjdata`: `[robhold, ufprog, ufmec, uframe, oframe]`.
+fn frame(tokens: &Tokens<'_>, value: &Value) -> Result<Isometry3<f64>, Reason> {
+    let [holds, is_fixed, _, user, object] = value.list().unwrap_or_default() else { return Err(Reason::Unreadable) };
+    match (is_true(tokens, holds), is_true(tokens, is_fixed)) {
+        (Some(true), _) => Err(Reason::StationaryTool),
+        (_, Some(false)) => Err(Reason::MovingFrame),
+        (Some(false), Some(true)) => match (pose(user), pose(object)) {
+            (Some(user), Some(object)) => Ok(user * object),
+            _ => Err(Reason::Unreadable),
+        },
+        _ => Err(Reason::Unreadable),
+    }
+}
+
+/// Values with `parts` parts inside arrays, with their indices from 1.
+fn collect<'v>(value: &'v Value, parts: usize, index: &mut Vec<usize>, elements: &mut Vec<(Vec<usize>, &'v Value)>) {
+    let Some(items) = value.list() else { return };
+    let is_number_list = |item: &Value| item.list().is_some_and(|list| list.iter().any(|part| part.number().is_some()));
+    if items.len() == parts && items.first().is_some_and(is_number_list) {
+        elements.push((index.clone(), value));
+        return;
+    }
+    for (at, item) in items.iter().enumerate() {
+        index.push(at + 1);
+        if item.list().is_some() {
+            collect(item, parts, index, elements);
+        }
+        index.pop();
+    }
+}
+
+/// Constant indices `{1,2}` of an element; empty if they are computed.
+fn element(tokens: &Tokens<'_>, start: usize, end: usize) -> String {
+    if !tokens.is(start, b'{') {
+        return String::new();
+    }
+    let inside: Vec<usize> = (start + 1..end.saturating_sub(1)).collect();
+    let is_constant = inside
+        .iter()
+        .all(|at| tokens.get(*at).is_some_and(|token| matches!(token.kind, Kind::Number | Kind::Symbol(b','))));
+    if is_constant { inside.iter().map(|at| tokens.str(*at)).collect() } else { String::new() }
+}
+
+fn line_of(tokens: &Tokens<'_>, range: Range<usize>, byte: Option<usize>) -> Option<usize> {
+    let byte = byte?;
+    let (mut low, mut high) = (range.start, range.end);
+    while low < high {
+        let middle = low.midpoint(high);
+        if tokens.get(middle)?.start < byte { low = middle + 1 } else { high = middle }
+    }
+    tokens.get(low).map(|token| token.line)
+}
+
+fn line_ends(tokens: &Tokens<'_>, at: usize) -> bool {
+    tokens.get(at).is_none_or(|token| token.kind == Kind::LineEnd)
+}
+
+fn end_of_line(tokens: &Tokens<'_>, at: usize) -> usize {
+    (at..tokens.len()).find(|place| line_ends(tokens, *place)).unwrap_or(tokens.len())
+}
+
+/// The place behind `IF … THEN`, `WHILE … DO` and `FOR … DO`, or behind the condition of an `IF` with one instruction.
+fn behind_condition(tokens: &Tokens<'_>, start: usize) -> usize {
+    let mut depth = 0_usize;
+    for at in start + 1..tokens.len() {
+        let Some(token) = tokens.get(at) else { break };
+        match token.kind {
+            Kind::Symbol(b'(' | b'[') => depth += 1,
+            Kind::Symbol(b')' | b']') => depth = depth.saturating_sub(1),
+            Kind::Symbol(b';') => return at + 1,
+            Kind::Word if tokens.is_word(at, "THEN") || tokens.is_word(at, "DO") => return at + 1,
+            Kind::Word if depth == 0 => {
+                let word = tokens.str(at).to_ascii_lowercase();
+                let is_behind_operand = tokens
+                    .get(at - 1)
+                    .is_some_and(|before| matches!(before.kind, Kind::Word | Kind::Number | Kind::Symbol(b')' | b'}')));
+                let is_argument = tokens.is(at + 1, b':') || tokens.is(at + 1, b'(');
+                if at > start + 1 && is_behind_operand && !is_argument && Instruction::named(&word).is_some() {
+                    return at;
+                }
+            }
+            _ => {}
+        }
+    }
+    tokens.len()
+}

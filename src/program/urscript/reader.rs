@@ -1,0 +1,459 @@
+//! Reads URScript: literal joint vectors and poses, and the motion functions that use them, as PolyScope and people write them.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use nalgebra::Isometry3;
+
+use super::super::ProgramError;
+use super::super::configuration::Configuration;
+use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
+use super::super::lexer::{Kind, Number, Rules, Tokens, Value};
+use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
+use super::super::orientation::Orientation;
+use crate::units::DEGREE;
+
+const RULES: Rules = Rules { comment: b"#", quotes: b"\"'", in_words: b"" };
+
+/// Name of the tool that the installation of the robot sets.
+const TCP: &str = "tcp";
+
+pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
+    let files: Vec<Tokens<'_>> = source.files().map(|(_, text)| Tokens::new(text, RULES)).collect();
+    let mut findings = Findings::default();
+    let mut script = Script { joints: source.robot.chain.dof(), constants: HashMap::new() };
+    for (file, tokens) in files.iter().enumerate() {
+        script.collect(tokens, file);
+    }
+    for (file, tokens) in files.iter().enumerate() {
+        let mut reader =
+            Reader { script: &script, tokens, file, tool: None, tools: Vec::new(), is_set_late: false, before: None };
+        let first = findings.motions.len();
+        reader.read(&mut findings);
+        // A function that sets no tool is called after the only `set_tcp` of the file.
+        if let ([tool], false) = (reader.tools.as_slice(), reader.is_set_late) {
+            for motion in findings.motions.iter_mut().skip(first).flatten() {
+                if motion.tool == Ok(Setting::Named(TCP.to_owned())) {
+                    motion.tool = Ok(tool.clone());
+                }
+            }
+        }
+        findings.motions.push(None);
+    }
+    findings.resolve(source)
+}
+
+/// Constants of all files.
+struct Script {
+    joints: usize,
+    /// Literal values of each variable with the place of the assignment.
+    constants: HashMap<String, Vec<((usize, usize), Constant)>>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Constant {
+    Joints(Vec<f64>),
+    Pose(Isometry3<f64>),
+}
+
+impl Script {
+    fn collect(&mut self, tokens: &Tokens<'_>, file: usize) {
+        for at in 0..tokens.len() {
+            let Some(assignment) = Assignment::at(tokens, at) else { continue };
+            let literal = literal(tokens, assignment.value.clone(), self.joints);
+            if let (Some(Ok(literal)), Some(name)) = (literal, tokens.name(at)) {
+                let constant = match literal.form {
+                    Form::Joints(_) => Some(Constant::Joints(literal.numbers)),
+                    Form::Pose(form) => form.pose(&literal.numbers).map(Constant::Pose),
+                };
+                self.constants.entry(name).or_default().extend(constant.map(|constant| ((file, at), constant)));
+            }
+        }
+    }
+
+    /// The value of a variable at a place: the last assignment in front of it, or else the first.
+    fn constant(&self, name: &str, place: (usize, usize)) -> Option<&Constant> {
+        let all = self.constants.get(name)?;
+        let split = all.partition_point(|(assigned, _)| *assigned < place);
+        all.get(split.saturating_sub(1)).map(|(_, constant)| constant)
+    }
+}
+
+/// `name = value`.
+struct Assignment {
+    value: Range<usize>,
+}
+
+impl Assignment {
+    fn at(tokens: &Tokens<'_>, at: usize) -> Option<Self> {
+        tokens.word(at)?;
+        if !tokens.is(at + 1, b'=') || tokens.is(at + 2, b'=') {
+            return None;
+        }
+        let is_start = at.checked_sub(1).is_none_or(|before| {
+            tokens.get(before).is_none_or(|token| token.kind == Kind::LineEnd)
+                || tokens.is_word(before, "global")
+                || tokens.is_word(before, "local")
+        });
+        is_start.then(|| Self { value: at + 2..end_of_statement(tokens, at + 2) })
+    }
+}
+
+/// The line end outside brackets.
+fn end_of_statement(tokens: &Tokens<'_>, start: usize) -> usize {
+    let mut depth = 0_usize;
+    for at in start..tokens.len() {
+        match tokens.get(at).map(|token| token.kind) {
+            Some(Kind::Symbol(b'(' | b'[' | b'{')) => depth += 1,
+            Some(Kind::Symbol(b')' | b']' | b'}')) => depth = depth.saturating_sub(1),
+            // A bracket that is never closed must not swallow the file.
+            Some(Kind::LineEnd) if depth == 0 || at > start + LONGEST => return at,
+            _ => {}
+        }
+    }
+    tokens.len()
+}
+
+/// Longest statement over several lines (tokens).
+const LONGEST: usize = 200_000;
+
+struct Reader<'r, 'a> {
+    script: &'r Script,
+    tokens: &'r Tokens<'a>,
+    file: usize,
+    tool: Option<Setting>,
+    /// All different tools of the file.
+    tools: Vec<Setting>,
+    /// A `set_tcp` follows a motion of its function: the tool before it is unknown.
+    is_set_late: bool,
+    /// Joint values of the last move that states them.
+    before: Option<Vec<f64>>,
+}
+
+impl Reader<'_, '_> {
+    fn read(&mut self, findings: &mut Findings) {
+        let tokens = self.tokens;
+        let mut at = 0;
+        while at < tokens.len() {
+            if tokens.is_word(at, "def") || tokens.is_word(at, "thread") {
+                findings.motions.push(None);
+                at = end_of_statement(tokens, at);
+            } else if tokens.word(at).is_some() && tokens.is(at + 1, b'(') {
+                at = self.call(findings, at);
+            } else if let Some(assignment) = Assignment::at(tokens, at) {
+                at = self.assignment(findings, at, &assignment);
+            } else {
+                self.component(findings, at);
+                at += 1;
+            }
+        }
+    }
+
+    /// `q[0] = …`.
+    fn component(&self, findings: &mut Findings, at: usize) {
+        let tokens = self.tokens;
+        let is_start =
+            at.checked_sub(1).is_none_or(|before| tokens.get(before).is_none_or(|token| token.kind == Kind::LineEnd));
+        if !is_start || !tokens.is(at + 1, b'[') || self.file != 0 {
+            return;
+        }
+        let Some(name) = tokens.name(at) else { return };
+        let end = tokens.behind(at + 1, (at + 64).min(tokens.len()));
+        let is_known =
+            self.script.constants.contains_key(&name) || findings.copies.iter().any(|(copy, _)| copy.name == name);
+        if tokens.is(end, b'=') && !tokens.is(end + 1, b'=') && is_known {
+            findings.leave(tokens.line(at), Some(name), Reason::Component);
+        }
+    }
+
+    fn assignment(&self, findings: &mut Findings, at: usize, assignment: &Assignment) -> usize {
+        let tokens = self.tokens;
+        let Some(name) = tokens.name(at) else { return at + 1 };
+        let value = assignment.value.clone();
+        let key = Key { scope: 0, name: name.clone(), element: String::new() };
+        let line = tokens.line(at);
+        if let Some(content) = literal(tokens, value.clone(), self.script.joints) {
+            findings.definitions.push(Definition {
+                file: self.file,
+                line,
+                name: Some(name),
+                key,
+                content,
+                is_quiet: true,
+            });
+            return value.end;
+        }
+        for (index, part) in elements(tokens, value.clone()).into_iter().enumerate() {
+            let Some(content) = literal(tokens, part.clone(), self.script.joints) else { continue };
+            findings.definitions.push(Definition {
+                file: self.file,
+                line: tokens.line(part.start),
+                name: Some(format!("{name}[{index}]")),
+                key: Key { element: index.to_string(), ..key.clone() },
+                content,
+                is_quiet: true,
+            });
+        }
+        let inner = self.argument(value.clone());
+        match tokens.name(inner.range.start).filter(|_| inner.range.len() == 1) {
+            Some(original) if tokens.word(inner.range.start).is_some() => {
+                findings.copies.push((key, Key { scope: 0, name: original, element: String::new() }));
+                value.end
+            }
+            // The value may contain calls.
+            _ => value.start,
+        }
+    }
+
+    fn call(&mut self, findings: &mut Findings, at: usize) -> usize {
+        let tokens = self.tokens;
+        let name = tokens.str(at);
+        let end = tokens.behind(at + 1, end_of_statement(tokens, at));
+        let inside = at + 2..end.saturating_sub(1);
+        if name == "set_tcp" {
+            let parts = tokens.split(inside);
+            let argument = parts.first().map(|part| self.argument(without_keyword(tokens, part.clone())));
+            let tool = argument
+                .map_or_else(|| Setting::Named(TCP.to_owned()), |argument| self.setting(argument.range, "set_tcp"));
+            if !self.tools.contains(&tool) && self.tools.len() < 2 {
+                self.tools.push(tool.clone());
+            }
+            self.is_set_late |= findings.motions.last().is_some_and(Option::is_some);
+            self.tool = Some(tool);
+            return end;
+        }
+        let Some(instruction) = Instruction::named(name) else {
+            let is_like_motion =
+                name.to_ascii_lowercase().contains("move") || name.to_ascii_lowercase().contains("servo");
+            if is_like_motion && self.file == 0 {
+                for part in tokens.split(inside) {
+                    if literal(tokens, part.clone(), self.script.joints).is_some() {
+                        findings.leave(tokens.line(part.start), None, Reason::PassedTo(name.to_owned()));
+                    }
+                }
+                return end;
+            }
+            return at + 2;
+        };
+        let parts = tokens.split(inside);
+        let mut points = Vec::new();
+        let mut frame = Setting::Identity;
+        let mut configuration = None;
+        for (index, keyword) in instruction.keywords.iter().enumerate() {
+            let named =
+                parts.iter().find(|part| tokens.is_word(part.start, keyword) && tokens.is(part.start + 1, b'='));
+            let Some(part) = named.or_else(|| parts.get(index)).or_else(|| parts.first()) else { continue };
+            let argument = self.argument(without_keyword(tokens, part.clone()));
+            frame = argument.frame.clone();
+            configuration = argument.near.clone().map(Configuration::Near);
+            points.push(self.point(findings, &argument));
+        }
+        let Some(point) = points.pop() else { return at + 2 };
+        let stated = match &point {
+            Point::Here(index) => findings.definitions.get(*index).and_then(|found| match &found.content {
+                Ok(literal) if matches!(literal.form, Form::Joints(_)) => Some(literal.numbers.clone()),
+                Ok(_) | Err(_) => None,
+            }),
+            Point::Variable { name, .. } => match self.script.constant(name, (self.file, at)) {
+                Some(Constant::Joints(numbers)) => Some(numbers.clone()),
+                Some(Constant::Pose(_)) | None => None,
+            },
+            Point::Left { .. } | Point::Current => None,
+        };
+        let near = match &configuration {
+            Some(Configuration::Near(values)) => Some(values.clone()),
+            _ => self.before.clone(),
+        };
+        self.before = stated.or_else(|| near.clone());
+        findings.motions.push(Some(Motion {
+            file: self.file,
+            line: tokens.line(at),
+            way: instruction.way,
+            via: points.pop(),
+            point,
+            tool: Ok(self.tool.clone().unwrap_or_else(|| Setting::Named(TCP.to_owned()))),
+            frame: Ok(frame),
+            configuration: near.map(Configuration::Near),
+        }));
+        end
+    }
+
+    /// Takes `get_inverse_kin(…)` and `pose_trans(…)` off a point.
+    fn argument(&self, range: Range<usize>) -> Argument {
+        let tokens = self.tokens;
+        let mut argument = Argument { range: self.bare(range), frame: Setting::Identity, near: None };
+        for _ in 0..DEEPEST {
+            let start = argument.range.start;
+            let is_whole =
+                tokens.is(start + 1, b'(') && tokens.behind(start + 1, argument.range.end) == argument.range.end;
+            if !is_whole {
+                break;
+            }
+            let parts = tokens.split(start + 2..argument.range.end.saturating_sub(1));
+            if tokens.is_word(start, "get_inverse_kin") {
+                let near = parts
+                    .iter()
+                    .skip(1)
+                    .find(|part| tokens.is_word(part.start, "qnear") || !tokens.is(part.start + 1, b'='));
+                if let Some(part) = near {
+                    argument.near = self.joints(without_keyword(tokens, part.clone()));
+                }
+                let Some(first) = parts.first() else { break };
+                argument.range = self.bare(without_keyword(tokens, first.clone()));
+            } else if tokens.is_word(start, "pose_trans") && argument.frame == Setting::Identity {
+                let [frame, point] = parts.as_slice() else { break };
+                argument.frame = self.setting(frame.clone(), "frame");
+                argument.range = self.bare(point.clone());
+            } else {
+                break;
+            }
+        }
+        argument
+    }
+
+    /// A range without parentheses around it.
+    fn bare(&self, range: Range<usize>) -> Range<usize> {
+        let tokens = self.tokens;
+        let mut range = tokens.trimmed(range);
+        while range.len() > 2 && tokens.is(range.start, b'(') && tokens.behind(range.start, range.end) == range.end {
+            range = tokens.trimmed(range.start + 1..range.end - 1);
+        }
+        range
+    }
+
+    fn joints(&self, range: Range<usize>) -> Option<Vec<f64>> {
+        match literal(self.tokens, range.clone(), self.script.joints) {
+            Some(Ok(literal)) if matches!(literal.form, Form::Joints(_)) => Some(literal.numbers),
+            Some(_) => None,
+            None => match self.script.constant(&self.tokens.name(range.start)?, (self.file, range.start)) {
+                Some(Constant::Joints(numbers)) if range.len() == 1 => Some(numbers.clone()),
+                _ => None,
+            },
+        }
+    }
+
+    fn setting(&self, range: Range<usize>, name: &str) -> Setting {
+        let tokens = self.tokens;
+        if let Some(Ok(Literal { form: Form::Pose(form), numbers, .. })) =
+            literal(tokens, range.clone(), self.script.joints)
+            && let Some(pose) = form.pose(&numbers)
+        {
+            return Setting::Known { name: name.to_owned(), pose };
+        }
+        let variable = tokens.name(range.start).filter(|_| range.len() == 1);
+        let constant = variable.as_deref().and_then(|name| self.script.constant(name, (self.file, range.start)));
+        match (variable, constant) {
+            (Some(name), Some(Constant::Pose(pose))) => Setting::Known { name, pose: *pose },
+            (Some(name), _) => Setting::Named(name),
+            (None, _) => Setting::Named(tokens.source(range)),
+        }
+    }
+
+    fn point(&self, findings: &mut Findings, argument: &Argument) -> Point {
+        let (tokens, range) = (self.tokens, argument.range.clone());
+        if let Some(content) = literal(tokens, range.clone(), self.script.joints) {
+            return findings.here(self.file, tokens.line(range.start), content);
+        }
+        let source = || Some(tokens.source(range.clone()));
+        let Some(name) = tokens.name(range.start) else {
+            return Point::Left { name: source(), reason: Reason::Computed };
+        };
+        let index_end =
+            if tokens.is(range.start + 1, b'[') { tokens.behind(range.start + 1, range.end) } else { range.start + 1 };
+        if index_end == range.end && name != "p" {
+            let is_constant =
+                range.len() == 4 && tokens.get(range.start + 2).is_some_and(|token| token.kind == Kind::Number);
+            let element = if is_constant { tokens.str(range.start + 2).to_owned() } else { String::new() };
+            return Point::Variable { key: Key { scope: 0, name: name.clone(), element }, name };
+        }
+        let is_offset = matches!(name.as_str(), "pose_add" | "pose_trans");
+        if is_offset {
+            for at in range.clone().skip(1) {
+                if let Some(name) = tokens.name(at) {
+                    let key = Key { scope: 0, name, element: String::new() };
+                    findings.other_uses.push(OtherUse { key, reason: Reason::OffsetBase });
+                }
+            }
+        }
+        Point::Left { name: source(), reason: if is_offset { Reason::Offset } else { Reason::Computed } }
+    }
+}
+
+/// Deepest nesting of `get_inverse_kin` and `pose_trans`.
+const DEEPEST: usize = 4;
+
+/// A point without the functions around it.
+struct Argument {
+    range: Range<usize>,
+    frame: Setting,
+    near: Option<Vec<f64>>,
+}
+
+struct Instruction {
+    way: Way,
+    /// Names of the arguments that are points.
+    keywords: &'static [&'static str],
+}
+
+impl Instruction {
+    fn named(name: &str) -> Option<Self> {
+        let (way, keywords): (Way, &'static [&'static str]) = match name {
+            "movej" | "optimovej" => (Way::Joint, &["q"]),
+            "movel" | "movep" | "optimovel" => (Way::Linear, &["pose"]),
+            "movec" => (Way::Circular, &["pose_via", "pose_to"]),
+            "servoj" => (Way::Streamed, &["q"]),
+            "servoc" | "servol" => (Way::Linear, &["pose"]),
+            _ => return None,
+        };
+        Some(Self { way, keywords })
+    }
+}
+
+fn without_keyword(tokens: &Tokens<'_>, part: Range<usize>) -> Range<usize> {
+    let is_named =
+        tokens.word(part.start).is_some() && tokens.is(part.start + 1, b'=') && !tokens.is(part.start + 2, b'=');
+    if is_named { tokens.trimmed(part.start + 2..part.end) } else { part }
+}
+
+/// The parts of a list of lists.
+fn elements(tokens: &Tokens<'_>, range: Range<usize>) -> Vec<Range<usize>> {
+    let is_list = tokens.is(range.start, b'[') && tokens.behind(range.start, range.end) == range.end;
+    if is_list { tokens.split(range.start + 1..range.end.saturating_sub(1)) } else { Vec::new() }
+}
+
+/// A joint vector or pose; `None` if the range is something else.
+fn literal(tokens: &Tokens<'_>, range: Range<usize>, joints: usize) -> Option<Result<Literal, Reason>> {
+    let is_pose = tokens.is_word(range.start, "p") && tokens.is(range.start + 1, b'[');
+    let list = if is_pose { range.start + 1..range.end } else { range };
+    let parts = elements(tokens, list);
+    let needed = if is_pose { 6 } else { joints };
+    let is_flat = parts.iter().all(|part| !tokens.is(part.start, b'[') && !tokens.is_word(part.start, "p"));
+    if parts.is_empty() || !is_flat || (!is_pose && parts.len() != needed) {
+        return None;
+    }
+    let values: Option<Vec<(Number, f64)>> = parts.into_iter().map(|part| value(tokens, part)).collect();
+    let Some(values) = values.filter(|values| values.len() == needed) else {
+        return Some(Err(if is_pose { Reason::Unreadable } else { Reason::Computed }));
+    };
+    let form = if is_pose { Form::Pose(Orientation::Vector) } else { Form::Joints(JointUnit::Si) };
+    let slots = values.iter().map(|(number, scale)| Slot { scale: *scale, ..Slot::at(number.place.clone()) });
+    Some(Ok(Literal {
+        form,
+        slots: slots.collect(),
+        numbers: values.iter().map(|(number, scale)| number.value * scale).collect(),
+        configuration: Configuration::Free,
+    }))
+}
+
+/// A number, or one inside `d2r(…)`.
+fn value(tokens: &Tokens<'_>, range: Range<usize>) -> Option<(Number, f64)> {
+    match Value::read(tokens, range.clone(), b'[') {
+        Value::Number(number) => Some((number, 1.0)),
+        Value::List(_) => None,
+        Value::Other(_) => {
+            let is_degrees = tokens.is_word(range.start, "d2r") && tokens.is(range.start + 1, b'(');
+            let (number, end) = tokens.number(range.start + 2).filter(|_| is_degrees)?;
+            (tokens.is(end, b')') && end + 1 == range.end).then_some((number, DEGREE))
+        }
+    }
+}
