@@ -45,6 +45,7 @@ pub(super) fn run<O: Write, E: Write>(
     let mut largest: Vec<f64> = vec![0.0; joints.len()];
     for target in &scan.targets {
         let motion::Goal::Joints(configuration) = &target.goal else {
+            unreached += 1;
             notes.push((target.line, "left as it is: a Cartesian target".to_owned()));
             commands.push(None);
             continue;
