@@ -38,6 +38,7 @@ mod planning_reference;
 mod plans;
 mod procedure;
 mod profile_messages;
+mod program_files;
 mod program_rewrite;
 mod programs;
 #[cfg(unix)]

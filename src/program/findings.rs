@@ -323,7 +323,9 @@ impl Names {
                 by_key.entry(key.variable()).or_default().push(index);
             }
         }
-        Self { by_key, variables, originals: copies.iter().cloned().collect() }
+        let mut names = Self { by_key, variables, originals: HashMap::new() };
+        names.originals = copies.iter().map(|(copy, original)| (names.scoped(copy), original.clone())).collect();
+        names
     }
 
     /// The key with the scope in which the variable is declared.

@@ -1,0 +1,432 @@
+//! Programs as people have them: what is a target, what stays and why, and that nothing else ever changes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use trupose::profile::{Profile, builtin};
+use trupose::program::motion::{Command, Companion, Goal, MoveKind, ReadOptions, Reason, Scan, Setting};
+use trupose::program::rewrite::{rewrite, scan};
+use trupose::program::{Dialect, Robot};
+
+const PULSES: [Option<f64>; 7] = [Some(1000.0); 7];
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs")
+}
+
+fn companion(name: &str) -> Companion {
+    Companion { name: name.to_owned(), text: fs::read(folder().join(name)).unwrap() }
+}
+
+fn with(profile: &Profile) -> Robot<'_> {
+    Robot {
+        profile: profile.name(),
+        chain: profile.chain(),
+        max_speeds: &[],
+        pulses_per_degree: &PULSES,
+        joint_aliases: profile.joint_aliases(),
+    }
+}
+
+fn profile(arm: &str) -> Profile {
+    Profile::parse(builtin(arm).unwrap(), arm).unwrap().0
+}
+
+fn found(dialect: Dialect, arm: &str, text: &[u8], companions: Vec<Companion>) -> Scan {
+    let options = ReadOptions { companions, ..ReadOptions::default() };
+    scan(dialect, &with(&profile(arm)), &options, text).unwrap()
+}
+
+/// A program of the field with what is right for it: lines of targets, and of places that stay.
+struct Field {
+    file: &'static str,
+    dialect: Dialect,
+    arm: &'static str,
+    companions: &'static [&'static str],
+    targets: &'static [usize],
+    left: &'static [(usize, Reason)],
+}
+
+const fn field(
+    file: &'static str,
+    dialect: Dialect,
+    arm: &'static str,
+    companions: &'static [&'static str],
+    targets: &'static [usize],
+    left: &'static [(usize, Reason)],
+) -> Field {
+    Field { file, dialect, arm, companions, targets, left }
+}
+
+const ABB: &str = "abb_irb120";
+const KUKA: &str = "kuka_kr6_r900";
+const FANUC: &str = "fanuc_lrmate200id";
+const PANDA: &str = "franka_panda";
+const STAUBLI: &str = "staubli_tx2_60";
+
+const FIELD: &[Field] = &[
+    field("r01_numarray.mod", Dialect::Rapid, ABB, &[], &[5], &[]),
+    field("r02_split.mod", Dialect::Rapid, ABB, &[], &[2], &[]),
+    field("r03_latin1.mod", Dialect::Rapid, ABB, &[], &[3], &[]),
+    field(
+        "r05_robjoint.mod",
+        Dialect::Rapid,
+        ABB,
+        &[],
+        &[],
+        &[(4, Reason::Component), (5, Reason::Component), (6, Reason::Elsewhere)],
+    ),
+    field(
+        "r06_moves.mod",
+        Dialect::Rapid,
+        ABB,
+        &[],
+        &[],
+        &[(2, Reason::SeveralSettings), (8, Reason::Offset), (9, Reason::Offset)],
+    ),
+    field("r07_yumi.mod", Dialect::Rapid, ABB, &[], &[2], &[]),
+    field("r07_yumi.mod", Dialect::Rapid, PANDA, &[], &[2], &[]),
+    field("r08_comment_move.mod", Dialect::Rapid, ABB, &[], &[4], &[]),
+    field("r09_offsetjoint.mod", Dialect::Rapid, ABB, &[], &[6], &[(3, Reason::NotMovedTo), (4, Reason::NotMovedTo)]),
+    field("r10_only_extax.mod", Dialect::Rapid, ABB, &[], &[], &[(2, Reason::Incomplete)]),
+    field("r11_twotasks_move_var.mod", Dialect::Rapid, ABB, &[], &[2], &[]),
+    field(
+        "r12_noext.mod",
+        Dialect::Rapid,
+        ABB,
+        &[],
+        &[4],
+        &[(3, Reason::Unreadable), (5, Reason::Computed), (6, Reason::Elsewhere)],
+    ),
+    field(
+        "k01_rel_names.dat",
+        Dialect::Krl,
+        KUKA,
+        &[],
+        &[],
+        &[(3, Reason::NotMovedTo), (4, Reason::NotMovedTo), (5, Reason::NotMovedTo)],
+    ),
+    field("k01_rel_names.dat", Dialect::Krl, KUKA, &["krl/release.src"], &[3, 4, 5], &[]),
+    field("k02_tol.dat", Dialect::Krl, KUKA, &[], &[], &[(2, Reason::NotMovedTo), (3, Reason::NotMovedTo)]),
+    field(
+        "k02_tol.dat",
+        Dialect::Krl,
+        KUKA,
+        &["krl/release.src"],
+        &[],
+        &[(2, Reason::NotMovedTo), (3, Reason::Relative)],
+    ),
+    field("k03_arrays.dat", Dialect::Krl, KUKA, &["krl/release.src"], &[3, 4, 5, 6], &[]),
+    field("k04_inline.src", Dialect::Krl, KUKA, &[], &[], &[(9, Reason::Elsewhere), (12, Reason::Elsewhere)]),
+    field(
+        "k05_e6axis_part.src",
+        Dialect::Krl,
+        KUKA,
+        &[],
+        &[2, 4, 6, 7, 9, 10, 11, 14, 14, 16],
+        &[(3, Reason::Incomplete), (5, Reason::Relative), (8, Reason::Component), (12, Reason::Relative)],
+    ),
+    field(
+        "k06_rel_var.src",
+        Dialect::Krl,
+        KUKA,
+        &[],
+        &[],
+        &[(3, Reason::Relative), (4, Reason::Elsewhere), (5, Reason::Relative)],
+    ),
+    field("f01_comment_gp2.ls", Dialect::Fanuc, FANUC, &[], &[12], &[]),
+    field(
+        "f02_pos_word.ls",
+        Dialect::Fanuc,
+        FANUC,
+        &[],
+        &[14],
+        &[(12, Reason::Offset), (21, Reason::OffsetBase), (27, Reason::Untaught)],
+    ),
+    field("f03_pr_only.ls", Dialect::Fanuc, FANUC, &[], &[], &[(10, Reason::Register), (11, Reason::Register)]),
+    field("f04_posreg.va", Dialect::Fanuc, FANUC, &[], &[], &[(2, Reason::Register)]),
+    field("f05_gp2only.ls", Dialect::Fanuc, FANUC, &[], &[], &[(7, Reason::OtherGroup)]),
+    field("f06_ext7.ls", Dialect::Fanuc, FANUC, &[], &[12], &[(5, Reason::JointCount { found: 7, joints: 6 })]),
+    field("i01_two_groups.jbi", Dialect::Inform, "soochow", &[], &[8, 9, 10], &[(18, Reason::ExternalAxes)]),
+    field(
+        "i02_spaces.jbi",
+        Dialect::Inform,
+        "soochow",
+        &[],
+        &[8, 9],
+        &[(10, Reason::JointCount { found: 7, joints: 6 }), (11, Reason::JointCount { found: 8, joints: 6 })],
+    ),
+    field("i03_angle.jbi", Dialect::Inform, "soochow", &[], &[8], &[]),
+    field("u01_polyscope.script", Dialect::Urscript, "ur5e", &[], &[4, 6], &[]),
+    field(
+        "v01_omitted.dtx",
+        Dialect::Val3,
+        STAUBLI,
+        &["field/v04_prog.pgx"],
+        &[5],
+        &[
+            (8, Reason::NotMovedTo),
+            (11, Reason::NotMovedTo),
+            (12, Reason::NotMovedTo),
+            (15, Reason::OffsetBase),
+            (16, Reason::NotMovedTo),
+        ],
+    ),
+    field("v02_old.dtx", Dialect::Val3, STAUBLI, &["val3/home.pgx"], &[6, 13], &[]),
+    field(
+        "v03_jointrs.dtx",
+        Dialect::Val3,
+        STAUBLI,
+        &["field/v04_prog.pgx"],
+        &[],
+        &[(5, Reason::JointCount { found: 4, joints: 6 }), (8, Reason::NotMovedTo)],
+    ),
+    field("s01_block.yaml", Dialect::Ros, PANDA, &[], &[10, 20], &[]),
+    field("s02_json.json", Dialect::Ros, PANDA, &[], &[2], &[]),
+    field("s03_jtc.yaml", Dialect::Ros, PANDA, &[], &[6, 8], &[]),
+    field("s04_fingers.yaml", Dialect::Ros, PANDA, &[], &[3], &[]),
+    field("s05_order.yaml", Dialect::Ros, PANDA, &[], &[4], &[]),
+    field("s07_goal_positions.yaml", Dialect::Ros, PANDA, &[], &[4], &[]),
+];
+
+#[test]
+fn programs_of_the_field_give_what_is_right() {
+    for Field { file, dialect, arm, companions, targets, left } in FIELD {
+        let text = fs::read(folder().join("field").join(file)).unwrap();
+        let scan = found(*dialect, arm, &text, companions.iter().map(|name| companion(name)).collect());
+        let lines: Vec<usize> = scan.targets.iter().map(|target| target.line).collect();
+        let reasons: Vec<(usize, Reason)> = scan.left.iter().map(|left| (left.line, left.reason.clone())).collect();
+        assert_eq!((lines.as_slice(), reasons.as_slice()), (*targets, *left), "{file}: {scan:?}");
+    }
+}
+
+#[test]
+fn settings_of_the_controller_stay() {
+    let text = fs::read(folder().join("field/k07_ifhome.src")).unwrap();
+    let scan = found(Dialect::Krl, KUKA, &text, Vec::new());
+    assert!(scan.targets.is_empty());
+    let lines: Vec<usize> = scan.left.iter().map(|left| left.line).collect();
+    assert_eq!(lines, [3, 5, 6, 7]);
+    let utf16 = fs::read(folder().join("field/r04_utf16.mod")).unwrap();
+    let profile = profile(ABB);
+    assert!(rewrite(Dialect::Rapid, &with(&profile), &utf16, &Scan::default(), &[]).unwrap() == utf16);
+    assert!(trupose::program::rewrite::scan(Dialect::Rapid, &with(&profile), &ReadOptions::default(), &utf16).is_err());
+    assert!(
+        trupose::program::rewrite::scan(Dialect::Urscript, &with(&profile), &ReadOptions::default(), &[0x1f, 0x8b, 8])
+            .is_err()
+    );
+}
+
+#[test]
+fn polyscope_states_pose_tool_and_branch() {
+    let text = fs::read(folder().join("field/u01_polyscope.script")).unwrap();
+    let scan = found(Dialect::Urscript, "ur5e", &text, Vec::new());
+    let Goal::Pose(pose) = &scan.targets[0].goal else { panic!("{scan:?}") };
+    assert_eq!(pose.frame_from_tool.translation.vector, Vector3::new(-0.144, -0.436, 0.202));
+    assert!(matches!(&pose.tool, Setting::Known { pose, .. } if pose.translation.z == 0.15));
+    assert_eq!(pose.frame, Setting::Identity);
+    assert!(pose.configuration.to_string().contains("nearest"), "{}", pose.configuration);
+    let kinds: Vec<_> = scan.moves.iter().map(|motion| (motion.kind, motion.target, motion.path)).collect();
+    assert_eq!(kinds, [(MoveKind::Joint, Some(0), 1), (MoveKind::Linear, Some(1), 1)]);
+}
+
+#[test]
+fn inline_forms_take_tool_and_base_from_their_data() {
+    let own = own(Dialect::Krl, include_str!("programs/krl.txt"));
+    let part = &own[0];
+    let scan = found(part.dialect, &part.arm, part.text.as_bytes(), part.companions.clone());
+    for target in scan.targets.iter().filter(|target| target.name.as_deref() != Some("XHOME1")) {
+        let Goal::Pose(pose) = &target.goal else { panic!("{target:?}") };
+        assert_eq!((pose.tool.name(), pose.frame.name()), ("TOOL_DATA[1]", "BASE_DATA[2]"));
+        assert_eq!(pose.configuration.to_string(), "S 2, T 10");
+    }
+    // The other file of the pair: its moves are there, their values are not.
+    let source = fs::read(folder().join("krl/part.src")).unwrap();
+    let data = Companion { name: "part.dat".to_owned(), text: part.text.clone().into_bytes() };
+    let scan = found(Dialect::Krl, KUKA, &source, vec![data]);
+    assert!(scan.left.iter().all(|left| left.reason == Reason::InFile("part.dat".to_owned())), "{scan:?}");
+    assert_eq!((scan.left.len(), scan.moves.len()), (3, 3));
+}
+
+/// A program written in the manner of real ones.
+struct Own {
+    title: String,
+    dialect: Dialect,
+    arm: String,
+    targets: usize,
+    left: usize,
+    companions: Vec<Companion>,
+    text: String,
+}
+
+fn own(dialect: Dialect, file: &str) -> Vec<Own> {
+    let programs = file.split("=== ").filter(|part| !part.trim().is_empty());
+    programs
+        .map(|part| {
+            let (head, text) = part.split_once('\n').unwrap();
+            let mut fields = head.split("; ");
+            let mut next = || fields.next().unwrap().to_owned();
+            let (title, arm) = (next(), next());
+            let number = |field: String| field.split(' ').nth(1).unwrap().parse().unwrap();
+            let (targets, left) = (number(next()), number(next()));
+            let companions = fields.map(|field| companion(field.strip_prefix("with ").unwrap())).collect();
+            Own { title, dialect, arm, targets, left, companions, text: text.to_owned() }
+        })
+        .collect()
+}
+
+fn all_own() -> Vec<Own> {
+    [
+        (Dialect::Rapid, include_str!("programs/rapid.txt")),
+        (Dialect::Krl, include_str!("programs/krl.txt")),
+        (Dialect::Fanuc, include_str!("programs/fanuc.txt")),
+        (Dialect::Urscript, include_str!("programs/urscript.txt")),
+        (Dialect::Val3, include_str!("programs/val3.txt")),
+        (Dialect::Inform, include_str!("programs/inform.txt")),
+        (Dialect::Ros, include_str!("programs/ros.txt")),
+    ]
+    .into_iter()
+    .flat_map(|(dialect, file)| own(dialect, file))
+    .collect()
+}
+
+#[test]
+fn own_programs_have_their_targets() {
+    for program in all_own() {
+        let scan = found(program.dialect, &program.arm, program.text.as_bytes(), program.companions.clone());
+        let counts = (scan.targets.len(), scan.left.len());
+        assert_eq!(
+            counts,
+            (program.targets, program.left),
+            "{} {}: {scan:#?}",
+            program.dialect as usize,
+            program.title
+        );
+    }
+}
+
+/// New values for all targets: joints by a hundredth of a degree, poses by some micrometres and microradians.
+fn moved(scan: &Scan, by: f64) -> Vec<Option<Command>> {
+    let turn = UnitQuaternion::from_euler_angles(by, -2.0 * by, by);
+    let shift = Isometry3::from_parts(Vector3::new(by, by, -by).into(), turn);
+    let command = |goal: &Goal| match goal {
+        Goal::Joints(joints) => Command::Joints(joints.iter().map(|q| q + by).collect()),
+        Goal::Pose(pose) => Command::Pose(pose.frame_from_tool * shift),
+    };
+    scan.targets.iter().map(|target| Some(command(&target.goal))).collect()
+}
+
+/// How far two goals are apart, as the larger of metres and radians.
+fn distance(one: &Goal, command: &Command) -> f64 {
+    match (one, command) {
+        (Goal::Joints(one), Command::Joints(two)) => {
+            one.iter().zip(two).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        }
+        (Goal::Pose(one), Command::Pose(two)) => {
+            let shift = (one.frame_from_tool.translation.vector - two.translation.vector).norm();
+            shift.max(one.frame_from_tool.rotation.angle_to(&two.rotation))
+        }
+        (Goal::Joints(_) | Goal::Pose(_), _) => f64::INFINITY,
+    }
+}
+
+#[test]
+fn corrected_values_are_read_back_as_meant() {
+    for program in all_own() {
+        let profile = profile(&program.arm);
+        let robot = with(&profile);
+        let options = ReadOptions { companions: program.companions.clone(), ..ReadOptions::default() };
+        for line_end in ["\n", "\r\n"] {
+            let text = program.text.replace('\n', line_end).into_bytes();
+            let scan = scan(program.dialect, &robot, &options, &text).unwrap();
+            let commands = moved(&scan, 1.7e-4);
+            let written = rewrite(program.dialect, &robot, &text, &scan, &commands).unwrap();
+            let again = trupose::program::rewrite::scan(program.dialect, &robot, &options, &written).unwrap();
+            assert_eq!(again.targets.len(), scan.targets.len(), "{}", program.title);
+            assert_eq!(again.left, scan.left, "{}", program.title);
+            // Digits that the controllers store: three decimals of FANUC, whole pulses, four decimals of Yaskawa's angles.
+            let digits = match program.dialect {
+                Dialect::Fanuc | Dialect::Inform => 3e-5,
+                Dialect::Rapid | Dialect::Krl | Dialect::Urscript | Dialect::Val3 | Dialect::Ros => 4e-7,
+            };
+            for (target, command) in again.targets.iter().zip(commands.iter().flatten()) {
+                let apart = distance(&target.goal, command);
+                assert!(apart < digits, "{}: {target:?} is {apart} off {command:?}", program.title);
+            }
+            assert_eq!(skeleton(&written), skeleton(&text), "{}", program.title);
+        }
+    }
+}
+
+/// A text without its numbers, and without the attributes that VAL3 omits when they are zero.
+fn skeleton(text: &[u8]) -> Vec<u8> {
+    let mut text = text.to_vec();
+    for name in ["j1", "j2", "j3", "j4", "j5", "j6", "rx", "ry", "rz", "x", "y", "z"] {
+        let mark = format!(" {name}=\"").into_bytes();
+        while let Some(at) = text.windows(mark.len()).position(|window| window == mark) {
+            let end = text[at + mark.len()..]
+                .iter()
+                .position(|byte| *byte == b'"')
+                .map_or(text.len(), |end| at + mark.len() + end + 1);
+            text.drain(at..end);
+        }
+    }
+    text.retain(|byte| !matches!(byte, b'0'..=b'9' | b'.' | b'-' | b'+' | b'e' | b'E' | b' '));
+    text
+}
+
+/// A pseudo-random sequence that is the same everywhere.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self, below: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from(self.0 >> 33).unwrap() % below.max(1)
+    }
+}
+
+#[test]
+fn broken_programs_never_panic_and_change_only_in_numbers() {
+    let mut programs: Vec<(Dialect, String, Vec<u8>, Vec<Companion>)> =
+        all_own().into_iter().map(|own| (own.dialect, own.arm, own.text.into_bytes(), own.companions)).collect();
+    for Field { file, dialect, arm, companions, .. } in FIELD {
+        let text = fs::read(folder().join("field").join(file)).unwrap();
+        programs.push((*dialect, (*arm).to_owned(), text, companions.iter().map(|name| companion(name)).collect()));
+    }
+    const BYTES: &[u8] = b"[]{}()<>\"'\\;:,=!#.- \t\r\n0123456789EePpAXJ/*\xfc";
+    let mut dice = Dice(20);
+    for (dialect, arm, text, companions) in &programs {
+        let profile = profile(arm);
+        let robot = with(&profile);
+        let options = ReadOptions { companions: companions.clone(), ..ReadOptions::default() };
+        for _ in 0..40 {
+            let mut broken = text.clone();
+            for _ in 0..=dice.roll(4) {
+                if broken.len() < 2 {
+                    break;
+                }
+                let at = dice.roll(broken.len() - 1);
+                match dice.roll(4) {
+                    0 => broken[at] = BYTES[dice.roll(BYTES.len())],
+                    1 => broken.insert(at, BYTES[dice.roll(BYTES.len())]),
+                    2 => {
+                        let end = (at + dice.roll(40)).min(broken.len());
+                        broken.drain(at..end);
+                    }
+                    _ => broken.truncate(at + 1),
+                }
+            }
+            let Ok(found) = scan(*dialect, &robot, &options, &broken) else { continue };
+            let none = vec![None; found.targets.len()];
+            assert!(rewrite(*dialect, &robot, &broken, &found, &none).unwrap() == broken);
+            let written = rewrite(*dialect, &robot, &broken, &found, &moved(&found, 1e-4)).unwrap();
+            assert_eq!(
+                String::from_utf8_lossy(&skeleton(&written)),
+                String::from_utf8_lossy(&skeleton(&broken)),
+                "{}",
+                String::from_utf8_lossy(&broken)
+            );
+        }
+    }
+}
