@@ -30,6 +30,7 @@ mod measured_data;
 mod measurement_messages;
 mod measurement_tables;
 mod models;
+mod numbers;
 mod paper;
 #[cfg(target_os = "linux")]
 mod pictures;

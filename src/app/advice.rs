@@ -18,6 +18,9 @@ pub(super) fn words(advice: Advice) -> String {
         Advice::VerifyDistances => "give '--use CONDITION --verify-rest', or '--leave-one-out position'",
         Advice::SeparateVerification => "'--use' picks rows, such as \"kind == 'verification'\"",
         Advice::StateSocketDistance => "give '--socket-distance-mm'",
+        Advice::RefitTarget => {
+            "identify it with the others, or verify its rows on their own: 'trupose verify --refit target' fits its position"
+        }
         Advice::StateLimits
         | Advice::OmitKind
         | Advice::PlanPoses

@@ -9,15 +9,16 @@ use super::identify::exit_status;
 use super::{Console, advice, load, payload_of, to_json};
 use crate::cli::VerifyArgs;
 use crate::error::{ExitStatus, Failure};
-use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup};
+use crate::identification::verification::{FittedSetup, ModelErrors, fit_setup, fit_targets};
 use crate::identification::{Observations, Places, PointSample, Problem};
 use crate::kinematics::{Arm, FreeParameter, ParameterId, Place};
 use crate::procedure::assess::{point_verification, verdict};
-use crate::procedure::checks;
+use crate::procedure::checks::{self, Unseen};
 use crate::procedure::{ProcedureError, input_file, provenance};
 use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
+use crate::session::measurements::Row;
 use crate::session::set_up::PayloadText;
 use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
 use crate::text;
@@ -39,13 +40,20 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let profile = &calibration.mounted_on(&loaded.profile);
     let measured = load::measurements(&args.measurements, args.layout, profile, InputRole::Verification)?;
     let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;
-    let (rows, _) = load::split(&measured.table, filter.as_ref())?;
-    let samples = load::samples(&rows, profile)?;
-    if samples.is_empty() {
+    let (measured_rows, _) = load::split(&measured.table, filter.as_ref())?;
+    let all = load::samples(&measured_rows, profile)?;
+    if all.is_empty() {
         return Err(Failure::new(ExitStatus::Usage, "no row is left for the verification").hint("check '--use'"));
     }
 
-    let plausible = check_table(args, profile, &samples)?;
+    let plausible = check_table(args, profile, &all)?;
+    let joints = profile.chain().joints();
+    let known = identification_places(&calibration, profile, &file)?;
+    check_targets(args.refit, profile, &known, &all)?;
+    let unseen = Unseen::new(joints, &known, all.iter().map(|sample| &sample.at));
+    let counting = measured_rows.iter().zip(&all).zip(&unseen.counts).filter(|(_, counts)| **counts);
+    let (rows, samples): (Vec<&Row>, Vec<PointSample>) =
+        counting.map(|((row, sample), _)| (*row, sample.clone())).unzip();
     let payload = payload_of(&args.payload, profile)?;
     let models = Models::new(&calibration, profile, payload.as_ref(), &file)?;
     let (nominal, identified) = models.set_up(args.refit, profile, &samples, &file)?;
@@ -55,7 +63,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     };
     let (nominal_errors, identified_errors) = (errors(&nominal)?, errors(&identified)?);
     let mut warnings = checks::table_warnings(None, &measured.table.warnings);
-    let configurations = rows.iter().map(|row| (row.line, row.configuration.as_slice()));
+    let configurations = measured_rows.iter().map(|row| (row.line, row.configuration.as_slice()));
     warnings.extend(checks::limit_warning(profile, None, configurations));
     warnings.extend(carried_over(&calibration));
     let of_calibration = calibration.warnings.iter().find(|warning| warning.code == SIMULATED);
@@ -64,12 +72,15 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let (basis, fitted) = match args.refit {
         Refit::None => ("same set-up as the identification", 0),
         Refit::Frame => ("another set-up: the position of the tracker was fitted to these same points", 6),
+        Refit::Target => {
+            let basis = "same place of the tracker: the position of the SMR was fitted to these same points";
+            (basis, remounted_targets(profile, &samples).len())
+        }
         Refit::FrameAndTarget => {
             let basis = "another set-up: the positions of tracker and SMR were fitted to these same points";
             (basis, 6 + remounted_targets(profile, &samples).len())
         }
     };
-    let joints = profile.chain().joints();
     let tested: Vec<Place> = samples.iter().map(|sample| sample.at.clone()).collect();
     let poses = Places::new(joints, &tested).distinct();
     if fitted > 0 && 3 * poses < 4 * fitted {
@@ -79,12 +90,12 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         );
         warnings.push(Warning::new("few_data", message, true));
     }
-    let known = identification_places(&calibration, profile, &file)?;
+    let left_out = unseen.left_out();
+    warnings.extend(unseen.warning);
     warnings.extend(checks::set_warnings(joints, &known, &tested));
     warnings.extend(checks::few_warning(samples.len(), poses));
     let named = rows.iter().zip(&identified_errors.vectors);
     warnings.extend(checks::far_warning(named.map(|(row, error)| (row.pose.as_str(), row.line, error))));
-    warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     let mut verification = point_verification(
         joints,
         &samples,
@@ -93,7 +104,10 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
         format!("'{}', {basis}", measured.input.file),
         args.refit,
     );
+    verification.left_out = left_out;
     verification.independent = checks::is_independent(&warnings);
+    warnings.extend(checks::better_warning(&verification));
+    warnings.sort_by_key(|warning| !warning.blocks_acceptance);
     if args.refit == Refit::None {
         warnings.splice(0..0, moved_set_up(&verification.identified));
     }
@@ -113,10 +127,36 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     Ok(exit_status(report.verdict.status))
 }
 
+/// Refuses targets that the calibration does not know, unless they are fitted.
+fn check_targets(refit: Refit, profile: &Profile, known: &[Place], samples: &[PointSample]) -> Result<(), Failure> {
+    let fitted = match refit {
+        Refit::None | Refit::Frame => false,
+        Refit::Target | Refit::FrameAndTarget => true,
+    };
+    // Old calibrations do not list their samples.
+    if fitted || known.is_empty() {
+        return Ok(());
+    }
+    let unknown = checks::unknown_targets(profile, known.iter(), samples.iter().map(|sample| &sample.at));
+    if unknown.is_empty() {
+        return Ok(());
+    }
+    let message = format!(
+        "the calibration does not know where {} {} in the flange: the errors would be those of the guess in the profile",
+        text::listed(&unknown),
+        if unknown.len() == 1 { "is" } else { "are" }
+    );
+    let hint = match refit {
+        Refit::Frame => "'--refit frame+target' fits it to these points",
+        Refit::None | Refit::Target | Refit::FrameAndTarget => "'--refit target' fits it to these points",
+    };
+    Err(Failure::new(ExitStatus::Usage, message).hint(hint))
+}
+
 /// Looks for mistakes in the whole table, as `identify` does.
 fn check_table(args: &VerifyArgs, profile: &Profile, samples: &[PointSample]) -> Result<Option<Warning>, Failure> {
     let mut parameters = profile.parameters(Level::Geometric);
-    if args.refit == Refit::FrameAndTarget {
+    if matches!(args.refit, Refit::Target | Refit::FrameAndTarget) {
         parameters.retain(|parameter| parameter.id.target().is_none());
         parameters.extend(remounted_targets(profile, samples));
     }
@@ -205,13 +245,18 @@ impl Models {
         file: &str,
     ) -> Result<(FittedSetup, FittedSetup), Failure> {
         let free = match refit {
-            Refit::None => {
+            Refit::None | Refit::Target => {
                 let known = |arm, station: Option<Isometry3<f64>>| -> Result<FittedSetup, Failure> {
                     let base_from_station = vec![station.ok_or_else(|| {
                         Failure::new(ExitStatus::Usage, format!("'{file}' contains no tracker position"))
                             .hint("use '--refit frame' or '--refit frame+target'")
                     })?];
-                    Ok(FittedSetup { arm, base_from_station })
+                    if refit == Refit::None {
+                        return Ok(FittedSetup { arm, base_from_station });
+                    }
+                    fit_targets(&arm, &base_from_station, samples).ok_or_else(|| {
+                        Failure::new(ExitStatus::Numerical, "the position of the SMR could not be fitted")
+                    })
                 };
                 return Ok((known(self.nominal, self.nominal_station)?, known(self.identified, self.station)?));
             }

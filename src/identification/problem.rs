@@ -99,14 +99,19 @@ impl Observations {
         self.points.iter().map(|sample| sample.station + 1).max().unwrap_or(0)
     }
 
-    /// The observations without the rejected ones. Shared points keep their place in the list, also without a seat.
+    /// The observations without the rejected ones.
     #[must_use]
     pub fn without(&self, rejected: &[Rejected]) -> Self {
-        let is_rejected = |sample: SampleIndex| rejected.iter().any(|rejected| rejected.sample == sample);
+        self.of_samples(|sample| rejected.iter().all(|rejected| rejected.sample != sample))
+    }
+
+    /// The samples that `keep` picks. Shared points keep their place in the list, also without a seat.
+    #[must_use]
+    pub fn of_samples(&self, keep: impl Fn(SampleIndex) -> bool) -> Self {
         let mut place = 0;
         let mut keeps = || {
             place += 1;
-            !is_rejected(SampleIndex::Place(place - 1))
+            keep(SampleIndex::Place(place - 1))
         };
         let points = self.points.iter().filter(|_| keeps()).cloned().collect();
         let shared = self
@@ -114,7 +119,7 @@ impl Observations {
             .iter()
             .map(|shared| SharedPoint { at: shared.at.iter().filter(|_| keeps()).cloned().collect() });
         let shared = shared.collect();
-        let kept = self.lengths.iter().enumerate().filter(|(index, _)| !is_rejected(SampleIndex::Length(*index)));
+        let kept = self.lengths.iter().enumerate().filter(|(index, _)| keep(SampleIndex::Length(*index)));
         Self { points, shared, lengths: kept.map(|(_, length)| length.clone()).collect() }
     }
 

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 use super::linearise::{Weights, point_residuals};
 use super::problem::{LengthEnd, Observations, PointSample, Problem};
 use super::{Estimator, IdentificationError, Places, Prior, Settings, Weighting, identify};
-use crate::kinematics::{Arm, FreeParameter, Joint, JointType};
+use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, Joint, JointType};
 use crate::units::MILLIMETRE;
 
 /// Above this many points the distances are taken between evenly picked ones: 2000 points have two million pairs.
@@ -315,4 +315,24 @@ pub fn fit_setup(
     };
     let fitted = identify(&problem, &settings, &mut |_| {})?;
     Ok(FittedSetup { arm: fitted.arm, base_from_station: fitted.base_from_station })
+}
+
+/// The arm with the targets of `samples` fitted to them where the poses of the instrument are known; `None` where a station is not.
+pub fn fit_targets(arm: &Arm, base_from_station: &[Isometry3<f64>], samples: &[PointSample]) -> Option<FittedSetup> {
+    let mut fitted = arm.clone();
+    let forward = ForwardKinematics::new(&arm.chain);
+    for (target, point) in fitted.targets.iter_mut().enumerate() {
+        let of_target: Vec<Vector3<f64>> = samples
+            .iter()
+            .filter(|sample| sample.at.target == target)
+            .map(|sample| {
+                let in_base = base_from_station.get(sample.station)? * sample.point;
+                Some(forward.base_from_flange(&sample.at.configuration).inverse_transform_point(&in_base).coords)
+            })
+            .collect::<Option<_>>()?;
+        if !of_target.is_empty() {
+            *point = Point3::from(of_target.iter().sum::<Vector3<f64>>() / of_target.len() as f64);
+        }
+    }
+    Some(FittedSetup { arm: fitted, base_from_station: base_from_station.to_vec() })
 }

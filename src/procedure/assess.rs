@@ -1,5 +1,6 @@
 //! Verification summaries, and the verdict on them.
 
+use super::result::DOES_NOT_FIT;
 use crate::identification::verification::{DirectErrors, ErrorStatistics, ModelErrors, residual_against_joints};
 use crate::identification::{Observations, PointSample};
 use crate::kinematics::Joint;
@@ -77,6 +78,7 @@ pub(crate) fn point_verification(
     let configurations: Vec<&[f64]> = samples.iter().map(|sample| sample.at.configuration.as_slice()).collect();
     VerificationSummary {
         samples: samples.len(),
+        left_out: 0,
         basis,
         independent: true,
         refit,
@@ -103,6 +105,7 @@ pub(crate) fn direct_verification(
     };
     VerificationSummary {
         samples: identified.seats.len() + identified.lengths.len(),
+        left_out: 0,
         basis,
         independent: true,
         refit: Refit::None,
@@ -122,8 +125,14 @@ pub(crate) fn verdict(
     let verification = match verification {
         Ok(verification) => verification,
         Err(advice) => {
-            let reasons = vec!["there are no verification samples".to_owned()];
-            return Verdict { advice: Some(advice), ..decided(VerdictStatus::NotEvaluated, reasons, Vec::new()) };
+            let mut reasons = vec!["there are no verification samples".to_owned()];
+            // Data that do not describe the robot need no verification to be refused.
+            let refuted = warnings.iter().any(|warning| warning.code == DOES_NOT_FIT);
+            let status = if refuted { VerdictStatus::NotAccepted } else { VerdictStatus::NotEvaluated };
+            if refuted {
+                reasons.insert(0, format!("see the warning '{DOES_NOT_FIT}'"));
+            }
+            return Verdict { advice: Some(advice), ..decided(status, reasons, Vec::new()) };
         }
     };
     let checks = limit_checks(acceptance, &verification.identified);
@@ -208,6 +217,7 @@ mod tests {
         };
         VerificationSummary {
             samples: 9,
+            left_out: 0,
             basis: String::new(),
             independent: true,
             refit: Refit::None,

@@ -1,6 +1,8 @@
 //! Checks of the data that `identify`, `verify` and `constraints` share: odd rows, joint limits, mistakes in a whole table, and
 //! whether the verification samples are independent, numerous enough, and in the same range as the identification samples.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
 
 use super::ProcedureError;
@@ -12,12 +14,18 @@ use crate::profile::Profile;
 use crate::report::number;
 use crate::session::TableProblem;
 use crate::session::advice::Advice;
-use crate::session::summary::Warning;
+use crate::session::summary::{VerificationSummary, Warning};
 use crate::text::counted;
 use crate::units::{MICROMETRE, Quantity, to_mm};
 
-/// Code of the warning that verification samples were also identification samples.
+/// Code of the warning that all verification samples were also identification samples.
 pub(crate) const NOT_INDEPENDENT: &str = "not_independent";
+/// Code of the note that some were, and do not count.
+const SEEN_BEFORE: &str = "seen_before";
+/// Code of the warning that the identified arm is no better than the nominal one.
+const NOT_BETTER: &str = "not_better";
+/// Errors (mm) that nobody can tell apart.
+const SAME_ERROR: f64 = 0.001;
 /// Acceptance needs at least this many verification poses.
 const TOO_FEW_POSES: usize = 5;
 /// Fewer verification poses than this say little about the largest error.
@@ -26,6 +34,12 @@ const FEW_POSES: usize = 10;
 const ENOUGH_TO_COMPARE: usize = 4;
 /// A verification sample is far off if its error is this many times the median of all.
 const FAR: f64 = 10.0;
+/// Code of the warning about poses that move one joint at a time.
+const ONE_AT_A_TIME: &str = "one_joint_at_a_time";
+/// A joint that is no further from its usual value than this (deg, sliding joints mm) has not moved.
+const STAYS: f64 = 1.0;
+/// Share of the poses that makes a pattern.
+const MOST: f64 = 0.8;
 /// Most problems of one kind that a warning lists.
 const SHOWN: usize = 3;
 
@@ -144,23 +158,123 @@ pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &
     })
 }
 
-/// Warnings about a pair of identification and verification sets.
-pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    let places = Places::new(joints, known);
-    let shared = tested.iter().filter(|at| places.contains(at)).count();
-    if shared > 0 {
-        let verb = if shared == 1 { "is" } else { "are" };
+/// The verification samples that the identification did not see.
+#[derive(Debug)]
+pub(crate) struct Unseen {
+    /// Whether each place counts: all do where the identification saw every one.
+    pub(crate) counts: Vec<bool>,
+    pub(crate) warning: Option<Warning>,
+}
+
+impl Unseen {
+    /// Of the places `tested`, where `known` were identified. The SMR that was measured there makes no difference: the error of a
+    /// pose is in all of them.
+    pub(crate) fn new<'a>(joints: &[Joint], known: &[Place], tested: impl IntoIterator<Item = &'a Place>) -> Self {
+        let any_target = |at: &Place| Place { target: 0, ..at.clone() };
+        let known: Vec<Place> = known.iter().map(any_target).collect();
+        let places = Places::new(joints, &known);
+        let counts: Vec<bool> = tested.into_iter().map(|at| !places.contains(&any_target(at))).collect();
+        let seen = counts.iter().filter(|counts| !**counts).count();
+        let samples = counted(counts.len(), "verification sample");
+        if seen == 0 {
+            return Self { counts, warning: None };
+        }
+        if seen == counts.len() {
+            let message = format!(
+                "all {samples} are at poses that were also identified: the figures below say nothing about other poses and are no independent verification"
+            );
+            let warning = Warning::new(NOT_INDEPENDENT, message, true).with_advice(Advice::SeparateVerification);
+            return Self { counts: vec![true; seen], warning: Some(warning) };
+        }
         let message = format!(
-            "{shared} of {} {verb} of a pose that is also in the identification set: the figures below say nothing about other poses and are no independent verification",
-            counted(tested.len(), "verification sample")
+            "{seen} of {samples} {} at poses that were also identified: {} left out, and the figures below are those of the other {}",
+            if seen == 1 { "is" } else { "are" },
+            if seen == 1 { "it is" } else { "they are" },
+            counts.len() - seen
         );
-        warnings.push(Warning::new(NOT_INDEPENDENT, message, true).with_advice(Advice::SeparateVerification));
+        Self { counts, warning: Some(Warning::new(SEEN_BEFORE, message, false)) }
     }
+
+    /// How many samples do not count.
+    pub(crate) fn left_out(&self) -> usize {
+        self.counts.iter().filter(|counts| !**counts).count()
+    }
+}
+
+/// Names of the targets that are only `tested`, and whose position is a guess of the profile.
+pub(crate) fn unknown_targets<'a>(
+    profile: &Profile,
+    known: impl Iterator<Item = &'a Place>,
+    tested: impl Iterator<Item = &'a Place>,
+) -> Vec<String> {
+    let known: BTreeSet<usize> = known.map(|at| at.target).collect();
+    let tested: BTreeSet<usize> = tested.map(|at| at.target).collect();
+    let targets = tested.difference(&known).filter_map(|target| profile.targets().get(*target));
+    targets.filter(|target| target.is_free()).map(|target| format!("'{}'", target.name)).collect()
+}
+
+/// Warnings about the poses of a pair of identification and verification sets.
+pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) -> Vec<Warning> {
     let known: Vec<&[f64]> = known.iter().map(|at| at.configuration.as_slice()).collect();
     let tested: Vec<&[f64]> = tested.iter().map(|at| at.configuration.as_slice()).collect();
-    warnings.extend(coverage_gaps(joints, &known, &tested).iter().map(|gap| coverage_warning(joints, gap)));
+    let gaps = coverage_gaps(joints, &known, &tested);
+    let mut warnings: Vec<Warning> = gaps.iter().map(|gap| coverage_warning(joints, gap)).collect();
+    let of_verification = moves_one_joint_at_a_time(joints, &tested);
+    if of_verification {
+        let message = "the verification poses move one joint at a time: the figures below do not carry over to poses that move several joints, because errors of joints that multiply do not show; verify with poses that move all joints";
+        warnings.push(Warning::new(ONE_AT_A_TIME, message, true));
+    }
+    if moves_one_joint_at_a_time(joints, &known) {
+        let message = "the identification poses move one joint at a time: what joints do to each other is not measured, and other poses may be worse than predicted; add poses that move all joints";
+        warnings.push(Warning::new(ONE_AT_A_TIME, message, of_verification));
+    }
     warnings
+}
+
+/// Whether most configurations differ in at most one joint from a common one.
+fn moves_one_joint_at_a_time(joints: &[Joint], configurations: &[&[f64]]) -> bool {
+    let count = configurations.len();
+    if joints.len() < 3 || count < TOO_FEW_POSES {
+        return false;
+    }
+    let still = |joint: usize| joints[joint].joint_type.quantity().from_edge(STAYS);
+    let common: Vec<f64> = (0..joints.len())
+        .map(|joint| {
+            let mut values: Vec<f64> = configurations.iter().map(|configuration| configuration[joint]).collect();
+            let (_, median, _) = values.select_nth_unstable_by(count / 2, f64::total_cmp);
+            *median
+        })
+        .collect();
+    let moved = |configuration: &&&[f64]| {
+        let away = |joint: &usize| (configuration[*joint] - common[*joint]).abs() > still(*joint);
+        (0..joints.len()).filter(away).count()
+    };
+    let one_at_a_time = configurations.iter().filter(|configuration| moved(configuration) <= 1).count();
+    let moving = configurations.iter().filter(|configuration| moved(configuration) > 0).count();
+    moving > 0 && one_at_a_time as f64 >= MOST * count as f64
+}
+
+/// A warning that blocks acceptance where the nominal arm is as good as the identified one.
+pub(crate) fn better_warning(verification: &VerificationSummary) -> Option<Warning> {
+    let VerificationSummary { nominal, identified, .. } = verification;
+    let worse: Vec<String> = nominal
+        .errors()
+        .into_iter()
+        .zip(identified.errors())
+        .filter_map(|((name, before), (_, after))| Some((name, before?.rms, after?.rms)))
+        .filter(|(_, before, after)| *after >= *before && *after > SAME_ERROR)
+        .map(|(name, before, after)| {
+            format!("{name} (rms) {} mm identified, {} mm nominal", number(after, 4), number(before, 4))
+        })
+        .collect();
+    if worse.is_empty() {
+        return None;
+    }
+    let message = format!(
+        "the identified arm is no better than the nominal one at the verification poses: {}. Keep the nominal model, and look for what has changed between the two sets (payload, temperature, a moved SMR or tracker) or for poses that the identification does not cover",
+        worse.join("; ")
+    );
+    Some(Warning::new(NOT_BETTER, message, true))
 }
 
 /// Whether no warning says that the verification samples depend on the identification samples.

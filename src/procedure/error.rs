@@ -8,6 +8,7 @@ use crate::planning::candidates::TooFewCandidates;
 use crate::planning::order::OrderError;
 use crate::planning::{CellError, PlanningError};
 use crate::session::advice::Advice;
+use crate::text;
 
 /// Why a procedure has no result.
 #[derive(Debug, Error)]
@@ -63,6 +64,12 @@ pub enum ProcedureError {
     /// Too few positions to leave one out.
     #[error("leaving one position out needs at least two positions")]
     OnePosition,
+    /// Targets that only the verification has.
+    #[error(
+        "only the verification has {} of {}, whose position in the flange is not exactly known: its errors would be those of the guess in the profile",
+        if .0.len() == 1 { "samples" } else { "those" }, text::listed(.0)
+    )]
+    UnknownTargets(Vec<String>),
     /// Nothing can be identified.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
@@ -106,6 +113,7 @@ impl ProcedureError {
                 IdentificationError::Cancelled => &[],
                 _ => &[Advice::CheckRobot],
             },
+            Self::UnknownTargets(_) => &[Advice::RefitTarget],
             Self::NoTarget
             | Self::Cell(_)
             | Self::Candidates(_)

@@ -3,13 +3,15 @@
 use std::ops::ControlFlow;
 
 use super::assess::{direct_verification, point_verification};
+use super::checks::Unseen;
 use super::result::{self, Context};
 use super::summary::{Finished, SampleName};
 use super::workspace::Workspace;
 use super::{EstimationSettings, ProcedureError, checks, joint_errors, target_parameters};
 use crate::identification::verification::{DirectErrors, FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{
-    Identification, Observations, PointSample, Problem, Settings, Stage, Terms, WithTerms, identify_with_terms,
+    Identification, LengthEnd, Observations, PointSample, Problem, SampleIndex, Settings, Stage, Terms, WithTerms,
+    identify_with_terms,
 };
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
@@ -166,11 +168,11 @@ pub fn identify(
     let candidates = request.settings.candidates();
     let with_terms = identify_with_terms(&problem, &settings, &candidates, progress)?;
     let found = &with_terms.found;
-    let context = Context { level: request.settings.level, expected };
-    warnings.extend(result::result_warnings(&problem, found, &settings, context));
-    warnings.extend(joint_errors::warnings(&problem, found));
     let nominal = nominal_setup(&problem, found)?;
     let nominal_rms = joint_errors::nominal_rms(&problem, found, &nominal);
+    let context = Context { level: request.settings.level, expected, nominal: nominal_rms };
+    warnings.extend(result::result_warnings(&problem, found, &settings, context));
+    warnings.extend(joint_errors::warnings(&problem, found));
     let workspace = Workspace::new(profile, &problem, &with_terms, nominal_rms);
     let of_identification = warnings.clone();
 
@@ -245,13 +247,17 @@ fn verify(
     found: &Identification,
 ) -> Result<Verified, ProcedureError> {
     let set = &request.verification;
-    let tested = set.observations();
+    let all = set.observations();
     let joints = plausible.arm.chain.joints();
-    let mut warnings = set_warnings(set, &tested, &request.profile);
+    let mut warnings = set_warnings(set, &all, &request.profile);
+    check_targets(&request.profile, plausible.observations, &all)?;
     // In a session every reading was checked as it was measured.
     if request.verification_mode != VerificationMode::Session {
-        warnings.extend(checks::check_verification(plausible, &tested.points)?);
+        warnings.extend(checks::check_verification(plausible, &all.points)?);
     }
+    let known: Vec<Place> = plausible.observations.places().cloned().collect();
+    let unseen = Unseen::new(joints, &known, all.places());
+    let tested = unseen_observations(&all, &unseen);
     let basis = request.basis.clone();
     let errors = |arm: &FittedSetup| ModelErrors::new(&arm.arm, &arm.base_from_station, &tested.points);
     let identified = FittedSetup { arm: found.arm.clone(), base_from_station: found.base_from_station.clone() };
@@ -264,14 +270,42 @@ fn verify(
     } else {
         return Ok(Verified { verification: None, warnings });
     };
-    let places = |observations: &Observations| observations.places().cloned().collect::<Vec<_>>();
-    let doubts = checks::set_warnings(joints, &places(plausible.observations), &places(&tested));
-    summary.independent = checks::is_independent(&doubts);
-    warnings.extend(doubts);
+    summary.left_out = unseen.left_out();
+    let named = set.samples.iter().zip(&unseen.counts).filter(|(_, counts)| **counts).map(|(named, _)| named);
+    let named = named.zip(&vectors);
+    let far = checks::far_warning(named.map(|(named, error)| (named.pose.as_str(), named.line, error)));
+    warnings.extend(unseen.warning);
+    summary.independent = checks::is_independent(&warnings);
+    warnings.extend(checks::set_warnings(joints, &known, &tested.places().cloned().collect::<Vec<_>>()));
     warnings.extend(checks::few_warning(summary.samples, tested.distinct(joints).min(summary.samples)));
-    let named = set.samples.iter().zip(&vectors);
-    warnings.extend(checks::far_warning(named.map(|(named, error)| (named.pose.as_str(), named.line, error))));
+    warnings.extend(far);
+    warnings.extend(checks::better_warning(&summary));
     Ok(Verified { verification: Some(summary), warnings })
+}
+
+/// The samples that count. A length does where one of its ends does, or where both are shared points.
+fn unseen_observations(all: &Observations, unseen: &Unseen) -> Observations {
+    let seats = all.points.len() + all.shared.iter().map(|shared| shared.at.len()).sum::<usize>();
+    let mut ends = unseen.counts.iter().skip(seats);
+    let lengths: Vec<bool> = all
+        .lengths
+        .iter()
+        .map(|length| {
+            let targets = [&length.from, &length.to].into_iter().filter(|end| matches!(end, LengthEnd::Target(_)));
+            let counts: Vec<bool> = targets.filter_map(|_| ends.next().copied()).collect();
+            counts.is_empty() || counts.contains(&true)
+        })
+        .collect();
+    all.of_samples(|sample| match sample {
+        SampleIndex::Place(place) => unseen.counts.get(place).copied().unwrap_or(true),
+        SampleIndex::Length(length) => lengths.get(length).copied().unwrap_or(true),
+    })
+}
+
+/// Refuses targets that only the verification has, and whose position nobody knows exactly: they would be judged at a guess.
+fn check_targets(profile: &Profile, known: &Observations, tested: &Observations) -> Result<(), ProcedureError> {
+    let unknown = checks::unknown_targets(profile, known.places(), tested.places());
+    if unknown.is_empty() { Ok(()) } else { Err(ProcedureError::UnknownTargets(unknown)) }
 }
 
 /// Identifies once per position of the plate without it, and pools the errors on the positions left out. `positions` has the
@@ -308,7 +342,8 @@ fn leave_one_out(
     let basis = format!("leaving out each of {} positions in turn", distinct.len());
     let summary = direct_verification(joints, &nominal, &identified, &tested, basis);
     let poses = problem.observations.distinct(joints).min(summary.samples);
-    let warnings = checks::few_warning(summary.samples, poses).into_iter().collect();
+    let few = checks::few_warning(summary.samples, poses);
+    let warnings = few.into_iter().chain(checks::better_warning(&summary)).collect();
     Ok(Verified { verification: Some(summary), warnings })
 }
 

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 
 use super::summary::parameter_summaries;
 use super::workspace::ranges;
-use crate::identification::verification::{ErrorStatistics, FittedSetup, ModelErrors};
+use crate::identification::verification::{DirectErrors, ErrorStatistics, FittedSetup, ModelErrors};
 use crate::identification::{Identification, Problem, Scored, Settings, Terms, WithTerms};
 use crate::kinematics::{JointTerm, JointType, KinematicChain, ParameterId, SMOOTH_ORDERS};
 use crate::profile::Profile;
@@ -62,7 +62,10 @@ pub(super) fn selection(
 
 /// Root mean square error of the nominal arm at the accepted samples (m).
 pub(super) fn nominal_rms(problem: &Problem<'_>, found: &Identification, nominal: &FittedSetup) -> Option<f64> {
-    let errors = ModelErrors::new(&nominal.arm, &nominal.base_from_station, &problem.observations.points)?;
+    let Some(errors) = ModelErrors::new(&nominal.arm, &nominal.base_from_station, &problem.observations.points) else {
+        let direct = DirectErrors::new(&nominal.arm, problem.observations);
+        return direct.seat.or(direct.length).map(|statistics| statistics.rms);
+    };
     let accepted = errors.vectors.iter().enumerate().filter(|(place, _)| !found.is_rejected(*place));
     Some(ErrorStatistics::new(accepted.map(|(_, vector)| vector.norm()).collect())?.rms)
 }

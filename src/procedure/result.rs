@@ -14,13 +14,19 @@ const RAN_AWAY: f64 = 5.0;
 const FAR_AWAY: f64 = 10.0;
 /// Residuals up to this many times the expected effect of the fixed constants are attributed to them.
 const FIXED_CONSTANTS: f64 = 6.0;
+/// Code of the warning that the identified arm does not describe the data.
+pub(super) const DOES_NOT_FIT: &str = "does_not_fit";
 /// Codes of warnings that make a result unusable.
-const UNUSABLE: [&str; 3] = ["does_not_fit", "implausible", NOT_CONVERGED];
+const UNUSABLE: [&str; 2] = ["implausible", NOT_CONVERGED];
 const NOT_CONVERGED: &str = "not_converged";
 /// Residuals that exceed the stated sigma by this factor get a warning.
 const SIGMA_EXCESS: f64 = 1.5;
-/// Residuals beyond this (m) after identification mean that the data belong to another robot.
-const NONSENSE_RESIDUAL: f64 = MILLIMETRE;
+/// Residuals up to this many times the stated sigma always fit.
+const FAR_BEYOND_SIGMA: f64 = 10.0;
+/// An identification that leaves more than this part of the nominal arm's error explains hardly anything.
+const HARDLY_BETTER: f64 = 0.7;
+/// Residuals up to this part of what the expected deviations cause are small, however good the nominal arm is.
+const SMALL_PART: f64 = 0.05;
 /// A larger share of rejected samples means that there is no consistent majority to trust.
 const MANY_REJECTED: f64 = 0.2;
 
@@ -31,6 +37,29 @@ pub(crate) struct Context {
     pub(crate) level: Level,
     /// Root mean square residual (m) that the expected deviations of all link constants explain; only known for points.
     pub(crate) expected: Option<f64>,
+    /// Root mean square error of the nominal arm at the accepted samples (m).
+    pub(crate) nominal: Option<f64>,
+}
+
+impl Context {
+    /// Whether a `residual` per coordinate (m) is far more than the stated sigma, and either more than the expected deviations cause
+    /// altogether, or no small part of it and hardly less than the nominal arm's error.
+    fn does_not_fit(&self, residual: f64, found: &Identification) -> bool {
+        let nominal = self.nominal.map_or(f64::INFINITY, per_coordinate);
+        let all = self.expected.map_or(f64::INFINITY, per_coordinate);
+        self.is_large(residual, found) && (residual > all || residual > HARDLY_BETTER * nominal)
+    }
+
+    /// Whether a `residual` per coordinate (m) is far more than the stated sigma, and no small part of what the expected deviations
+    /// cause.
+    fn is_large(&self, residual: f64, found: &Identification) -> bool {
+        let small = self.expected.map_or(MILLIMETRE, |expected| SMALL_PART * per_coordinate(expected));
+        residual > small && residual > FAR_BEYOND_SIGMA * found.sigma.instrument.unwrap_or(0.0)
+    }
+}
+
+fn per_coordinate(rms: f64) -> f64 {
+    rms / 3.0_f64.sqrt()
 }
 
 /// Warnings about the result itself.
@@ -49,19 +78,25 @@ pub(crate) fn result_warnings(
         })
         .collect();
     let residual = found.sigma.from_residuals.unwrap_or(0.0);
-    let explained = context.expected.map_or(0.0, |expected| FIXED_CONSTANTS * expected / 3.0_f64.sqrt());
-    if residual > NONSENSE_RESIDUAL && context.level == Level::Offsets && residual <= explained {
+    let explained = context.expected.map_or(0.0, |expected| FIXED_CONSTANTS * per_coordinate(expected));
+    if context.level == Level::Offsets && context.is_large(residual, found) && residual <= explained {
         let message = format!(
             "joint offsets alone leave {} mm per coordinate, as much as the other link constants are expected to cause",
             number(to_mm(residual), 3)
         );
         warnings.push(Warning::new("offsets_only", message, false).with_advice(Advice::IdentifyGeometry));
-    } else if residual.is_nan() || residual > NONSENSE_RESIDUAL {
+    } else if residual.is_nan() || context.does_not_fit(residual, found) {
+        let nominal = context.nominal.map_or_else(String::new, |nominal| {
+            format!(", the nominal one by {} mm", number(to_mm(per_coordinate(nominal)), 3))
+        });
+        let stated = found.sigma.instrument.map_or_else(String::new, |sigma| {
+            format!(" with a stated sigma of {} mm", number(to_mm(sigma), 4))
+        });
         let message = format!(
-            "the identified robot misses the measured points by {} mm per coordinate: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
+            "the identified robot misses the measured points by {} mm per coordinate{nominal}{stated}: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
             number(to_mm(residual), 3)
         );
-        warnings.push(Warning::new("does_not_fit", message, true));
+        warnings.push(Warning::new(DOES_NOT_FIT, message, true));
     }
     warnings.extend(run_away(found, settings));
     if let Some(stated) = found.sigma.instrument.filter(|_| found.sigma.excess() > SIGMA_EXCESS) {

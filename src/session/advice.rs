@@ -40,6 +40,8 @@ pub enum Advice {
     StateTarget,
     /// Mount the target beside the axis that is turned.
     MountBesideAxis,
+    /// Measure every target at identification poses too, or fit it to the verification.
+    RefitTarget,
     /// Make the recording of a session again.
     RebuildRecording,
 }
@@ -69,6 +71,7 @@ impl fmt::Display for Advice {
             Self::MountBesideAxis => {
                 "mount the SMR beside the axis and state roughly where, state exactly where it is, or leave it free"
             }
+            Self::RefitTarget => "measure it at identification poses too, or leave its samples out",
             Self::RebuildRecording => "it can be rebuilt from the journal at any time",
         })
     }

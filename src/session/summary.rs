@@ -346,6 +346,8 @@ pub enum Refit {
     None,
     /// The tracker was moved
     Frame,
+    /// The SMR was remounted, or is another one
+    Target,
     /// The tracker was moved and the SMR remounted
     #[value(name = "frame+target")]
     FrameAndTarget,
@@ -357,6 +359,9 @@ names_of_option!(Refit);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerificationSummary {
     pub samples: usize,
+    /// Samples at poses that were also identified, which do not count.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub left_out: usize,
     /// Origin of the samples, and what was fitted to them.
     pub basis: String,
     /// Whether the identification saw none of them.
@@ -368,6 +373,11 @@ pub struct VerificationSummary {
     pub identified: ModelSummary,
     /// Error of the identified model against each joint.
     pub residual_by_joint: Vec<JointSummary>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+const fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// What an acceptance limit is about. For shared points the position error is the distance from the shared point.

@@ -25,7 +25,8 @@ pub(super) fn words(advice: Advice) -> String {
         | Advice::StateSocketDistance
         | Advice::StateTarget
         | Advice::MountBesideAxis
-        | Advice::RebuildRecording => advice.to_string(),
+        | Advice::RebuildRecording
+        | Advice::RefitTarget => advice.to_string(),
     }
 }
 

@@ -212,6 +212,7 @@ fn verification() -> VerificationSummary {
     };
     VerificationSummary {
         samples: 20,
+        left_out: 0,
         basis: "the verification poses of this session, same set-up".to_owned(),
         independent: true,
         refit: Refit::None,

@@ -1,0 +1,245 @@
+//! Numbers that hold: what a verification counts, when it is compared with the nominal arm, and what the words about it say.
+
+use std::ops::ControlFlow;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use rand::RngExt as _;
+use trupose::identification::PointSample;
+use trupose::kinematics::{Arm, Place};
+use trupose::procedure::identify::{Identified, IdentifyRequest, NamedSample, SampleSet, identify};
+use trupose::procedure::{EstimationSettings, ProcedureError};
+use trupose::profile::{Level, Profile, builtin};
+use trupose::session::summary::{VerdictStatus, VerificationMode, Warning};
+use trupose::units::{MICROMETRE, MILLIMETRE};
+
+use crate::support::paper_case::{normal, seeded};
+
+const NOISE: f64 = 10.0 * MICROMETRE;
+
+/// A simulated robot in front of a tracker.
+struct Bench {
+    profile: Profile,
+    text: String,
+    real: Arm,
+    rng: rand_chacha::ChaCha8Rng,
+}
+
+impl Bench {
+    /// The robot of a profile whose constants are off by `size` times what is expected.
+    fn new(text: &str, size: f64, seed: u64) -> Self {
+        let profile = Profile::parse(text, "robot").unwrap_or_else(|errors| panic!("{errors}")).0;
+        let mut rng = seeded(seed);
+        let deviations: Vec<_> = profile
+            .parameters(Level::Geometric)
+            .into_iter()
+            .map(|parameter| (parameter.id, size * normal(&mut rng) * parameter.expected))
+            .collect();
+        let real = profile.arm().with(deviations).unwrap();
+        Self { profile, text: text.to_owned(), real, rng }
+    }
+
+    fn builtin(name: &str, seed: u64) -> Self {
+        Self::new(builtin(name).unwrap(), 0.5, seed)
+    }
+
+    fn configurations(&mut self, count: usize) -> Vec<Vec<f64>> {
+        let limits: Vec<_> = self.profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect();
+        (0..count).map(|_| limits.iter().map(|(low, high)| self.rng.random_range(*low..*high)).collect()).collect()
+    }
+
+    fn point(&mut self, at: &Place) -> Point3<f64> {
+        let station = Isometry3::new(Vector3::new(2.0, 1.0, 0.4), Vector3::new(0.1, 0.2, 1.0));
+        let noise = Vector3::from_fn(|_, _| NOISE * normal(&mut self.rng));
+        station.inverse() * self.real.point_in_base(at) + noise
+    }
+
+    fn measured(&mut self, configurations: &[Vec<f64>], target: usize) -> Vec<NamedSample> {
+        let named = |(index, configuration): (usize, &Vec<f64>)| {
+            let at = Place { configuration: configuration.clone(), target };
+            let point = self.point(&at);
+            NamedSample {
+                pose: (index + 1).to_string(),
+                line: index + 2,
+                sample: PointSample { at, station: 0, point, sigma: None },
+                temperature: None,
+            }
+        };
+        configurations.iter().enumerate().map(named).collect()
+    }
+
+    fn random(&mut self, count: usize) -> Vec<NamedSample> {
+        let configurations = self.configurations(count);
+        self.measured(&configurations, 0)
+    }
+
+    fn try_identify(
+        &self,
+        identification: Vec<NamedSample>,
+        verification: Vec<NamedSample>,
+    ) -> Result<Identified, ProcedureError> {
+        let verification_mode =
+            if verification.is_empty() { VerificationMode::None } else { VerificationMode::File };
+        let request = IdentifyRequest {
+            mounted: None,
+            payload: None,
+            profile: self.profile.clone(),
+            profile_text: self.text.clone(),
+            created: "2026-01-02T03:04:05Z".to_owned(),
+            inputs: Vec::new(),
+            settings: EstimationSettings { level: Level::Geometric, ..EstimationSettings::default() },
+            identification: SampleSet::from(identification),
+            verification: SampleSet::from(verification),
+            basis: "other poses".to_owned(),
+            verification_mode,
+            layout: None,
+            socket_distance_mm: None,
+        };
+        identify(&request, &mut |_| ControlFlow::Continue(()))
+    }
+
+    fn identify(&self, identification: Vec<NamedSample>, verification: Vec<NamedSample>) -> Identified {
+        self.try_identify(identification, verification).unwrap()
+    }
+}
+
+fn warning<'a>(identified: &'a Identified, code: &str) -> Option<&'a Warning> {
+    identified.summary.warnings.iter().find(|warning| warning.code == code)
+}
+
+/// 28 of 447 rows of one measured set were at identified poses, and blocked everything.
+#[test]
+fn verification_rows_at_identified_poses_are_left_out_and_the_rest_is_judged() {
+    let mut bench = Bench::builtin("soochow", 1);
+    let known = bench.random(40);
+    let fresh = bench.random(20);
+    let same: Vec<Vec<f64>> =
+        known.iter().take(3).map(|named| named.sample.at.configuration.clone()).collect();
+    let mut seen = bench.measured(&same, 0);
+    // Far off, so that it would show in the figures.
+    for named in &mut seen {
+        named.sample.point.x += 5.0 * MILLIMETRE;
+    }
+    let clean = bench.identify(known.clone(), fresh.clone());
+    let mixed = bench.identify(known.clone(), seen.iter().chain(&fresh).cloned().collect());
+    assert_eq!(mixed.summary.verdict.status, VerdictStatus::Accepted, "{:?}", mixed.summary.warnings);
+    let (verification, alone) =
+        (mixed.summary.verification.as_ref().unwrap(), clean.summary.verification.as_ref().unwrap());
+    assert_eq!((verification.samples, verification.left_out, verification.independent), (20, 3, true));
+    assert_eq!(verification.identified.position_mm, alone.identified.position_mm);
+    let note = warning(&mixed, "seen_before").unwrap();
+    assert!(!note.blocks_acceptance);
+    assert!(note.message.starts_with("3 of 23 verification samples are at poses that were also identified"), "{note:?}");
+    assert!(note.message.contains("the other 20"), "{note:?}");
+
+    // Too few are left: that blocks, not the rows at identified poses.
+    let few = bench.identify(known.clone(), seen.iter().chain(&fresh[..3]).cloned().collect());
+    assert_eq!(few.summary.verdict.status, VerdictStatus::NotAccepted);
+    assert!(warning(&few, "few_verification_samples").unwrap().blocks_acceptance);
+    assert!(warning(&few, "not_independent").is_none());
+
+    // None is left: the words are true.
+    let none = bench.identify(known, seen);
+    let refused = warning(&none, "not_independent").unwrap();
+    assert!(refused.blocks_acceptance && refused.message.starts_with("all 3 verification samples are at"));
+    assert!(!none.summary.verification.unwrap().independent);
+}
+
+/// A set was accepted with a distance rms of 0.57 mm against 0.38 mm of the nominal arm.
+#[test]
+fn an_arm_that_is_no_better_than_the_nominal_one_is_not_accepted() {
+    let mut bench = Bench::new(builtin("soochow").unwrap(), 0.02, 2);
+    let known = bench.random(40);
+    let good = bench.real.clone();
+    // Something changes between the sets: a link that is 0.3 mm longer. Then the nominal arm happens to be the better one.
+    bench.real = bench.profile.arm();
+    let fresh = bench.random(20);
+    bench.real = good;
+    let identified = bench.identify(known, fresh);
+    let refused = warning(&identified, "not_better").unwrap();
+    assert!(refused.blocks_acceptance);
+    for word in ["position error (rms)", "distance error (rms)", "Keep the nominal model"] {
+        assert!(refused.message.contains(word), "{refused:?}");
+    }
+    assert_eq!(identified.summary.verdict.status, VerdictStatus::NotAccepted);
+}
+
+#[test]
+fn poses_that_move_one_joint_at_a_time_are_said_not_to_carry_over() {
+    let mut bench = Bench::builtin("soochow", 3);
+    let known = bench.random(40);
+    let limits: Vec<_> = bench.profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect();
+    let home: Vec<f64> = limits.iter().map(|(low, high)| 0.4 * low + 0.6 * high).collect();
+    let star: Vec<Vec<f64>> = (0..30)
+        .map(|index| {
+            let mut moved = home.clone();
+            let (low, high) = limits[index % 6];
+            moved[index % 6] = low + (high - low) * f64::from(u8::try_from(index / 6).unwrap()) / 4.0;
+            moved
+        })
+        .collect();
+    let fresh = bench.measured(&star, 0);
+    let identified = bench.identify(known.clone(), fresh.clone());
+    let refused = warning(&identified, "one_joint_at_a_time").unwrap();
+    assert!(refused.blocks_acceptance && refused.message.contains("do not carry over"), "{refused:?}");
+    // Such poses to identify from are only noted where a verification shows what they are worth.
+    let spread = bench.random(20);
+    let identified = bench.identify(fresh, spread);
+    let noted = warning(&identified, "one_joint_at_a_time").unwrap();
+    assert!(!noted.blocks_acceptance && noted.message.starts_with("the identification poses"), "{noted:?}");
+}
+
+fn two_targets() -> String {
+    let text = builtin("soochow").unwrap();
+    let start = text.find("targets: [").unwrap();
+    let end = start + text[start..].find("],").unwrap() + 2;
+    format!(
+        "{}targets: [(name: \"first\", position_mm: (0.0, 20.0, 70.0)), (name: \"second\", position_mm: (30.0, -20.0, 70.0))],{}",
+        &text[..start],
+        &text[end..]
+    )
+}
+
+/// It was judged at the guess of the profile, 25 mm off, without any warning.
+#[test]
+fn a_target_that_only_the_verification_has_is_refused() {
+    let mut bench = Bench::new(&two_targets(), 0.5, 4);
+    let known = bench.random(40);
+    let poses = bench.configurations(20);
+    let fresh = bench.measured(&poses, 1);
+    let refused = bench.try_identify(known, fresh).unwrap_err();
+    assert!(refused.to_string().contains("only the verification has samples of 'second'"), "{refused}");
+}
+
+/// It was an absolute millimetre, and left no file.
+#[test]
+fn what_does_not_fit_is_judged_by_sigma_and_the_nominal_arm_and_leaves_a_result() {
+    let mut bench = Bench::builtin("soochow", 5);
+    let known = bench.random(40);
+    // 1.5 mm of scatter where the instrument promises 1 mm: sloppy, but no other robot.
+    let mut sloppy = known.clone();
+    for named in &mut sloppy {
+        named.sample.point += Vector3::from_fn(|_, _| 1.5 * MILLIMETRE * normal(&mut bench.rng));
+        named.sample.sigma = Some(MILLIMETRE);
+    }
+    let identified = bench.identify(sloppy.clone(), Vec::new());
+    assert!(warning(&identified, "does_not_fit").is_none(), "{:?}", identified.summary.warnings);
+    assert!(identified.calibration.is_some());
+
+    // The same scatter from an instrument of 10 µm, on an arm that is nearly nominal: nothing is explained.
+    for named in &mut sloppy {
+        named.sample.sigma = Some(NOISE);
+    }
+    bench.real = bench.profile.arm();
+    let mut wild = bench.random(40);
+    for named in &mut wild {
+        named.sample.point += Vector3::from_fn(|_, _| 3.0 * MILLIMETRE * normal(&mut bench.rng));
+        named.sample.sigma = Some(NOISE);
+    }
+    let fresh = bench.random(20);
+    let identified = bench.identify(wild, fresh);
+    let refused = warning(&identified, "does_not_fit").unwrap();
+    assert!(refused.blocks_acceptance && refused.message.contains("the nominal one by"), "{refused:?}");
+    assert!(identified.calibration.is_some(), "the numbers are kept");
+    assert_eq!(identified.summary.verdict.status, VerdictStatus::NotAccepted);
+    assert!(identified.summary.workspace.is_some(), "results state their predicted error");
+}
