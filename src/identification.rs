@@ -274,6 +274,17 @@ fn summarise(solve: &Solve<'_, '_>, settings: &Settings, solved: Solved) -> Iden
     let problem = solve.problem;
     let sigma = sigma(solve, settings, &at);
     let covariance = covariance(solve, &at);
+    let rejected = rejected(solve, &at);
+    let observability = if rejected.is_empty() && at.arm.targets == problem.arm.targets {
+        observability
+    } else {
+        // As designed, so that parallel axes are parallel, but with the targets where they are: a guess of the profile on the last
+        // axis would hide what the data can tell.
+        let arm = Arm { targets: at.arm.targets.clone(), ..problem.arm.clone() };
+        let accepted = problem.observations.without(&rejected);
+        let geometry = geometry(problem);
+        Observability::new(&Problem { arm: &arm, observations: &accepted, ..problem.of_geometry(&geometry) })
+    };
     let estimates = problem
         .parameters
         .iter()
@@ -287,13 +298,6 @@ fn summarise(solve: &Solve<'_, '_>, settings: &Settings, solved: Solved) -> Iden
             identifiable: observability.is_identifiable(index),
         })
         .collect();
-    let rejected = rejected(solve, &at);
-    let observability = if rejected.is_empty() {
-        observability
-    } else {
-        let accepted = problem.observations.without(&rejected);
-        Observability::new(&Problem { observations: &accepted, ..problem.of_geometry(&geometry(problem)) })
-    };
     Identification {
         arm: at.arm,
         estimates,

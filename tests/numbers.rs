@@ -243,3 +243,55 @@ fn what_does_not_fit_is_judged_by_sigma_and_the_nominal_arm_and_leaves_a_result(
     assert_eq!(identified.summary.verdict.status, VerdictStatus::NotAccepted);
     assert!(identified.summary.workspace.is_some(), "results state their predicted error");
 }
+
+fn with_guess(x: f64, y: f64, z: f64) -> String {
+    let text = builtin("abb_irb120").unwrap();
+    text.replace("position_mm: (0.0, 0.0, 40.0)", &format!("position_mm: ({x:.1}, {y:.1}, {z:.1})"))
+}
+
+/// The same fit from four guesses of the SMR had 0, 4, 4 and 4 acceptances of 5.
+#[test]
+fn guesses_of_the_smr_with_the_same_fit_have_the_same_verdict() {
+    let mut bench = Bench::new(&with_guess(35.0, 20.0, 60.0), 0.3, 6);
+    let (known, fresh) = (bench.random(40), bench.random(20));
+    let mut found = Vec::new();
+    for (x, y, z) in [(35.0, 20.0, 60.0), (0.0, 0.0, 40.0), (0.0, 0.0, 60.0), (-20.0, 40.0, 20.0)] {
+        let text = with_guess(x, y, z);
+        bench.profile = Profile::parse(&text, "robot").unwrap().0;
+        bench.text = text;
+        let identified = bench.identify(known.clone(), fresh.clone());
+        let codes: Vec<String> = identified.summary.warnings.iter().map(|warning| warning.code.clone()).collect();
+        let identifiable: Vec<bool> = identified.found.estimates.iter().map(|estimate| estimate.identifiable).collect();
+        found.push((identified.summary.verdict.status, identified.summary.rank, codes, identifiable));
+    }
+    assert_eq!(found[0].0, VerdictStatus::Accepted, "{:?}", found[0]);
+    assert!(found.iter().all(|other| *other == found[0]), "{found:?}");
+}
+
+#[test]
+fn a_weak_combination_is_named_with_what_it_costs_and_blocks_beyond_the_limit() {
+    let mut bench = Bench::builtin("abb_irb120", 7);
+    // Joint 5 stays near zero, so that axes 4 and 6 are nearly one, and the instrument is poor.
+    let mut narrow = bench.configurations(40);
+    for configuration in &mut narrow {
+        configuration[4] = 0.1 * configuration[4];
+    }
+    let mut known = bench.measured(&narrow, 0);
+    for named in &mut known {
+        named.sample.point += Vector3::from_fn(|_, _| MILLIMETRE * normal(&mut bench.rng));
+        named.sample.sigma = Some(MILLIMETRE);
+    }
+    let fresh = bench.random(20);
+    let identified = bench.identify(known.clone(), fresh.clone());
+    let weak = warning(&identified, "poor_data").unwrap();
+    assert!(weak.message.contains("mm rms over the workspace") && weak.message.contains(" by "), "{weak:?}");
+    let loose = bench.text.replace(
+        "acceptance: (position_rms_mm: 0.3, position_max_mm: 0.8, distance_rms_mm: 0.3)",
+        "acceptance: (position_rms_mm: 30.0)",
+    );
+    bench.profile = Profile::parse(&loose, "robot").unwrap().0;
+    bench.text = loose;
+    let identified = bench.identify(known, fresh);
+    let weak = warning(&identified, "poor_data").unwrap();
+    assert!(!weak.blocks_acceptance, "{weak:?}");
+}

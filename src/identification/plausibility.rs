@@ -5,14 +5,14 @@
 //! deviations allow by much. Where it does, each mistake is tried in turn and the one that explains the data is named. This
 //! happens before identification, because a solver bends parameters until nonsense looks like a fit.
 
-use nalgebra::Point3;
+use nalgebra::{DMatrix, Point3, SymmetricEigen};
 
 use super::linearise::{Evaluation, Weights, point_residuals, project};
 use super::problem::{Observations, PointSample, Problem};
 use super::robust::gross_trust;
 use super::{Estimator, Identification, IdentificationError, Observability, Settings, SigmaSource, identify};
 use crate::geometry::principal_spread;
-use crate::kinematics::{FreeParameter, JointType, Place};
+use crate::kinematics::{Arm, FreeParameter, JointType, Place};
 use crate::units::{DEGREE, INCH, MILLIMETRE, to_deg, to_mm};
 
 /// Nominal residuals beyond this many expected ones are not explained by a robot with its expected deviations.
@@ -31,9 +31,8 @@ const STILL_JOINT: f64 = 5.0 * DEGREE;
 const STILL_SLIDE: f64 = 20.0 * MILLIMETRE;
 /// Independent values per independent combination below which the error bars rest on too little.
 const VALUES_PER_COMBINATION: usize = 2;
-/// A combination whose deviation the data show with less than this many standard deviations per expected deviation rests on the
-/// prior more than on the data.
-const WEAK_SIGNAL: f64 = 1.0;
+/// A combination of which this part of the expected variance is left rests on the prior more than on the data.
+const WEAK: f64 = 0.5;
 /// Points flatter than this fraction of their extent are a plane.
 const FLAT: f64 = 0.02;
 
@@ -303,13 +302,6 @@ pub enum Weakness {
         /// Spread along the principal axes, root mean square (m).
         spread: [f64; 3],
     },
-    /// Combinations that could be found in principle, but of which these data say less than the expected deviations do.
-    WeakCombinations {
-        /// How many.
-        weak: usize,
-        /// Of how many.
-        combinations: usize,
-    },
     /// No gap in the singular values decides the rank.
     RankUnclear {
         /// The largest ratio of neighbours.
@@ -340,9 +332,6 @@ impl Weakness {
                 to_mm(spread[0]),
                 to_mm(spread[1]),
                 to_mm(spread[2])
-            ),
-            Self::WeakCombinations { weak, combinations } => format!(
-                "poor excitation: {weak} of {combinations} combinations of parameters rest on the expected deviations more than on the data; spread the poses over the joint ranges, or use a planned pose set"
             ),
             Self::RankUnclear { gap } => format!(
                 "the rank is not clear (largest gap in the singular values {gap:.1}): which parameters can be found is not decided by these data"
@@ -378,7 +367,10 @@ fn structural_rank(problem: &Problem<'_>) -> usize {
 pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec<Weakness> {
     let accepted = problem.observations.without(&identification.rejected);
     let problem = &Problem { observations: &accepted, ..*problem };
-    let (observability, sigma) = (&identification.observability, identification.sigma.used);
+    let observability = &identification.observability;
+    // The rank is a matter of where the targets are, not of where the profile guesses them.
+    let arm = Arm { targets: identification.arm.targets.clone(), ..problem.arm.clone() };
+    let problem = &Problem { arm: &arm, ..*problem };
     let mut found = Vec::new();
     let once = problem.observations.without_repetitions(problem.arm.chain.joints());
     let (values, all) = (once.independent_values(), problem.observations.independent_values());
@@ -409,15 +401,33 @@ pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec
             found.push(Weakness::Flat { spread });
         }
     }
-    match observability.rank {
-        None => found.push(Weakness::RankUnclear { gap: observability.gap }),
-        Some(rank) => {
-            let signals = observability.singular_values.iter().take(rank);
-            let weak = signals.filter(|&&value| value < WEAK_SIGNAL * sigma).count();
-            if weak > 0 {
-                found.push(Weakness::WeakCombinations { weak, combinations: rank });
-            }
-        }
+    if observability.rank.is_none() {
+        found.push(Weakness::RankUnclear { gap: observability.gap });
     }
     found
+}
+
+/// The combinations of geometry and targets of which the data say less than the expected deviations do, as columns: deviations ((m)
+/// and (rad)) of one standard deviation each, in the order of the estimates. Those without any effect are among them.
+pub fn weak_combinations(identification: &Identification) -> DMatrix<f64> {
+    let n = identification.estimates.len();
+    let geometry: Vec<usize> = (0..n).filter(|&index| !identification.estimates[index].id.is_joint_error()).collect();
+    let expected = |index: usize| identification.estimates[geometry[index]].expected;
+    // What is left of the expected variances: between 0, known from the data, and 1, nothing known.
+    let left = DMatrix::from_fn(geometry.len(), geometry.len(), |i, j| {
+        identification.covariance[(geometry[i], geometry[j])] / (expected(i) * expected(j))
+    });
+    if left.iter().any(|value| !value.is_finite()) {
+        return DMatrix::zeros(n, 0);
+    }
+    let spread = SymmetricEigen::new(left);
+    let weak: Vec<usize> = (0..geometry.len()).filter(|&index| spread.eigenvalues[index] > WEAK).collect();
+    let mut combinations = DMatrix::zeros(n, weak.len());
+    for (column, &direction) in weak.iter().enumerate() {
+        let size = spread.eigenvalues[direction].sqrt();
+        for (row, &parameter) in geometry.iter().enumerate() {
+            combinations[(parameter, column)] = spread.eigenvectors[(row, direction)] * size * expected(row);
+        }
+    }
+    combinations
 }

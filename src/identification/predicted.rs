@@ -59,8 +59,8 @@ impl<'a> Predictor<'a> {
         Some(Self { found, ids, centre, response, frame: inverse * found.sigma.used.powi(2) })
     }
 
-    /// Covariance of the position at each of `places` (m²).
-    pub fn covariances(&self, places: &[&Place]) -> Vec<Matrix3<f64>> {
+    /// Derivatives of all positions by the parameters, and by the frame, once it has followed the parameters.
+    fn derivatives(&self, places: &[&Place]) -> (DMatrix<f64>, Vec<SMatrix<f64, 3, 6>>) {
         let points = self.found.arm.points_in_base(places.iter().copied());
         let mut rows = jacobian(&self.found.arm, &self.ids, places);
         let motions: Vec<SMatrix<f64, 3, 6>> = points.iter().map(|point| motion(&(point - self.centre))).collect();
@@ -69,6 +69,18 @@ impl<'a> Predictor<'a> {
             let mut rows = rows.rows_mut(3 * index, 3);
             rows -= moved;
         }
+        (rows, motions)
+    }
+
+    /// Mean products (m²) of what the columns of `deviations` ((m) and (rad), in the order of the estimates) do to the positions.
+    pub fn effects(&self, places: &[&Place], deviations: &DMatrix<f64>) -> DMatrix<f64> {
+        let moved = self.derivatives(places).0 * deviations;
+        moved.transpose() * moved / places.len().max(1) as f64
+    }
+
+    /// Covariance of the position at each of `places` (m²).
+    pub fn covariances(&self, places: &[&Place]) -> Vec<Matrix3<f64>> {
+        let (rows, motions) = self.derivatives(places);
         let product = &rows * &self.found.covariance;
         motions
             .iter()

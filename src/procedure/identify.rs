@@ -170,10 +170,16 @@ pub fn identify(
     let found = &with_terms.found;
     let nominal = nominal_setup(&problem, found)?;
     let nominal_rms = joint_errors::nominal_rms(&problem, found, &nominal);
-    let context = Context { level: request.settings.level, expected, nominal: nominal_rms };
-    warnings.extend(result::result_warnings(&problem, found, &settings, context));
-    warnings.extend(joint_errors::warnings(&problem, found));
     let workspace = Workspace::new(profile, &problem, &with_terms, nominal_rms);
+    let context = Context {
+        level: request.settings.level,
+        expected,
+        nominal: nominal_rms,
+        is_workspace_known: workspace.is_some(),
+    };
+    warnings.extend(result::result_warnings(&problem, found, &settings, context));
+    warnings.extend(workspace.as_ref().and_then(|workspace| workspace.weak_combinations(profile)));
+    warnings.extend(joint_errors::warnings(&problem, found));
     let of_identification = warnings.clone();
 
     let Verified { verification, warnings: doubts } = match request.verification_mode {

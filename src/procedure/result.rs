@@ -1,6 +1,6 @@
 //! Warnings about the result of an identification, and whether it is usable.
 
-use crate::identification::plausibility::weaknesses;
+use crate::identification::plausibility::{Weakness, weaknesses};
 use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason};
 use crate::profile::Level;
 use crate::report::number;
@@ -39,6 +39,8 @@ pub(crate) struct Context {
     pub(crate) expected: Option<f64>,
     /// Root mean square error of the nominal arm at the accepted samples (m).
     pub(crate) nominal: Option<f64>,
+    /// Whether the error over the workspace can be predicted.
+    pub(crate) is_workspace_known: bool,
 }
 
 impl Context {
@@ -74,7 +76,9 @@ pub(crate) fn result_warnings(
         .iter()
         .map(|weakness| {
             let text = weakness.describe(|joint| joints[joint].name.clone(), |joint| joints[joint].joint_type);
-            Warning::new("poor_data", text, true)
+            // What an unclear rank leaves open costs so many millimetres, which are judged, where the workspace is known.
+            let is_judged = context.is_workspace_known && matches!(weakness, Weakness::RankUnclear { .. });
+            Warning::new("poor_data", text, !is_judged)
         })
         .collect();
     let residual = found.sigma.from_residuals.unwrap_or(0.0);

@@ -1,17 +1,19 @@
 //! The error that is predicted where nothing was measured: over the range of the joints in which the arm has to be accurate.
 
-use nalgebra::Matrix3;
+use nalgebra::{DVector, Matrix3, SymmetricEigen};
 
 use crate::geometry::register;
+use crate::identification::plausibility::weak_combinations;
 use crate::identification::predicted::Predictor;
 use crate::identification::verification::ErrorStatistics;
-use crate::identification::{Identification, Problem, WithTerms};
+use crate::identification::{Estimate, Identification, Problem, WithTerms};
 use crate::kinematics::{Arm, Place};
 use crate::planning::{JointBox, random};
 use crate::profile::{Acceptance, Profile};
 use crate::report::number;
 use crate::session::summary::{VerificationSummary, Warning, WorkspaceSummary};
-use crate::units::to_mm;
+use crate::text::{self, counted};
+use crate::units::{MICROMETRE, to_mm};
 
 /// Code of the warning that the arm is not known where it has to be accurate.
 const CODE: &str = "workspace";
@@ -22,8 +24,14 @@ const SEED: u64 = 0x5eed;
 /// Measured poses from which a joint is taken over its range, and the values that it takes.
 const POSES_OF_A_JOINT: usize = 10;
 const VALUES_OF_A_JOINT: usize = 16;
-/// Mean of the norm of three normal numbers per root mean square.
+/// Mean of the norm of three normal numbers per root mean square, and what 95 % of them stay below.
 const MEAN_PER_RMS: f64 = 0.921;
+const LARGEST_PER_RMS: f64 = 1.614;
+/// A combination of parameters that costs less than this part of the noise need not be named.
+const WORTH_NAMING: f64 = 0.5;
+/// Most parameters of a combination that are named, and the least part of the largest that any of them has.
+const NAMED: usize = 4;
+const HAS_A_SAY: f64 = 0.2;
 
 /// The prediction over the workspace.
 #[derive(Clone, Debug)]
@@ -31,6 +39,8 @@ pub(super) struct Workspace<'a> {
     pub(super) summary: WorkspaceSummary,
     predictor: Predictor<'a>,
     found: &'a Identification,
+    /// Random configurations over the ranges.
+    places: Vec<Place>,
     /// Places that define the frame.
     measured: Vec<&'a Place>,
     /// Ranges of the joints ((rad) or (m)).
@@ -88,20 +98,20 @@ impl<'a> Workspace<'a> {
             .enumerate()
             .map(|(index, configuration)| Place { configuration, target: index % targets })
             .collect();
-        let places: Vec<&Place> = places.iter().collect();
-        let errors = predicted(&predictor, found, &places);
+        let all: Vec<&Place> = places.iter().collect();
+        let errors = predicted(&predictor, found, &all);
         let statistics = ErrorStatistics::new(errors)?;
         let beside_geometry = (!with_terms.selection.terms().is_geometry())
-            .then(|| difference(&with_terms.geometric.arm, &found.arm, &measured, &places))
+            .then(|| difference(&with_terms.geometric.arm, &found.arm, &measured, &all))
             .flatten();
         let summary = WorkspaceSummary {
-            configurations: places.len(),
+            configurations: all.len(),
             rms_mm: to_mm(statistics.rms),
             p95_mm: to_mm(statistics.p95),
             max_mm: to_mm(statistics.max),
             beside_geometry_rms_mm: beside_geometry.map(to_mm),
         };
-        Some(Self { summary, predictor, found, measured, ranges, nominal })
+        Some(Self { summary, predictor, found, places, measured, ranges, nominal })
     }
 
     /// A warning that blocks acceptance where the prediction is beyond a limit, or beyond the nominal arm's own error.
@@ -118,9 +128,75 @@ impl<'a> Workspace<'a> {
         Some(Warning::new(CODE, message, true))
     }
 
+    /// A warning about combinations of parameters that rest on the expected deviations more than on the data. It blocks acceptance
+    /// where they cost more than a limit, or more than the nominal arm's own error.
+    pub(super) fn weak_combinations(&self, profile: &Profile) -> Option<Warning> {
+        let combinations = weak_combinations(self.found);
+        if combinations.ncols() == 0 {
+            return None;
+        }
+        let places: Vec<&Place> = self.places.iter().collect();
+        let spread = SymmetricEigen::new(self.predictor.effects(&places, &combinations));
+        let costs: Vec<f64> = spread.eigenvalues.iter().map(|square| to_mm(square.max(0.0).sqrt())).collect();
+        let worth_naming = |cost: &&f64| **cost > WORTH_NAMING * to_mm(self.found.sigma.used.max(MICROMETRE));
+        let weak = costs.iter().filter(worth_naming).count();
+        let worst = costs.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)?;
+        if weak == 0 {
+            return None;
+        }
+        let total = costs.iter().map(|cost| cost * cost).sum::<f64>().sqrt();
+        let beyond = self.limit_below(profile.acceptance(), total, LARGEST_PER_RMS * total, self.nominal.map(to_mm));
+        let direction = combinations * spread.eigenvectors.column(worst);
+        let message = format!(
+            "poor excitation: {} of parameters {} on the expected deviations more than on the data, which leaves {} mm rms over the workspace{}; what matters most is the change {}. Spread the poses over the joint ranges, or use a planned pose set",
+            counted(weak, "combination"),
+            if weak == 1 { "rests" } else { "rest" },
+            number(total, 3),
+            beyond.as_ref().map_or_else(String::new, |limit| format!(", more than {limit}")),
+            self.combination(&direction)
+        );
+        Some(Warning::new("poor_data", message, beyond.is_some()))
+    }
+
+    /// The parameters that have most of the say in a change of them.
+    fn combination(&self, direction: &DVector<f64>) -> String {
+        let mut parts: Vec<(f64, &Estimate, f64)> = self
+            .found
+            .estimates
+            .iter()
+            .zip(direction.iter())
+            .map(|(estimate, change)| ((change / estimate.expected).abs(), estimate, *change))
+            .collect();
+        parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let largest = parts.first().map_or(0.0, |part| part.0);
+        let named: Vec<String> = parts
+            .iter()
+            .take(NAMED)
+            .filter(|(share, ..)| *share > HAS_A_SAY * largest)
+            .map(|(_, estimate, change)| {
+                let unit = estimate.id.unit();
+                let change = unit.to_edge(*change);
+                let sign = if change < 0.0 { "" } else { "+" };
+                format!("{} by {sign}{} {unit}", estimate.id, number(change, 3))
+            })
+            .collect();
+        text::listed(&named)
+    }
+
     /// The limit that the prediction exceeds, in words.
     fn beyond(&self, acceptance: &Acceptance, nominal_mm: Option<f64>) -> Option<String> {
         let WorkspaceSummary { rms_mm, p95_mm, .. } = self.summary;
+        self.limit_below(acceptance, rms_mm, p95_mm, nominal_mm)
+    }
+
+    /// The limit that an error of `rms_mm`, and `p95_mm` at 95 % of the configurations, exceeds, in words.
+    fn limit_below(
+        &self,
+        acceptance: &Acceptance,
+        rms_mm: f64,
+        p95_mm: f64,
+        nominal_mm: Option<f64>,
+    ) -> Option<String> {
         let limits = [
             (acceptance.position_mean, MEAN_PER_RMS * rms_mm, "mean"),
             (acceptance.position_rms, rms_mm, "rms"),
