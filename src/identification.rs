@@ -53,6 +53,7 @@ pub mod circle_point;
 mod error;
 mod factor;
 mod linearise;
+mod mistake;
 mod noise;
 mod observability;
 mod pairs;

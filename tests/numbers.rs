@@ -4,13 +4,14 @@ use std::ops::ControlFlow;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::RngExt as _;
-use trupose::identification::PointSample;
+use trupose::identification::plausibility::{Columns, Mistake, compare_with_nominal};
+use trupose::identification::{Observations, PointSample, Problem};
 use trupose::kinematics::{Arm, Place};
 use trupose::procedure::identify::{Identified, IdentifyRequest, NamedSample, SampleSet, identify};
 use trupose::procedure::{EstimationSettings, ProcedureError};
 use trupose::profile::{Level, Profile, builtin};
 use trupose::session::summary::{VerdictStatus, VerificationMode, Warning};
-use trupose::units::{MICROMETRE, MILLIMETRE};
+use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
 
 use crate::support::paper_case::{normal, seeded};
 
@@ -294,4 +295,106 @@ fn a_weak_combination_is_named_with_what_it_costs_and_blocks_beyond_the_limit() 
     let identified = bench.identify(known, fresh);
     let weak = warning(&identified, "poor_data").unwrap();
     assert!(!weak.blocks_acceptance, "{weak:?}");
+}
+
+/// The mistakes that are named for samples.
+fn mistakes(bench: &Bench, samples: &[NamedSample]) -> Vec<Mistake> {
+    let points = samples.iter().map(|named| named.sample.clone()).collect();
+    let observations = Observations { points, ..Observations::default() };
+    let (arm, parameters) = (bench.profile.arm(), bench.profile.parameters(Level::Geometric));
+    let problem = Problem { arm: &arm, parameters: &parameters, observations: &observations };
+    compare_with_nominal(&problem).unwrap().mistakes
+}
+
+fn altered(samples: &[NamedSample], change: impl Fn(&mut [f64])) -> Vec<NamedSample> {
+    let mut samples = samples.to_vec();
+    samples.iter_mut().for_each(|named| change(&mut named.sample.at.configuration));
+    samples
+}
+
+/// An arm that is its own mirror image with joints 1, 4 and 6 reversed: the advice to reverse an axis of the tracker led to a
+/// mirrored arm that was accepted.
+#[test]
+fn several_reversed_joints_are_named_before_a_mirrored_frame() {
+    let mut bench = Bench::builtin("abb_irb120", 11);
+    let samples = bench.random(40);
+    let reversed = altered(&samples, |q| [0, 3, 5].iter().for_each(|joint| q[*joint] *= -1.0));
+    let found = mistakes(&bench, &reversed);
+    assert_eq!(found.first(), Some(&Mistake::JointSigns { joints: vec![0, 3, 5] }), "{found:?}");
+    assert_eq!(found.last(), Some(&Mistake::Mirrored), "{found:?}");
+    let refused = bench.try_identify(reversed, Vec::new()).unwrap_err().to_string();
+    for words in ["the likeliest first: (1) joints J1, J4 and J6 count the other way", "Trackers are hardly ever left-handed"] {
+        assert!(refused.contains(words), "{refused}");
+    }
+    let reversed = altered(&samples, |q| [1, 4].iter().for_each(|joint| q[*joint] *= -1.0));
+    assert_eq!(mistakes(&bench, &reversed).first(), Some(&Mistake::JointSigns { joints: vec![1, 4] }));
+}
+
+#[test]
+fn two_joints_with_another_zero_are_named() {
+    let mut bench = Bench::builtin("kuka_kr6_r900", 12);
+    let samples = bench.random(40);
+    let moved = altered(&samples, |q| {
+        q[1] += 90.0 * DEGREE;
+        q[2] -= 90.0 * DEGREE;
+    });
+    let found = mistakes(&bench, &moved);
+    let expected = Mistake::JointZeros { zeros: vec![(1, -90.0 * DEGREE), (2, 90.0 * DEGREE)] };
+    assert_eq!(found.first(), Some(&expected), "{found:?}");
+    let words = found[0].describe(|joint| format!("A{}", joint + 1));
+    assert!(words.starts_with("joints A2 and A3 have another zero: the data fit with -90 and +90 deg added"), "{words}");
+}
+
+/// The most frequent report of all: FANUC and linkage arms count joint 3 together with joint 2.
+#[test]
+fn a_coupling_that_is_missing_or_doubled_is_named() {
+    for (name, added, factor) in [("fanuc_lrmate200id", 1.0, -1.0), ("fanuc_lrmate200id", -1.0, 1.0), ("abb_irb120", -1.0, 1.0)] {
+        let mut bench = Bench::builtin(name, 13);
+        let samples = bench.random(40);
+        let coupled = altered(&samples, |q| q[2] += added * q[1]);
+        let found = mistakes(&bench, &coupled);
+        let expected = Mistake::Coupling { joint: 2, with: 1, factor, reversed: false };
+        assert_eq!(found.first(), Some(&expected), "{name} {added}: {found:?}");
+    }
+    // Imported from a description without the coupling, joint 3 also counts the other way.
+    let mut bench = Bench::builtin("abb_irb120", 14);
+    let samples = bench.random(40);
+    let fanuc = altered(&samples, |q| q[2] = -(q[2] + q[1]));
+    let found = mistakes(&bench, &fanuc);
+    let expected = Mistake::Coupling { joint: 2, with: 1, factor: -1.0, reversed: true };
+    assert_eq!(found.first(), Some(&expected), "{found:?}");
+}
+
+#[test]
+fn columns_and_rows_that_are_mixed_up_are_named() {
+    let mut bench = Bench::builtin("abb_irb120", 15);
+    let samples = bench.random(40);
+    let columns = |change: fn(&mut [f64])| mistakes(&bench, &altered(&samples, change)).into_iter().next();
+    let exchanged = columns(|q| q.swap(4, 5));
+    assert_eq!(exchanged, Some(Mistake::Columns(Columns::Exchanged { joints: [4, 5] })));
+    assert_eq!(columns(|q| q.rotate_right(1)), Some(Mistake::Columns(Columns::Rotated { first: 1 })));
+    assert_eq!(columns(|q| q.reverse()), Some(Mistake::Columns(Columns::Reversed)));
+
+    let rows = |change: &dyn Fn(&mut Vec<Point3<f64>>)| {
+        let mut points: Vec<Point3<f64>> = samples.iter().map(|named| named.sample.point).collect();
+        change(&mut points);
+        let mut mixed = samples.clone();
+        mixed.truncate(points.len());
+        for (named, point) in mixed.iter_mut().zip(points) {
+            named.sample.point = point;
+        }
+        mistakes(&bench, &mixed).into_iter().next()
+    };
+    // A point is lost: the others move up.
+    for from in [0, 11, 18] {
+        let lost = rows(&|points| {
+            points.remove(from);
+        });
+        assert_eq!(lost, Some(Mistake::RowsShifted { from, below: true }));
+    }
+    let doubled = rows(&|points| points.insert(12, points[3]));
+    assert!(matches!(doubled, Some(Mistake::RowsShifted { from: 12 | 13, below: false })), "{doubled:?}");
+    assert_eq!(rows(&|points| points.reverse()), Some(Mistake::RowsReversed));
+    let centimetres = rows(&|points| points.iter_mut().for_each(|point| *point /= 10.0));
+    assert!(matches!(centimetres, Some(Mistake::CoordinateUnit { story, .. }) if story.contains("centimetres")));
 }

@@ -7,13 +7,16 @@
 
 use nalgebra::{DMatrix, Point3, SymmetricEigen};
 
+use super::mistake;
 use super::linearise::{Evaluation, Weights, point_residuals, project};
 use super::problem::{Observations, PointSample, Problem};
 use super::robust::gross_trust;
 use super::{Estimator, Identification, IdentificationError, Observability, Settings, SigmaSource, identify};
-use crate::geometry::principal_spread;
+use crate::geometry::{principal_spread, register};
 use crate::kinematics::{Arm, FreeParameter, JointType, Place};
-use crate::units::{DEGREE, INCH, MILLIMETRE, to_deg, to_mm};
+use crate::units::{DEGREE, MILLIMETRE, to_mm};
+
+pub use super::mistake::{Columns, Mistake};
 
 /// Nominal residuals beyond this many expected ones are not explained by a robot with its expected deviations.
 const IMPLAUSIBLE: f64 = 6.0;
@@ -25,6 +28,14 @@ const EXPLAINS: f64 = 0.25;
 const FITS: f64 = 0.1;
 /// Evenly picked points that are tried against each mistake: a mistake in a whole table shows in any part of it.
 const TRIED_POINTS: usize = 500;
+/// Points at which mistakes of several numbers are looked at, and how many of those mistakes are then tried.
+const GLANCED_AT: usize = 60;
+const LOOKED_INTO: usize = 12;
+/// Mistakes whose residuals are within this factor of the smallest, or this part of the extent, explain the data equally well.
+const EQUALLY: f64 = 1.5;
+const SAME_FIT: f64 = 0.002;
+/// Most explanations that are named.
+const NAMED: usize = 3;
 /// A joint that moves less than this over the whole set does not move (rad).
 const STILL_JOINT: f64 = 5.0 * DEGREE;
 /// The same for a prismatic joint (m).
@@ -36,66 +47,6 @@ const WEAK: f64 = 0.5;
 /// Points flatter than this fraction of their extent are a plane.
 const FLAT: f64 = 0.02;
 
-/// A mistake that explains data the nominal robot cannot.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Mistake {
-    /// Measured coordinates are in another unit; they should have been multiplied by `factor`.
-    CoordinateUnit {
-        /// Measured extent over predicted extent.
-        ratio: f64,
-        /// The likely story.
-        story: &'static str,
-    },
-    /// Joint values were radians read as degrees.
-    RadiansAsDegrees,
-    /// Joint values were degrees read as radians.
-    DegreesAsRadians,
-    /// A joint counts the other way.
-    JointSign {
-        /// Index of the joint.
-        joint: usize,
-    },
-    /// A joint has another zero.
-    JointZero {
-        /// Index of the joint.
-        joint: usize,
-        /// What has to be added to its pendant value (rad).
-        offset: f64,
-    },
-    /// The measured frame is left-handed.
-    Mirrored,
-}
-
-impl Mistake {
-    /// What it is and what to do, with names instead of indices.
-    pub fn describe(&self, joint_name: impl Fn(usize) -> String) -> String {
-        match self {
-            Self::CoordinateUnit { ratio, story } => {
-                format!("the measured points span {ratio:.4} times what the robot can reach between them: {story}")
-            }
-            Self::RadiansAsDegrees => {
-                "the joint values fit when read as radians: name the columns 'q1_rad', 'q2_rad', …".to_owned()
-            }
-            Self::DegreesAsRadians => {
-                "the joint values fit when read as degrees: name the columns 'q1_deg', 'q2_deg', …".to_owned()
-            }
-            Self::JointSign { joint } => format!(
-                "joint {} counts the other way: the data fit with its sign reversed; check the sign of its column, or 'direction' in the profile",
-                joint_name(*joint)
-            ),
-            Self::JointZero { joint, offset } => format!(
-                "joint {} has another zero: the data fit with {:+.0} deg added to it; check the column, or 'theta_deg' in the profile",
-                joint_name(*joint),
-                to_deg(*offset)
-            ),
-            Self::Mirrored => {
-                "the points fit only when mirrored: the instrument's frame is left-handed; reverse one of its axes"
-                    .to_owned()
-            }
-        }
-    }
-}
-
 /// How the measured points compare with the nominal robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plausibility {
@@ -104,8 +55,8 @@ pub struct Plausibility {
     pub nominal: f64,
     /// Root mean square distance that the expected deviations predict (m).
     pub expected: f64,
-    /// The mistake that explains a nominal residual which is too large.
-    pub mistake: Option<Mistake>,
+    /// The mistakes that explain a nominal residual which is too large, each on its own and equally well, the likeliest first.
+    pub mistakes: Vec<Mistake>,
 }
 
 impl Plausibility {
@@ -129,12 +80,11 @@ pub fn compare_with_nominal(problem: &Problem<'_>) -> Result<Plausibility, Ident
     let expected = expected_residual(problem);
     let trial = Trial::new(problem);
     let all = &problem.observations.points;
-    let used = all.len().min(TRIED_POINTS);
-    let points: Vec<PointSample> = (0..used).map(|index| all[index * all.len() / used].clone()).collect();
+    let points = evenly(all, TRIED_POINTS);
     let fit = trial.fit(&points);
-    let mut plausibility = Plausibility { nominal: fit.typical, expected, mistake: None };
+    let mut plausibility = Plausibility { nominal: fit.typical, expected, mistakes: Vec::new() };
     if points.len() >= 4 && !plausibility.is_plausible() {
-        plausibility.mistake = trial.find_mistake(&points, fit.relative());
+        plausibility.mistakes = trial.find_mistakes(all, &points, fit.relative());
     }
     Ok(plausibility)
 }
@@ -188,68 +138,49 @@ impl<'a, 'p> Trial<'a, 'p> {
         TrialFit { typical, extent: extent(&predicted) }
     }
 
-    fn find_mistake(&self, points: &[PointSample], as_given: f64) -> Option<Mistake> {
-        let mut trials = self.coordinate_mistakes(points);
-        trials.extend(self.joint_mistakes(points));
-        let mirrored =
-            alter(points, |sample| sample.point = Point3::new(-sample.point.x, sample.point.y, sample.point.z));
-        trials.push((Mistake::Mirrored, mirrored));
-        trials
-            .into_iter()
-            .map(|(mistake, altered)| (self.fit(&altered).relative(), mistake))
-            .filter(|(relative, _)| *relative < EXPLAINS * as_given && *relative < FITS)
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, mistake)| mistake)
-    }
-
-    /// The extent of the measured points against the predicted ones suggests a unit; the fit decides.
-    fn coordinate_mistakes(&self, points: &[PointSample]) -> Vec<(Mistake, Vec<PointSample>)> {
-        const STORIES: [(f64, &str); 5] = [
-            (1e-3, "metres were read as millimetres; name the columns 'x_m', 'y_m', 'z_m'"),
-            (1e3, "millimetres were read as metres; name the columns 'x_mm', 'y_mm', 'z_mm'"),
-            (MILLIMETRE / INCH, "inches were read as millimetres; name the columns 'x_in', 'y_in', 'z_in'"),
-            (INCH / MILLIMETRE, "millimetres were read as inches; name the columns 'x_mm', 'y_mm', 'z_mm'"),
-            (1e-3 / INCH, "metres were read as inches; name the columns 'x_m', 'y_m', 'z_m'"),
-        ];
-        let predicted = self.problem.arm.points_in_base(points.iter().map(|sample| &sample.at));
-        let measured: Vec<Point3<f64>> = points.iter().map(|sample| sample.point).collect();
+    /// Mistakes that explain the `picked` of `all` points, the likeliest of those that fit equally first.
+    fn find_mistakes(&self, all: &[PointSample], picked: &[PointSample], as_given: f64) -> Vec<Mistake> {
+        let arm = self.problem.arm;
+        let predicted = arm.points_in_base(picked.iter().map(|sample| &sample.at));
+        let measured: Vec<Point3<f64>> = picked.iter().map(|sample| sample.point).collect();
         let ratio = extent(&measured) / extent(&predicted);
-        STORIES
-            .iter()
-            .filter(|(factor, _)| (0.5..2.0).contains(&(ratio / factor)))
-            .map(|(factor, story)| {
-                let scaled = alter(points, |sample| sample.point.coords /= *factor);
-                (Mistake::CoordinateUnit { ratio, story }, scaled)
-            })
-            .collect()
-    }
-
-    fn joint_mistakes(&self, points: &[PointSample]) -> Vec<(Mistake, Vec<PointSample>)> {
-        let joints = self.problem.arm.chain.joints();
-        let turning = |joint: &usize| joints[*joint].joint_type == JointType::Revolute;
-        let scaled = |factor: f64| {
-            alter(points, |sample| {
-                for joint in (0..joints.len()).filter(turning) {
-                    sample.at.configuration[joint] *= factor;
-                }
-            })
-        };
-        let mut mistakes =
-            vec![(Mistake::RadiansAsDegrees, scaled(1.0 / DEGREE)), (Mistake::DegreesAsRadians, scaled(DEGREE))];
-        for joint in 0..joints.len() {
-            let reversed = alter(points, |sample| sample.at.configuration[joint] *= -1.0);
-            mistakes.push((Mistake::JointSign { joint }, reversed));
-        }
-        // The zero of joint 1 only turns the base: distances cannot see it, and need not.
-        for joint in (1..joints.len()).filter(turning) {
-            for offset in [90.0, -90.0, 180.0] {
-                let offset = offset * DEGREE;
-                let shifted = alter(points, |sample| sample.at.configuration[joint] += offset);
-                mistakes.push((Mistake::JointZero { joint, offset }, shifted));
+        let mut trials = mistake::simple(arm, picked, ratio);
+        let mut compound: Vec<(f64, mistake::Trial)> =
+            mistake::compound(arm, all, picked).into_iter().map(|trial| (self.glance(&trial.1), trial)).collect();
+        compound.sort_by(|a, b| a.0.total_cmp(&b.0));
+        trials.extend(compound.into_iter().take(LOOKED_INTO).map(|(_, trial)| trial));
+        let mut fitting: Vec<(f64, Mistake)> = trials
+            .into_iter()
+            .map(|(mistake, altered)| (self.fit(&evenly(&altered, TRIED_POINTS)).relative(), mistake))
+            .filter(|(relative, _)| *relative < EXPLAINS * as_given && *relative < FITS)
+            .collect();
+        let best = fitting.iter().map(|(relative, _)| *relative).fold(f64::INFINITY, f64::min);
+        fitting.retain(|(relative, _)| *relative < (EQUALLY * best).max(best + SAME_FIT));
+        fitting.sort_by(|a, b| a.1.rarity().cmp(&b.1.rarity()).then(a.0.total_cmp(&b.0)));
+        let mut found: Vec<Mistake> = Vec::new();
+        for (_, mistake) in fitting {
+            // A joint that hardly matters can be added to any explanation.
+            if found.len() < NAMED && !found.iter().any(|simpler| mistake.contains(simpler)) {
+                found.push(mistake);
             }
         }
-        mistakes
+        found
     }
+
+    /// How well a few points fit with the target of the profile: rough, but quick.
+    fn glance(&self, points: &[PointSample]) -> f64 {
+        let few = evenly(points, GLANCED_AT);
+        let predicted = self.problem.arm.points_in_base(few.iter().map(|sample| &sample.at));
+        let pairs = few.iter().zip(&predicted).map(|(sample, predicted)| (1.0, sample.point, *predicted));
+        let rms = register(pairs).map_or(f64::INFINITY, |registered| registered.rms);
+        rms / extent(&predicted).max(f64::MIN_POSITIVE)
+    }
+}
+
+/// At most `most` of the points, evenly picked.
+fn evenly(points: &[PointSample], most: usize) -> Vec<PointSample> {
+    let used = points.len().min(most);
+    (0..used).map(|index| points[index * points.len() / used].clone()).collect()
 }
 
 /// How well the nominal arm fits altered data.
@@ -270,12 +201,6 @@ impl TrialFit {
 /// Root mean square distance from the centroid (m).
 fn extent(points: &[Point3<f64>]) -> f64 {
     principal_spread(points.iter()).iter().map(|value| value * value).sum::<f64>().sqrt()
-}
-
-fn alter(points: &[PointSample], change: impl Fn(&mut PointSample)) -> Vec<PointSample> {
-    let mut altered = points.to_vec();
-    altered.iter_mut().for_each(change);
-    altered
 }
 
 /// Something that makes the result of an identification doubtful although it can be computed.

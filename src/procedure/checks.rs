@@ -111,12 +111,23 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
         number(to_mm(plausibility.nominal), 1),
         number(to_mm(expected), 1)
     );
-    if let Some(mistake) = &plausibility.mistake {
-        let mistake = mistake.describe(|joint| joints[joint].name.clone());
-        return Err(ProcedureError::Mistaken { gap, mistake });
+    let name = |joint: usize| joints[joint].name.clone();
+    let mistakes: Vec<String> = plausibility.mistakes.iter().map(|mistake| mistake.describe(name)).collect();
+    match mistakes.as_slice() {
+        [] => {}
+        [mistake] => return Err(ProcedureError::Mistaken { gap, mistake: mistake.clone() }),
+        several => {
+            let numbered: Vec<String> =
+                several.iter().enumerate().map(|(index, mistake)| format!("({}) {mistake}", index + 1)).collect();
+            let mistake = format!(
+                "these explain it equally well, the likeliest first: {}. Only one of them is true, and correcting another one would leave a wrong robot that fits: compare the joint values of one pose with the pendant before you correct anything",
+                numbered.join("; ")
+            );
+            return Err(ProcedureError::Mistaken { gap, mistake });
+        }
     }
     let message =
-        format!("{gap}, and no single mistake explains it (rows in another order, another robot, two joints wrong?)");
+        format!("{gap}, and no single mistake explains it (another robot, several mistakes at once?)");
     Ok(Compared { expected, warning: Some(Warning::new("implausible", message, true)) })
 }
 
