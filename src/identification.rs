@@ -66,6 +66,7 @@ mod robust;
 mod selection;
 mod settings;
 mod solver;
+mod systematic;
 mod terms;
 pub mod triage;
 pub mod verification;
@@ -83,6 +84,7 @@ pub use repetitions::Places;
 pub use result::{Estimate, Identification, Rejected, RejectionReason, SampleIndex, Sigma};
 pub use selection::{Scored, Selection, Stage, WithTerms, identify_with_terms};
 pub use settings::{Estimator, Iteration, Prior, Settings, SigmaSource, TerminationReason, Weighting};
+pub use systematic::Unmodelled;
 pub use terms::{TermGroup, Terms};
 
 use crate::geometry::{principal_spread, register};
@@ -90,6 +92,7 @@ use crate::kinematics::{Arm, FreeParameter};
 use crate::units::MICROMETRE;
 use linearise::{SMALLEST_SIGMA, Trust};
 use noise::{Estimation, Groups, Noise};
+use robust::Decision;
 use solver::{Basis, Linearised, Solution, Solve};
 
 /// First guess of what the arm scatters from pose to pose (m).
@@ -132,18 +135,20 @@ pub fn identify_while(
     let noise = Noise { stated, shot: 0.0, pose: FIRST_SIGMA * FIRST_SIGMA, confirmed: 1.0 };
     let mut fit = Fit { iterations: Vec::new(), path: Vec::new(), progress };
     let mut trust = everything.clone();
+    let mut unmodelled = Vec::new();
     if settings.estimator == Estimator::Robust {
         let predicted = problem.arm.points_in_base(problem.observations.places());
         let plausible = robust::gross_trust(problem, &predicted);
         let search = Solve { trust: &plausible, estimation: Estimation::Robust, ..solve };
         let searched = fit.solve(&search, zero.clone(), noise, settings.iterations)?;
-        trust = robust::find_outliers(&search, &searched.at);
+        let decision = robust::find_outliers(&search, &searched.at);
+        (trust, unmodelled) = (decision.trust, decision.unmodelled);
         // The steps on record are those that lead to the result.
         fit.iterations.clear();
         fit.path.clear();
     }
     let solution = fit.solve(&Solve { trust: &trust, ..solve }, zero, noise, settings.iterations)?;
-    prepared.finish(settings, fit, &trust, solution)
+    Ok(Identification { unmodelled, ..prepared.finish(settings, fit, &trust, solution)? })
 }
 
 /// Where a fit with more parameters begins: at what one with fewer found.
@@ -174,15 +179,18 @@ fn identify_from(
         progress,
     };
     let mut solution = fit.solve(&prepared.solve(&trust), deviations, noise, settings.iterations)?;
+    let mut unmodelled = Vec::new();
     if settings.estimator == Estimator::Robust {
         let settled = robust::settle(&prepared.solve(&trust), solution.at.clone());
-        if settled.trust != trust {
-            trust = settled.trust;
+        let decision = Decision::new(&prepared.solve(&trust), settled.trust, &settled.at);
+        unmodelled = decision.unmodelled;
+        if decision.trust != trust {
+            trust = decision.trust;
             let Linearised { z, noise, .. } = settled.at;
             solution = fit.solve(&prepared.solve(&trust), z, noise, settings.iterations)?;
         }
     }
-    prepared.finish(settings, fit, &trust, solution)
+    Ok(Identification { unmodelled, ..prepared.finish(settings, fit, &trust, solution)? })
 }
 
 /// A problem that was found to be well posed, with what every fit of it needs.
@@ -306,6 +314,7 @@ fn summarise(solve: &Solve<'_, '_>, settings: &Settings, solved: Solved) -> Iden
         observability,
         sigma,
         rejected,
+        unmodelled: Vec::new(),
         iterations,
         path,
         termination,
@@ -382,6 +391,8 @@ fn rejected(solve: &Solve<'_, '_>, at: &Linearised) -> Vec<Rejected> {
             .filter(|&other| other != place && place < points.len() && other < points.len())
             .find(|&other| fits(place, other) && fits(other, place))
     };
+    let scatter = solve.scatter(at, &DVector::zeros(at.x.len()));
+    let typical = scatter.of_reading(&at.noise);
     let length_residual = |index: usize| {
         let errors = verification::DirectErrors::new(&at.arm, problem.observations);
         errors.lengths.get(index).map_or(0.0, |error| error.abs())
@@ -394,7 +405,16 @@ fn rejected(solve: &Solve<'_, '_>, at: &Linearised) -> Vec<Rejected> {
             } else {
                 (SampleIndex::Length(sample - places), length_residual(sample - places))
             };
-            let reason = swapped(sample).map_or(RejectionReason::Outlier, RejectionReason::SwappedWith);
+            let typed = || {
+                let point = points.get(sample)?;
+                let station = at.points.base_from_station.get(point.station)?;
+                let fitting = station.inverse_transform_point(&predicted(sample));
+                RejectionReason::typed(&point.point, &fitting, typical)
+            };
+            let reason = swapped(sample).map_or_else(
+                || typed().unwrap_or(RejectionReason::Outlier),
+                RejectionReason::SwappedWith,
+            );
             Rejected { sample: index, residual, ratio: judged.ratios[sample], reason }
         })
         .collect()

@@ -13,6 +13,7 @@ pub mod circles;
 pub mod deliver;
 mod error;
 pub mod identify;
+mod intervals;
 mod joint_errors;
 pub mod models;
 pub mod plan;

@@ -163,7 +163,19 @@ fn poor_data_are_never_accepted() {
         }
         rows.last_mut().unwrap().splice(7.., first);
     });
-    let (code, report) = shifted.json(&[]);
+    let (code, _, err) = shifted.identify(&[]);
+    let flat = err.replace("\n ", "");
+    assert!(code == 2 && flat.contains("from sample 1 on, each point belongs to the joint values of the row below"), "{err}");
+    assert!(!flat.contains("equally well"), "{err}");
+    // Two halves of different rows: nothing simple explains it.
+    let mixed = Table::changed(|_, rows| {
+        let points: Vec<Vec<String>> = rows.iter().map(|row| row[7..].to_vec()).collect();
+        let count = rows.len();
+        for (index, row) in rows.iter_mut().enumerate() {
+            row.splice(7.., points[(index * 25 + 11) % count].clone());
+        }
+    });
+    let (code, report) = mixed.json(&[]);
     assert_eq!((code, report["verdict"]["status"].as_str()), (4, Some("not_accepted")));
     assert!(codes(&report).contains(&"implausible".to_owned()));
 }

@@ -398,3 +398,90 @@ fn columns_and_rows_that_are_mixed_up_are_named() {
     let centimetres = rows(&|points| points.iter_mut().for_each(|point| *point /= 10.0));
     assert!(matches!(centimetres, Some(Mistake::CoordinateUnit { story, .. }) if story.contains("centimetres")));
 }
+
+/// 21 of 22 rejected poses of one measured set had J2 below -30 deg, and the arm became worse there.
+#[test]
+fn rejected_samples_that_share_a_region_are_the_arm_and_are_kept() {
+    let mut bench = Bench::builtin("abb_irb120", 21);
+    let mut samples = bench.random(150);
+    let bends = |q: &[f64]| q[1] < -40.0 * DEGREE;
+    let bent = samples.iter().filter(|named| bends(&named.sample.at.configuration)).count();
+    assert!((5..40).contains(&bent), "{bent}");
+    for named in samples.iter_mut().filter(|named| bends(&named.sample.at.configuration)) {
+        let direction = named.sample.at.configuration[0];
+        named.sample.point += 0.2 * MILLIMETRE * Vector3::new(direction.sin(), direction.cos(), (7.0 * direction).sin());
+    }
+    let identified = bench.identify(samples, Vec::new());
+    let noted = warning(&identified, "region_not_described").unwrap();
+    assert!(noted.message.contains("have J2 below") && noted.message.contains("kept"), "{noted:?}");
+    assert!(identified.found.rejected.len() <= bent / 4, "{:?}", identified.found.rejected);
+}
+
+#[test]
+fn a_pose_at_which_no_smr_fits_is_the_arm_and_one_bumped_smr_is_not() {
+    let mut bench = Bench::new(&two_targets(), 0.5, 22);
+    let poses = bench.configurations(40);
+    let first = bench.measured(&poses, 0);
+    let mut samples: Vec<NamedSample> = first.into_iter().chain(bench.measured(&poses, 1)).collect();
+    let off = Vector3::new(0.2, -0.1, 0.15) * MILLIMETRE;
+    for index in [7, 47, 12] {
+        samples[index].sample.point += off;
+    }
+    let identified = bench.identify(samples, Vec::new());
+    let rejected: Vec<usize> = identified.summary.rejected.iter().map(|rejected| rejected.line).collect();
+    assert_eq!(rejected, [14], "line of sample 12: {:?}", identified.summary.rejected);
+    let noted = warning(&identified, "region_not_described").unwrap();
+    assert!(noted.message.starts_with("no SMR fits at 1 pose"), "{noted:?}");
+}
+
+#[test]
+fn a_missing_sign_and_a_wrong_digit_are_named() {
+    let mut bench = Bench::builtin("soochow", 23);
+    let mut samples = bench.random(40);
+    samples[5].sample.point.y *= -1.0;
+    samples[9].sample.point.x += 30.0 * MILLIMETRE;
+    samples[14].sample.point.z += 31.4 * MILLIMETRE;
+    let identified = bench.identify(samples, Vec::new());
+    let reasons: Vec<(usize, &str)> =
+        identified.summary.rejected.iter().map(|rejected| (rejected.line, rejected.reason.as_str())).collect();
+    assert_eq!(reasons[0], (7, "the sign of y is wrong: the point fits with the other one"));
+    assert_eq!(reasons[1], (11, "one digit of x is wrong: the point fits with 30 mm less"));
+    assert!(reasons[2].0 == 16 && reasons[2].1.ends_with("times the scatter of the others"), "{reasons:?}");
+}
+
+#[test]
+fn joints_from_0_to_360_degrees_are_called_that() {
+    let mut bench = Bench::builtin("abb_irb120", 24);
+    let samples = bench.random(30);
+    let turned = altered(&samples, |q| q.iter_mut().filter(|value| **value < 0.0).for_each(|value| *value += 360.0 * DEGREE));
+    let identified = bench.identify(turned, Vec::new());
+    let noted = warning(&identified, "joint_limits").unwrap();
+    assert!(noted.message.contains("count from 0 to 360 deg"), "{noted:?}");
+}
+
+#[test]
+fn figures_of_a_verification_come_with_intervals_and_digits_that_mean_something() {
+    let mut bench = Bench::builtin("soochow", 25);
+    let (known, fresh) = (bench.random(40), bench.random(20));
+    let identified = bench.identify(known, fresh);
+    let verification = identified.summary.verification.as_ref().unwrap();
+    assert_eq!(verification.poses, 20);
+    for errors in [verification.identified.position_mm.unwrap(), verification.identified.distance_mm.unwrap()] {
+        let [mean, rms, _, max] = errors.figures();
+        for figure in [mean, rms, max] {
+            let [low, high] = figure.interval.unwrap();
+            assert!(low <= figure.value && figure.value <= high && high < 3.0 * low, "{figure:?}");
+        }
+        assert!(max.interval.unwrap()[1] <= errors.max, "a sample says nothing about larger errors");
+    }
+    let nominal = verification.nominal.position_mm.unwrap();
+    // Millimetres with an uncertainty of some tenths: no micrometres.
+    assert!(nominal.figures()[0].text().split('.').nth(1).unwrap().len() <= 2, "{nominal:?}");
+    let text = trupose::report::identification_text(&identified.summary);
+    assert!(text.contains("95 % interval") && text.contains("about one in 21 other poses"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    // The same data have the same intervals.
+    let json = serde_json::to_string(verification).unwrap();
+    let back: trupose::session::summary::VerificationSummary = serde_json::from_str(&json).unwrap();
+    assert_eq!(&back, verification);
+}

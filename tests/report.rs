@@ -598,7 +598,14 @@ fn numbers_that_are_none_reach_neither_file() {
             }
             let verification = summary.verification.as_mut().unwrap();
             for model in [&mut verification.nominal, &mut verification.identified] {
-                model.position_mm = Some(StatisticsSummary { count: 1, mean: bad, rms: bad, p95: bad, max: bad });
+                model.position_mm = Some(StatisticsSummary {
+                    count: 1,
+                    mean: bad,
+                    rms: bad,
+                    p95: bad,
+                    max: bad,
+                    ..StatisticsSummary::default()
+                });
             }
             for (index, point) in result.points.iter_mut().enumerate() {
                 *point = PointErrorText {

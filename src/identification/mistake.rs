@@ -205,6 +205,7 @@ impl Mistake {
             (Self::JointZeros { zeros }, Self::JointZeros { zeros: fewer }) => {
                 fewer.len() < zeros.len() && fewer.iter().all(|zero| zeros.contains(zero))
             }
+            (Self::RowsShifted { below, .. }, Self::RowsShifted { below: other, .. }) => below == other,
             _ => false,
         }
     }
@@ -352,7 +353,9 @@ fn rows(arm: &Arm, all: &[PointSample]) -> Vec<Trial> {
             all[..from].iter().cloned().chain(moved.map(|(a, b)| with_configuration_of(a, b))).collect()
         };
         let start = usize::from(!below);
-        for from in [Some(start), break_of(arm, all, below)].into_iter().flatten() {
+        // A break at the first rows is none.
+        let later = break_of(arm, all, below).filter(|from| *from > start + 1);
+        for from in [Some(start), later].into_iter().flatten() {
             trials.push((Mistake::RowsShifted { from, below }, shifted(from)));
         }
     }

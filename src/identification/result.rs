@@ -1,10 +1,12 @@
 //! What an identification returns.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 
 use super::observability::Observability;
 use super::settings::{Iteration, SigmaSource, TerminationReason};
+use super::systematic::Unmodelled;
 use crate::kinematics::{Arm, ParameterId};
+use crate::units::{MICROMETRE, MILLIMETRE};
 
 /// How much a coordinate of a reading scatters (standard deviations), and what of: the instrument, readings of one pose among each
 /// other, and what a pose has in common. The latter, repeatability and what the model lacks, is always estimated.
@@ -61,7 +63,44 @@ pub enum RejectionReason {
     Outlier,
     /// Its point fits the configuration of another rejected sample, and the reverse: two rows were swapped.
     SwappedWith(usize),
+    /// A coordinate of the point lost its sign, or has one that it should not have.
+    Sign {
+        /// 0, 1, 2 for x, y, z.
+        axis: usize,
+    },
+    /// One digit of a coordinate of the point is wrong.
+    Digit {
+        /// 0, 1, 2 for x, y, z.
+        axis: usize,
+        /// Given less right coordinate (m).
+        by: f64,
+    },
 }
+
+impl RejectionReason {
+    /// A slip of the pen that leads from the `fitting` point (m) to the one that is `given`, where points scatter by `sigma` (m).
+    pub(super) fn typed(given: &Point3<f64>, fitting: &Point3<f64>, sigma: f64) -> Option<Self> {
+        let close = CLOSE * sigma.max(MICROMETRE);
+        let off = given - fitting;
+        let mut axes = (0..3).filter(|axis| off[*axis].abs() > close);
+        let (axis, None) = (axes.next()?, axes.next()) else { return None };
+        if (given[axis] + fitting[axis]).abs() < close {
+            return Some(Self::Sign { axis });
+        }
+        // One to nine units of some digit; a unit must be far larger than the scatter, or any difference would do.
+        let units = (-1..=3).map(|power| 10_f64.powi(power) * MILLIMETRE).filter(|unit| *unit > COARSE * close);
+        let by = |unit: f64| {
+            let count = (off[axis] / unit).round();
+            let fits = (1.0..=9.0).contains(&count.abs()) && (off[axis] - count * unit).abs() < close;
+            fits.then_some(count * unit)
+        };
+        units.filter_map(by).next().map(|by| Self::Digit { axis, by })
+    }
+}
+
+/// Points within this many standard deviations are the same, and a digit counts at least so many of those.
+const CLOSE: f64 = 5.0;
+const COARSE: f64 = 10.0;
 
 /// Which sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -100,6 +139,8 @@ pub struct Identification {
     pub sigma: Sigma,
     /// Samples left out, with reasons.
     pub rejected: Vec<Rejected>,
+    /// Samples that did not fit and were kept, because they are the arm.
+    pub unmodelled: Vec<Unmodelled>,
     /// Steps of the solver.
     pub iterations: Vec<Iteration>,
     /// Deviations of all parameters after each of them ((m) and (rad)), in the order of the estimates.

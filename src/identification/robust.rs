@@ -19,6 +19,7 @@ use super::linearise::{Trust, Weights, point_residuals};
 use super::noise::{GroupMeans, Noise};
 use super::problem::Problem;
 use super::solver::{Linearised, Solve};
+use super::systematic::{Unmodelled, unmodelled};
 use crate::units::MILLIMETRE;
 
 /// A sample further off than this many robust standard deviations is rejected. Real arms have heavy tails (gravity, backlash,
@@ -259,8 +260,29 @@ fn geman_mcclure(square: f64, width: f64) -> f64 {
     (width / (square + width)).powi(2)
 }
 
-/// Decides which samples to trust, beginning with a fit made with the trust of `solve`. Trust is 1 or 0.
-pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Trust {
+/// A decision about which samples to trust, 1 or 0, and what in it is the arm.
+#[derive(Debug)]
+pub(crate) struct Decision {
+    pub(crate) trust: Trust,
+    pub(crate) unmodelled: Vec<Unmodelled>,
+}
+
+impl Decision {
+    /// Keeps the samples that `trust` leaves out, at the fit `at` that was made with it, where they are the arm.
+    pub(crate) fn new(solve: &Solve<'_, '_>, mut trust: Trust, at: &Linearised) -> Self {
+        let judged = judge(&Solve { trust: &trust, ..*solve }, at);
+        let problem = solve.problem;
+        let joints = problem.arm.chain.joints();
+        let unmodelled = unmodelled(joints, &problem.observations.points, &trust, &judged.ratios);
+        for place in unmodelled.iter().flat_map(Unmodelled::places) {
+            trust.set_sample(*place, 1.0);
+        }
+        Self { trust, unmodelled }
+    }
+}
+
+/// Decides which samples to trust, beginning with a fit made with the trust of `solve`.
+pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Decision {
     let start = solve.trust.clone();
     let judged = judge(solve, first);
     let suspect = suspect_at(judged.ratios.len());
@@ -272,7 +294,7 @@ pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Trust 
     // One sample can also bend parameters so far that everything fits: they then leave what is expected of them.
     let ran_away = solve.basis.prior_weight > 0.0 && first.z.amax() > RAN_AWAY;
     if settled && !ran_away {
-        return start;
+        return Decision::new(solve, start, first);
     }
     // Several outliers, or one with all the say about some parameter, can bend a fit so that it accepts them. So the decision
     // is made from three starts that go wrong in different ways, and the cheapest explanation counts.
@@ -293,7 +315,10 @@ pub(crate) fn find_outliers(solve: &Solve<'_, '_>, first: &Linearised) -> Trust 
     };
     let priced = candidates.iter().map(|candidate| (price(candidate), candidate));
     let best = priced.min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map_or_else(|| solve.trust.clone(), |(_, candidate)| candidate.trust.clone())
+    match best {
+        Some((_, candidate)) => Decision::new(solve, candidate.trust.clone(), &candidate.at),
+        None => Decision { trust: solve.trust.clone(), unmodelled: Vec::new() },
+    }
 }
 
 /// Lets samples change sides, beginning with a fit `at` that was made with the trust of `solve`.

@@ -63,6 +63,17 @@ pub struct ModelErrors {
     /// Distance errors `|l_measured − l_predicted|` over pairs of samples of one station (table III), but not between repetitions
     /// of a pose, whose distance is that of no two poses; `None` without a pair.
     pub distance: Option<ErrorStatistics>,
+    /// The distance errors behind it.
+    pub distances: Vec<DistanceError>,
+}
+
+/// Error of the distance between two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistanceError {
+    /// Indices of the samples, small because there may be two million errors.
+    pub samples: [u32; 2],
+    /// Measured − predicted (m).
+    pub error: f64,
 }
 
 impl ModelErrors {
@@ -80,13 +91,14 @@ impl ModelErrors {
         };
         let axis_mean = over_axes(&|sum, value| sum + value).map(|sum| sum / vectors.len() as f64);
         let axis_max = over_axes(&f64::max);
-        let distance = distance_errors(arm.chain.joints(), samples, &predicted);
-        Some(Self { vectors, position, axis_mean, axis_max, distance })
+        let distances = distance_errors(arm.chain.joints(), samples, &predicted);
+        let distance = ErrorStatistics::new(distances.iter().map(|distance| distance.error).collect());
+        Some(Self { vectors, position, axis_mean, axis_max, distance, distances })
     }
 }
 
 /// Distance errors over all pairs of one station that are no repetitions; evenly picked samples where there are more than 2000.
-fn distance_errors(joints: &[Joint], samples: &[PointSample], predicted: &[Point3<f64>]) -> Option<ErrorStatistics> {
+fn distance_errors(joints: &[Joint], samples: &[PointSample], predicted: &[Point3<f64>]) -> Vec<DistanceError> {
     let pose = Places::new(joints, samples.iter().map(|sample| &sample.at)).first_of_each();
     let used = samples.len().min(PAIRED_POINTS);
     let picked: Vec<usize> = (0..used).map(|index| index * samples.len() / used).collect();
@@ -95,11 +107,13 @@ fn distance_errors(joints: &[Joint], samples: &[PointSample], predicted: &[Point
         for &j in &picked[..position] {
             if samples[j].station == samples[k].station && pose[j] != pose[k] {
                 let measured = (samples[k].point - samples[j].point).norm();
-                errors.push(measured - (predicted[k] - predicted[j]).norm());
+                let error = measured - (predicted[k] - predicted[j]).norm();
+                let samples = [j, k].map(|index| u32::try_from(index).unwrap_or(u32::MAX));
+                errors.push(DistanceError { samples, error });
             }
         }
     }
-    ErrorStatistics::new(errors)
+    errors
 }
 
 /// Distance of every seat from the mean of its shared point (m), and the errors of lengths between shared points (m).
@@ -107,6 +121,8 @@ fn distance_errors(joints: &[Joint], samples: &[PointSample], predicted: &[Point
 pub struct DirectErrors {
     /// Predicted position of each seat less the mean of its shared point, in the base (m).
     pub seats: Vec<Vector3<f64>>,
+    /// Index of the shared point of each seat.
+    pub shared: Vec<usize>,
     /// Statistics of the distances of the seats from their mean; `None` without a shared point that was seen twice.
     pub seat: Option<ErrorStatistics>,
     /// Measured − predicted lengths (m).
@@ -119,14 +135,15 @@ impl DirectErrors {
     /// Errors of `arm` on shared points and lengths.
     pub fn new(arm: &Arm, observations: &Observations) -> Self {
         let mut means = Vec::with_capacity(observations.shared.len());
-        let mut seats = Vec::new();
-        for shared in &observations.shared {
+        let (mut seats, mut of_shared) = (Vec::new(), Vec::new());
+        for (index, shared) in observations.shared.iter().enumerate() {
             let points = arm.points_in_base(shared.at.iter());
             let sum = points.iter().fold(Vector3::zeros(), |sum, point| sum + point.coords);
             let mean = Point3::from(sum / points.len().max(1) as f64);
             means.push(mean);
             if points.len() > 1 {
                 seats.extend(points.iter().map(|point| point - mean));
+                of_shared.extend(points.iter().map(|_| index));
             }
         }
         let end = |end: &LengthEnd| match end {
@@ -138,7 +155,7 @@ impl DirectErrors {
             .iter()
             .filter_map(|length| Some(length.length - (end(&length.to)? - end(&length.from)?).norm()))
             .collect();
-        Self::of_values(seats, lengths)
+        Self::of_values(seats, of_shared, lengths)
     }
 
     /// The errors of both, as one set.
@@ -146,11 +163,14 @@ impl DirectErrors {
     pub fn pooled_with(&self, other: &Self) -> Self {
         let seats = self.seats.iter().chain(&other.seats).copied().collect();
         let lengths = self.lengths.iter().chain(&other.lengths).copied().collect();
-        Self::of_values(seats, lengths)
+        let next = self.shared.iter().max().map_or(0, |last| last + 1);
+        let shared = self.shared.iter().copied().chain(other.shared.iter().map(|index| next + index)).collect();
+        Self::of_values(seats, shared, lengths)
     }
 
-    fn of_values(seats: Vec<Vector3<f64>>, lengths: Vec<f64>) -> Self {
+    fn of_values(seats: Vec<Vector3<f64>>, shared: Vec<usize>, lengths: Vec<f64>) -> Self {
         Self {
+            shared,
             seat: ErrorStatistics::new(seats.iter().map(Vector3::norm).collect()),
             length: ErrorStatistics::new(lengths.clone()),
             seats,

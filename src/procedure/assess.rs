@@ -1,38 +1,96 @@
 //! Verification summaries, and the verdict on them.
 
+use std::collections::BTreeMap;
+
+use super::intervals::{Intervals, OfPoses};
 use super::result::DOES_NOT_FIT;
 use crate::identification::verification::{DirectErrors, ErrorStatistics, ModelErrors, residual_against_joints};
-use crate::identification::{Observations, PointSample};
-use crate::kinematics::Joint;
+use crate::identification::{Observations, Places, PointSample};
+use crate::kinematics::{Joint, Place};
 use crate::profile::Acceptance;
 use crate::report::number;
 use crate::session::advice::Advice;
 use crate::session::summary::{
-    AxisSummary, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, StatisticsSummary, Verdict,
+    AxisSummary, Figure, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, StatisticsSummary, Verdict,
     VerdictStatus, VerificationSummary, Warning,
 };
 use crate::units::to_mm;
 
-fn statistics(statistics: &ErrorStatistics) -> StatisticsSummary {
+fn statistics(statistics: &ErrorStatistics, intervals: Option<Intervals>) -> StatisticsSummary {
     let ErrorStatistics { count, mean, rms, p95, max } = *statistics;
-    StatisticsSummary { count, mean: to_mm(mean), rms: to_mm(rms), p95: to_mm(p95), max: to_mm(max) }
+    let mm = |pick: fn(&Intervals) -> [f64; 2]| intervals.as_ref().map(|intervals| pick(intervals).map(to_mm));
+    StatisticsSummary {
+        count,
+        mean: to_mm(mean),
+        rms: to_mm(rms),
+        p95: to_mm(p95),
+        max: to_mm(max),
+        mean_interval: mm(|intervals| intervals.mean),
+        rms_interval: mm(|intervals| intervals.rms),
+        max_interval: mm(|intervals| intervals.max),
+    }
 }
 
-fn model_summary(errors: &ModelErrors) -> ModelSummary {
+/// The poses of samples, counted from zero, and how many there are.
+struct Poses {
+    of_samples: Vec<usize>,
+    count: usize,
+}
+
+impl Poses {
+    fn new(joints: &[Joint], samples: &[PointSample]) -> Self {
+        let any_target: Vec<Place> = samples.iter().map(|sample| Place { target: 0, ..sample.at.clone() }).collect();
+        Self::of(&Places::new(joints, &any_target).first_of_each())
+    }
+
+    /// From what each sample has in common with others.
+    fn of(first: &[usize]) -> Self {
+        let mut numbers = BTreeMap::new();
+        let of_samples = first
+            .iter()
+            .map(|first| {
+                let next = numbers.len();
+                *numbers.entry(*first).or_insert(next)
+            })
+            .collect();
+        Self { of_samples, count: numbers.len() }
+    }
+
+    fn intervals(&self, errors: impl Iterator<Item = ([usize; 2], f64)>) -> Option<Intervals> {
+        let of_poses = |(samples, error): ([usize; 2], f64)| {
+            let [one, other] = samples.map(|sample| self.of_samples.get(sample).copied());
+            Some(OfPoses { poses: [one?, other?], error: error.abs() })
+        };
+        Intervals::new(&errors.map(of_poses).collect::<Option<Vec<_>>>()?, self.count)
+    }
+}
+
+fn model_summary(errors: &ModelErrors, poses: &Poses) -> ModelSummary {
+    let vectors = errors.vectors.iter().enumerate();
+    let of_positions = poses.intervals(vectors.map(|(index, vector)| ([index; 2], vector.norm())));
+    let pairs = errors.distances.iter().map(|pair| (pair.samples.map(|index| index as usize), pair.error));
+    let of_distances = poses.intervals(pairs);
     ModelSummary {
-        position_mm: Some(statistics(&errors.position)),
+        position_mm: Some(statistics(&errors.position, of_positions)),
         axis_mm: Some(AxisSummary { mean: errors.axis_mean.map(to_mm), max: errors.axis_max.map(to_mm) }),
-        distance_mm: errors.distance.as_ref().map(statistics),
+        distance_mm: errors.distance.as_ref().map(|errors| statistics(errors, of_distances)),
         seat_mm: None,
     }
 }
 
 fn direct_summary(errors: &DirectErrors) -> ModelSummary {
+    // Seats of one shared point depend on each other; lengths do not.
+    let shared = Poses::of(&errors.shared);
+    let seats = errors.seats.iter().enumerate();
+    let of_seats = shared.intervals(seats.map(|(index, seat)| ([index; 2], seat.norm())));
+    let each = Poses::of(&(0..errors.lengths.len()).collect::<Vec<_>>());
+    let lengths = errors.lengths.iter().enumerate();
+    let of_lengths = each.intervals(lengths.map(|(index, error)| ([index; 2], *error)));
     ModelSummary {
         position_mm: None,
         axis_mm: None,
-        distance_mm: errors.length.as_ref().map(statistics),
-        seat_mm: errors.seat.as_ref().map(statistics),
+        distance_mm: errors.length.as_ref().map(|errors| statistics(errors, of_lengths)),
+        seat_mm: errors.seat.as_ref().map(|errors| statistics(errors, of_seats)),
     }
 }
 
@@ -76,14 +134,16 @@ pub(crate) fn point_verification(
     refit: Refit,
 ) -> VerificationSummary {
     let configurations: Vec<&[f64]> = samples.iter().map(|sample| sample.at.configuration.as_slice()).collect();
+    let poses = Poses::new(joints, samples);
     VerificationSummary {
         samples: samples.len(),
+        poses: poses.count,
         left_out: 0,
         basis,
         independent: true,
         refit,
-        nominal: model_summary(nominal),
-        identified: model_summary(identified),
+        nominal: model_summary(nominal, &poses),
+        identified: model_summary(identified, &poses),
         residual_by_joint: joint_summaries(joints, &configurations, &identified.vectors),
     }
 }
@@ -105,6 +165,7 @@ pub(crate) fn direct_verification(
     };
     VerificationSummary {
         samples: identified.seats.len() + identified.lengths.len(),
+        poses: 0,
         left_out: 0,
         basis,
         independent: true,
@@ -184,22 +245,27 @@ pub(crate) fn verdict(
 /// Compares every limit of the profile with the errors found. The distance of a seat from its shared point is a position error.
 fn limit_checks(acceptance: &Acceptance, found: &ModelSummary) -> Vec<LimitCheck> {
     let position_errors = found.position_mm.as_ref().or(found.seat_mm.as_ref());
-    let position = |pick: fn(&StatisticsSummary) -> f64| position_errors.map(pick);
-    let distance = |pick: fn(&StatisticsSummary) -> f64| found.distance_mm.as_ref().map(pick);
+    let position = |pick: fn(&StatisticsSummary) -> Figure| position_errors.map(pick);
+    let distance = |pick: fn(&StatisticsSummary) -> Figure| found.distance_mm.as_ref().map(pick);
+    let mean = |statistics: &StatisticsSummary| statistics.figures()[0];
+    let rms = |statistics: &StatisticsSummary| statistics.figures()[1];
+    let max = |statistics: &StatisticsSummary| statistics.figures()[3];
     [
-        (LimitedQuantity::PositionMean, acceptance.position_mean, position(|s| s.mean)),
-        (LimitedQuantity::PositionRms, acceptance.position_rms, position(|s| s.rms)),
-        (LimitedQuantity::PositionMax, acceptance.position_max, position(|s| s.max)),
-        (LimitedQuantity::DistanceMean, acceptance.distance_mean, distance(|s| s.mean)),
-        (LimitedQuantity::DistanceRms, acceptance.distance_rms, distance(|s| s.rms)),
-        (LimitedQuantity::DistanceMax, acceptance.distance_max, distance(|s| s.max)),
+        (LimitedQuantity::PositionMean, acceptance.position_mean, position(mean)),
+        (LimitedQuantity::PositionRms, acceptance.position_rms, position(rms)),
+        (LimitedQuantity::PositionMax, acceptance.position_max, position(max)),
+        (LimitedQuantity::DistanceMean, acceptance.distance_mean, distance(mean)),
+        (LimitedQuantity::DistanceRms, acceptance.distance_rms, distance(rms)),
+        (LimitedQuantity::DistanceMax, acceptance.distance_max, distance(max)),
     ]
     .into_iter()
-    .filter_map(|(quantity, limit, value_mm)| {
+    .filter_map(|(quantity, limit, figure)| {
         let limit_mm = to_mm(limit?);
+        let value_mm = figure.map(|figure| figure.value);
+        let interval_mm = figure.and_then(|figure| figure.interval);
         // A value that is not a number does not meet the limit.
         let met = value_mm.map(|value| value <= limit_mm);
-        Some(LimitCheck { quantity, value_mm, limit_mm, met })
+        Some(LimitCheck { quantity, value_mm, interval_mm, limit_mm, met })
     })
     .collect()
 }
@@ -209,7 +275,14 @@ mod tests {
     use super::*;
 
     fn of(distance_mm: Option<f64>) -> VerificationSummary {
-        let statistics = |value: f64| StatisticsSummary { count: 9, mean: value, rms: value, p95: value, max: value };
+        let statistics = |value: f64| StatisticsSummary {
+            count: 9,
+            mean: value,
+            rms: value,
+            p95: value,
+            max: value,
+            ..StatisticsSummary::default()
+        };
         let identified = ModelSummary {
             seat_mm: Some(statistics(0.1)),
             distance_mm: distance_mm.map(statistics),
@@ -217,6 +290,7 @@ mod tests {
         };
         VerificationSummary {
             samples: 9,
+            poses: 9,
             left_out: 0,
             basis: String::new(),
             independent: true,

@@ -2,6 +2,7 @@
 //! whether the verification samples are independent, numerous enough, and in the same range as the identification samples.
 
 use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
@@ -9,7 +10,7 @@ use super::ProcedureError;
 use crate::identification::plausibility::compare_with_nominal;
 use crate::identification::verification::{CoverageGap, coverage_gaps};
 use crate::identification::{Observations, Places, PointSample, Problem};
-use crate::kinematics::{Joint, Place};
+use crate::kinematics::{Joint, JointType, Place};
 use crate::profile::Profile;
 use crate::report::number;
 use crate::session::TableProblem;
@@ -64,12 +65,17 @@ pub(crate) fn limit_warning<'a>(
 ) -> Option<Warning> {
     let joints = profile.chain().joints();
     let mut outside = Vec::new();
+    let mut by_a_turn = 0;
     for (line, configuration) in rows {
         for ((joint, range), value) in joints.iter().zip(profile.joints()).zip(configuration) {
             let quantity = joint.joint_type.quantity();
             if let Some((low, high)) = range.limits
                 && !(low - 1e-9..=high + 1e-9).contains(value)
             {
+                let turned = [*value - TAU, *value + TAU];
+                let is_a_turn = joint.joint_type == JointType::Revolute;
+                by_a_turn +=
+                    usize::from(is_a_turn && turned.iter().any(|value| (low - 1e-9..=high + 1e-9).contains(value)));
                 outside.push(format!(
                     "line {line}: {} at {} {unit}, allowed {}…{} {unit}",
                     joint.name,
@@ -83,9 +89,12 @@ pub(crate) fn limit_warning<'a>(
     }
     let list = first_of(&outside, SHOWN);
     let place = file.map_or_else(String::new, |file| format!(" in '{file}'"));
-    let message = format!(
-        "joint values outside the limits of the profile{place} (degrees and radians mixed up, or another robot?): {list}"
-    );
+    let cause = if by_a_turn == outside.len() {
+        "they count from 0 to 360 deg, and a full turn less is inside: the point is the same, but errors that follow a joint and programs need the pendant's values"
+    } else {
+        "degrees and radians mixed up, or another robot?"
+    };
+    let message = format!("joint values outside the limits of the profile{place} ({cause}): {list}");
     (!outside.is_empty()).then(|| Warning::new("joint_limits", message, false))
 }
 

@@ -1,11 +1,13 @@
 //! Warnings about the result of an identification, and whether it is usable.
 
 use crate::identification::plausibility::{Weakness, weaknesses};
-use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason};
+use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason, Unmodelled};
+use crate::kinematics::Joint;
 use crate::profile::Level;
 use crate::report::number;
 use crate::session::advice::Advice;
 use crate::session::summary::Warning;
+use crate::text::counted;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
 /// A parameter further from nominal than this many expected deviations gets a warning.
@@ -121,6 +123,7 @@ pub(crate) fn result_warnings(
         );
         warnings.push(Warning::new("many_rejected", message, true));
     }
+    warnings.extend(found.unmodelled.iter().map(|unmodelled| unmodelled_warning(joints, unmodelled)));
     match found.termination {
         TerminationReason::Converged => {}
         TerminationReason::IterationLimit => {
@@ -136,6 +139,27 @@ pub(crate) fn result_warnings(
         }
     }
     warnings
+}
+
+/// A warning about samples that did not fit and were kept, because they are the arm.
+fn unmodelled_warning(joints: &[Joint], unmodelled: &Unmodelled) -> Warning {
+    let (which, region) = match unmodelled {
+        Unmodelled::End { joint, at, above, poses: (inside, all), .. } => {
+            let joint = &joints[*joint];
+            let quantity = joint.joint_type.quantity();
+            let end = if *above { "above" } else { "below" };
+            let region = format!("{} {end} {} {}", joint.name, number(quantity.to_edge(*at), 0), quantity.unit());
+            (format!("{inside} of the {} that do not fit have {region}", counted(*all, "pose")), region)
+        }
+        Unmodelled::Poses { poses, .. } => (
+            format!("no SMR fits at {}", counted(*poses, "pose")),
+            "at these poses".to_owned(),
+        ),
+    };
+    let message = format!(
+        "{which}: that is the arm and no bumped SMR, so the samples are kept. The model does not describe the arm there ({region}): errors of joints may explain it, a load or a cable may pull there; or narrow the planning limits to where the arm works"
+    );
+    Warning::new("region_not_described", message, false)
 }
 
 /// A warning about parameters further from nominal than on any robot of this make.

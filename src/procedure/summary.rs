@@ -4,6 +4,7 @@ use super::identify::IdentifyRequest;
 use super::{assess, provenance};
 use crate::identification::{Estimate, Identification, Observability, Prior, RejectionReason, SampleIndex, Sigma};
 use crate::profile::Profile;
+use crate::report::number;
 use crate::session::advice::Advice;
 use crate::session::summary::{
     BlindGroupSummary, CorrelationSummary, IdentificationSettings, IdentificationSummary, IterationSummary,
@@ -11,6 +12,8 @@ use crate::session::summary::{
 };
 use crate::units::to_mm;
 
+/// Names of the coordinates.
+const AXES: [&str; 3] = ["x", "y", "z"];
 /// Smallest correlation that is listed.
 const STRONG_CORRELATION: f64 = 0.9;
 
@@ -47,6 +50,14 @@ fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary
             };
             let reason = match rejected.reason {
                 RejectionReason::Outlier => format!("{:.0} times the scatter of the others", rejected.ratio),
+                RejectionReason::Sign { axis } => {
+                    format!("the sign of {} is wrong: the point fits with the other one", AXES[axis.min(2)])
+                }
+                RejectionReason::Digit { axis, by } => format!(
+                    "one digit of {} is wrong: the point fits with {} mm less",
+                    AXES[axis.min(2)],
+                    number(to_mm(by), 3)
+                ),
                 RejectionReason::SwappedWith(other) => format!("looks swapped with {}", name(other).text()),
             };
             RejectedSummary { pose, line, residual_mm: to_mm(rejected.residual), ratio: rejected.ratio, reason }

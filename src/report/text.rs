@@ -87,7 +87,7 @@ fn verdict(verdict: &Verdict) -> String {
             Some(false) => ("> ", "NOT MET"),
             None => ("  ", "NOT EVALUATED"),
         };
-        let value = check.value_mm.map_or_else(|| "-".to_owned(), |value| fixed(value, 4));
+        let value = check.value_text();
         push_line(
             &mut text,
             &format!(
@@ -108,7 +108,7 @@ fn verification_tables(verification: &VerificationSummary) -> String {
     let which =
         if *independent { "that the identification did not see" } else { "that the identification saw in part or all" };
     let mut text = paragraph("", &format!("Accuracy on {} {which}: {basis}", counted(*samples, "sample")));
-    push_line(&mut text, &format!("  {:<34}{:>12}{:>14}", "mm", "nominal", "identified"));
+    push_line(&mut text, &format!("  {:<34}{:>12}{:>14}{:>18}", "mm", "nominal", "identified", "95 % interval"));
     for ((name, nominal), (_, identified)) in nominal.errors().into_iter().zip(identified.errors()) {
         if let (Some(nominal), Some(identified)) = (nominal, identified) {
             text.push_str(&statistics_rows(name, &nominal, &identified));
@@ -125,16 +125,21 @@ fn verification_tables(verification: &VerificationSummary) -> String {
             row(&mut text, &format!("along {name}, largest"), nominal.max[axis], identified.max[axis]);
         }
     }
+    if let Some(sentence) = verification.sample_sentence() {
+        text.push_str(&paragraph("  ", &format!("{sentence}.")));
+    }
     text.push('\n');
     text
 }
 
 fn statistics_rows(name: &str, nominal: &StatisticsSummary, identified: &StatisticsSummary) -> String {
     let mut text = String::new();
-    row(&mut text, &format!("{name}, mean of {}", identified.count), nominal.mean, identified.mean);
-    row(&mut text, "  rms", nominal.rms, identified.rms);
-    row(&mut text, "  95 %", nominal.p95, identified.p95);
-    row(&mut text, "  max", nominal.max, identified.max);
+    let names =
+        [format!("{name}, mean of {}", identified.count), "  rms".to_owned(), "  95 %".to_owned(), "  max".to_owned()];
+    for ((name, before), after) in names.iter().zip(nominal.figures()).zip(identified.figures()) {
+        let interval = after.interval_text().map_or_else(String::new, |interval| format!("{interval:>18}"));
+        push_line(&mut text, &format!("  {name:<34}{:>12}{:>14}{interval}", before.text(), after.text()));
+    }
     text
 }
 

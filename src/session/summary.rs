@@ -12,7 +12,7 @@ use super::measurements::Layout;
 use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Terms, Weighting};
 use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::Level;
-use crate::text::{fixed, names, names_of_option, written_as_text};
+use crate::text::{counted, decimals_for, fixed, names, names_of_option, written_as_text};
 
 /// Version of the layout of these objects.
 pub const SCHEMA: u32 = 1;
@@ -232,7 +232,7 @@ impl Warning {
 }
 
 /// Statistics of a non-negative error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatisticsSummary {
     pub count: usize,
     pub mean: f64,
@@ -240,6 +240,66 @@ pub struct StatisticsSummary {
     /// 95 % of the values are at most this.
     pub p95: f64,
     pub max: f64,
+    /// Interval of 95 % of the mean over other sets of as many poses; none where there are too few.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_interval: Option<[f64; 2]>,
+    /// The same of the root mean square.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rms_interval: Option<[f64; 2]>,
+    /// The same of the largest; its upper end says nothing about larger errors at other poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_interval: Option<[f64; 2]>,
+}
+
+impl StatisticsSummary {
+    /// The figures with their intervals: mean, root mean square, 95 % and largest.
+    pub const fn figures(&self) -> [Figure; 4] {
+        [
+            Figure { value: self.mean, interval: self.mean_interval },
+            Figure { value: self.rms, interval: self.rms_interval },
+            Figure { value: self.p95, interval: None },
+            Figure { value: self.max, interval: self.max_interval },
+        ]
+    }
+}
+
+/// A figure in mm with its interval of 95 %.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figure {
+    pub value: f64,
+    pub interval: Option<[f64; 2]>,
+}
+
+/// Decimals of a figure of which no interval is known.
+const DECIMALS: usize = 4;
+
+impl Figure {
+    /// Decimals that show two digits of the standard deviation behind the interval, and no more than are measured.
+    fn decimals(&self) -> usize {
+        let sigma = self.interval.map_or(0.0, |[low, high]| (high - low) / 4.0);
+        if sigma > 0.0 { decimals_for(sigma).min(DECIMALS) } else { DECIMALS }
+    }
+
+    /// The figure with as many digits as its interval justifies.
+    pub fn text(&self) -> String {
+        fixed(self.value, self.decimals())
+    }
+
+    /// The interval with the same digits.
+    pub fn interval_text(&self) -> Option<String> {
+        let [low, high] = self.interval?;
+        Some(format!("{} .. {}", fixed(low, self.decimals()), fixed(high, self.decimals())))
+    }
+
+    /// The figure with enough digits to be on the right side of a limit.
+    pub fn text_beside(&self, limit: f64) -> String {
+        let side = |decimals: usize| {
+            let shown: f64 = fixed(self.value, decimals).parse().unwrap_or(self.value);
+            (shown <= limit) == (self.value <= limit)
+        };
+        let decimals = (self.decimals()..DECIMALS).find(|decimals| side(*decimals)).unwrap_or(DECIMALS);
+        fixed(self.value, decimals)
+    }
 }
 
 /// Per-axis absolute errors in the robot base, as table IV of the method paper.
@@ -359,6 +419,9 @@ names_of_option!(Refit);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerificationSummary {
     pub samples: usize,
+    /// Different poses among them.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub poses: usize,
     /// Samples at poses that were also identified, which do not count.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub left_out: usize,
@@ -378,6 +441,19 @@ pub struct VerificationSummary {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
 const fn is_zero(count: &usize) -> bool {
     *count == 0
+}
+
+impl VerificationSummary {
+    /// What intervals and the largest error mean; nothing for reports that do not count their poses.
+    pub fn sample_sentence(&self) -> Option<String> {
+        (self.poses > 0).then(|| {
+            format!(
+                "Intervals (95 %) say what other sets of as many poses could have shown (bootstrap over {}). The largest error is that of these poses, a sample: about one in {} other poses is expected to be worse",
+                counted(self.poses, "pose"),
+                self.poses + 1
+            )
+        })
+    }
 }
 
 /// What an acceptance limit is about. For shared points the position error is the distance from the shared point.
@@ -414,9 +490,20 @@ pub struct LimitCheck {
     pub quantity: LimitedQuantity,
     /// Value found; none if the data do not determine it.
     pub value_mm: Option<f64>,
+    /// Interval of 95 % of the value, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_mm: Option<[f64; 2]>,
     pub limit_mm: f64,
     /// Whether it is met; none where it could not be evaluated.
     pub met: Option<bool>,
+}
+
+impl LimitCheck {
+    /// The value with as many digits as its interval justifies; a dash without one.
+    pub fn value_text(&self) -> String {
+        let figure = self.value_mm.map(|value| Figure { value, interval: self.interval_mm });
+        figure.map_or_else(|| "-".to_owned(), |figure| figure.text_beside(self.limit_mm))
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,12 +1,12 @@
 //! The verdict, and the accuracy on poses that the identification did not see.
 
 use super::charts::{MOST, against_joints, histogram, norm, of_kind, per_pose, worst};
-use super::markup::{Column, NONE, add, escape, list, number, optional, paragraph, table};
+use super::markup::{Column, NONE, add, escape, list, number, paragraph, table};
 use super::views::views;
 use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
 use crate::session::joint_errors::workspace_sentence;
 use crate::session::summary::{
-    IdentificationSummary, LimitCheck, LimitedQuantity, ModelSummary, StatisticsSummary, VerdictStatus,
+    Figure, IdentificationSummary, LimitCheck, LimitedQuantity, ModelSummary, StatisticsSummary, VerdictStatus,
     VerificationMode, VerificationSummary, Warning, WorkspaceSummary,
 };
 use crate::text::{counted, counted_as};
@@ -64,7 +64,7 @@ fn limits(checks: &[LimitCheck]) -> String {
             };
             vec![
                 quantity(check.quantity).to_owned(),
-                optional(check.value_mm, 4),
+                check.value_text(),
                 number(check.limit_mm, 4),
                 met.to_owned(),
             ]
@@ -109,6 +109,7 @@ pub(super) fn accuracy(document: &Document) -> String {
     let (before, after) = (&verification.nominal, &verification.identified);
     html.push_str(&distances(before, after));
     html.push_str(&positions(before, after));
+    html.push_str(&verification.sample_sentence().map_or_else(String::new, |said| paragraph(&format!("{said}."))));
     if let Some(workspace) = &result.workspace {
         html.push_str(&predicted(workspace));
     }
@@ -161,21 +162,22 @@ fn procedure(result: &IdentificationSummary, verification: &VerificationSummary,
     )
 }
 
-/// Picks one figure of some statistics.
-type Figure = (&'static str, fn(&StatisticsSummary) -> f64);
-const FIGURES: [Figure; 4] = [
-    ("largest", |statistics| statistics.max),
-    ("mean", |statistics| statistics.mean),
-    ("root mean square", |statistics| statistics.rms),
-    ("95 % are at most", |statistics| statistics.p95),
+const FIGURES: [&str; 4] = ["mean", "root mean square", "95 % are at most", "largest of these"];
+
+const COLUMNS: [(&str, Column); 4] = [
+    ("mm", Column::Text),
+    ("nominal (before)", Column::Number),
+    ("identified (after)", Column::Number),
+    ("95 % interval (after)", Column::Number),
 ];
 
-const COLUMNS: [(&str, Column); 3] =
-    [("mm", Column::Text), ("nominal (before)", Column::Number), ("identified (after)", Column::Number)];
-
 fn statistics(before: &StatisticsSummary, after: &StatisticsSummary) -> Vec<Vec<String>> {
-    let row = |(name, pick): &Figure| vec![(*name).to_owned(), number(pick(before), 4), number(pick(after), 4)];
-    FIGURES.iter().map(row).collect()
+    let figures = before.figures().into_iter().zip(after.figures());
+    let row = |(name, (before, after)): (&&str, (Figure, Figure))| {
+        let interval = after.interval_text().unwrap_or_else(|| NONE.to_owned());
+        vec![(*name).to_owned(), before.text(), after.text(), interval]
+    };
+    FIGURES.iter().zip(figures).map(row).collect()
 }
 
 fn distances(before: &ModelSummary, after: &ModelSummary) -> String {

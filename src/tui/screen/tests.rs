@@ -164,6 +164,7 @@ fn verdict(status: VerdictStatus) -> Verdict {
     let check = |quantity, value: f64, limit_mm: f64| LimitCheck {
         quantity,
         value_mm: Some(value),
+        interval_mm: Some([0.8 * value, 1.2 * value]),
         limit_mm,
         met: Some(value <= limit_mm),
     };
@@ -187,6 +188,9 @@ fn model(factor: f64) -> ModelSummary {
         rms: factor * 1.1 * mean,
         p95: factor * 1.6 * mean,
         max: factor * 2.4 * mean,
+        mean_interval: Some([0.8 * factor * mean, 1.2 * factor * mean]),
+        rms_interval: Some([0.9 * factor * mean, 1.3 * factor * mean]),
+        max_interval: Some([1.6 * factor * mean, 2.4 * factor * mean]),
     };
     ModelSummary {
         position_mm: Some(statistics(20, 0.0103)),
@@ -212,6 +216,7 @@ fn verification() -> VerificationSummary {
     };
     VerificationSummary {
         samples: 20,
+        poses: 20,
         left_out: 0,
         basis: "the verification poses of this session, same set-up".to_owned(),
         independent: true,

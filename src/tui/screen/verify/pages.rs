@@ -1,8 +1,8 @@
 //! Verdict and tables of the verification.
 
 use crate::session::joint_errors::workspace_sentence;
-use crate::session::summary::{Verdict, VerdictStatus, VerificationSummary};
-use crate::text::{counted, fixed};
+use crate::session::summary::{Figure, Verdict, VerdictStatus, VerificationSummary};
+use crate::text::{self, counted, fixed};
 use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
 use crate::wizard::view::VerifyView;
@@ -62,7 +62,7 @@ fn limits(verdict: &Verdict, page: &mut Page) {
             Some(false) => ("> ", "NOT MET", Role::Warn),
             None => ("  ", "NOT EVALUATED", Role::Warn),
         };
-        let value = check.value_mm.map_or_else(|| "-".to_owned(), |value| fixed(value, 4));
+        let value = check.value_text();
         let quantity = check.quantity.words();
         let line = format!("  {quantity:<16}{value:>9} mm  {sign} {:>7} mm  ", fixed(check.limit_mm, 3));
         page.line(vec![(line, Role::Plain), (result.to_owned(), role)]);
@@ -80,19 +80,32 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.line(vec![(format!("{:<names$}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
     for ((name, before), (_, after)) in nominal.errors().into_iter().zip(identified.errors()) {
         let (Some(before), Some(after)) = (before, after) else { continue };
-        row(page, &format!("{name}, mean of {}", after.count), before.mean, after.mean);
-        row(page, "  rms", before.rms, after.rms);
-        row(page, "  95 %", before.p95, after.p95);
-        row(page, "  max", before.max, after.max);
+        let names = [format!("{name}, mean of {}", after.count), "  rms".to_owned(), "  95 %".to_owned(), "  max".to_owned()];
+        for ((name, before), after) in names.iter().zip(before.figures()).zip(after.figures()) {
+            row(page, name, before, after);
+        }
     }
     if let (Some(before), Some(after)) = (&nominal.axis_mm, &identified.axis_mm) {
         for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
             let [from, to] = [before, after].map(|model| (model.mean.get(axis), model.max.get(axis)));
             if let ((Some(mean), Some(max)), (Some(mean_after), Some(max_after))) = (from, to) {
-                row(page, &format!("along {name}, mean of absolute"), *mean, *mean_after);
-                row(page, "  largest", *max, *max_after);
+                let plain = |value: &f64| Figure { value: *value, interval: None };
+                row(page, &format!("along {name}, mean of absolute"), plain(mean), plain(mean_after));
+                row(page, "  largest", plain(max), plain(max_after));
             }
         }
+    }
+    for (name, errors) in identified.errors() {
+        let Some(errors) = errors else { continue };
+        let figures = ["mean", "rms", "95 %", "max"].into_iter().zip(errors.figures());
+        let intervals: Vec<String> =
+            figures.filter_map(|(figure, of)| Some(format!("{figure} {}", of.interval_text()?))).collect();
+        if !intervals.is_empty() {
+            page.paragraph(&format!("{name} after, 95 % intervals: {}.", text::listed(&intervals)), Role::Plain);
+        }
+    }
+    if let Some(sentence) = verification.sample_sentence() {
+        page.paragraph(&format!("{sentence}."), Role::Dim);
     }
     page.paragraph("before: nominal model; after: identified model. Distance errors need no frame.", Role::Dim);
 }
@@ -102,8 +115,8 @@ fn names(page: &Page) -> usize {
     page.columns().saturating_sub(29).clamp(26, 32)
 }
 
-fn row(page: &mut Page, name: &str, before: f64, after: f64) {
-    let ratio = before / after;
+fn row(page: &mut Page, name: &str, before: Figure, after: Figure) {
+    let ratio = before.value / after.value;
     let (better, role) = match ratio {
         ratio if !ratio.is_finite() => ("-".to_owned(), Role::Plain),
         ratio if ratio < 1.0 => ("WORSE".to_owned(), Role::Warn),
@@ -111,7 +124,7 @@ fn row(page: &mut Page, name: &str, before: f64, after: f64) {
         ratio => (format!("{ratio:.0} x"), Role::Plain),
     };
     let names = names(page);
-    let line = format!("{name:<names$}{:>10}{:>10}", fixed(before, 4), fixed(after, 4));
+    let line = format!("{name:<names$}{:>10}{:>10}", before.text(), after.text());
     page.line(vec![(line, Role::Plain), (format!("{better:>9}"), role)]);
 }
 
