@@ -18,6 +18,7 @@ mod joint_errors;
 pub mod models;
 pub mod plan;
 pub mod points;
+mod poses;
 mod provenance;
 mod result;
 mod settings;

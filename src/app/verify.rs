@@ -92,7 +92,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     }
     let left_out = unseen.left_out();
     warnings.extend(unseen.warning);
-    warnings.extend(checks::set_warnings(joints, &known, &tested));
+    warnings.extend(checks::set_warnings(profile, &known, &tested));
     warnings.extend(checks::few_warning(samples.len(), poses));
     let named = rows.iter().zip(&identified_errors.vectors);
     warnings.extend(checks::far_warning(named.map(|(row, error)| (row.pose.as_str(), row.line, error))));

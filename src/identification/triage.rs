@@ -66,6 +66,8 @@ pub struct Finding {
     pub share: f64,
     /// Other explanations that are not much worse, best first.
     pub alternatives: Vec<Explanation>,
+    /// Whether so few samples came before that a pose exchanged with a later one looks like a bad reading.
+    pub is_early: bool,
 }
 
 /// A measured distance against its prediction.
@@ -186,6 +188,7 @@ fn not_at_rest(triage: &Triage<'_>, newest: usize) -> Option<Finding> {
         cause: Cause::NotAtRest { scatter },
         share: 1.0,
         alternatives: Vec::new(),
+        is_early: false,
     })
 }
 

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::ProcedureError;
+use super::{ProcedureError, poses};
 use crate::identification::plausibility::compare_with_nominal;
 use crate::identification::verification::{CoverageGap, coverage_gaps};
 use crate::identification::{Observations, Places, PointSample, Problem};
@@ -35,12 +35,6 @@ const FEW_POSES: usize = 10;
 const ENOUGH_TO_COMPARE: usize = 4;
 /// A verification sample is far off if its error is this many times the median of all.
 const FAR: f64 = 10.0;
-/// Code of the warning about poses that move one joint at a time.
-const ONE_AT_A_TIME: &str = "one_joint_at_a_time";
-/// A joint that is no further from its usual value than this (deg, sliding joints mm) has not moved.
-const STAYS: f64 = 1.0;
-/// Share of the poses that makes a pattern.
-const MOST: f64 = 0.8;
 /// Most problems of one kind that a warning lists.
 const SHOWN: usize = 3;
 
@@ -234,44 +228,14 @@ pub(crate) fn unknown_targets<'a>(
 }
 
 /// Warnings about the poses of a pair of identification and verification sets.
-pub(crate) fn set_warnings(joints: &[Joint], known: &[Place], tested: &[Place]) -> Vec<Warning> {
+pub(crate) fn set_warnings(profile: &Profile, known: &[Place], tested: &[Place]) -> Vec<Warning> {
+    let joints = profile.chain().joints();
     let known: Vec<&[f64]> = known.iter().map(|at| at.configuration.as_slice()).collect();
     let tested: Vec<&[f64]> = tested.iter().map(|at| at.configuration.as_slice()).collect();
     let gaps = coverage_gaps(joints, &known, &tested);
     let mut warnings: Vec<Warning> = gaps.iter().map(|gap| coverage_warning(joints, gap)).collect();
-    let of_verification = moves_one_joint_at_a_time(joints, &tested);
-    if of_verification {
-        let message = "the verification poses move one joint at a time: the figures below do not carry over to poses that move several joints, because errors of joints that multiply do not show; verify with poses that move all joints";
-        warnings.push(Warning::new(ONE_AT_A_TIME, message, true));
-    }
-    if moves_one_joint_at_a_time(joints, &known) {
-        let message = "the identification poses move one joint at a time: what joints do to each other is not measured, and other poses may be worse than predicted; add poses that move all joints";
-        warnings.push(Warning::new(ONE_AT_A_TIME, message, of_verification));
-    }
+    warnings.extend(poses::warnings(profile, &known, &tested));
     warnings
-}
-
-/// Whether most configurations differ in at most one joint from a common one.
-fn moves_one_joint_at_a_time(joints: &[Joint], configurations: &[&[f64]]) -> bool {
-    let count = configurations.len();
-    if joints.len() < 3 || count < TOO_FEW_POSES {
-        return false;
-    }
-    let still = |joint: usize| joints[joint].joint_type.quantity().from_edge(STAYS);
-    let common: Vec<f64> = (0..joints.len())
-        .map(|joint| {
-            let mut values: Vec<f64> = configurations.iter().map(|configuration| configuration[joint]).collect();
-            let (_, median, _) = values.select_nth_unstable_by(count / 2, f64::total_cmp);
-            *median
-        })
-        .collect();
-    let moved = |configuration: &&&[f64]| {
-        let away = |joint: &usize| (configuration[*joint] - common[*joint]).abs() > still(*joint);
-        (0..joints.len()).filter(away).count()
-    };
-    let one_at_a_time = configurations.iter().filter(|configuration| moved(configuration) <= 1).count();
-    let moving = configurations.iter().filter(|configuration| moved(configuration) > 0).count();
-    moving > 0 && one_at_a_time as f64 >= MOST * count as f64
 }
 
 /// A warning that blocks acceptance where the nominal arm is as good as the identified one.

@@ -282,7 +282,7 @@ fn verify(
     let far = checks::far_warning(named.map(|(named, error)| (named.pose.as_str(), named.line, error)));
     warnings.extend(unseen.warning);
     summary.independent = checks::is_independent(&warnings);
-    warnings.extend(checks::set_warnings(joints, &known, &tested.places().cloned().collect::<Vec<_>>()));
+    warnings.extend(checks::set_warnings(&request.profile, &known, &tested.places().cloned().collect::<Vec<_>>()));
     warnings.extend(checks::few_warning(summary.samples, tested.distinct(joints).min(summary.samples)));
     warnings.extend(far);
     warnings.extend(checks::better_warning(&summary));

@@ -448,7 +448,7 @@ impl VerificationSummary {
     pub fn sample_sentence(&self) -> Option<String> {
         (self.poses > 0).then(|| {
             format!(
-                "Intervals (95 %) say what other sets of as many poses could have shown (bootstrap over {}). The largest error is that of these poses, a sample: about one in {} other poses is expected to be worse",
+                "Intervals (95 %) say what other sets of as many poses could have shown (bootstrap over {}). The largest error is that of these poses, a sample: about 1 of {} other poses is expected to be worse",
                 counted(self.poses, "pose"),
                 self.poses + 1
             )

@@ -320,10 +320,25 @@ fn several_suspects_are_all_named() {
         cause: Cause::Unexplained,
         share: 0.4,
         alternatives: vec![blame(1), blame(0)],
+        is_early: false,
     };
     assert_eq!(finding.suspects(), [3, 1, 0]);
     let text = told(&finding);
     assert!(text.contains("which of point 4, point 2, point 1 is wrong: the next point will tell"), "{text}");
+}
+
+/// An exchange of two poses that cannot be told from a bad reading yet is called that.
+#[test]
+fn an_early_exchange_is_not_called_a_bad_reading_alone() {
+    let mut session = Session::new(12);
+    session.samples[5].point.x += from_mm(300.0);
+    let early = session.after(6).unwrap();
+    assert_eq!((early.sample, &early.cause, early.is_early), (5, &Cause::Unexplained, true));
+    assert!(told(&early).contains("two poses exchanged), which cannot be told from a bad reading yet"), "{}", told(&early));
+    let mut session = Session::new(12);
+    session.samples[15].point.x += from_mm(300.0);
+    let late = session.after(16).unwrap();
+    assert!(!late.is_early && !told(&late).contains("exchanged"), "{}", told(&late));
 }
 
 #[test]

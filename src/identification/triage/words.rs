@@ -69,6 +69,11 @@ impl Finding {
                 stories.push(told);
             }
         }
+        if self.is_early && self.cause == Cause::Unexplained && stories.len() == 1 {
+            stories.push(format!(
+                "{sample} was taken at a pose that comes later (two poses exchanged), which cannot be told from a bad reading yet"
+            ));
+        }
         let told = match stories.as_slice() {
             [only] if self.share >= SURE => only.clone(),
             [only] => format!("most likely {only}"),

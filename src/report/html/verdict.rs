@@ -1,7 +1,7 @@
 //! The verdict, and the accuracy on poses that the identification did not see.
 
 use super::charts::{MOST, against_joints, histogram, norm, of_kind, per_pose, worst};
-use super::markup::{Column, NONE, add, escape, list, number, paragraph, table};
+use super::markup::{Column, NONE, add, escape, list, number, optional, paragraph, table};
 use super::views::views;
 use crate::report::document::{Details, Document, PointOrigin, PointPart, ResultState};
 use crate::session::joint_errors::workspace_sentence;
@@ -64,7 +64,7 @@ fn limits(checks: &[LimitCheck]) -> String {
             };
             vec![
                 quantity(check.quantity).to_owned(),
-                check.value_text(),
+                if check.interval_mm.is_some() { check.value_text() } else { optional(check.value_mm, 4) },
                 number(check.limit_mm, 4),
                 met.to_owned(),
             ]
@@ -162,7 +162,7 @@ fn procedure(result: &IdentificationSummary, verification: &VerificationSummary,
     )
 }
 
-const FIGURES: [&str; 4] = ["mean", "root mean square", "95 % are at most", "largest of these"];
+const FIGURES: [&str; 4] = ["mean", "root mean square", "95 % are at most", "largest"];
 
 const COLUMNS: [(&str, Column); 4] = [
     ("mm", Column::Text),
@@ -171,13 +171,21 @@ const COLUMNS: [(&str, Column); 4] = [
     ("95 % interval (after)", Column::Number),
 ];
 
+/// A figure with as many digits as its interval justifies, or the mark for none.
+fn figure(figure: Figure) -> String {
+    if figure.interval.is_some() { figure.text() } else { number(figure.value, 4) }
+}
+
 fn statistics(before: &StatisticsSummary, after: &StatisticsSummary) -> Vec<Vec<String>> {
     let figures = before.figures().into_iter().zip(after.figures());
     let row = |(name, (before, after)): (&&str, (Figure, Figure))| {
         let interval = after.interval_text().unwrap_or_else(|| NONE.to_owned());
-        vec![(*name).to_owned(), before.text(), after.text(), interval]
+        vec![(*name).to_owned(), figure(before), figure(after), interval]
     };
-    FIGURES.iter().zip(figures).map(row).collect()
+    let mut rows: Vec<Vec<String>> = FIGURES.iter().zip(figures).map(row).collect();
+    // The largest comes first, as in table III of the method paper.
+    rows.rotate_right(1);
+    rows
 }
 
 fn distances(before: &ModelSummary, after: &ModelSummary) -> String {
