@@ -411,10 +411,8 @@ fn rejected(solve: &Solve<'_, '_>, at: &Linearised) -> Vec<Rejected> {
                 let fitting = station.inverse_transform_point(&predicted(sample));
                 RejectionReason::typed(&point.point, &fitting, typical)
             };
-            let reason = swapped(sample).map_or_else(
-                || typed().unwrap_or(RejectionReason::Outlier),
-                RejectionReason::SwappedWith,
-            );
+            let reason = swapped(sample)
+                .map_or_else(|| typed().unwrap_or(RejectionReason::Outlier), RejectionReason::SwappedWith);
             Rejected { sample: index, residual, ratio: judged.ratios[sample], reason }
         })
         .collect()

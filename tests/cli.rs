@@ -165,7 +165,10 @@ fn poor_data_are_never_accepted() {
     });
     let (code, _, err) = shifted.identify(&[]);
     let flat = err.replace("\n ", "");
-    assert!(code == 2 && flat.contains("from sample 1 on, each point belongs to the joint values of the row below"), "{err}");
+    assert!(
+        code == 2 && flat.contains("from sample 1 on, each point belongs to the joint values of the row below"),
+        "{err}"
+    );
     assert!(!flat.contains("equally well"), "{err}");
     // Two halves of different rows: nothing simple explains it.
     let mixed = Table::changed(|_, rows| {

@@ -78,8 +78,7 @@ impl Bench {
         identification: Vec<NamedSample>,
         verification: Vec<NamedSample>,
     ) -> Result<Identified, ProcedureError> {
-        let verification_mode =
-            if verification.is_empty() { VerificationMode::None } else { VerificationMode::File };
+        let verification_mode = if verification.is_empty() { VerificationMode::None } else { VerificationMode::File };
         let request = IdentifyRequest {
             mounted: None,
             payload: None,
@@ -113,8 +112,7 @@ fn verification_rows_at_identified_poses_are_left_out_and_the_rest_is_judged() {
     let mut bench = Bench::builtin("soochow", 1);
     let known = bench.random(40);
     let fresh = bench.random(20);
-    let same: Vec<Vec<f64>> =
-        known.iter().take(3).map(|named| named.sample.at.configuration.clone()).collect();
+    let same: Vec<Vec<f64>> = known.iter().take(3).map(|named| named.sample.at.configuration.clone()).collect();
     let mut seen = bench.measured(&same, 0);
     // Far off, so that it would show in the figures.
     for named in &mut seen {
@@ -129,7 +127,10 @@ fn verification_rows_at_identified_poses_are_left_out_and_the_rest_is_judged() {
     assert_eq!(verification.identified.position_mm, alone.identified.position_mm);
     let note = warning(&mixed, "seen_before").unwrap();
     assert!(!note.blocks_acceptance);
-    assert!(note.message.starts_with("3 of 23 verification samples are at poses that were also identified"), "{note:?}");
+    assert!(
+        note.message.starts_with("3 of 23 verification samples are at poses that were also identified"),
+        "{note:?}"
+    );
     assert!(note.message.contains("the other 20"), "{note:?}");
 
     // Too few are left: that blocks, not the rows at identified poses.
@@ -323,7 +324,9 @@ fn several_reversed_joints_are_named_before_a_mirrored_frame() {
     assert_eq!(found.first(), Some(&Mistake::JointSigns { joints: vec![0, 3, 5] }), "{found:?}");
     assert_eq!(found.last(), Some(&Mistake::Mirrored), "{found:?}");
     let refused = bench.try_identify(reversed, Vec::new()).unwrap_err().to_string();
-    for words in ["the likeliest first: (1) joints J1, J4 and J6 count the other way", "Trackers are hardly ever left-handed"] {
+    for words in
+        ["the likeliest first: (1) joints J1, J4 and J6 count the other way", "Trackers are hardly ever left-handed"]
+    {
         assert!(refused.contains(words), "{refused}");
     }
     let reversed = altered(&samples, |q| [1, 4].iter().for_each(|joint| q[*joint] *= -1.0));
@@ -342,13 +345,18 @@ fn two_joints_with_another_zero_are_named() {
     let expected = Mistake::JointZeros { zeros: vec![(1, -90.0 * DEGREE), (2, 90.0 * DEGREE)] };
     assert_eq!(found.first(), Some(&expected), "{found:?}");
     let words = found[0].describe(|joint| format!("A{}", joint + 1));
-    assert!(words.starts_with("joints A2 and A3 have another zero: the data fit with -90 and +90 deg added"), "{words}");
+    assert!(
+        words.starts_with("joints A2 and A3 have another zero: the data fit with -90 and +90 deg added"),
+        "{words}"
+    );
 }
 
 /// The most frequent report of all: FANUC and linkage arms count joint 3 together with joint 2.
 #[test]
 fn a_coupling_that_is_missing_or_doubled_is_named() {
-    for (name, added, factor) in [("fanuc_lrmate200id", 1.0, -1.0), ("fanuc_lrmate200id", -1.0, 1.0), ("abb_irb120", -1.0, 1.0)] {
+    for (name, added, factor) in
+        [("fanuc_lrmate200id", 1.0, -1.0), ("fanuc_lrmate200id", -1.0, 1.0), ("abb_irb120", -1.0, 1.0)]
+    {
         let mut bench = Bench::builtin(name, 13);
         let samples = bench.random(40);
         let coupled = altered(&samples, |q| q[2] += added * q[1]);
@@ -409,7 +417,8 @@ fn rejected_samples_that_share_a_region_are_the_arm_and_are_kept() {
     assert!((5..40).contains(&bent), "{bent}");
     for named in samples.iter_mut().filter(|named| bends(&named.sample.at.configuration)) {
         let direction = named.sample.at.configuration[0];
-        named.sample.point += 0.2 * MILLIMETRE * Vector3::new(direction.sin(), direction.cos(), (7.0 * direction).sin());
+        named.sample.point +=
+            0.2 * MILLIMETRE * Vector3::new(direction.sin(), direction.cos(), (7.0 * direction).sin());
     }
     let identified = bench.identify(samples, Vec::new());
     let noted = warning(&identified, "region_not_described").unwrap();
@@ -453,7 +462,8 @@ fn a_missing_sign_and_a_wrong_digit_are_named() {
 fn joints_from_0_to_360_degrees_are_called_that() {
     let mut bench = Bench::builtin("abb_irb120", 24);
     let samples = bench.random(30);
-    let turned = altered(&samples, |q| q.iter_mut().filter(|value| **value < 0.0).for_each(|value| *value += 360.0 * DEGREE));
+    let turned =
+        altered(&samples, |q| q.iter_mut().filter(|value| **value < 0.0).for_each(|value| *value += 360.0 * DEGREE));
     let identified = bench.identify(turned, Vec::new());
     let noted = warning(&identified, "joint_limits").unwrap();
     assert!(noted.message.contains("count from 0 to 360 deg"), "{noted:?}");

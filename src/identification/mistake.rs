@@ -323,7 +323,15 @@ fn columns(count: usize, points: &[PointSample]) -> Vec<Trial> {
     let mut trials = Vec::new();
     for one in 0..count {
         for other in one + 1..count {
-            let source = |joint| Some(if joint == one { other } else if joint == other { one } else { joint });
+            let source = |joint| {
+                Some(if joint == one {
+                    other
+                } else if joint == other {
+                    one
+                } else {
+                    joint
+                })
+            };
             trials.push(arranged(Columns::Exchanged { joints: [one, other] }, &source));
         }
     }
@@ -340,10 +348,8 @@ fn columns(count: usize, points: &[PointSample]) -> Vec<Trial> {
 /// Points of another row, from the first sample on or from the sample where the distances between neighbours say so.
 fn rows(arm: &Arm, all: &[PointSample]) -> Vec<Trial> {
     let mut trials = Vec::new();
-    let with_configuration_of = |sample: &PointSample, other: &PointSample| PointSample {
-        at: other.at.clone(),
-        ..sample.clone()
-    };
+    let with_configuration_of =
+        |sample: &PointSample, other: &PointSample| PointSample { at: other.at.clone(), ..sample.clone() };
     let reversed = all.iter().zip(all.iter().rev()).map(|(sample, other)| with_configuration_of(sample, other));
     trials.push((Mistake::RowsReversed, reversed.collect()));
     for below in [true, false] {

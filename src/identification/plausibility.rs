@@ -7,8 +7,8 @@
 
 use nalgebra::{DMatrix, Point3, SymmetricEigen};
 
-use super::mistake;
 use super::linearise::{Evaluation, Weights, point_residuals, project};
+use super::mistake;
 use super::problem::{Observations, PointSample, Problem};
 use super::robust::gross_trust;
 use super::{Estimator, Identification, IdentificationError, Observability, Settings, SigmaSource, identify};

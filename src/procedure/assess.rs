@@ -11,8 +11,8 @@ use crate::profile::Acceptance;
 use crate::report::number;
 use crate::session::advice::Advice;
 use crate::session::summary::{
-    AxisSummary, Figure, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, StatisticsSummary, Verdict,
-    VerdictStatus, VerificationSummary, Warning,
+    AxisSummary, Figure, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, StatisticsSummary,
+    Verdict, VerdictStatus, VerificationSummary, Warning,
 };
 use crate::units::to_mm;
 

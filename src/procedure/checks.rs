@@ -129,8 +129,7 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
             return Err(ProcedureError::Mistaken { gap, mistake });
         }
     }
-    let message =
-        format!("{gap}, and no single mistake explains it (another robot, several mistakes at once?)");
+    let message = format!("{gap}, and no single mistake explains it (another robot, several mistakes at once?)");
     Ok(Compared { expected, warning: Some(Warning::new("implausible", message, true)) })
 }
 

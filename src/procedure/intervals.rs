@@ -131,13 +131,17 @@ mod tests {
         let (true_rms, true_distance) = (3.0_f64.sqrt(), 2.0_f64.sqrt());
         for _ in 0..trials {
             let errors: Vec<[f64; 3]> = (0..poses).map(|_| normal(&mut rng)).collect();
-            let positions: Vec<OfPoses> =
-                errors.iter().enumerate().map(|(pose, error)| OfPoses { poses: [pose; 2], error: norm(*error) }).collect();
+            let positions: Vec<OfPoses> = errors
+                .iter()
+                .enumerate()
+                .map(|(pose, error)| OfPoses { poses: [pose; 2], error: norm(*error) })
+                .collect();
             let [low, high] = Intervals::new(&positions, poses).unwrap().rms;
             of_positions += usize::from((low..=high).contains(&true_rms));
             let pairs = (0..poses).flat_map(|one| (0..one).map(move |other| [one, other]));
-            let distances: Vec<OfPoses> =
-                pairs.map(|poses| OfPoses { poses, error: (errors[poses[0]][0] - errors[poses[1]][0]).abs() }).collect();
+            let distances: Vec<OfPoses> = pairs
+                .map(|poses| OfPoses { poses, error: (errors[poses[0]][0] - errors[poses[1]][0]).abs() })
+                .collect();
             let [low, high] = Intervals::new(&distances, poses).unwrap().rms;
             of_distances += usize::from((low..=high).contains(&true_distance));
         }

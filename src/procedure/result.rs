@@ -95,9 +95,10 @@ pub(crate) fn result_warnings(
         let nominal = context.nominal.map_or_else(String::new, |nominal| {
             format!(", the nominal one by {} mm", number(to_mm(per_coordinate(nominal)), 3))
         });
-        let stated = found.sigma.instrument.map_or_else(String::new, |sigma| {
-            format!(" with a stated sigma of {} mm", number(to_mm(sigma), 4))
-        });
+        let stated = found
+            .sigma
+            .instrument
+            .map_or_else(String::new, |sigma| format!(" with a stated sigma of {} mm", number(to_mm(sigma), 4)));
         let message = format!(
             "the identified robot misses the measured points by {} mm per coordinate{nominal}{stated}: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
             number(to_mm(residual), 3)
@@ -151,10 +152,9 @@ fn unmodelled_warning(joints: &[Joint], unmodelled: &Unmodelled) -> Warning {
             let region = format!("{} {end} {} {}", joint.name, number(quantity.to_edge(*at), 0), quantity.unit());
             (format!("{inside} of the {} that do not fit have {region}", counted(*all, "pose")), region)
         }
-        Unmodelled::Poses { poses, .. } => (
-            format!("no SMR fits at {}", counted(*poses, "pose")),
-            "at these poses".to_owned(),
-        ),
+        Unmodelled::Poses { poses, .. } => {
+            (format!("no SMR fits at {}", counted(*poses, "pose")), "at these poses".to_owned())
+        }
     };
     let message = format!(
         "{which}: that is the arm and no bumped SMR, so the samples are kept. The model does not describe the arm there ({region}): errors of joints may explain it, a load or a cable may pull there; or narrow the planning limits to where the arm works"

@@ -457,9 +457,7 @@ impl<'a> Case<'a, '_> {
             cause: best.cause.clone(),
             share: weight(best) / total,
             alternatives,
-            is_early: best.sample == self.newest
-                && self.base.items.len() < SETTLED
-                && !self.triage.planned.is_empty(),
+            is_early: best.sample == self.newest && self.base.items.len() < SETTLED && !self.triage.planned.is_empty(),
         })
     }
 

@@ -334,7 +334,11 @@ fn an_early_exchange_is_not_called_a_bad_reading_alone() {
     session.samples[5].point.x += from_mm(300.0);
     let early = session.after(6).unwrap();
     assert_eq!((early.sample, &early.cause, early.is_early), (5, &Cause::Unexplained, true));
-    assert!(told(&early).contains("two poses exchanged), which cannot be told from a bad reading yet"), "{}", told(&early));
+    assert!(
+        told(&early).contains("two poses exchanged), which cannot be told from a bad reading yet"),
+        "{}",
+        told(&early)
+    );
     let mut session = Session::new(12);
     session.samples[15].point.x += from_mm(300.0);
     let late = session.after(16).unwrap();

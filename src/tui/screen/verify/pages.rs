@@ -80,7 +80,8 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
     page.line(vec![(format!("{:<names$}{:>10}{:>10}{:>9}", "mm", "before", "after", "better"), Role::Dim)]);
     for ((name, before), (_, after)) in nominal.errors().into_iter().zip(identified.errors()) {
         let (Some(before), Some(after)) = (before, after) else { continue };
-        let names = [format!("{name}, mean of {}", after.count), "  rms".to_owned(), "  95 %".to_owned(), "  max".to_owned()];
+        let names =
+            [format!("{name}, mean of {}", after.count), "  rms".to_owned(), "  95 %".to_owned(), "  max".to_owned()];
         for ((name, before), after) in names.iter().zip(before.figures()).zip(after.figures()) {
             row(page, name, before, after);
         }
