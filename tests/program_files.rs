@@ -296,13 +296,7 @@ fn own_programs_have_their_targets() {
     for program in all_own() {
         let scan = found(program.dialect, &program.arm, program.text.as_bytes(), program.companions.clone());
         let counts = (scan.targets.len(), scan.left.len());
-        assert_eq!(
-            counts,
-            (program.targets, program.left),
-            "{} {}: {scan:#?}",
-            program.dialect as usize,
-            program.title
-        );
+        assert_eq!(counts, (program.targets, program.left), "{:?} {}: {scan:#?}", program.dialect, program.title);
     }
 }
 
@@ -428,5 +422,57 @@ fn broken_programs_never_panic_and_change_only_in_numbers() {
                 String::from_utf8_lossy(&broken)
             );
         }
+    }
+}
+
+/// What the page on programs says about its examples.
+fn described(scan: &Scan) -> String {
+    let name = |name: &Option<String>| name.as_ref().map_or_else(String::new, |name| format!(" {name}"));
+    let setting = |setting: &Setting| match setting {
+        Setting::Identity => "none".to_owned(),
+        Setting::Known { name, .. } => name.clone(),
+        Setting::Named(name) => format!("{name} (to be stated)"),
+    };
+    let target = |target: &trupose::program::motion::Target| {
+        let goal = match &target.goal {
+            Goal::Joints(_) => "joints".to_owned(),
+            Goal::Pose(pose) => {
+                let branch = pose.configuration.to_string();
+                let branch = if branch.is_empty() { "as before".to_owned() } else { branch };
+                format!("pose; branch {branch}; tool {}; frame {}", setting(&pose.tool), setting(&pose.frame))
+            }
+        };
+        (target.line, format!("line {}:{} target, {goal}", target.line, name(&target.name)))
+    };
+    let mut lines: Vec<(usize, String)> = scan.targets.iter().map(target).collect();
+    let left = |left: &trupose::program::motion::LeftAlone| {
+        (left.line, format!("line {}:{} left, {}", left.line, name(&left.name), left.reason))
+    };
+    lines.extend(scan.left.iter().map(left));
+    lines.sort_by_key(|(line, _)| *line);
+    lines.into_iter().map(|(_, text)| format!("{text}\n")).collect()
+}
+
+#[test]
+fn the_examples_of_the_page_give_what_it_says() {
+    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/programs.md")).unwrap();
+    let block = |from: &str| {
+        let (_, rest) = page.split_once(&format!("```{from}\n")).unwrap();
+        let (code, rest) = rest.split_once("```").unwrap();
+        let (_, rest) = rest.split_once("```text\n").unwrap();
+        (code.to_owned(), rest.split_once("```").unwrap().0.to_owned())
+    };
+    for (name, dialect, arm) in [
+        ("rapid", Dialect::Rapid, ABB),
+        ("krl", Dialect::Krl, KUKA),
+        ("fanuc", Dialect::Fanuc, FANUC),
+        ("urscript", Dialect::Urscript, "ur5e"),
+        ("val3", Dialect::Val3, STAUBLI),
+        ("inform", Dialect::Inform, "soochow"),
+        ("ros", Dialect::Ros, PANDA),
+    ] {
+        let (code, stated) = block(name);
+        let found = described(&found(dialect, arm, code.as_bytes(), Vec::new()));
+        assert_eq!(found, stated, "{name}:\n{found}");
     }
 }

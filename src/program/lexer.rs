@@ -119,7 +119,8 @@ impl<'a> Tokens<'a> {
     pub(super) fn number(&self, at: usize) -> Option<(Number, usize)> {
         let signs = usize::from(self.is(at, b'-') || self.is(at, b'+'));
         let (first, last) = (self.get(at)?, self.get(at + signs)?);
-        if last.kind != Kind::Number {
+        // A sign belongs to the digits behind it; anything between them would be lost with the old number.
+        if last.kind != Kind::Number || last.start != first.start + signs {
             return None;
         }
         let digits: f64 = as_str(self.text, last.start..last.end).parse().ok()?;

@@ -8,10 +8,11 @@ use crate::kinematics::{Convention, ForwardKinematics, JointType, LinkParameter,
 const EVERYTHING: &str = r#"(
     schema: 1, name: "all", title: "All fields", source: "made up for a test", convention: Modified,
     base: (xyz_mm: (100.0, 0.0, 0.0), rpy_deg: (0.0, 0.0, 90.0)),
+    controller_world: (xyz_mm: (0.0, 0.0, 375.0)),
     joints: [
         (name: "A", type: Revolute, alpha_deg: 0.0, a_mm: 0.0, d_mm: 200.0, theta_deg: 0.0,
             direction: -1, limits_deg: (-90.0, 90.0), planning_limits_deg: (-45.0, 60.0),
-            max_speed_deg_s: 180.0, pulses_per_degree: -1024.0, mass_kg: 12.5, centre_mm: (10.0, -20.0, 30.0)),
+            max_speed_deg_s: 180.0, pulses_per_degree: -1024.0, aliases: ["joint_1", "joint_a1"], mass_kg: 12.5, centre_mm: (10.0, -20.0, 30.0)),
         (name: "B", type: Revolute, alpha_deg: 0.0, a_mm: 300.0, d_mm: 0.0, theta_deg: 0.0, beta_deg: 0.5,
             limits_deg: (-90.0, 90.0), coupling: {"A": 0.5}, mass_kg: 4.0, centre_mm: (-150.0, 0.0, 0.0)),
         (name: "C", type: Prismatic, alpha_deg: 90.0, a_mm: 0.0, d_mm: 50.0, theta_deg: 0.0,
@@ -72,6 +73,14 @@ fn ranges_follow_the_type_of_the_joint() {
     assert_eq!(b.planning_limits, b.limits);
     assert_eq!((b.max_speed, b.pulses_per_degree), (None, None));
     assert!(near(c.limits.unwrap().1, 0.4) && near(c.max_speed.unwrap(), 0.5));
+}
+
+#[test]
+fn names_and_origin_of_other_programs() {
+    let profile = everything();
+    assert_eq!(profile.joint_aliases()[0], ["joint_1", "joint_a1"]);
+    assert!(profile.joint_aliases()[1].is_empty());
+    assert!(near(profile.base_from_world().translation.z, 0.375));
 }
 
 #[test]

@@ -23,11 +23,20 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let mut findings = Findings::default();
     let mut script = Script { joints: source.robot.chain.dof(), constants: HashMap::new() };
     for (file, tokens) in files.iter().enumerate() {
-        script.collect(tokens, file);
+        script.collect(tokens, &statement_ends(tokens), file);
     }
     for (file, tokens) in files.iter().enumerate() {
-        let mut reader =
-            Reader { script: &script, tokens, file, tool: None, tools: Vec::new(), is_set_late: false, before: None };
+        let ends = statement_ends(tokens);
+        let mut reader = Reader {
+            script: &script,
+            tokens,
+            ends: &ends,
+            file,
+            tool: None,
+            tools: Vec::new(),
+            is_set_late: false,
+            before: None,
+        };
         let first = findings.motions.len();
         reader.read(&mut findings);
         // A function that sets no tool is called after the only `set_tcp` of the file.
@@ -57,9 +66,9 @@ enum Constant {
 }
 
 impl Script {
-    fn collect(&mut self, tokens: &Tokens<'_>, file: usize) {
+    fn collect(&mut self, tokens: &Tokens<'_>, ends: &[usize], file: usize) {
         for at in 0..tokens.len() {
-            let Some(assignment) = Assignment::at(tokens, at) else { continue };
+            let Some(assignment) = Assignment::at(tokens, ends, at) else { continue };
             let literal = literal(tokens, assignment.value.clone(), self.joints);
             if let (Some(Ok(literal)), Some(name)) = (literal, tokens.name(at)) {
                 let constant = match literal.form {
@@ -85,7 +94,7 @@ struct Assignment {
 }
 
 impl Assignment {
-    fn at(tokens: &Tokens<'_>, at: usize) -> Option<Self> {
+    fn at(tokens: &Tokens<'_>, ends: &[usize], at: usize) -> Option<Self> {
         tokens.word(at)?;
         if !tokens.is(at + 1, b'=') || tokens.is(at + 2, b'=') {
             return None;
@@ -95,31 +104,44 @@ impl Assignment {
                 || tokens.is_word(before, "global")
                 || tokens.is_word(before, "local")
         });
-        is_start.then(|| Self { value: at + 2..end_of_statement(tokens, at + 2) })
+        is_start.then(|| Self { value: at + 2..end_of(ends, at + 2) })
     }
 }
 
-/// The line end outside brackets.
-fn end_of_statement(tokens: &Tokens<'_>, start: usize) -> usize {
-    let mut depth = 0_usize;
-    for at in start..tokens.len() {
-        match tokens.get(at).map(|token| token.kind) {
-            Some(Kind::Symbol(b'(' | b'[' | b'{')) => depth += 1,
-            Some(Kind::Symbol(b')' | b']' | b'}')) => depth = depth.saturating_sub(1),
-            // A bracket that is never closed must not swallow the file.
-            Some(Kind::LineEnd) if depth == 0 || at > start + LONGEST => return at,
+/// For each token the end of its statement: the next line end outside brackets. Behind a bracket that is never closed every line
+/// end counts, so that it does not swallow the file.
+fn statement_ends(tokens: &Tokens<'_>) -> Vec<usize> {
+    let kind = |at: usize| tokens.get(at).map(|token| token.kind);
+    let mut open: Vec<usize> = Vec::new();
+    let mut is_end = vec![false; tokens.len()];
+    for (at, is_end) in is_end.iter_mut().enumerate() {
+        match kind(at) {
+            Some(Kind::Symbol(b'(' | b'[' | b'{')) => open.push(at),
+            Some(Kind::Symbol(b')' | b']' | b'}')) => drop(open.pop()),
+            Some(Kind::LineEnd) => *is_end = open.is_empty(),
             _ => {}
         }
     }
-    tokens.len()
+    let torn = open.first().copied().unwrap_or(tokens.len());
+    let mut next = tokens.len();
+    let mut ends = vec![next; tokens.len()];
+    for (at, (end, is_end)) in ends.iter_mut().zip(is_end).enumerate().rev() {
+        if is_end || at >= torn && kind(at) == Some(Kind::LineEnd) {
+            next = at;
+        }
+        *end = next;
+    }
+    ends
 }
 
-/// Longest statement over several lines (tokens).
-const LONGEST: usize = 200_000;
+fn end_of(ends: &[usize], at: usize) -> usize {
+    ends.get(at).copied().unwrap_or(ends.len())
+}
 
 struct Reader<'r, 'a> {
     script: &'r Script,
     tokens: &'r Tokens<'a>,
+    ends: &'r [usize],
     file: usize,
     tool: Option<Setting>,
     /// All different tools of the file.
@@ -132,15 +154,15 @@ struct Reader<'r, 'a> {
 
 impl Reader<'_, '_> {
     fn read(&mut self, findings: &mut Findings) {
-        let tokens = self.tokens;
+        let (tokens, ends) = (self.tokens, self.ends);
         let mut at = 0;
         while at < tokens.len() {
             if tokens.is_word(at, "def") || tokens.is_word(at, "thread") {
                 findings.motions.push(None);
-                at = end_of_statement(tokens, at);
+                at = end_of(self.ends, at);
             } else if tokens.word(at).is_some() && tokens.is(at + 1, b'(') {
                 at = self.call(findings, at);
-            } else if let Some(assignment) = Assignment::at(tokens, at) {
+            } else if let Some(assignment) = Assignment::at(tokens, ends, at) {
                 at = self.assignment(findings, at, &assignment);
             } else {
                 self.component(findings, at);
@@ -208,7 +230,7 @@ impl Reader<'_, '_> {
     fn call(&mut self, findings: &mut Findings, at: usize) -> usize {
         let tokens = self.tokens;
         let name = tokens.str(at);
-        let end = tokens.behind(at + 1, end_of_statement(tokens, at));
+        let end = tokens.behind(at + 1, end_of(self.ends, at));
         let inside = at + 2..end.saturating_sub(1);
         if name == "set_tcp" {
             let parts = tokens.split(inside);

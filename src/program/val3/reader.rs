@@ -116,9 +116,12 @@ impl<'a> Xml<'a> {
         let name_end = at;
         let mut attributes = Vec::new();
         let mut is_empty = false;
+        // A tag or a text without its end is broken: nothing in it is changed.
+        let (mut is_closed, mut is_torn) = (false, false);
         while let Some(&byte) = text.get(at) {
             match byte {
                 b'>' => {
+                    is_closed = true;
                     at += 1;
                     break;
                 }
@@ -133,6 +136,7 @@ impl<'a> Xml<'a> {
                     let attribute = as_str(text, begin..at).to_owned();
                     let sign = while_in(text, at, |byte| byte.is_ascii_whitespace());
                     if text.get(sign) != Some(&b'=') {
+                        is_torn = true;
                         continue;
                     }
                     let quote = while_in(text, sign + 1, |byte| byte.is_ascii_whitespace());
@@ -140,10 +144,14 @@ impl<'a> Xml<'a> {
                     if let Some(&mark @ (b'"' | b'\'')) = text.get(quote) {
                         let end = while_in(text, quote + 1, |byte| byte != mark && byte != b'<');
                         attributes.push((attribute, quote + 1..end));
+                        is_torn |= text.get(end) != Some(&mark);
                         at = end + usize::from(text.get(end) == Some(&mark));
                     }
                 }
-                _ => at += 1,
+                _ => {
+                    is_torn |= matches!(byte, b'"' | b'\'');
+                    at += 1;
+                }
             }
         }
         if name == "Code" && !is_closing && !is_empty {
@@ -153,6 +161,7 @@ impl<'a> Xml<'a> {
                 self.code.push((at..end, first));
             }
         }
+        let name = if is_closed && !is_torn { name } else { String::new() };
         self.tags.push(Tag { name, line, attributes, is_closing, is_empty, name_end });
         at
     }
