@@ -24,7 +24,7 @@ pub struct LinkTestArgs {
     /// Options of the protocol: the name of a preset, or the options that differ from the defaults, such as '(measure_ms: 2000)'
     #[arg(long, value_name = "TEXT")]
     pub options: Option<String>,
-    /// Address of the robot's controller, such as 'rtde:192.168.0.10'
+    /// Address of the robot's controller, such as 'rtde:192.168.0.10', 'kuka:192.168.0.10' or 'ascii:listen:0.0.0.0:5001'
     #[arg(long, value_name = "ADDRESS")]
     pub robot: Option<String>,
     /// Number of shots; 0 for none
@@ -50,8 +50,8 @@ pub struct SimulateArgs {
     /// Listen on a pseudo-terminal, as on a serial line
     #[arg(long)]
     pub pty: bool,
-    /// Report the joints of the simulated robot by RTDE at this TCP address
-    #[arg(long, value_name = "HOST:PORT")]
+    /// Report the joints of the simulated robot at this TCP address, by RTDE or by the protocol in front of it, such as 'kuka:127.0.0.1:7000'
+    #[arg(long, value_name = "[PROTOCOL:]HOST:PORT")]
     pub robot: Option<String>,
     /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
     #[arg(long, value_name = "NAME|FILE", default_value = "soochow")]

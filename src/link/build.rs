@@ -11,12 +11,16 @@ use super::protocol::Protocol;
 use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Checksum, Column, Layout, Mode, Preset};
 use super::protocol::emscon::{Emscon, EmsconOptions};
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
+use super::protocol::joints::JointLines;
+use super::protocol::kuka::Kuka;
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::{Rtde, RtdeOptions};
 use super::simulator::Simulator;
 use super::simulator::ascii::AsciiSimulator;
 use super::simulator::emscon::EmsconSimulator;
 use super::simulator::geocom::GeocomSimulator;
+use super::simulator::joints::JointsSimulator;
+use super::simulator::kuka::KukaSimulator;
 use super::simulator::ndi::NdiSimulator;
 use super::simulator::rtde::RtdeSimulator;
 use crate::session::wire::{Route, WireAddress, WireProtocol};
@@ -95,6 +99,8 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
             let RtdeSettings { frequency_hz } = read(options)?;
             Ok(Box::new(Rtde::new(RtdeOptions { frequency: frequency_hz, ..RtdeOptions::default() })))
         }
+        WireProtocol::Joints => without_options(address, options).map(|()| Box::<JointLines>::default() as _),
+        WireProtocol::Kuka => without_options(address, options).map(|()| Box::<Kuka>::default() as _),
         WireProtocol::Ascii => {
             let preset = options.and_then(|name| name.parse::<Preset>().ok());
             let mut options: AsciiOptions = match preset {
@@ -119,6 +125,11 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
     }
 }
 
+/// Refuses options of a protocol that has none.
+fn without_options(address: &WireAddress, options: Option<&str>) -> Result<(), String> {
+    options.map_or(Ok(()), |_| Err(format!("{} has no options", address.protocol)))
+}
+
 /// The simulator of a protocol. `faults` are given by their names.
 ///
 /// # Errors
@@ -127,6 +138,8 @@ pub(super) fn simulator(protocol: WireProtocol, faults: &[String]) -> Result<Box
     Ok(match protocol {
         WireProtocol::Emscon => Box::new(EmsconSimulator::new(parsed(faults)?)),
         WireProtocol::Rtde => Box::new(RtdeSimulator::new(parsed(faults)?)),
+        WireProtocol::Joints => Box::new(JointsSimulator::new(parsed(faults)?)),
+        WireProtocol::Kuka => Box::new(KukaSimulator::new(parsed(faults)?)),
         WireProtocol::Ascii => Box::new(AsciiSimulator::new(rehearsal_ascii(), parsed(faults)?)?),
         WireProtocol::Geocom => Box::new(GeocomSimulator::new(parsed(faults)?)),
         WireProtocol::Ndi => Box::new(NdiSimulator::new([0.0; 3], parsed(faults)?)),
@@ -159,7 +172,11 @@ pub(super) fn rehearsal_options(protocol: WireProtocol) -> Option<String> {
     match protocol {
         WireProtocol::Ascii => Some(REHEARSAL_ASCII.to_owned()),
         WireProtocol::Emscon => Some(format!("(measure_ms: {})", MEASURE_MS.start())),
-        WireProtocol::Geocom | WireProtocol::Ndi | WireProtocol::Rtde => None,
+        WireProtocol::Geocom
+        | WireProtocol::Ndi
+        | WireProtocol::Rtde
+        | WireProtocol::Joints
+        | WireProtocol::Kuka => None,
     }
 }
 

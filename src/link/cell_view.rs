@@ -11,21 +11,17 @@ use super::transport::Stopwatch;
 use super::{LinkError, SimulatedCell};
 use crate::profile::Profile;
 use crate::session::reading::MeasureRequest;
-
-/// Number of joints that a controller reports.
-const JOINTS: usize = 6;
+use crate::session::wire::WireProtocol;
 
 /// Checks that a controller can report the joints of this arm.
 ///
 /// # Errors
 /// [`LinkError::SetUp`]: the numbers of joints differ.
-pub(super) fn check_joints(profile: &Profile) -> Result<(), LinkError> {
+pub(super) fn check_joints(profile: &Profile, protocol: WireProtocol) -> Result<(), LinkError> {
     let joints = profile.chain().dof();
-    if joints == JOINTS {
-        return Ok(());
-    }
+    let Some(reported) = protocol.reported_joints().filter(|reported| *reported != joints) else { return Ok(()) };
     Err(LinkError::SetUp(format!(
-        "'{}' has {joints} joints, but an RTDE controller reports {JOINTS}: \
+        "'{}' has {joints} joints, but {protocol} reports {reported}: \
          choose the instrument without the robot, or the profile of that robot",
         profile.name()
     )))
@@ -68,12 +64,11 @@ impl CellView {
         Self { cell, advance, request: None, shots: Vec::new(), taken: 0, motion: None, clock: Stopwatch::start() }
     }
 
-    /// Moves the robot to another pose at once and starts its measurement. Returns the time from which the controller reports
-    /// the new pose (s).
+    /// Moves the robot to another pose at once and starts its measurement.
     ///
     /// # Errors
     /// The request does not fit this cell.
-    pub(super) fn move_to(&mut self, request: &MeasureRequest) -> Result<f64, LinkError> {
+    pub(super) fn move_to(&mut self, request: &MeasureRequest) -> Result<(), LinkError> {
         self.shots = match self.cell.shots(request) {
             Ok(shots) => shots,
             Err(LinkError::BeamBroken) => Vec::new(),
@@ -82,7 +77,7 @@ impl CellView {
         self.taken = 0;
         self.motion = None;
         self.request = Some(request.clone());
-        Ok(self.clock.now().as_secs_f64())
+        Ok(())
     }
 
     /// Starts a move to another pose that takes this long.
@@ -136,9 +131,8 @@ impl CellView {
     }
 
     fn joints(&self) -> JointState {
-        let mut positions = self.current_request().map_or_else(Vec::new, |request| self.cell.actual_joints(&request));
-        // The controller reports six joints, whatever the arm.
-        positions.resize(JOINTS, 0.0);
+        let at_zero = || vec![0.0; self.cell.truth().arm.chain.dof()];
+        let positions = self.current_request().map_or_else(at_zero, |request| self.cell.actual_joints(&request));
         JointState { controller_time: self.clock.now().as_secs_f64(), ..JointState::at(positions) }
     }
 }

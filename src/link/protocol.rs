@@ -18,6 +18,8 @@ pub mod emscon;
 pub mod error_streak;
 mod excerpt;
 pub mod geocom;
+pub mod joints;
+pub mod kuka;
 pub mod lines;
 pub mod ndi;
 pub mod outbox;

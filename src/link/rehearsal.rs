@@ -47,7 +47,7 @@ impl Rehearsal {
         for wire in &simulation.wires {
             let protocol = wire.protocol();
             if protocol.is_robot() {
-                check_joints(profile)?;
+                check_joints(profile, protocol)?;
             }
             if wire.is_serial() && !protocol.has_serial_lines() {
                 return Err(LinkError::SetUp(format!("{protocol} does not use serial lines; use tcp")));
@@ -95,8 +95,7 @@ impl Link for Rehearsal {
     }
 
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError> {
-        let since = self.view.lock().move_to(request)?;
-        self.wired.robot_moved(since);
+        self.view.lock().move_to(request)?;
         let mut reading = self.wired.measure(request, keep_going)?;
         // Time is virtual, as without wires.
         reading.seconds = self.view.lock().cell.time(request, reading.shots);

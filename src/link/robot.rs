@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::protocol::{CONTROLLER, Failure, Identity};
 use super::wire::{RawLog, Wire, WireEvent};
-use super::wired::{joints_timeout, link_ended, no_robot};
+use super::wired::{joints_timeout, link_ended};
 use super::{LinkError, LinkEvent, build};
 use crate::session::reading::LiveReading;
 use crate::session::wire::WireAddress;
@@ -35,9 +35,7 @@ impl WiredRobot {
     /// # Errors
     /// [`LinkError::SetUp`]: not an address of a robot, an invalid option, or a thread that cannot be started.
     pub fn new(address: &WireAddress, options: Option<&str>, log: Option<&RawLog>) -> Result<Self, LinkError> {
-        if !address.protocol.is_robot() {
-            return Err(LinkError::SetUp(no_robot(address)));
-        }
+        let address = &WireAddress::of_robot(&address.to_string()).map_err(LinkError::SetUp)?;
         let protocol = build::protocol(address, options).map_err(LinkError::SetUp)?;
         let wire = Wire::start(address.clone(), protocol, log.cloned())
             .map_err(|error| LinkError::SetUp(format!("cannot start the link: {error}")))?;

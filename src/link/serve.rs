@@ -240,7 +240,7 @@ impl Served {
         faults: &[String],
     ) -> Result<Self, LinkError> {
         if protocol.is_robot() {
-            check_joints(profile)?;
+            check_joints(profile, protocol)?;
         }
         if listen.is_none() && !protocol.has_serial_lines() {
             return Err(LinkError::SetUp(format!("{protocol} does not use serial lines; it needs a TCP address")));
@@ -254,14 +254,20 @@ impl Served {
         Ok(Self { view, address, options: build::rehearsal_options(protocol), robot_title, number: 0, stop })
     }
 
-    /// Serves the controller of the same robot at a TCP address as well, and returns its address.
+    /// Serves the controller of the same robot as well, and returns its address. `listen` is a TCP address, with the protocol in front
+    /// unless it is RTDE, such as `kuka:127.0.0.1:7000`.
     ///
     /// # Errors
-    /// [`LinkError::SetUp`]: a robot that RTDE cannot report, or a port that is not available.
+    /// [`LinkError::SetUp`]: a robot that the protocol cannot report, or a port that is not available.
     pub fn listen_for_robot(&self, profile: &Profile, listen: &str) -> Result<String, LinkError> {
-        check_joints(profile)?;
+        let named = WireProtocol::ALL
+            .into_iter()
+            .filter(|protocol| protocol.is_robot())
+            .find_map(|protocol| Some((protocol, listen.strip_prefix(protocol.name())?.strip_prefix(':')?)));
+        let (protocol, listen) = named.unwrap_or((WireProtocol::Rtde, listen));
+        check_joints(profile, protocol)?;
         let endpoint = Endpoint::Tcp(listen.to_owned());
-        serve(WireProtocol::Rtde, &[], &endpoint, self.view.clone(), Speedup(1), &self.stop)
+        serve(protocol, &[], &endpoint, self.view.clone(), Speedup(1), &self.stop)
     }
 
     /// Address for the client.

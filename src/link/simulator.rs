@@ -10,6 +10,8 @@ pub mod bench;
 pub mod emscon;
 pub mod fault;
 pub mod geocom;
+pub mod joints;
+pub mod kuka;
 pub mod ndi;
 pub mod rtde;
 mod schedule;

@@ -16,6 +16,8 @@ use nalgebra::Point3;
 use super::protocol::ascii::{AsciiOptions, AsciiProtocol};
 use super::protocol::emscon::{Emscon, EmsconOptions};
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
+use super::protocol::joints::JointLines;
+use super::protocol::kuka::Kuka;
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::Rtde;
 use super::protocol::{JointState, Protocol, Shot};
@@ -24,6 +26,8 @@ use super::simulator::PointSource;
 use super::simulator::ascii::AsciiFault;
 use super::simulator::emscon::EmsconFault;
 use super::simulator::geocom::GeocomFault;
+use super::simulator::joints::JointsFault;
+use super::simulator::kuka::KukaFault;
 use super::simulator::ndi::NdiFault;
 use super::simulator::rtde::RtdeFault;
 use super::transport::Stopwatch;
@@ -126,6 +130,8 @@ fn quick(protocol: WireProtocol) -> Box<dyn Protocol> {
             Box::new(NdiProtocol::new(NdiOptions { timeout_s: 0.5, ..NdiOptions::default() }).unwrap())
         }
         WireProtocol::Rtde => Box::new(Rtde::default()),
+        WireProtocol::Joints => Box::new(JointLines::default()),
+        WireProtocol::Kuka => Box::new(Kuka::default()),
     }
 }
 
@@ -133,6 +139,8 @@ fn quick(protocol: WireProtocol) -> Box<dyn Protocol> {
 fn fault_names(protocol: WireProtocol) -> Vec<&'static str> {
     match protocol {
         WireProtocol::Emscon => EmsconFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Joints => JointsFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Kuka => KukaFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Rtde => RtdeFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Ascii => AsciiFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Geocom => GeocomFault::ALL.iter().map(|fault| fault.name()).collect(),
@@ -162,6 +170,22 @@ impl Bench {
         };
         let instrument = wire(protocol, endpoint, of_instrument, 20);
         let robot = of_robot.map(|names| wire(WireProtocol::Rtde, &Endpoint::Loopback, names, 1));
+        Self::over(protocol, instrument, robot, stage, stop)
+    }
+
+    /// With a robot of this protocol.
+    fn with_robot(robot: WireProtocol, faults_of_robot: &[&str]) -> Self {
+        let stage = Stage::new();
+        let stop = Arc::new(AtomicBool::new(false));
+        let wire = |protocol: WireProtocol, names: &[&str], speedup| {
+            let served = serve(protocol, &faults(names), &Endpoint::Loopback, stage.clone(), Speedup(speedup), &stop);
+            Wire::start(served.unwrap().parse().unwrap(), quick(protocol), None).unwrap()
+        };
+        let (instrument, robot) = (wire(WireProtocol::Emscon, &[], 20), wire(robot, faults_of_robot, 1));
+        Self::over(WireProtocol::Emscon, instrument, Some(robot), stage, stop)
+    }
+
+    fn over(protocol: WireProtocol, instrument: Wire, robot: Option<Wire>, stage: Stage, stop: Arc<AtomicBool>) -> Self {
         let wired = Wired::over(protocol.to_string(), instrument, robot).simulated(Box::new(|| ()));
         Self { stage, wired, stop }
     }

@@ -13,7 +13,7 @@ use super::wire::{Latest, RawLog, Wire, WireEvent, WireMonitor};
 use super::{Link, LinkError, LinkEvent, build};
 use crate::profile::Profile;
 use crate::session::reading::{JointScatter, LiveReading, MeasureRequest, Reading, Remark};
-use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
+use crate::session::wire::{LinkChoice, WireAddress};
 use crate::units::to_mm;
 
 /// Longest duration of a set-up: trackers take more than a minute to initialise.
@@ -69,8 +69,6 @@ pub struct Wired {
     previous_point: Option<(Point3<f64>, Option<u32>)>,
     /// Set for a simulated instrument.
     before_shot: Option<BeforeShot>,
-    /// For a simulated robot: joint values before this time belong to its previous position (s, controller's clock).
-    robot_since: f64,
     joints: JointRecord,
 }
 
@@ -107,10 +105,7 @@ impl Wired {
             let message = format!("'{address}' is a robot controller: it reports joint angles, not SMR positions");
             return Err(LinkError::SetUp(message));
         }
-        let robot = choice.robot.as_deref().map(str::parse::<WireAddress>).transpose().map_err(LinkError::SetUp)?;
-        if let Some(robot) = robot.as_ref().filter(|robot| !robot.protocol.is_robot()) {
-            return Err(LinkError::SetUp(no_robot(robot)));
-        }
+        let robot = choice.robot.as_deref().map(WireAddress::of_robot).transpose().map_err(LinkError::SetUp)?;
         let start = |address: WireAddress, options: Option<&str>| {
             let protocol = build::protocol(&address, options).map_err(LinkError::SetUp)?;
             Wire::start(address, protocol, log.cloned())
@@ -126,7 +121,13 @@ impl Wired {
     /// # Errors
     /// [`LinkError::SetUp`]: the numbers of joints differ.
     pub fn check_arm(profile: &Profile, choice: &LinkChoice) -> Result<(), LinkError> {
-        if choice.robot.is_some() { check_joints(profile) } else { Ok(()) }
+        match &choice.robot {
+            None => Ok(()),
+            Some(robot) => {
+                let address = WireAddress::of_robot(robot).map_err(LinkError::SetUp)?;
+                check_joints(profile, address.protocol)
+            }
+        }
     }
 
     /// An instrument on a wire that was started already.
@@ -142,7 +143,6 @@ impl Wired {
             sigmas: VecDeque::new(),
             previous_point: None,
             before_shot: None,
-            robot_since: f64::NEG_INFINITY,
             joints: JointRecord::default(),
         }
     }
@@ -152,11 +152,6 @@ impl Wired {
     pub(super) fn simulated(mut self, before_shot: BeforeShot) -> Self {
         self.before_shot = Some(before_shot);
         self
-    }
-
-    /// Tells the link that the simulated robot moved at this time (s, controller's clock).
-    pub(super) const fn robot_moved(&mut self, since: f64) {
-        self.robot_since = since;
     }
 
     /// Identity of the instrument, once it is connected.
@@ -187,7 +182,7 @@ impl Wired {
                 }
             }
             for (at, state) in robot.take_joints() {
-                if at >= self.joints.since && state.controller_time > self.robot_since {
+                if at >= self.joints.since {
                     self.joints.latest = Some(at);
                     self.joints.watch.feed(&state);
                 }
@@ -566,11 +561,6 @@ pub(super) fn joints_timeout(waited: Duration) -> Failure {
 /// The thread of the link has ended.
 pub(super) fn link_ended() -> Failure {
     Failure::Disconnected("the link has ended".to_owned())
-}
-
-/// An address that is not one of a robot's controller.
-pub(super) fn no_robot(address: &WireAddress) -> String {
-    format!("'{address}' is not a robot controller; use '{}'", WireProtocol::ROBOT_ADDRESS)
 }
 
 /// Why the joint values of a measurement cannot be used, as an error.

@@ -7,6 +7,7 @@
 //! ascii:listen:0.0.0.0:5000       a client that connects here
 //! ascii:udp:0.0.0.0:5000          datagrams that arrive here
 //! rtde:192.168.1.10               a robot
+//! joints:listen:0.0.0.0:5001      lines of joint values; `ascii:` means the same where an address of a robot is expected
 //! ```
 
 use std::fmt;
@@ -30,11 +31,16 @@ pub enum WireProtocol {
     Ndi,
     /// Universal Robots RTDE: joint angles of the robot.
     Rtde,
+    /// Lines of text with the joint values of a robot.
+    Joints,
+    /// KUKA controller with KUKAVARPROXY or C3 Bridge: joint angles of the robot.
+    Kuka,
 }
 
 impl WireProtocol {
     /// All protocols.
-    pub const ALL: [Self; 5] = [Self::Emscon, Self::Ascii, Self::Geocom, Self::Ndi, Self::Rtde];
+    pub const ALL: [Self; 7] =
+        [Self::Emscon, Self::Ascii, Self::Geocom, Self::Ndi, Self::Rtde, Self::Joints, Self::Kuka];
 
     /// Name in addresses.
     pub const fn name(self) -> &'static str {
@@ -44,6 +50,8 @@ impl WireProtocol {
             Self::Geocom => "geocom",
             Self::Ndi => "ndi",
             Self::Rtde => "rtde",
+            Self::Joints => "joints",
+            Self::Kuka => "kuka",
         }
     }
 
@@ -53,7 +61,8 @@ impl WireProtocol {
             Self::Emscon => Some(700),
             Self::Ndi => Some(8765),
             Self::Rtde => Some(30004),
-            Self::Ascii | Self::Geocom => None,
+            Self::Kuka => Some(7000),
+            Self::Ascii | Self::Geocom | Self::Joints => None,
         }
     }
 
@@ -65,17 +74,28 @@ impl WireProtocol {
     /// Default speed of a serial line (baud).
     const fn usual_speed(self) -> Option<u32> {
         match self {
-            Self::Ascii | Self::Geocom | Self::Ndi => Some(9600),
-            Self::Emscon | Self::Rtde => None,
+            Self::Ascii | Self::Geocom | Self::Ndi | Self::Joints => Some(9600),
+            Self::Emscon | Self::Rtde | Self::Kuka => None,
         }
     }
 
     /// Form of the address of a robot's controller, for hints.
-    pub const ROBOT_ADDRESS: &str = "rtde:HOST";
+    pub const ROBOT_ADDRESS: &str = "rtde:HOST, kuka:HOST or ascii:tcp:HOST:PORT";
 
     /// Whether this is the protocol of a robot's controller, which reports joint angles and not SMR positions.
     pub const fn is_robot(self) -> bool {
-        matches!(self, Self::Rtde)
+        match self {
+            Self::Rtde | Self::Joints | Self::Kuka => true,
+            Self::Emscon | Self::Ascii | Self::Geocom | Self::Ndi => false,
+        }
+    }
+
+    /// Number of joints that the controller reports, whatever the arm; `None` if it reports those of the arm.
+    pub const fn reported_joints(self) -> Option<usize> {
+        match self {
+            Self::Rtde | Self::Kuka => Some(6),
+            Self::Joints | Self::Emscon | Self::Ascii | Self::Geocom | Self::Ndi => None,
+        }
     }
 }
 
@@ -176,7 +196,7 @@ impl FromStr for WireAddress {
             }
         };
         match (&route, protocol) {
-            (Route::Udp { .. }, WireProtocol::Ascii) => {}
+            (Route::Udp { .. }, WireProtocol::Ascii | WireProtocol::Joints) => {}
             (Route::Udp { .. }, _) => return Err(format!("{protocol} does not use UDP; use tcp")),
             (Route::Serial { .. }, _) if !protocol.has_serial_lines() => {
                 return Err(format!("{protocol} does not use serial lines; use tcp"));
@@ -184,6 +204,23 @@ impl FromStr for WireAddress {
             _ => {}
         }
         Ok(Self { protocol, route })
+    }
+}
+
+impl WireAddress {
+    /// Reads the address of a robot's controller. Here `ascii:` means lines of joint values.
+    ///
+    /// # Errors
+    /// The text is not an address, or one of an instrument.
+    pub fn of_robot(text: &str) -> Result<Self, String> {
+        let mut address: Self = text.parse()?;
+        if address.protocol == WireProtocol::Ascii {
+            address.protocol = WireProtocol::Joints;
+        }
+        if address.protocol.is_robot() {
+            return Ok(address);
+        }
+        Err(format!("'{address}' is not a robot controller; use {}", WireProtocol::ROBOT_ADDRESS))
     }
 }
 
@@ -263,6 +300,15 @@ mod tests {
             assert_eq!(full(text).as_deref(), Ok(wanted), "{text}");
             assert_eq!(full(wanted).as_deref(), Ok(wanted), "{wanted}");
         }
+    }
+
+    #[test]
+    fn lines_where_a_robot_is_expected_are_lines_of_joints() {
+        let robot = |text: &str| WireAddress::of_robot(text).map(|address| address.to_string());
+        assert_eq!(robot("ascii:listen:0.0.0.0:5001").as_deref(), Ok("joints:listen:0.0.0.0:5001"));
+        assert_eq!(robot("joints:udp:0.0.0.0:5001").as_deref(), Ok("joints:udp:0.0.0.0:5001"));
+        assert_eq!(robot("kuka:10.0.0.1").as_deref(), Ok("kuka:tcp:10.0.0.1:7000"));
+        assert!(robot("emscon:10.0.0.1").unwrap_err().contains("is not a robot controller"));
     }
 
     #[test]

@@ -30,6 +30,23 @@ fn the_joints_of_the_robot_come_with_the_point() {
 }
 
 #[test]
+fn every_kind_of_controller_reports_the_joints_and_its_moves_are_noticed() {
+    for protocol in WireProtocol::ALL.into_iter().filter(|protocol| protocol.is_robot()) {
+        let mut bench = Bench::with_robot(protocol, &[]);
+        bench.wired.connect().unwrap();
+        let stood = bench.stage.lock().joints.positions.clone();
+        let reading = bench.measure().unwrap();
+        let told = reading.configuration.unwrap();
+        let difference = told.iter().zip(&stood).map(|(told, stood)| (told - stood).abs()).fold(0.0, f64::max);
+        assert!(difference < 1e-8 && told.len() == 6, "{protocol}: {told:?}");
+        assert!(reading.joint_scatter.is_some_and(|scatter| scatter.count >= 4), "{protocol}");
+        bench.stage.lock().turns = 0.01;
+        let error = bench.measure().unwrap_err();
+        assert!(matches!(&error, LinkError::Robot(why) if why.contains("moved during")), "{protocol}: {error:?}");
+    }
+}
+
+#[test]
 fn a_robot_that_moves_is_waited_for_and_then_refused() {
     let mut bench = bench(&["moving@1x*"]);
     let before = bench.stage.shots();

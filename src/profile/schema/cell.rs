@@ -59,7 +59,9 @@ pub(super) fn link(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Link
 /// Decodes the address of an instrument or of a robot's controller.
 fn wire_address(ast: &Ast, is_robot: bool, findings: &mut Findings<'_>) -> Option<WireAddress> {
     let hint = if is_robot { "write \"rtde:192.168.0.10\"" } else { "write \"emscon:192.168.0.2\", see docs/links.md" };
-    let problem = match text(ast, findings)?.parse::<WireAddress>() {
+    let written = text(ast, findings)?;
+    let address = if is_robot { WireAddress::of_robot(&written).or_else(|_| written.parse()) } else { written.parse() };
+    let problem = match address {
         Ok(address) if address.protocol.is_robot() == is_robot => return Some(address),
         Ok(address) if is_robot => format!("{} is a protocol of instruments, not of robots", address.protocol),
         Ok(address) => format!("{} is a protocol of robots; it belongs in 'robot'", address.protocol),

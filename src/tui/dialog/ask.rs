@@ -6,7 +6,7 @@ use crate::session::measurements::Layout;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
-use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
+use crate::session::wire::{LinkChoice, WireAddress};
 use crate::tui::form::{TextField, Validator};
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Intent, reading};
@@ -105,7 +105,7 @@ pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
                 &proposed.options.unwrap_or_default(),
                 "Empty: defaults. For ascii a preset such as xyz or bridge; otherwise as in (measure_ms: 2000).",
             )
-            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, if the robot controller reports its joint angles. Empty: it does not.")
+            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, kuka:HOST or ascii:tcp:HOST:PORT, if the robot controller reports its joint angles. Empty: it does not.")
             .pick(
                 "automatic measuring",
                 &["no", "yes"],
@@ -123,10 +123,8 @@ fn link(values: &[String]) -> Result<Intent, String> {
     }
     let some = |text: &String| (!text.trim().is_empty()).then(|| text.trim().to_owned());
     let robot = some(robot);
-    if let Some(robot) = &robot
-        && !robot.parse::<WireAddress>()?.protocol.is_robot()
-    {
-        return Err(format!("'{robot}' is not a robot controller; use {}", WireProtocol::ROBOT_ADDRESS));
+    if let Some(robot) = &robot {
+        WireAddress::of_robot(robot)?;
     }
     let is_automatic = automatic == "yes";
     let choice = LinkChoice { address: parsed.to_string(), options: some(options), robot, is_automatic };

@@ -7,7 +7,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Input, MockCell, START, Tape, is_answer};
-use crate::link::protocol::outbox::{MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES};
+use crate::link::protocol::outbox::{MAX_JOINTS, MAX_OFFERED, MAX_OUTPUTS, MAX_STATUSES};
 use crate::link::protocol::{Protocol, ProtocolEvent};
 use crate::link::simulator::{Output, Simulator};
 
@@ -18,7 +18,7 @@ const ROUNDS: u64 = 50;
 const INPUTS: u32 = 20;
 
 /// Most queued events besides answers and ends: statuses of both severities, offered points, a live point and joints.
-const MAX_EVENTS: usize = 2 * MAX_STATUSES + MAX_OFFERED + 2;
+const MAX_EVENTS: usize = 2 * MAX_STATUSES + MAX_OFFERED + MAX_JOINTS + 1;
 
 /// Most bytes that a simulator may queue for a peer that does not read.
 const MAX_BYTES: usize = 2 << 20;
