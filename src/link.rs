@@ -6,6 +6,7 @@
 
 mod build;
 mod cell_view;
+mod ports;
 pub mod protocol;
 mod rehearsal;
 mod replay;
@@ -23,6 +24,7 @@ use std::time::Duration;
 
 use thiserror::Error;
 
+pub use ports::{SerialPortName, serial_ports};
 pub use rehearsal::Rehearsal;
 pub use replay::{Replay, ReplayRow};
 pub use robot::WiredRobot;

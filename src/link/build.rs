@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::protocol::Protocol;
+use super::protocol::abb::{Abb, AbbOptions};
 use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Checksum, Column, Layout, Mode, Preset};
 use super::protocol::emscon::{Emscon, EmsconOptions};
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
@@ -16,6 +17,7 @@ use super::protocol::kuka::Kuka;
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::{Rtde, RtdeOptions};
 use super::simulator::Simulator;
+use super::simulator::abb::AbbSimulator;
 use super::simulator::ascii::AsciiSimulator;
 use super::simulator::emscon::EmsconSimulator;
 use super::simulator::geocom::GeocomSimulator;
@@ -100,6 +102,10 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
             Ok(Box::new(Rtde::new(RtdeOptions { frequency: frequency_hz, ..RtdeOptions::default() })))
         }
         WireProtocol::Joints => without_options(address, options).map(|()| Box::<JointLines>::default() as _),
+        WireProtocol::Abb => {
+            let options: AbbOptions = read(options)?;
+            Ok(Box::new(Abb::new(options)?))
+        }
         WireProtocol::Kuka => without_options(address, options).map(|()| Box::<Kuka>::default() as _),
         WireProtocol::Ascii => {
             let preset = options.and_then(|name| name.parse::<Preset>().ok());
@@ -139,6 +145,7 @@ pub(super) fn simulator(protocol: WireProtocol, faults: &[String]) -> Result<Box
         WireProtocol::Emscon => Box::new(EmsconSimulator::new(parsed(faults)?)),
         WireProtocol::Rtde => Box::new(RtdeSimulator::new(parsed(faults)?)),
         WireProtocol::Joints => Box::new(JointsSimulator::new(parsed(faults)?)),
+        WireProtocol::Abb => Box::new(AbbSimulator::new(parsed(faults)?)),
         WireProtocol::Kuka => Box::new(KukaSimulator::new(parsed(faults)?)),
         WireProtocol::Ascii => Box::new(AsciiSimulator::new(rehearsal_ascii(), parsed(faults)?)?),
         WireProtocol::Geocom => Box::new(GeocomSimulator::new(parsed(faults)?)),
@@ -176,7 +183,8 @@ pub(super) fn rehearsal_options(protocol: WireProtocol) -> Option<String> {
         | WireProtocol::Ndi
         | WireProtocol::Rtde
         | WireProtocol::Joints
-        | WireProtocol::Kuka => None,
+        | WireProtocol::Kuka
+        | WireProtocol::Abb => None,
     }
 }
 

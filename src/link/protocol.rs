@@ -11,6 +11,7 @@
 
 #![warn(missing_docs)]
 
+pub mod abb;
 pub mod ascii;
 pub mod backoff;
 pub mod crc;
@@ -18,9 +19,11 @@ pub mod emscon;
 pub mod error_streak;
 mod excerpt;
 pub mod geocom;
+pub mod http;
 pub mod joints;
 pub mod kuka;
 pub mod lines;
+pub mod md5;
 pub mod ndi;
 pub mod outbox;
 pub mod receive_buffer;

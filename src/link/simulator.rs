@@ -4,6 +4,7 @@
 //! [`PointSource`], so that one simulated cell serves all of them. Faults are named and counted, never random, so that tests can
 //! rely on them.
 
+pub mod abb;
 pub mod ascii;
 #[cfg(test)]
 pub mod bench;

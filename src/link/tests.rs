@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Point3;
 
+use super::protocol::abb::{Abb, AbbOptions};
 use super::protocol::ascii::{AsciiOptions, AsciiProtocol};
 use super::protocol::emscon::{Emscon, EmsconOptions};
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
@@ -23,6 +24,7 @@ use super::protocol::rtde::Rtde;
 use super::protocol::{JointState, Protocol, Shot};
 use super::serve::{Endpoint, Speedup, serve};
 use super::simulator::PointSource;
+use super::simulator::abb::AbbFault;
 use super::simulator::ascii::AsciiFault;
 use super::simulator::emscon::EmsconFault;
 use super::simulator::geocom::GeocomFault;
@@ -132,6 +134,7 @@ fn quick(protocol: WireProtocol) -> Box<dyn Protocol> {
         WireProtocol::Rtde => Box::new(Rtde::default()),
         WireProtocol::Joints => Box::new(JointLines::default()),
         WireProtocol::Kuka => Box::new(Kuka::default()),
+        WireProtocol::Abb => Box::new(Abb::new(AbbOptions::default()).unwrap()),
     }
 }
 
@@ -141,6 +144,7 @@ fn fault_names(protocol: WireProtocol) -> Vec<&'static str> {
         WireProtocol::Emscon => EmsconFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Joints => JointsFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Kuka => KukaFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Abb => AbbFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Rtde => RtdeFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Ascii => AsciiFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Geocom => GeocomFault::ALL.iter().map(|fault| fault.name()).collect(),

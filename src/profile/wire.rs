@@ -35,12 +35,14 @@ pub enum WireProtocol {
     Joints,
     /// KUKA controller with KUKAVARPROXY or C3 Bridge: joint angles of the robot.
     Kuka,
+    /// ABB controller with Robot Web Services of RobotWare 6: joint angles of the robot.
+    Abb,
 }
 
 impl WireProtocol {
     /// All protocols.
-    pub const ALL: [Self; 7] =
-        [Self::Emscon, Self::Ascii, Self::Geocom, Self::Ndi, Self::Rtde, Self::Joints, Self::Kuka];
+    pub const ALL: [Self; 8] =
+        [Self::Emscon, Self::Ascii, Self::Geocom, Self::Ndi, Self::Rtde, Self::Joints, Self::Kuka, Self::Abb];
 
     /// Name in addresses.
     pub const fn name(self) -> &'static str {
@@ -52,6 +54,7 @@ impl WireProtocol {
             Self::Rtde => "rtde",
             Self::Joints => "joints",
             Self::Kuka => "kuka",
+            Self::Abb => "abb",
         }
     }
 
@@ -62,6 +65,7 @@ impl WireProtocol {
             Self::Ndi => Some(8765),
             Self::Rtde => Some(30004),
             Self::Kuka => Some(7000),
+            Self::Abb => Some(80),
             Self::Ascii | Self::Geocom | Self::Joints => None,
         }
     }
@@ -75,17 +79,17 @@ impl WireProtocol {
     const fn usual_speed(self) -> Option<u32> {
         match self {
             Self::Ascii | Self::Geocom | Self::Ndi | Self::Joints => Some(9600),
-            Self::Emscon | Self::Rtde | Self::Kuka => None,
+            Self::Emscon | Self::Rtde | Self::Kuka | Self::Abb => None,
         }
     }
 
     /// Form of the address of a robot's controller, for hints.
-    pub const ROBOT_ADDRESS: &str = "rtde:HOST, kuka:HOST or ascii:tcp:HOST:PORT";
+    pub const ROBOT_ADDRESS: &str = "rtde:HOST, abb:HOST, kuka:HOST or ascii:tcp:HOST:PORT";
 
     /// Whether this is the protocol of a robot's controller, which reports joint angles and not SMR positions.
     pub const fn is_robot(self) -> bool {
         match self {
-            Self::Rtde | Self::Joints | Self::Kuka => true,
+            Self::Rtde | Self::Joints | Self::Kuka | Self::Abb => true,
             Self::Emscon | Self::Ascii | Self::Geocom | Self::Ndi => false,
         }
     }
@@ -93,7 +97,7 @@ impl WireProtocol {
     /// Number of joints that the controller reports, whatever the arm; `None` if it reports those of the arm.
     pub const fn reported_joints(self) -> Option<usize> {
         match self {
-            Self::Rtde | Self::Kuka => Some(6),
+            Self::Rtde | Self::Kuka | Self::Abb => Some(6),
             Self::Joints | Self::Emscon | Self::Ascii | Self::Geocom | Self::Ndi => None,
         }
     }

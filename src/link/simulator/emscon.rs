@@ -115,8 +115,12 @@ impl EmsconSimulator {
         }
     }
 
-    /// Refuses a command if a fault is planned for it.
+    /// Refuses a command, or accepts it without effect, if a fault is planned for it.
     fn is_refused(&mut self, command: CommandId) -> bool {
+        if command == CommandId::SetStationaryModeParams && self.faults.strikes(EmsconFault::OwnTime) {
+            self.send(PacketWriter::reply(command, ResultStatus::Other(11)).finish());
+            return true;
+        }
         if command == CommandId::SetStationaryModeParams && self.faults.strikes(EmsconFault::NoStationary) {
             self.send(PacketWriter::reply(command, ResultStatus::NotImplemented).finish());
             return true;

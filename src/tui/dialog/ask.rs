@@ -105,7 +105,7 @@ pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
                 &proposed.options.unwrap_or_default(),
                 "Empty: defaults. For ascii a preset such as xyz or bridge; otherwise as in (measure_ms: 2000).",
             )
-            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, kuka:HOST or ascii:tcp:HOST:PORT, if the robot controller reports its joint angles. Empty: it does not.")
+            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, abb:HOST, kuka:HOST or ascii:tcp:HOST:PORT, if the robot controller reports its joint angles. Empty: it does not.")
             .pick(
                 "automatic measuring",
                 &["no", "yes"],

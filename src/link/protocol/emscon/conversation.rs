@@ -246,7 +246,7 @@ impl Conversation {
     /// Handles an answer in the set-up.
     fn take_step(&mut self, status: ResultStatus, reply: Option<&Reply>, now: Moment) {
         let outcome = match reply {
-            Some(reply) if status == ResultStatus::AllOk => self.set_up.answered(reply),
+            Some(reply) if status.is_done() => self.set_up.answered(reply),
             _ => self.set_up.refused(status),
         };
         match outcome {

@@ -320,7 +320,8 @@ impl SetUp {
         let text = format!("measurement time: {milliseconds} ms, distance meter {adm} (read back)");
         match (is_right, is_check) {
             (true, _) => self.checked.push(text),
-            (false, true) => self.warnings.push(text),
+            // Some trackers choose both on their own; a point does not depend on them.
+            (false, true) => self.checked.push(format!("{text}, which the tracker chooses")),
             (false, false) => self.write_next(Setting::Stationary),
         }
     }

@@ -250,6 +250,12 @@ impl MeasurementMode {
 }
 
 impl ResultStatus {
+    /// Whether the command was carried out: with success, or with a parameter that was set to the nearest possible value. What was
+    /// set is read back in any case.
+    pub const fn is_done(self) -> bool {
+        matches!(self, Self::AllOk | Self::Other(11 | 13 | 15 | 17 | 19 | 21))
+    }
+
     /// The failure for a status other than success, during the action `what`.
     pub fn failure(self, what: &str) -> Failure {
         let text = format!("{what}: {}", self.described());

@@ -15,6 +15,7 @@ faults! {
         Metres "metres" "Accepts new units but keeps metres. Occasion: setting the units.",
         TryStuck "try-stuck" "Accepts new system settings but stays in try mode. Occasion: setting them.",
         NoStationary "no-stationary" "Does not support the duration of a measurement. Occasion: setting it.",
+        OwnTime "own-time" "Accepts another duration of a measurement with status 11 but keeps its own. Occasion: setting it.",
         Busy "busy" "Answers that the server is busy.",
         NotReady "not-ready" "Answers with the error 'measurement status not ready'.",
         Mute "mute" "Stops answering until the next connection.",

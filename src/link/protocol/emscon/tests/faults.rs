@@ -284,6 +284,17 @@ fn what_an_instrument_does_not_know_is_a_warning_where_points_do_not_depend_on_i
 }
 
 #[test]
+fn a_tracker_that_keeps_its_own_duration_is_no_cause_for_a_warning() {
+    let mut bench = bench(&[Planned::always(EmsconFault::OwnTime)]);
+    let events = bench.settle();
+    let Some(ProtocolEvent::Ready(identity)) = events.last() else { panic!("{events:?}") };
+    assert_eq!(identity.warnings, Vec::<String>::new());
+    let said = "measurement time: 2500 ms, distance meter 0 (read back), which the tracker chooses";
+    assert!(identity.checked.iter().any(|text| text == said), "{identity:?}");
+    assert_recovered(&mut bench);
+}
+
+#[test]
 fn a_scale_of_the_tracker_ends_the_set_up_and_a_shift_is_a_warning() {
     let mut unused = ready(&[Planned::once(EmsconFault::UnusedScale)]);
     let Some(ProtocolEvent::Ready(identity)) = unused.settle().pop() else { panic!() };
