@@ -27,7 +27,10 @@ pub fn serial_ports() -> Vec<SerialPortName> {
         .map(|port| {
             let named = persistent.iter().find(|(_, target)| *target == port.port_name);
             let device = named.map_or_else(|| port.port_name.clone(), |(name, _)| name.clone());
-            (!matches!(port.port_type, SerialPortType::UsbPort(_)), SerialPortName { device, description: described(&port.port_type) })
+            (
+                !matches!(port.port_type, SerialPortType::UsbPort(_)),
+                SerialPortName { device, description: described(&port.port_type) },
+            )
         })
         .collect();
     ports.sort();
@@ -64,7 +67,10 @@ mod tests {
         std::os::unix::fs::symlink(&device, links.join("usb-maker-if00")).unwrap();
         let names = persistent_names(&links);
         let device = fs::canonicalize(&device).unwrap();
-        assert_eq!(names, [(links.join("usb-maker-if00").to_str().unwrap().to_owned(), device.to_str().unwrap().to_owned())]);
+        assert_eq!(
+            names,
+            [(links.join("usb-maker-if00").to_str().unwrap().to_owned(), device.to_str().unwrap().to_owned())]
+        );
         assert_eq!(persistent_names(Path::new("/there/is/no/such/folder")), []);
         // Whatever this computer has, the list has no port twice.
         let ports = serial_ports();

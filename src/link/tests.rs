@@ -189,7 +189,13 @@ impl Bench {
         Self::over(WireProtocol::Emscon, instrument, Some(robot), stage, stop)
     }
 
-    fn over(protocol: WireProtocol, instrument: Wire, robot: Option<Wire>, stage: Stage, stop: Arc<AtomicBool>) -> Self {
+    fn over(
+        protocol: WireProtocol,
+        instrument: Wire,
+        robot: Option<Wire>,
+        stage: Stage,
+        stop: Arc<AtomicBool>,
+    ) -> Self {
         let wired = Wired::over(protocol.to_string(), instrument, robot).simulated(Box::new(|| ()));
         Self { stage, wired, stop }
     }

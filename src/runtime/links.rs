@@ -143,7 +143,9 @@ fn failed(error: &LinkError) -> Answer {
         }
         LinkError::Instrument(failure) => vec![failure.hint().to_owned()],
         LinkError::Controller(failure) => vec![failure.controller_hint().to_owned()],
-        LinkError::Robot(_) => vec!["bring the robot to rest at the pose and clear any stop at its pendant, then measure again".to_owned()],
+        LinkError::Robot(_) => {
+            vec!["bring the robot to rest at the pose and clear any stop at its pendant, then measure again".to_owned()]
+        }
         LinkError::NoReading { .. } => vec!["skip the pose, or take the poses of the recording as plan".to_owned()],
         _ => Vec::new(),
     };

@@ -54,7 +54,8 @@ impl Default for AbbOptions {
 impl AbbOptions {
     /// Fails with the reason if a text cannot be part of a request.
     pub fn validate(&self) -> Result<(), String> {
-        let is_name = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+        let is_name =
+            |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
         if !is_name(&self.unit) {
             return Err("unit must be a name such as ROB_1".to_owned());
         }

@@ -43,8 +43,11 @@ impl Response {
         let (head, rest) = bytes.split_at_checked(end + 4).unwrap_or((bytes, &[]));
         let head = String::from_utf8_lossy(head);
         let mut lines = head.lines();
-        let status = lines.next().and_then(|line| line.split(' ').nth(1)?.parse().ok()).ok_or("its status is missing")?;
-        let pair = |line: &str| line.split_once(':').map(|(name, value)| (name.trim().to_lowercase(), value.trim().to_owned()));
+        let status =
+            lines.next().and_then(|line| line.split(' ').nth(1)?.parse().ok()).ok_or("its status is missing")?;
+        let pair = |line: &str| {
+            line.split_once(':').map(|(name, value)| (name.trim().to_lowercase(), value.trim().to_owned()))
+        };
         let response = Self { status, headers: lines.filter_map(pair).collect(), body: Vec::new() };
         let is_chunked = response.headers("transfer-encoding").any(|value| value.eq_ignore_ascii_case("chunked"));
         let body = if is_chunked { chunked(rest)? } else { response.sized(rest)? };
@@ -73,7 +76,8 @@ fn chunked(bytes: &[u8]) -> Result<Option<(Vec<u8>, usize)>, String> {
         };
         let line = String::from_utf8_lossy(rest.get(..end).unwrap_or_default());
         let size = line.split(';').next().map(str::trim).and_then(|size| usize::from_str_radix(size, 16).ok());
-        let size = size.filter(|size| body.len() + size <= MAX_RESPONSE).ok_or("the length of a chunk cannot be read")?;
+        let size =
+            size.filter(|size| body.len() + size <= MAX_RESPONSE).ok_or("the length of a chunk cannot be read")?;
         let Some(chunk) = rest.get(end + 2..end + 2 + size + 2) else { return Ok(None) };
         at += end + 2 + size + 2;
         if size == 0 {

@@ -105,7 +105,8 @@ impl JointLine {
         let Some(("J", fields)) = fields.split_first().map(|(first, rest)| (*first, rest)) else {
             return Err("it does not begin with 'J,'".to_owned());
         };
-        let at = fields.iter().position(|field| field.parse::<AngleUnit>().is_ok()).ok_or("'deg' or 'rad' is missing")?;
+        let at =
+            fields.iter().position(|field| field.parse::<AngleUnit>().is_ok()).ok_or("'deg' or 'rad' is missing")?;
         let (values, rest) = fields.split_at(at);
         let unit = rest.first().and_then(|unit| unit.parse().ok()).ok_or("the unit is missing")?;
         let (status, time) = match rest {

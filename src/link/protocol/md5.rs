@@ -47,11 +47,7 @@ fn compressed([mut a, mut b, mut c, mut d]: [u32; 4], block: &[u8; 64]) -> [u32;
 }
 
 /// Constant of a step: the integer part of 2³² |sin(step + 1)|.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "the product is positive and below 2³²"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the product is positive and below 2³²")]
 fn constant(step: usize) -> u32 {
     ((step as f64 + 1.0).sin().abs() * 4_294_967_296.0) as u32
 }

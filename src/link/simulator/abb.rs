@@ -15,8 +15,7 @@ const ANSWERING: Duration = Duration::from_millis(40);
 const MAX_REQUEST: usize = 8192;
 
 /// What the controller challenges with.
-const CHALLENGE: &str =
-    "Digest realm=\"validusers@robapi.abb\", domain=\"/\", qop=\"auth\", nonce=\"5349a3f1b2\", opaque=\"799d5\", algorithm=\"MD5\"";
+const CHALLENGE: &str = "Digest realm=\"validusers@robapi.abb\", domain=\"/\", qop=\"auth\", nonce=\"5349a3f1b2\", opaque=\"799d5\", algorithm=\"MD5\"";
 
 /// Cookie of the session.
 const COOKIE: &str = "-http-session-=8::http.session::d9e1";
@@ -73,7 +72,9 @@ impl AbbSimulator {
         };
         let is_allowed = header("authorization").is_some_and(|(_, value)| is_right(value.trim(), method, uri));
         if !is_allowed {
-            return self.schedule.send(at, response("401 Unauthorized", &format!("WWW-Authenticate: {CHALLENGE}\r\n"), ""));
+            return self
+                .schedule
+                .send(at, response("401 Unauthorized", &format!("WWW-Authenticate: {CHALLENGE}\r\n"), ""));
         }
         let fault = self.faults.occasion(|_| true);
         match fault {
@@ -85,7 +86,8 @@ impl AbbSimulator {
             Some(AbbFault::Silent) => return,
             _ => {}
         }
-        if fault == Some(AbbFault::Unknown) || method != "GET" || uri != "/rw/motionsystem/mechunits/ROB_1/jointtarget" {
+        if fault == Some(AbbFault::Unknown) || method != "GET" || uri != "/rw/motionsystem/mechunits/ROB_1/jointtarget"
+        {
             return self.schedule.send(at, response("404 Not Found", "", ""));
         }
         let mut headers = String::new();
@@ -116,15 +118,19 @@ fn is_right(authorization: &str, method: &str, uri: &str) -> bool {
     let of = |name: &str| authorization.split_once(&format!("{name}=")).map(|(_, rest)| rest.trim_start_matches('"'));
     let client_nonce = of("cnonce").and_then(|rest| rest.split('"').next()).unwrap_or_default();
     let count = of("nc").and_then(|rest| u32::from_str_radix(rest.get(..8)?, 16).ok()).unwrap_or(0);
-    let Some(mut challenge) = Challenge::read(CHALLENGE).map(|challenge| challenge.after(count.saturating_sub(1))) else {
+    let Some(mut challenge) = Challenge::read(CHALLENGE).map(|challenge| challenge.after(count.saturating_sub(1)))
+    else {
         return false;
     };
     challenge.answer("Default User", "robotics", method, uri, client_nonce) == authorization
 }
 
 fn response(status: &str, headers: &str, body: &str) -> Vec<u8> {
-    format!("HTTP/1.1 {status}\r\nContent-Type: application/xhtml+xml\r\nContent-Length: {}\r\n{headers}\r\n{body}", body.len())
-        .into_bytes()
+    format!(
+        "HTTP/1.1 {status}\r\nContent-Type: application/xhtml+xml\r\nContent-Length: {}\r\n{headers}\r\n{body}",
+        body.len()
+    )
+    .into_bytes()
 }
 
 /// The content of the answer for joint values (rad).
@@ -133,7 +139,8 @@ fn joint_target(positions: &[f64], fault: Option<AbbFault>) -> String {
     let mut items = String::new();
     for joint in 1..=joints {
         let angle = positions.get(joint - 1).copied().unwrap_or(0.0).to_degrees();
-        let value = if fault == Some(AbbFault::NotANumber) && joint == 6 { "NaN".to_owned() } else { format!("{angle:.7}") };
+        let value =
+            if fault == Some(AbbFault::NotANumber) && joint == 6 { "NaN".to_owned() } else { format!("{angle:.7}") };
         items.push_str(&format!("<span class=\"rax_{joint}\">{value}</span>\n"));
     }
     items.push_str("<span class=\"eax_a\">8.9999998E+09</span>\n");

@@ -22,7 +22,8 @@ fn bench(faults: &[Planned<AbbFault>]) -> AbbBench {
 }
 
 fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states = events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
+    let states =
+        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
     states.collect()
 }
 

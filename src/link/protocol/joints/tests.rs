@@ -18,7 +18,8 @@ fn bench(faults: &[Planned<JointsFault>]) -> JointsBench {
 }
 
 fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states = events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
+    let states =
+        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
     states.collect()
 }
 
@@ -81,7 +82,8 @@ fn a_status_stops_and_broken_lines_are_skipped() {
     let events = stopped.run_for(Duration::from_secs(1));
     let words: Vec<Option<&str>> = joints(&events).iter().map(|state| state.stopped.as_deref()).collect();
     assert_eq!(words.iter().flatten().collect::<Vec<_>>(), [&"protective stop"; 2]);
-    for fault in [JointsFault::Cut, JointsFault::NotANumber, JointsFault::WrongUnit, JointsFault::NoUnit, JointsFault::Noise]
+    for fault in
+        [JointsFault::Cut, JointsFault::NotANumber, JointsFault::WrongUnit, JointsFault::NoUnit, JointsFault::Noise]
     {
         let mut bench = bench(&[Planned::from(fault, 3, 4)]);
         bench.settle();
@@ -94,7 +96,8 @@ fn a_status_stops_and_broken_lines_are_skipped() {
 
 #[test]
 fn another_number_of_joints_or_silence_loses_the_link() {
-    for (fault, part) in [(JointsFault::MissingJoint, "5 joint values, those before had 6"), (JointsFault::Silent, "no answer")]
+    for (fault, part) in
+        [(JointsFault::MissingJoint, "5 joint values, those before had 6"), (JointsFault::Silent, "no answer")]
     {
         let mut bench = bench(&[Planned::from(fault, 5, 60)]);
         bench.settle();

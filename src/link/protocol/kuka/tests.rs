@@ -17,7 +17,8 @@ fn bench(faults: &[Planned<KukaFault>]) -> KukaBench {
 }
 
 fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states = events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
+    let states =
+        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
     states.collect()
 }
 
@@ -38,7 +39,9 @@ fn values_of_the_axes_are_read_in_their_forms() {
     let expected = [10.0, -90.0, 90.0, 0.0, 0.5, -1.0].map(f64::to_radians);
     assert_eq!(joint_angles(value), Ok(expected.to_vec()));
     assert_eq!(joint_angles(&value.replace("E6AXIS: ", "")), Ok(expected.to_vec()));
-    for bad in ["", "{}", "A1 10.0", &value.replace("A6", "A7"), &value.replace("0.5", "1.#INF"), &value.replace('}', "")] {
+    for bad in
+        ["", "{}", "A1 10.0", &value.replace("A6", "A7"), &value.replace("0.5", "1.#INF"), &value.replace('}', "")]
+    {
         assert!(joint_angles(bad).is_err(), "{bad}");
     }
 }
