@@ -12,6 +12,7 @@ mod support;
 
 mod architecture;
 mod cartesian;
+mod cartesian_programs;
 mod cell;
 mod cli;
 mod compensate;

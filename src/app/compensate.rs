@@ -1,8 +1,11 @@
 //! `trupose compensate`: joint values to command so that the real arm reaches its targets.
 
+mod between;
+mod correct;
 mod picture;
 mod program;
 mod report;
+mod settings;
 mod stream;
 mod targets;
 mod uncertainty;
@@ -29,8 +32,9 @@ pub(super) fn run<O: Write, E: Write>(
     args: &CompensateArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    if let (Some(out), Some(source)) = (&args.out, args.targets.as_ref().or(args.program.as_ref()))
-        && is_same_file(out, source)
+    let mut sources = args.targets.iter().chain(&args.program);
+    if let Some(out) = &args.out
+        && sources.any(|source| is_same_file(out, source))
     {
         let message = format!("'{}' is the file to compensate", out.display());
         return Err(Failure::new(ExitStatus::Usage, message)
@@ -61,10 +65,11 @@ pub(super) fn run<O: Write, E: Write>(
         tools: [nominal.flange_from_tool, identified.flange_from_tool],
         uncertainty: Uncertainty::new(&calibration, &arm),
         largest_uncertainty: from_mm(args.largest_uncertainty_mm),
+        position_only: args.position_only,
     };
-    match (&args.program, args.dialect, &args.targets) {
-        (Some(path), Some(dialect), _) => program::run(args, &arm, path, dialect, console),
-        (_, _, Some(path)) => targets::run(args, &job, path, console),
+    match (args.dialect, &args.targets) {
+        (Some(dialect), _) if !args.program.is_empty() => program::run(args, &job, dialect, console),
+        (_, Some(path)) => targets::run(args, &job, path, console),
         _ if args.stream => stream::run(&job, console),
         _ => Err(Failure::new(ExitStatus::Usage, "nothing to compensate")
             .hint("give '--targets', '--program' or '--stream'")),
@@ -87,11 +92,17 @@ struct Job<'a> {
     uncertainty: Option<Uncertainty>,
     /// Beyond it nothing is corrected (m).
     largest_uncertainty: f64,
+    position_only: bool,
 }
 
 impl Job<'_> {
     fn joints(&self) -> &[Joint] {
         self.arm.identified.chain.joints()
+    }
+
+    /// The world of the controller, in which programs state their frames, in the base of the profile.
+    fn base_from_world(&self) -> Isometry3<f64> {
+        Isometry3::identity()
     }
 
     /// The predicted error at a configuration (m).

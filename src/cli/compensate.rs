@@ -1,13 +1,17 @@
 //! Arguments of the commands that apply a calibration: `compensate`, `export`, and `profile import-urdf`.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::{PayloadArgs, one_of};
 use crate::kinematics::Convention;
 use crate::model::Format;
 use crate::program::Dialect;
+use crate::text::printable;
+use crate::units::{from_deg, from_mm};
 
 /// Arguments of `compensate`.
 #[derive(Args, Debug)]
@@ -18,12 +22,30 @@ pub struct CompensateArgs {
     /// Targets: joint values, or positions with an orientation; CSV with units in the column names
     #[arg(long, value_name = "CSV", required_unless_present_any = ["program", "stream"], conflicts_with_all = ["program", "stream"])]
     pub targets: Option<PathBuf>,
-    /// Robot program whose joint targets are corrected; everything else in it is kept
+    /// Robot program whose motion targets are corrected, everything else in it is kept; several that belong together are corrected in one call
     #[arg(long, value_name = "FILE", requires = "dialect")]
-    pub program: Option<PathBuf>,
+    pub program: Vec<PathBuf>,
     /// Language of the program
     #[arg(long, value_parser = one_of::<Dialect>(Dialect::NAMES), ignore_case = true)]
     pub dialect: Option<Dialect>,
+    /// Program: whether its points were computed (offline programming, CAD) or taught on the robot; taught points are not corrected
+    #[arg(long, value_enum, requires = "program")]
+    pub points: Option<Points>,
+    /// Tool of Cartesian targets in the flange, mm and degrees about the fixed x, y, z; without a name for all that the program does not state
+    #[arg(long, value_name = "[NAME=]X,Y,Z,RX,RY,RZ", requires = "program", allow_hyphen_values = true)]
+    pub tool: Vec<NamedPose>,
+    /// Frame of Cartesian targets in the world of the controller, written as '--tool'
+    #[arg(long, value_name = "[NAME=]X,Y,Z,RX,RY,RZ", requires = "program", allow_hyphen_values = true)]
+    pub frame: Vec<NamedPose>,
+    /// File that belongs to the program and is only read: declarations, or the moves that use them
+    #[arg(long, value_name = "FILE", requires = "program")]
+    pub companion: Vec<PathBuf>,
+    /// Write the program even if corrected and uncorrected moves belong to one path
+    #[arg(long, requires = "program")]
+    pub partial: bool,
+    /// External axes carry neither the arm nor the workpiece: correct targets that state their positions
+    #[arg(long, requires = "program")]
+    pub ignore_external_axes: bool,
     /// ROS: names of the joints in the trajectory, from base to flange [default: those of the profile]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub joint_names: Vec<String>,
@@ -51,6 +73,43 @@ pub struct CompensateArgs {
     /// Point to bring to the targets: a target (SMR) of the profile [default: the flange]
     #[arg(long, value_name = "NAME")]
     pub target: Option<String>,
+}
+
+/// Where the points of a program come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Points {
+    /// By an offline programming system, from CAD or by calculation
+    Computed,
+    /// On the robot, with its pendant or by hand
+    Taught,
+}
+
+/// A pose with the name that a program gives it; without a name for all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPose {
+    pub name: Option<String>,
+    pub pose: Isometry3<f64>,
+}
+
+impl FromStr for NamedPose {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!("'{}' is no pose; write for example 'gripper=0,0,120,0,0,90' (mm; degrees about the fixed x, y, z)", printable(text))
+        };
+        let (name, numbers) = text.rsplit_once('=').map_or((None, text), |(name, numbers)| (Some(name.trim()), numbers));
+        let values: Vec<f64> =
+            numbers.split(',').map(|number| number.trim().parse()).collect::<Result<_, _>>().map_err(|_not_one| wrong())?;
+        match values[..] {
+            [x, y, z, roll, pitch, yaw] if values.iter().all(|value| value.is_finite()) => {
+                let rotation = UnitQuaternion::from_euler_angles(from_deg(roll), from_deg(pitch), from_deg(yaw));
+                let translation = Translation3::new(from_mm(x), from_mm(y), from_mm(z));
+                Ok(Self { name: name.map(str::to_owned), pose: Isometry3::from_parts(translation, rotation) })
+            }
+            _ => Err(wrong()),
+        }
+    }
 }
 
 /// Arguments of `export`.

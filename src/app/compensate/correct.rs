@@ -1,0 +1,313 @@
+//! The targets of a program, corrected: what is commanded instead, and why where nothing is.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::between::{Ends, deviation};
+use super::report::{Moved, PathReport, TargetReport};
+use super::settings::Settings;
+use super::{Job, reason, status_reason};
+use crate::compensation::{self, PoseGoal, Status};
+use crate::inverse::Posture;
+use crate::program::configuration::Configuration;
+use crate::program::motion::{Command, Goal, Move, MoveKind, PoseTarget, Scan, Target};
+use crate::units::{MICROMETRE, MICRORADIAN, to_mm};
+
+/// How the options resolve what a program only names.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Resolved<'a> {
+    pub(super) tools: Settings<'a>,
+    pub(super) frames: Settings<'a>,
+}
+
+/// A target with its correction.
+#[derive(Clone, Debug)]
+pub(super) struct Corrected {
+    pub(super) report: TargetReport,
+    done: Option<Done>,
+}
+
+/// A correction.
+#[derive(Clone, Debug)]
+struct Done {
+    command: Command,
+    /// Configurations of the nominal arm at the target and at the command ((rad) or (m)).
+    meant: Vec<f64>,
+    commanded: Vec<f64>,
+    flange_from_tool: Isometry3<f64>,
+    base_from_frame: Isometry3<f64>,
+    /// Where the tool is to be.
+    base_from_tool: Isometry3<f64>,
+    /// A configuration near which the controller inverts the target.
+    near: Option<Vec<f64>>,
+    has_orientation: bool,
+}
+
+/// Rounding of a written target that a proof accepts: what the digits of any dialect explain, but no wrong number (m, rad).
+const LARGEST_ROUNDING: (f64, f64) = (5e-5, 1e-4);
+
+/// Corrects all targets of a program. They are solved in the order in which they are moved to, because a target without a
+/// configuration is reached from the one before.
+pub(super) fn corrected(job: &Job<'_>, resolved: &Resolved<'_>, scan: &Scan) -> Vec<Corrected> {
+    let mut results: Vec<Option<Corrected>> = vec![None; scan.targets.len()];
+    let mut before: Option<Vec<f64>> = None;
+    let of_move = |step: &Move| {
+        let via = match step.kind {
+            MoveKind::Circular { via } => via,
+            MoveKind::Joint | MoveKind::Linear => None,
+        };
+        via.into_iter().chain(step.target)
+    };
+    for index in scan.moves.iter().flat_map(of_move).chain(0..scan.targets.len()) {
+        let Some(target) = scan.targets.get(index) else { continue };
+        let result = results[index].get_or_insert_with(|| {
+            let mut report = TargetReport { line: target.line, name: target.name.clone(), ..TargetReport::default() };
+            let done = match &target.goal {
+                Goal::Joints(q) => of_joints(job, q, &mut report),
+                Goal::Pose(pose) => of_pose(job, resolved, pose, before.as_deref(), &mut report),
+            };
+            Corrected { report, done }
+        });
+        // After a target that is not solved the arm is somewhere else.
+        before = result.done.as_ref().map(|done| done.commanded.clone());
+    }
+    results.into_iter().flatten().collect()
+}
+
+fn of_joints(job: &Job<'_>, q: &[f64], report: &mut TargetReport) -> Option<Done> {
+    let done = job.compensator.solve(&compensation::Goal::Configuration(q.to_vec()));
+    report.status = done.status.name();
+    if done.status != Status::Reached {
+        report.reason = Some(reason(&done, job.joints()));
+    }
+    if !done.status.is_usable() {
+        return None;
+    }
+    let flange_from_tool = job.tools[1];
+    is_known(job, &done.command, &flange_from_tool, report)?;
+    let nominal = job.compensator.inverse().forward();
+    let tool = |q: &[f64]| nominal.base_from_flange(q) * job.tools[0];
+    let meant = done.meant.clone()?;
+    report.moved = Some(Moved::between(&tool(&meant), &tool(&done.command)));
+    Some(Done {
+        command: Command::Joints(done.command.clone()),
+        base_from_tool: tool(&meant),
+        meant,
+        commanded: done.command,
+        flange_from_tool,
+        base_from_frame: Isometry3::identity(),
+        near: None,
+        has_orientation: done.status == Status::Reached && !job.position_only,
+    })
+}
+
+fn of_pose(
+    job: &Job<'_>,
+    resolved: &Resolved<'_>,
+    pose: &PoseTarget,
+    before: Option<&[f64]>,
+    report: &mut TargetReport,
+) -> Option<Done> {
+    let settings = (resolved.tools.pose(&pose.tool), resolved.frames.pose(&pose.frame));
+    let (flange_from_tool, frame) = match settings {
+        (Ok(tool), Ok(frame)) => (tool, frame),
+        (Err(reason), _) | (_, Err(reason)) => {
+            report.status = "unknown_setting";
+            report.reason = Some(reason);
+            return None;
+        }
+    };
+    let base_from_frame = job.base_from_world() * frame;
+    let near = match &pose.configuration {
+        Configuration::Near(near) => Some(near.clone()),
+        Configuration::Rapid { .. }
+        | Configuration::Krl { .. }
+        | Configuration::Fanuc(_)
+        | Configuration::Val3 { .. }
+        | Configuration::Inform(_)
+        | Configuration::Free => before.map(<[f64]>::to_vec),
+    };
+    let is_meant = |posture: Option<&Posture>, q: &[f64]| pose.configuration.matches(posture, q);
+    let goal = PoseGoal {
+        base_from_tool: base_from_frame * pose.frame_from_tool,
+        flange_from_tool,
+        is_meant: &is_meant,
+        near: near.as_deref(),
+    };
+    let done = match job.compensator.solve_pose(&goal) {
+        Ok(done) => done,
+        Err(status) => {
+            report.status = status.name();
+            report.reason = Some(status_reason(&status, job.joints()));
+            return None;
+        }
+    };
+    report.status = Status::Reached.name();
+    is_known(job, &done.command, &flange_from_tool, report)?;
+    report.moved = Some(Moved::between(&goal.base_from_tool, &done.base_from_tool));
+    Some(Done {
+        command: Command::Pose(base_from_frame.inverse() * done.base_from_tool),
+        base_from_tool: goal.base_from_tool,
+        meant: done.meant,
+        commanded: done.command,
+        flange_from_tool,
+        base_from_frame,
+        near,
+        has_orientation: true,
+    })
+}
+
+/// Notes how well the arm is known there; `None`, with the reason, if not well enough.
+fn is_known(job: &Job<'_>, q: &[f64], flange_from_tool: &Isometry3<f64>, report: &mut TargetReport) -> Option<()> {
+    let uncertainty = job.uncertainty(q, flange_from_tool);
+    report.uncertainty_mm = uncertainty.map(to_mm);
+    if let Some(reason) = job.too_uncertain(uncertainty) {
+        report.status = "uncertain";
+        report.reason = Some(reason);
+        return None;
+    }
+    Some(())
+}
+
+impl Corrected {
+    pub(super) const fn is_done(&self) -> bool {
+        self.done.is_some()
+    }
+
+    pub(super) fn command(&self) -> Option<Command> {
+        self.done.as_ref().map(|done| done.command.clone())
+    }
+
+    /// The name or the line of the target.
+    pub(super) fn label(&self) -> String {
+        self.report.name.clone().unwrap_or_else(|| format!("line {}", self.report.line))
+    }
+
+    /// Where the tool is meant to be, and where the nominal arm has it at the command (m).
+    pub(super) fn poses(&self, job: &Job<'_>) -> Option<[Isometry3<f64>; 2]> {
+        let done = self.done.as_ref()?;
+        Some([done.base_from_tool, done.commanded_pose(job)])
+    }
+
+    /// Largest correction of each joint so far, with this one.
+    pub(super) fn widen(&self, largest: &mut [f64]) {
+        let Some(done) = &self.done else { return };
+        for (largest, (command, meant)) in largest.iter_mut().zip(done.commanded.iter().zip(&done.meant)) {
+            *largest = largest.max((command - meant).abs());
+        }
+    }
+}
+
+impl Done {
+    fn commanded_pose(&self, job: &Job<'_>) -> Isometry3<f64> {
+        job.compensator.inverse().forward().base_from_flange(&self.commanded) * self.flange_from_tool
+    }
+}
+
+/// Lines of moves that belong to a path of which a part only is corrected.
+pub(super) fn half_corrected(scan: &Scan, results: &[Corrected]) -> Vec<usize> {
+    let is_done = |step: &Move| step.target.and_then(|index| results.get(index)).is_some_and(Corrected::is_done);
+    let paths = |wanted: bool| {
+        let moves = scan.moves.iter().filter(move |step| is_done(step) == wanted);
+        moves.map(|step| step.path).collect::<std::collections::BTreeSet<usize>>()
+    };
+    let (corrected, left) = (paths(true), paths(false));
+    let is_torn = |step: &&Move| corrected.contains(&step.path) && left.contains(&step.path) && !is_done(step);
+    scan.moves.iter().filter(is_torn).map(|step| step.line).collect()
+}
+
+/// How far the paths of linear and circular moves deviate between corrected targets.
+pub(super) fn between(job: &Job<'_>, scan: &Scan, results: &[Corrected]) -> Vec<PathReport> {
+    let done = |index: Option<usize>| index.and_then(|index| results.get(index)).and_then(|result| result.done.as_ref());
+    let mut reports = Vec::new();
+    for pair in scan.moves.windows(2) {
+        let [before, step] = pair else { continue };
+        let via = match step.kind {
+            MoveKind::Joint => continue,
+            MoveKind::Linear => None,
+            MoveKind::Circular { via } => match done(via) {
+                Some(via) => Some(via),
+                None => continue,
+            },
+        };
+        if before.path != step.path || before.companion != step.companion {
+            continue;
+        }
+        let (Some(from), Some(to)) = (done(before.target), done(step.target)) else { continue };
+        // The point before is left with the tool of this move.
+        let tool = to.flange_from_tool;
+        let start = |q: &[f64]| job.compensator.inverse().forward().base_from_flange(q) * tool;
+        let at = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
+        let meant = Ends {
+            from: start(&from.meant),
+            via: via.map(|via| at(&via.base_from_tool)),
+            to: to.base_from_tool,
+        };
+        let commanded = Ends {
+            from: start(&from.commanded),
+            via: via.map(|via| at(&via.commanded_pose(job))),
+            to: to.commanded_pose(job),
+        };
+        reports.extend(deviation(step.line, &job.compensator, &tool, [&meant, &commanded], &from.meant));
+    }
+    reports
+}
+
+/// Compares what a written program makes the identified arm do with what was meant.
+///
+/// # Errors
+/// In words, the first target that is not what it has to be.
+pub(super) fn prove(job: &Job<'_>, results: &[Corrected], old: &Scan, written: &Scan) -> Result<(), String> {
+    if written.targets.len() != old.targets.len() {
+        return Err(format!("{} targets became {}", old.targets.len(), written.targets.len()));
+    }
+    for ((result, old), new) in results.iter().zip(&old.targets).zip(&written.targets) {
+        let line = old.line;
+        let failed = |what: String| Err(format!("line {line}: {what}"));
+        let Some(done) = &result.done else {
+            if new.goal != old.goal {
+                return failed("a target that is left has changed".to_owned());
+            }
+            continue;
+        };
+        let Some((q, rounding)) = taken(job, done, new) else {
+            return failed("the controller would not reach the written target in its configuration".to_owned());
+        };
+        let there = job.compensator.identified_pose(&q, &done.flange_from_tool);
+        let position = (there.translation.vector - done.base_from_tool.translation.vector).norm();
+        let angle = if done.has_orientation { there.rotation.angle_to(&done.base_from_tool.rotation) } else { 0.0 };
+        let is_right = rounding.0 <= LARGEST_ROUNDING.0
+            && rounding.1 <= LARGEST_ROUNDING.1
+            && position <= MICROMETRE + 1.1 * rounding.0
+            && angle <= MICRORADIAN + 1.1 * rounding.1;
+        if !is_right {
+            return failed(format!(
+                "the written target is {:.3} um and {:.3} urad from what is meant",
+                position / MICROMETRE,
+                angle / MICRORADIAN
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The configuration that the controller takes for a written target, and by how much the digits differ from the command, as a distance
+/// and an angle of the tool.
+fn taken(job: &Job<'_>, done: &Done, written: &Target) -> Option<(Vec<f64>, (f64, f64))> {
+    let q = match &written.goal {
+        Goal::Joints(q) => q.clone(),
+        Goal::Pose(pose) => {
+            let is_meant = |posture: Option<&Posture>, q: &[f64]| pose.configuration.matches(posture, q);
+            let goal = PoseGoal {
+                base_from_tool: done.base_from_frame * pose.frame_from_tool,
+                flange_from_tool: done.flange_from_tool,
+                is_meant: &is_meant,
+                near: done.near.as_deref(),
+            };
+            job.compensator.taken(&goal).ok()?
+        }
+    };
+    let pose = job.compensator.inverse().forward().base_from_flange(&q) * done.flange_from_tool;
+    let command = done.commanded_pose(job);
+    let position = (pose.translation.vector - command.translation.vector).norm();
+    Some((q, (position, pose.rotation.angle_to(&command.rotation))))
+}
