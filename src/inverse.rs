@@ -125,7 +125,7 @@ impl<'a> InverseKinematics<'a> {
         };
         let mut all = Vec::new();
         for branch in branches {
-            self.turned(&branch, &mut all);
+            self.turned(&branch, &mut |q| all.push(q.to_vec()));
         }
         all
     }
@@ -148,10 +148,14 @@ impl<'a> InverseKinematics<'a> {
             if self.is_within(&q) && is_meant(posture.as_ref(), &q) {
                 return Some(q);
             }
-            let mut turned = Vec::new();
-            self.turned(&q, &mut turned);
-            let meant = turned.into_iter().filter(|q| is_meant(posture.as_ref(), q));
-            meant.min_by(|a, b| distance(a, near).total_cmp(&distance(b, near)))
+            let mut nearest: Option<Vec<f64>> = None;
+            self.turned(&q, &mut |turned| {
+                let is_nearer = nearest.as_ref().is_none_or(|known| distance(turned, near) < distance(known, near));
+                if is_meant(posture.as_ref(), turned) && is_nearer {
+                    nearest = Some(turned.to_vec());
+                }
+            });
+            nearest
         };
         branches.into_iter().filter_map(of_branch).collect()
     }
@@ -199,9 +203,6 @@ impl<'a> InverseKinematics<'a> {
 
     /// Joints whose value is beyond its limits or not a number.
     pub fn beyond(&self, q: &[f64]) -> Vec<usize> {
-        let is_inside = |value: f64, limits: Option<(f64, f64)>| {
-            value.is_finite() && limits.is_none_or(|(low, high)| (low - ROUNDING..=high + ROUNDING).contains(&value))
-        };
         let pairs = q.iter().zip(&self.limits).enumerate();
         pairs.filter(|(_, (value, limits))| !is_inside(**value, **limits)).map(|(index, _)| index).collect()
     }
@@ -232,7 +233,7 @@ impl<'a> InverseKinematics<'a> {
     }
 
     fn is_within(&self, q: &[f64]) -> bool {
-        self.beyond(q).is_empty()
+        q.iter().zip(&self.limits).all(|(value, limits)| is_inside(*value, *limits))
     }
 
     /// The value itself if its joint may have it, otherwise the nearest one that full turns bring into the limits.
@@ -341,30 +342,33 @@ impl<'a> InverseKinematics<'a> {
         (low.max(-turn).min(high), high.min(turn).max(low))
     }
 
-    /// Adds all configurations within the limits that differ from `q` by full turns.
-    fn turned(&self, q: &[f64], all: &mut Vec<Vec<f64>>) {
+    /// Visits all configurations within the limits that differ from `q` by full turns.
+    fn turned(&self, q: &[f64], visit: &mut dyn FnMut(&[f64])) {
         if !self.pendant.is_ordered {
             let turned = self.turned_into_limits(q);
             if self.is_within(&turned) {
-                all.push(turned);
+                visit(&turned);
             }
             return;
         }
-        let mut partial = vec![q.to_vec()];
-        for joint in 0..q.len() {
-            let values = self.turns_of(joint, q[joint]);
-            partial = partial
-                .into_iter()
-                .flat_map(|known| {
-                    values.iter().map(move |value| {
-                        let mut turned = known.clone();
-                        turned[joint] = *value;
-                        turned
-                    })
-                })
-                .collect();
+        let values: Vec<Vec<f64>> = q.iter().enumerate().map(|(joint, value)| self.turns_of(joint, *value)).collect();
+        if values.iter().any(Vec::is_empty) {
+            return;
         }
-        all.extend(partial.into_iter().filter(|q| self.is_within(q)));
+        let mut chosen = vec![0; q.len()];
+        let mut turned: Vec<f64> = values.iter().map(|values| values[0]).collect();
+        loop {
+            if self.is_within(&turned) {
+                visit(&turned);
+            }
+            // The next combination, as a counter with one digit per joint.
+            let Some(joint) = (0..q.len()).find(|&joint| chosen[joint] + 1 < values[joint].len()) else { return };
+            chosen[joint] += 1;
+            chosen[..joint].fill(0);
+            for earlier in 0..=joint {
+                turned[earlier] = values[earlier][chosen[earlier]];
+            }
+        }
     }
 
     fn turns_of(&self, joint: usize, value: f64) -> Vec<f64> {
@@ -380,6 +384,10 @@ impl<'a> InverseKinematics<'a> {
 
 /// Beyond this distance (rad, m) from the configuration that was asked for, a search may find a nearer solution.
 const FAR: f64 = 0.5;
+
+fn is_inside(value: f64, limits: Option<(f64, f64)>) -> bool {
+    value.is_finite() && limits.is_none_or(|(low, high)| (low - ROUNDING..=high + ROUNDING).contains(&value))
+}
 
 /// Largest difference of two configurations.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {

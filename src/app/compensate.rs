@@ -101,8 +101,8 @@ impl Job<'_> {
     }
 
     /// The world of the controller, in which programs state their frames, in the base of the profile.
-    fn base_from_world(&self) -> Isometry3<f64> {
-        Isometry3::identity()
+    const fn base_from_world(&self) -> &Isometry3<f64> {
+        self.arm.profile.base_from_world()
     }
 
     /// The predicted error at a configuration (m).

@@ -1,27 +1,41 @@
-//! `trupose compensate --program`: the joint targets of an existing robot program, corrected.
+//! `trupose compensate --program`: the motion targets of existing robot programs, corrected.
 
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
-use super::super::Console;
-use super::{SHOWN, reason, tool_arms};
-use crate::cli::compensate::CompensateArgs;
-use crate::compensation::{Compensator, Goal, Settings, Status};
+use super::super::{Console, to_json};
+use super::correct::{self, Corrected, Resolved};
+use super::report::Report;
+use super::settings::Settings;
+use super::{Job, SHOWN, is_same_file, picture};
+use crate::cli::compensate::{CompensateArgs, Points};
+use crate::compensation::Status;
 use crate::error::{ExitStatus, Failure};
-use crate::model::CalibratedArm;
-use crate::program::motion::{self, Command, ReadOptions};
+use crate::program::motion::{Companion, Goal, Hint, ReadOptions, Reason, Scan};
 use crate::program::{Dialect, ProgramError, Robot, rewrite};
 use crate::store;
+use crate::text::{counted, printable};
+
+/// Why points that were taught are not corrected.
+const TAUGHT: &str = "taught points are not corrected: they were recorded where the real arm was, so the arm returns to them as it is; corrected, \
+                      it would miss them by its error";
+
+/// A program and what becomes of it.
+struct Part<'p> {
+    path: &'p Path,
+    text: Vec<u8>,
+    scan: Scan,
+    results: Vec<Corrected>,
+    corrected: Vec<u8>,
+}
 
 pub(super) fn run<O: Write, E: Write>(
     args: &CompensateArgs,
-    arm: &CalibratedArm,
-    path: &std::path::Path,
+    job: &Job<'_>,
     dialect: Dialect,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let unusable = |error: ProgramError| Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()));
-    let text = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-    let profile = &arm.profile;
+    let profile = &job.arm.profile;
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
     let pulses: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
     let robot = Robot {
@@ -31,51 +45,185 @@ pub(super) fn run<O: Write, E: Write>(
         pulses_per_degree: &pulses,
         joint_aliases: profile.joint_aliases(),
     };
-    let joint_names = (!args.joint_names.is_empty()).then(|| args.joint_names.clone());
-    let options = ReadOptions { joint_names, ..ReadOptions::default() };
-    let scan = rewrite::scan(dialect, &robot, &options, &text).map_err(unusable)?;
-    let (nominal, identified) = tool_arms(arm, args.target.as_deref())?;
-    let limits: Vec<_> = profile.joints().iter().map(|range| range.limits).collect();
-    let settings = Settings { position_only: args.position_only, ..Settings::default() };
-    let compensator = Compensator::new(&nominal, &identified, &limits, settings);
-    let joints = arm.identified.chain.joints();
-    let mut commands = Vec::with_capacity(scan.targets.len());
-    let (mut replaced, mut position_only, mut unreached) = (0, 0, 0);
-    let mut notes: Vec<(usize, String)> = Vec::new();
-    let mut largest: Vec<f64> = vec![0.0; joints.len()];
-    for target in &scan.targets {
-        let motion::Goal::Joints(configuration) = &target.goal else {
-            unreached += 1;
-            notes.push((target.line, "left as it is: a Cartesian target".to_owned()));
-            commands.push(None);
-            continue;
+    let texts = args.program.iter().chain(&args.companion).map(|path| {
+        let text = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        Ok((path.as_path(), text))
+    });
+    let texts: Vec<(&Path, Vec<u8>)> = texts.collect::<Result<_, Failure>>()?;
+    let mut parts = Vec::new();
+    for (path, text) in texts.iter().take(args.program.len()) {
+        let unusable = |error: ProgramError| Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()));
+        let others = texts.iter().filter(|(other, _)| other != path);
+        let companions = others.map(|(path, text)| Companion { name: file_name(path), text: text.clone() });
+        let options = ReadOptions {
+            joint_names: (!args.joint_names.is_empty()).then(|| args.joint_names.clone()),
+            companions: companions.collect(),
+            ignores_external_axes: args.ignore_external_axes,
         };
-        let done = compensator.solve(&Goal::Configuration(configuration.clone()));
-        if done.status != Status::Reached {
-            let kept = if done.status.is_usable() { "" } else { "; left as it is" };
-            notes.push((target.line, format!("{}{kept}", reason(&done, joints))));
-        }
-        if !done.status.is_usable() {
-            unreached += 1;
-            commands.push(None);
-            continue;
-        }
-        replaced += 1;
-        position_only += usize::from(done.status == Status::PositionOnly);
-        for (largest, (command, meant)) in largest.iter_mut().zip(done.command.iter().zip(configuration)) {
-            *largest = largest.max((command - meant).abs());
-        }
-        commands.push(Some(Command::Joints(done.command)));
+        let scan = rewrite::scan(dialect, &robot, &options, text).map_err(unusable)?;
+        check_points(args.points, &scan)?;
+        let resolved = Resolved {
+            tools: Settings { given: &args.tool, kind: "tool" },
+            frames: Settings { given: &args.frame, kind: "frame" },
+        };
+        let results = correct::corrected(job, &resolved, &scan);
+        let commands: Vec<_> = results.iter().map(Corrected::command).collect();
+        let corrected = rewrite::rewrite(dialect, &robot, text, &scan, &commands).map_err(unusable)?;
+        let again = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
+        correct::prove(job, &results, &scan, &again).map_err(|what| {
+            let message = format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
+            Failure::new(ExitStatus::Internal, message)
+        })?;
+        parts.push(Part { path, text: text.clone(), scan, results, corrected });
     }
-    let corrected = rewrite::rewrite(dialect, &robot, &text, &scan, &commands).map_err(unusable)?;
-    match &args.out {
-        Some(path) => {
-            store::replace_bytes(path, &corrected).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+    check_paths(args, &parts)?;
+    let mut report = Report::default();
+    for part in &parts {
+        add(job, part, &mut report);
+    }
+    write(args, &parts, &mut report, console)?;
+    if let Some(path) = &args.record {
+        let results = parts.iter().flat_map(|part| &part.results);
+        picture::write(path, results.filter_map(|result| Some((result.label(), result.poses(job)?))))?;
+        report.written.push(path.display().to_string());
+    }
+    if args.json {
+        console.print(&to_json(&report)?)?;
+    }
+    for part in &parts {
+        remarks(job, part, console);
+    }
+    for line in report.lines() {
+        console.remark(&line);
+    }
+    let has_targets = parts.iter().any(|part| !part.scan.targets.is_empty());
+    if !has_targets {
+        console.remark("no motion target was found; is it this dialect?");
+    }
+    Ok(if report.left == 0 && has_targets { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// Only computed points are corrected, and only the user knows whether they are.
+fn check_points(points: Option<Points>, scan: &Scan) -> Result<(), Failure> {
+    let hints: Vec<String> = scan.hints.iter().map(ToString::to_string).collect();
+    let hints = if hints.is_empty() { String::new() } else { format!(" (in this program: {})", hints.join("; ")) };
+    match points {
+        Some(Points::Computed) => Ok(()),
+        Some(Points::Taught) => Err(Failure::new(ExitStatus::Usage, TAUGHT)
+            .hint("correct what was computed: programs of offline systems, CAD, measured or calculated positions")),
+        None => {
+            let guess = scan.hints.iter().find_map(Hint::is_computed);
+            let guess = match guess {
+                Some(true) => ". They look computed",
+                Some(false) => ". They look taught",
+                None => "",
+            };
+            let message = format!(
+                "are the points of this program computed or taught?{hints}{guess}. Computed points (offline programming, CAD) are where the nominal arm \
+                 would be and are corrected; {TAUGHT}"
+            );
+            Err(Failure::new(ExitStatus::Usage, message).hint("give '--points computed' or '--points taught'"))
+        }
+    }
+}
+
+/// A path of which only a part is corrected does not fit together.
+fn check_paths(args: &CompensateArgs, parts: &[Part<'_>]) -> Result<(), Failure> {
+    if args.partial {
+        return Ok(());
+    }
+    for part in parts {
+        let torn = correct::half_corrected(&part.scan, &part.results);
+        let Some(first) = torn.first() else { continue };
+        let reason = why_left(part, *first);
+        let message = format!(
+            "'{}': {} would stay uncorrected beside corrected ones of the same path, first line {first}{reason}; nothing is written",
+            part.path.display(),
+            counted(torn.len(), "move")
+        );
+        return Err(Failure::new(ExitStatus::NotAccepted, message)
+            .hint("name what is missing ('--tool', '--frame', '--companion'), or accept it with '--partial'"));
+    }
+    Ok(())
+}
+
+/// The reason why the move on a line is left, for a message.
+fn why_left(part: &Part<'_>, line: usize) -> String {
+    let step = part.scan.moves.iter().find(|step| step.line == line);
+    let target = step.and_then(|step| part.results.get(step.target?)).and_then(|result| result.report.reason.clone());
+    let left = part.scan.left.iter().find(|left| left.line == line).map(|left| left.reason.to_string());
+    target.or(left).map_or_else(String::new, |reason| format!(" ({reason})"))
+}
+
+/// Whether something that is left counts as a motion target that should have been corrected.
+fn is_missed(reason: &Reason) -> bool {
+    // Not motions, or read with the file that has them.
+    !matches!(reason, Reason::InFile(_) | Reason::SystemVariable | Reason::NotMovedTo | Reason::OtherGroup)
+}
+
+fn add(job: &Job<'_>, part: &Part<'_>, report: &mut Report) {
+    let corrected = part.results.iter().filter(|result| result.is_done()).count();
+    report.corrected += corrected;
+    let missed = part.scan.left.iter().filter(|left| is_missed(&left.reason)).count();
+    report.left += part.results.len() - corrected + missed;
+    report.targets.extend(part.results.iter().map(|result| result.report.clone()));
+    report.targets.extend(part.scan.left.iter().map(|left| super::report::TargetReport {
+        line: left.line,
+        name: left.name.clone(),
+        status: "left",
+        reason: Some(left.reason.to_string()),
+        ..super::report::TargetReport::default()
+    }));
+    report.paths.extend(correct::between(job, &part.scan, &part.results));
+}
+
+fn write<O: Write, E: Write>(
+    args: &CompensateArgs,
+    parts: &[Part<'_>],
+    report: &mut Report,
+    console: &mut Console<O, E>,
+) -> Result<(), Failure> {
+    let Some(out) = &args.out else {
+        return match parts {
+            [part] if !args.json => console.print_bytes(&part.corrected),
+            [_] => Ok(()),
+            _ => Err(Failure::new(ExitStatus::Usage, "several programs need a folder").hint("give '--out DIR'")),
+        };
+    };
+    for part in parts {
+        let path: PathBuf = if parts.len() > 1 || out.is_dir() { out.join(file_name(part.path)) } else { out.clone() };
+        if is_same_file(&path, part.path) {
+            let message = format!("'{}' is the program to correct", path.display());
+            return Err(Failure::new(ExitStatus::Usage, message)
+                .hint("write to another folder: corrected targets must not be corrected a second time"));
+        }
+        store::replace_bytes(&path, &part.corrected)
+            .map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+        report.written.push(path.display().to_string());
+        if !args.json {
             console.print(&format!("written: {}\n", path.display()))?;
         }
-        None => console.print_bytes(&corrected)?,
     }
-    notes.extend(scan.left.iter().map(|left| (left.line, format!("left as it is: {}", left.reason))));
+    Ok(())
+}
+
+fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, console: &mut Console<O, E>) {
+    let mut notes: Vec<(usize, String)> = Vec::new();
+    for result in &part.results {
+        if let Some(reason) = &result.report.reason {
+            let name = result.report.name.as_ref().map_or_else(String::new, |name| format!("{}: ", printable(name)));
+            let left = if result.is_done() { "" } else { "left as it is: " };
+            notes.push((result.report.line, format!("{name}{left}{reason}")));
+        }
+    }
+    notes.extend(part.scan.left.iter().map(|left| {
+        let name = left.name.as_ref().map_or_else(String::new, |name| format!("{}: ", printable(name)));
+        (left.line, format!("{name}left as it is: {}", left.reason))
+    }));
     notes.sort();
     for (line, note) in notes.iter().take(SHOWN) {
         console.remark(&format!("line {line}: {note}"));
@@ -83,21 +231,33 @@ pub(super) fn run<O: Write, E: Write>(
     if notes.len() > SHOWN {
         console.remark(&format!("and {} more lines", notes.len() - SHOWN));
     }
+    let (joints, mut largest) = (job.joints(), vec![0.0; job.joints().len()]);
+    for result in &part.results {
+        result.widen(&mut largest);
+    }
     let corrections = joints.iter().zip(&largest).map(|(joint, largest)| {
         let quantity = joint.joint_type.quantity();
         format!("{} {:.3} {}", joint.name, quantity.to_edge(*largest), quantity.unit())
     });
     let corrections: Vec<String> = corrections.collect();
+    let count = |is_pose: bool| {
+        let of_kind = |index: &usize| {
+            part.scan.targets.get(*index).is_some_and(|target| matches!(target.goal, Goal::Pose(_)) == is_pose)
+        };
+        let indices: Vec<usize> = (0..part.results.len()).filter(of_kind).collect();
+        let done = indices.iter().filter(|index| part.results[**index].is_done()).count();
+        (done, indices.len())
+    };
+    let ((joint, joints_found), (pose, poses_found)) = (count(false), count(true));
+    let position_only =
+        part.results.iter().filter(|result| result.is_done() && result.report.status == Status::PositionOnly.name());
     console.remark(&format!(
-        "{replaced} of {} joint targets replaced ({position_only} in position only), {unreached} not reached, {} other places \
-         left; largest corrections: {}",
-        scan.targets.len(),
-        scan.left.len(),
+        "{}: {joint} of {joints_found} joint targets and {pose} of {poses_found} Cartesian targets corrected ({} in position only), {} left; \
+         largest corrections: {}",
+        printable(&file_name(part.path)),
+        position_only.count(),
+        counted(part.scan.left.len(), "other place"),
         corrections.join(", ")
     ));
-    if scan.targets.is_empty() {
-        console.remark("no joint target was found; is it this dialect?");
-    }
-    let is_complete = unreached == 0 && scan.left.is_empty() && !scan.targets.is_empty();
-    Ok(if is_complete { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
+    debug_assert!(!part.text.is_empty() || part.scan.targets.is_empty());
 }
