@@ -59,6 +59,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "error",
             "geometry",
             "identification",
+            "inverse",
             "kinematics",
             "link",
             "model",
