@@ -92,7 +92,8 @@ fn module(cell: &Cell, last: &str) -> String {
 fn run(folder: &Path, program: &str, more: &[&str]) -> (i32, String, String) {
     let file = folder.join("part.mod");
     fs::write(&file, program).unwrap();
-    let mut arguments = vec!["compensate", "--calibration", CALIBRATION, "--dialect", "rapid", "--program", file.to_str().unwrap()];
+    let mut arguments =
+        vec!["compensate", "--calibration", CALIBRATION, "--dialect", "rapid", "--program", file.to_str().unwrap()];
     arguments.extend(more);
     let output = trupose(&arguments);
     let joined = text(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
@@ -104,7 +105,8 @@ fn written(program: &str) -> Vec<Isometry3<f64>> {
     let lines = program.lines().filter(|line| line.contains("robtarget"));
     let pose = |line: &str| {
         let numbers = line.split_once(":=").unwrap().1.split([',', '[', ']', ';']);
-        let numbers: Vec<f64> = numbers.filter(|cell| !cell.is_empty()).take(7).map(|cell| cell.parse().unwrap()).collect();
+        let numbers: Vec<f64> =
+            numbers.filter(|cell| !cell.is_empty()).take(7).map(|cell| cell.parse().unwrap()).collect();
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(numbers[3], numbers[4], numbers[5], numbers[6]));
         let place = Translation3::new(from_mm(numbers[0]), from_mm(numbers[1]), from_mm(numbers[2]));
         Isometry3::from_parts(place, rotation)
@@ -132,7 +134,9 @@ fn cartesian_targets_bring_the_identified_arm_where_they_were_meant() {
         // Without compensation it is elsewhere.
         assert!((cell.reached(&meant, &tool(), q).translation.vector - meant.translation.vector).norm() > 1e-4);
     }
-    let same = |text: &str| -> Vec<String> { text.lines().filter(|line| !line.contains("robtarget")).map(str::to_owned).collect() };
+    let same = |text: &str| -> Vec<String> {
+        text.lines().filter(|line| !line.contains("robtarget")).map(str::to_owned).collect()
+    };
     assert_eq!(same(&out), same(&program));
 }
 
@@ -164,9 +168,13 @@ fn a_path_is_corrected_as_a_whole_or_not_at_all() {
 fn a_tool_that_is_not_in_the_program_comes_from_an_option() {
     let (cell, folder) = (Cell::new(), tempfile::tempdir().unwrap());
     let whole = module(&cell, "");
-    let program: String = whole.lines().filter(|line| !line.contains("tooldata")).map(|line| format!("{line}\n")).collect();
+    let program: String =
+        whole.lines().filter(|line| !line.contains("tooldata")).map(|line| format!("{line}\n")).collect();
     let (code, _, err) = run(folder.path(), &program, &["--points", "computed"]);
-    assert!(code == 1 && err.contains("its tool 'gun' is not in the given files; give '--tool gun=x,y,z,rx,ry,rz'"), "{err}");
+    assert!(
+        code == 1 && err.contains("its tool 'gun' is not in the given files; give '--tool gun=x,y,z,rx,ry,rz'"),
+        "{err}"
+    );
     let (_, expected, _) = run(folder.path(), &whole, &["--points", "computed"]);
     for option in ["gun=10,0,150,0,0,0", "GUN=10,0,150,0,0,0", "10,0,150,0,0,0"] {
         let (code, out, err) = run(folder.path(), &program, &["--points", "computed", "--tool", option]);
@@ -183,7 +191,8 @@ fn a_tool_that_is_not_in_the_program_comes_from_an_option() {
 fn the_result_is_reported_and_drawn() {
     let (cell, folder) = (Cell::new(), tempfile::tempdir().unwrap());
     let (out_file, picture) = (folder.path().join("out.mod"), folder.path().join("targets.rrd"));
-    let options = ["--points", "computed", "--json", "--out", out_file.to_str().unwrap(), "--record", picture.to_str().unwrap()];
+    let options =
+        ["--points", "computed", "--json", "--out", out_file.to_str().unwrap(), "--record", picture.to_str().unwrap()];
     let (code, out, err) = run(folder.path(), &module(&cell, ""), &options);
     assert_eq!(code, 0, "{err}");
     let report: Value = serde_json::from_str(&out).unwrap();
@@ -193,6 +202,7 @@ fn the_result_is_reported_and_drawn() {
     assert_eq!(report["paths"].as_array().unwrap().len(), 2, "{out}");
     assert!(fs::metadata(&picture).unwrap().len() > 500 && out_file.exists());
     // Nothing is corrected where the arm is not known.
-    let (code, _, err) = run(folder.path(), &module(&cell, ""), &["--points", "computed", "--largest-uncertainty-mm", "0.001"]);
+    let (code, _, err) =
+        run(folder.path(), &module(&cell, ""), &["--points", "computed", "--largest-uncertainty-mm", "0.001"]);
     assert!(code == 1 && err.contains("above the limit of 0.00 mm"), "{err}");
 }

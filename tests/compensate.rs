@@ -507,7 +507,9 @@ fn a_robot_program_is_corrected_in_place() {
     // The second target has a straight wrist.
     assert!(message.contains("line 5: near a singularity only the position is reached"), "{message}");
     assert!(
-        message.contains("2 of 2 joint targets and 0 of 1 Cartesian targets corrected (1 in position only), 0 other places left"),
+        message.contains(
+            "2 of 2 joint targets and 0 of 1 Cartesian targets corrected (1 in position only), 0 other places left"
+        ),
         "{message}"
     );
     let corrected = fs::read(&out).unwrap();

@@ -96,11 +96,18 @@ impl FromStr for NamedPose {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
-            format!("'{}' is no pose; write for example 'gripper=0,0,120,0,0,90' (mm; degrees about the fixed x, y, z)", printable(text))
+            format!(
+                "'{}' is no pose; write for example 'gripper=0,0,120,0,0,90' (mm; degrees about the fixed x, y, z)",
+                printable(text)
+            )
         };
-        let (name, numbers) = text.rsplit_once('=').map_or((None, text), |(name, numbers)| (Some(name.trim()), numbers));
-        let values: Vec<f64> =
-            numbers.split(',').map(|number| number.trim().parse()).collect::<Result<_, _>>().map_err(|_not_one| wrong())?;
+        let (name, numbers) =
+            text.rsplit_once('=').map_or((None, text), |(name, numbers)| (Some(name.trim()), numbers));
+        let values: Vec<f64> = numbers
+            .split(',')
+            .map(|number| number.trim().parse())
+            .collect::<Result<_, _>>()
+            .map_err(|_not_one| wrong())?;
         match values[..] {
             [x, y, z, roll, pitch, yaw] if values.iter().all(|value| value.is_finite()) => {
                 let rotation = UnitQuaternion::from_euler_angles(from_deg(roll), from_deg(pitch), from_deg(yaw));

@@ -68,8 +68,7 @@ impl Course {
 
 impl Ends {
     fn pose(&self, course: &Course, part: f64) -> Isometry3<f64> {
-        let rotation =
-            self.from.rotation.try_slerp(&self.to.rotation, part, 1e-12).unwrap_or(self.from.rotation);
+        let rotation = self.from.rotation.try_slerp(&self.to.rotation, part, 1e-12).unwrap_or(self.from.rotation);
         Isometry3::from_parts(Translation3::from(course.at(part).coords), rotation)
     }
 }

@@ -217,7 +217,8 @@ pub(super) fn half_corrected(scan: &Scan, results: &[Corrected]) -> Vec<usize> {
 
 /// How far the paths of linear and circular moves deviate between corrected targets.
 pub(super) fn between(job: &Job<'_>, scan: &Scan, results: &[Corrected]) -> Vec<PathReport> {
-    let done = |index: Option<usize>| index.and_then(|index| results.get(index)).and_then(|result| result.done.as_ref());
+    let done =
+        |index: Option<usize>| index.and_then(|index| results.get(index)).and_then(|result| result.done.as_ref());
     let mut reports = Vec::new();
     for pair in scan.moves.windows(2) {
         let [before, step] = pair else { continue };
@@ -237,11 +238,8 @@ pub(super) fn between(job: &Job<'_>, scan: &Scan, results: &[Corrected]) -> Vec<
         let tool = to.flange_from_tool;
         let start = |q: &[f64]| job.compensator.inverse().forward().base_from_flange(q) * tool;
         let at = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
-        let meant = Ends {
-            from: start(&from.meant),
-            via: via.map(|via| at(&via.base_from_tool)),
-            to: to.base_from_tool,
-        };
+        let meant =
+            Ends { from: start(&from.meant), via: via.map(|via| at(&via.base_from_tool)), to: to.base_from_tool };
         let commanded = Ends {
             from: start(&from.commanded),
             via: via.map(|via| at(&via.commanded_pose(job))),

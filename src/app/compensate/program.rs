@@ -71,7 +71,8 @@ pub(super) fn run<O: Write, E: Write>(
         let corrected = rewrite::rewrite(dialect, &robot, text, &scan, &commands).map_err(unusable)?;
         let again = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
         correct::prove(job, &results, &scan, &again).map_err(|what| {
-            let message = format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
+            let message =
+                format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
             Failure::new(ExitStatus::Internal, message)
         })?;
         parts.push(Part { path, text: text.clone(), scan, results, corrected });
@@ -201,8 +202,7 @@ fn write<O: Write, E: Write>(
             return Err(Failure::new(ExitStatus::Usage, message)
                 .hint("write to another folder: corrected targets must not be corrected a second time"));
         }
-        store::replace_bytes(&path, &part.corrected)
-            .map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+        store::replace_bytes(&path, &part.corrected).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         report.written.push(path.display().to_string());
         if !args.json {
             console.print(&format!("written: {}\n", path.display()))?;
