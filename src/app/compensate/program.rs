@@ -23,7 +23,6 @@ const TAUGHT: &str = "taught points are not corrected: they were recorded where 
 /// A program and what becomes of it.
 struct Part<'p> {
     path: &'p Path,
-    text: Vec<u8>,
     scan: Scan,
     results: Vec<Corrected>,
     corrected: Vec<u8>,
@@ -75,7 +74,7 @@ pub(super) fn run<O: Write, E: Write>(
                 format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
             Failure::new(ExitStatus::Internal, message)
         })?;
-        parts.push(Part { path, text: text.clone(), scan, results, corrected });
+        parts.push(Part { path, scan, results, corrected });
     }
     check_paths(args, &parts)?;
     let mut report = Report::default();
@@ -92,7 +91,7 @@ pub(super) fn run<O: Write, E: Write>(
         console.print(&to_json(&report)?)?;
     }
     for part in &parts {
-        remarks(job, part, console);
+        remarks(job, part, &parts, console);
     }
     for line in report.lines() {
         console.remark(&line);
@@ -195,6 +194,9 @@ fn write<O: Write, E: Write>(
             _ => Err(Failure::new(ExitStatus::Usage, "several programs need a folder").hint("give '--out DIR'")),
         };
     };
+    if parts.len() > 1 {
+        store::create_folder(out).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+    }
     for part in parts {
         let path: PathBuf = if parts.len() > 1 || out.is_dir() { out.join(file_name(part.path)) } else { out.clone() };
         if is_same_file(&path, part.path) {
@@ -211,7 +213,13 @@ fn write<O: Write, E: Write>(
     Ok(())
 }
 
-fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, console: &mut Console<O, E>) {
+fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>], console: &mut Console<O, E>) {
+    // What another program of this call contains is corrected there.
+    let is_elsewhere = |reason: &Reason| match reason {
+        Reason::InFile(name) => all.iter().any(|other| file_name(other.path) == *name),
+        _ => false,
+    };
+    let left: Vec<_> = part.scan.left.iter().filter(|left| !is_elsewhere(&left.reason)).collect();
     let mut notes: Vec<(usize, String)> = Vec::new();
     for result in &part.results {
         if let Some(reason) = &result.report.reason {
@@ -220,7 +228,7 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, console: &mut Con
             notes.push((result.report.line, format!("{name}{left}{reason}")));
         }
     }
-    notes.extend(part.scan.left.iter().map(|left| {
+    notes.extend(left.iter().map(|left| {
         let name = left.name.as_ref().map_or_else(String::new, |name| format!("{}: ", printable(name)));
         (left.line, format!("{name}left as it is: {}", left.reason))
     }));
@@ -256,8 +264,7 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, console: &mut Con
          largest corrections: {}",
         printable(&file_name(part.path)),
         position_only.count(),
-        counted(part.scan.left.len(), "other place"),
+        counted(left.len(), "other place"),
         corrections.join(", ")
     ));
-    debug_assert!(!part.text.is_empty() || part.scan.targets.is_empty());
 }
