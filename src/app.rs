@@ -77,8 +77,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
     match command {
         Command::Demo(args) => script::demo(&args, console),
         Command::Resume(args) => match &args.script {
-            Some(file) => script::resume(&args.folder, file, &args.script_args, console),
-            None => wizard::resume(&args.folder, &args.script_args, args.terminal, console),
+            Some(file) => script::resume(args.folder.as_deref(), file, &args.script_args, console),
+            None => wizard::resume(args.folder.as_deref(), &args.script_args, args.terminal, console),
         },
         Command::Wizard(args) => {
             let place = ScriptArgs {

@@ -116,9 +116,9 @@ pub struct DemoArgs {
 /// Arguments of `resume`.
 #[derive(Args, Clone, Debug)]
 pub struct ResumeArgs {
-    /// Folder of the session
-    #[arg(value_name = "DIR")]
-    pub folder: PathBuf,
+    /// Folder or name of the session, or the beginning of its name [default: the latest]
+    #[arg(value_name = "DIR|NAME")]
+    pub folder: Option<PathBuf>,
     /// Continue with a script, without a terminal
     #[arg(long, value_name = "FILE")]
     pub script: Option<PathBuf>,
@@ -225,6 +225,16 @@ pub enum ProfileCommand {
     Check {
         /// Path of the profile file, or name of a shipped profile
         file: PathBuf,
+    },
+    /// Write a profile to start from: the text of another one, to be edited
+    #[command(after_help = "Example:\n  trupose profile new --from abb_irb120 --out my-robot.ron")]
+    New {
+        /// Profile to copy: the name of a shipped one ('trupose profile list'), or a file
+        #[arg(long, value_name = "NAME|FILE")]
+        from: String,
+        /// New file [default: print the text]
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
     },
     /// Make a profile from the serial chain of a URDF
     ImportUrdf(compensate::ImportUrdfArgs),

@@ -23,6 +23,7 @@ mod provenance;
 mod result;
 mod settings;
 mod summary;
+pub mod way;
 mod workspace;
 
 pub use error::{ErrorKind, ProcedureError};

@@ -12,6 +12,7 @@ mod check;
 mod decode;
 mod diagnostic;
 mod expected;
+mod gaps;
 mod masses;
 mod schema;
 mod syntax;
@@ -25,12 +26,13 @@ pub use builtin::{builtin, builtin_names};
 pub use cell::{Capsule, Instrument, KeepOut, Tracker};
 pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
 pub use expected::{ExpectedDeviation, ExpectedDeviations};
+pub use gaps::Gap;
 pub use masses::{Masses, Mounting};
 pub use text::{check_text, list_text, show_text};
 
 use wire::LinkSettings;
 
-use crate::kinematics::{Arm, FreeParameter, KinematicChain, LinkMass, LinkParameter, ParameterId};
+use crate::kinematics::{Arm, FreeParameter, JointType, KinematicChain, LinkMass, LinkParameter, ParameterId};
 use crate::text::{names_of_option, written_as_text};
 
 /// Angle below which neighbouring axes count as parallel (rad): 1°, far above any assembly error and far below any design angle.
@@ -38,6 +40,9 @@ pub const PARALLEL_TOLERANCE: f64 = crate::units::DEGREE;
 
 /// Default uncertainty of a target position (m): 50 mm, the size of a flange adapter.
 pub const FREE_TARGET_UNCERTAINTY: f64 = 50.0 * crate::units::MILLIMETRE;
+
+/// How far a revolute joint turns to either side in a plan, unless the profile states planning limits (rad).
+const HALF_TURN: f64 = std::f64::consts::PI;
 
 /// A checked description of a robot in its cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,12 +76,24 @@ pub struct Profile {
 pub struct JointRange {
     /// Lowest and highest value; `None` if the profile gives none.
     pub limits: Option<(f64, f64)>,
-    /// Range for measuring poses, inside `limits`; the same as `limits` if the profile gives none.
+    /// Range for measuring poses, inside `limits`; if the profile gives none, that of [`Self::usual_planning_limits`].
     pub planning_limits: Option<(f64, f64)>,
     /// Highest speed.
     pub max_speed: Option<f64>,
     /// Encoder pulses per degree of the joint (revolute only): joint offsets can be shown in pulses.
     pub pulses_per_degree: Option<f64>,
+}
+
+impl JointRange {
+    /// The range for measuring poses of a joint whose profile states only its limits: what of them lies within ±180°. Cables and
+    /// hoses seldom follow a wrist that turns farther, and no pose needs it.
+    pub fn usual_planning_limits(joint_type: JointType, limits: (f64, f64)) -> (f64, f64) {
+        let (low, high) = (limits.0.max(-HALF_TURN), limits.1.min(HALF_TURN));
+        match joint_type {
+            JointType::Revolute if low < high => (low, high),
+            JointType::Revolute | JointType::Prismatic => limits,
+        }
+    }
 }
 
 /// An SMR on the flange.
@@ -241,7 +258,7 @@ impl Profile {
         &self.bodies
     }
 
-    /// Height of the floor: z in the robot base (m).
+    /// Height of the floor: z in the robot base (m). A profile of an upright arm that states none has it at the base.
     pub const fn floor(&self) -> Option<f64> {
         self.floor
     }

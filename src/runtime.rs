@@ -14,6 +14,7 @@ mod engine;
 mod events;
 mod jobs;
 mod links;
+pub mod recent;
 pub mod signals;
 mod store_thread;
 

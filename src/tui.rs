@@ -81,6 +81,8 @@ pub struct Exit {
     pub signal: Option<i32>,
     /// Folder of the session.
     pub folder: Option<String>,
+    /// Folder of another session to continue.
+    pub resumes: Option<String>,
     /// Messages that could not be printed while the screen was up.
     pub remarks: Vec<String>,
 }
@@ -88,7 +90,8 @@ pub struct Exit {
 impl Exit {
     fn of(wizard: &Wizard, signal: Option<i32>, remarks: Vec<String>) -> Self {
         let cause = wizard.ended().unwrap_or("ended").to_owned();
-        Self { cause, signal, folder: wizard.folder().map(str::to_owned), remarks }
+        let resumes = wizard.resumes().map(str::to_owned);
+        Self { cause, signal, folder: wizard.folder().map(str::to_owned), resumes, remarks }
     }
 }
 

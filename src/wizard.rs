@@ -38,6 +38,8 @@ pub use intent::{Danger, Intent, IntentInfo, PlanSettings};
 pub use notice::{Notice, Problem, Severity};
 pub use view::ViewModel;
 
+use view::SessionCard;
+
 use crate::session::journal::{Entry, Line, SCHEMA};
 use crate::session::reading::LiveReading;
 use crate::session::set_up::{InstrumentChoice, Step};
@@ -70,6 +72,10 @@ pub struct Wizard {
     waiting: VecDeque<Intent>,
     notice: Option<Notice>,
     live: Live,
+    /// Sessions that can be continued instead of starting one.
+    sessions: Vec<SessionCard>,
+    /// Folder of the session to continue after the end.
+    resumes: Option<String>,
     ended: Option<String>,
 }
 
@@ -113,6 +119,8 @@ impl Wizard {
             waiting: VecDeque::new(),
             notice: None,
             live: Live::default(),
+            sessions: Vec::new(),
+            resumes: None,
             ended: None,
         }
     }
@@ -163,6 +171,11 @@ impl Wizard {
         self.ended.as_deref()
     }
 
+    /// Folder of the session that the operator wants to continue instead.
+    pub fn resumes(&self) -> Option<&str> {
+        self.resumes.as_deref()
+    }
+
     /// The current message to the operator.
     pub const fn notice(&self) -> Option<&Notice> {
         self.notice.as_ref()
@@ -186,6 +199,10 @@ impl Wizard {
                 Vec::new()
             }
             Event::Live(reading) => self.on_live(reading),
+            Event::Sessions(sessions) => {
+                self.sessions = sessions;
+                Vec::new()
+            }
             Event::Remark(notice) => {
                 self.notice = Some(notice);
                 Vec::new()
@@ -198,6 +215,10 @@ impl Wizard {
     fn on_live(&mut self, reading: LiveReading) -> Vec<Effect> {
         let last_sample = self.session.samples.last().map(|sample| self.session.point_of(sample));
         self.live.take(reading, last_sample);
+        let has_passed = self.phase.shown_stop().is_some_and(|stop| self.live.rests_at(stop));
+        if has_passed && self.is_idle() && self.ended.is_none() {
+            return self.on_intent(Intent::Passed);
+        }
         let is_wanted =
             matches!(&self.session.instrument, Some(InstrumentChoice::Linked(choice)) if choice.is_automatic);
         let Some(row) = self.phase.shown_row().filter(|_| is_wanted && self.is_idle() && self.ended.is_none()) else {
@@ -205,10 +226,26 @@ impl Wizard {
         };
         let can_measure =
             self.phase.intents(&self.cx()).iter().any(|info| info.intent == Intent::Measure && info.is_enabled());
-        if !can_measure || !self.live.is_time(&self.session, row) {
+        if !can_measure {
+            return Vec::new();
+        }
+        if let Some(found) = self.live.recognised(&self.session, row) {
+            return self.show_recognised(row, found);
+        }
+        if !self.live.is_time(&self.session, row) {
             return Vec::new();
         }
         self.on_intent(Intent::Measure)
+    }
+
+    /// Shows the row where the robot really is instead of the one awaited, which then comes at the end.
+    fn show_recognised(&mut self, awaited: usize, found: usize) -> Vec<Effect> {
+        let pose = |row: usize| self.session.rows.get(row).map_or("?", |row| row.planned.pose.as_str());
+        let notice = Notice::info(format!("the robot is at pose {}, not at {}", pose(found), pose(awaited)))
+            .hint("it is measured there; poses that were passed over come at the end");
+        self.actions.push_back(Action::Write(vec![Entry::Row(found)]));
+        self.actions.push_back(Action::Say(notice));
+        self.run()
     }
 
     /// All intents of this moment; those that are not possible carry the reason.
@@ -247,13 +284,13 @@ impl Wizard {
     }
 
     fn cx(&self) -> Cx<'_> {
-        Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now }
+        Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now, sessions: &self.sessions }
     }
 
     /// The step, mutable, beside what it may read.
     fn phase_and_cx(&mut self) -> (&mut Phase, Cx<'_>) {
         let cx =
-            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now };
+            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now, sessions: &self.sessions };
         (&mut self.phase, cx)
     }
 
@@ -301,6 +338,11 @@ impl Wizard {
             return Vec::new();
         }
         self.notice = None;
+        if let Intent::ResumeSession(folder) = intent {
+            let cause = format!("continuing the session in {folder}");
+            self.resumes = Some(folder);
+            return self.end(cause);
+        }
         if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo) {
             self.live.hold_until_moved();
         }

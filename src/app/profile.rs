@@ -1,11 +1,13 @@
-//! `trupose profile list | show | check`.
+//! `trupose profile list | show | new | check`.
 
 use std::io::Write;
+use std::path::Path;
 
 use super::{Console, load};
 use crate::cli::ProfileCommand;
 use crate::error::{ExitStatus, Failure};
 use crate::profile::{Profile, builtin, builtin_names, check_text, list_text, show_text};
+use crate::store;
 
 pub(super) fn run<O: Write, E: Write>(
     command: &ProfileCommand,
@@ -29,15 +31,35 @@ pub(super) fn run<O: Write, E: Write>(
             console.print(&show_text(&loaded.profile))?;
             Ok(ExitStatus::Accepted)
         }
+        ProfileCommand::New { from, out } => {
+            let text = text(Path::new(from))?;
+            let Some(out) = out else {
+                console.print(&text)?;
+                return Ok(ExitStatus::Accepted);
+            };
+            if out.exists() {
+                let message = format!("'{}' exists already", out.display());
+                return Err(Failure::new(ExitStatus::Usage, message).hint("give '--out' another name"));
+            }
+            store::replace(out, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+            let file = out.display();
+            console.remark(&format!("written to '{file}': edit it, then check it with 'trupose profile check {file}'"));
+            Ok(ExitStatus::Accepted)
+        }
         ProfileCommand::Check { file } => {
             let name = file.display().to_string();
-            let text = match builtin(&name) {
-                Some(text) if !file.exists() => text.to_owned(),
-                _ => load::text(file)?,
-            };
+            let text = text(file)?;
             let outcome = Profile::parse(&text, &name);
             console.print(&check_text(&name, &outcome))?;
             Ok(if outcome.is_ok() { ExitStatus::Accepted } else { ExitStatus::Usage })
         }
+    }
+}
+
+/// The text of a profile: a file, or a shipped one.
+fn text(name: &Path) -> Result<String, Failure> {
+    match builtin(&name.display().to_string()) {
+        Some(text) if !name.exists() => Ok(text.to_owned()),
+        _ => load::text(name),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
 
@@ -11,12 +11,13 @@ use crate::cli::{DemoArgs, RecordingArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::recording::Live;
 use crate::report;
-use crate::runtime::{Clock, Engine, Options, signals};
+use crate::runtime::{Clock, Engine, Options, recent, signals};
 use crate::script::{Format, Outcome, Runner, Script, ScriptError, Transcript};
 use crate::session::journal::JournalError;
 use crate::session::state::Session;
 use crate::store::session::{SessionError, SessionFolder};
 use crate::store::{self, StoreError};
+use crate::text::listed;
 
 /// The script of `trupose demo`.
 const DEMO: &str = include_str!("../../sessions/demo.script.ron");
@@ -50,11 +51,12 @@ pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O,
 
 /// Resumes a session and runs a script in it.
 pub(super) fn resume<O: Write, E: Write>(
-    folder: &Path,
+    folder: Option<&Path>,
     file: &Path,
     args: &ScriptArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
+    let folder = &find(folder, &args.sessions)?;
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
     let engine = open(folder, live_options(clock(&script), args, console)?)?;
@@ -118,6 +120,36 @@ fn live<O: Write, E: Write>(args: RecordingArgs, console: &mut Console<O, E>) ->
         live.url()
     ));
     Ok(Some(live))
+}
+
+/// Finds the session to resume: by its folder, by its name or the beginning of it, or the one that was written to last.
+pub(super) fn find(wanted: Option<&Path>, root: &Path) -> Result<PathBuf, Failure> {
+    let Some(wanted) = wanted else {
+        return recent::by_age(root).into_iter().next().ok_or_else(|| {
+            Failure::new(ExitStatus::Usage, format!("there is no session in '{}' to resume", root.display()))
+                .hint("'trupose' starts one; '--sessions DIR' looks in another folder")
+        });
+    };
+    if wanted.exists() || wanted.components().count() != 1 {
+        return Ok(wanted.to_owned());
+    }
+    let name = |folder: &PathBuf| folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let beginning = wanted.to_string_lossy();
+    let mut found = recent::by_age(root);
+    found.retain(|folder| name(folder).starts_with(&*beginning));
+    if let Some(exact) = found.iter().find(|folder| name(folder) == beginning) {
+        return Ok(exact.clone());
+    }
+    match found.as_slice() {
+        // The message about a missing folder says it best.
+        [] => Ok(wanted.to_owned()),
+        [only] => Ok(only.clone()),
+        several => {
+            let names: Vec<String> = several.iter().map(name).collect();
+            let message = format!("'{}' begins the names of several sessions: {}", wanted.display(), listed(&names));
+            Err(Failure::new(ExitStatus::Usage, message).hint("type more of the name"))
+        }
+    }
 }
 
 /// Opens a session to resume it.

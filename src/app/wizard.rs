@@ -24,22 +24,37 @@ pub(super) fn run<O: Write, E: Write>(
     let surface = surface(terminal)?;
     let mut engine = Engine::new(script::live_options(Clock::System, args, console)?)
         .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
-    if let Some(profile) = profile {
-        engine.intend(Intent::ChooseProfile(profile.to_owned()));
+    match profile {
+        Some(profile) => engine.intend(Intent::ChooseProfile(profile.to_owned())),
+        None => engine.offer_sessions(args.sessions.clone()),
     }
-    play(engine, surface, args.record_script.as_deref(), console)
+    match play(engine, surface, args.record_script.as_deref(), console)? {
+        Ended::Done(status) => Ok(status),
+        Ended::Continues(folder) => resume(Some(Path::new(&folder)), args, terminal, console),
+    }
 }
 
-/// Resumes a session.
+/// Resumes a session: the one of a folder or name, or else the latest.
 pub(super) fn resume<O: Write, E: Write>(
-    folder: &Path,
+    folder: Option<&Path>,
     args: &ScriptArgs,
     terminal: TerminalArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
-    let engine = script::open(folder, script::live_options(Clock::System, args, console)?)?;
-    play(engine, surface, args.record_script.as_deref(), console)
+    let folder = script::find(folder, &args.sessions)?;
+    let engine = script::open(&folder, script::live_options(Clock::System, args, console)?)?;
+    match play(engine, surface, args.record_script.as_deref(), console)? {
+        Ended::Done(status) => Ok(status),
+        Ended::Continues(folder) => resume(Some(Path::new(&folder)), args, terminal, console),
+    }
+}
+
+/// How the wizard ended.
+enum Ended {
+    Done(ExitStatus),
+    /// The operator wants to continue the session of this folder.
+    Continues(String),
 }
 
 /// Where the wizard is shown.
@@ -93,7 +108,7 @@ fn play<O: Write, E: Write>(
     surface: Surface,
     record: Option<&Path>,
     console: &mut Console<O, E>,
-) -> Result<ExitStatus, Failure> {
+) -> Result<Ended, Failure> {
     let mut recorded = Ok(());
     let mut at_end =
         |completed: &[CompletedIntent]| recorded = record.map_or(Ok(()), |file| write_script(file, completed));
@@ -106,13 +121,16 @@ fn play<O: Write, E: Write>(
     for remark in &exit.remarks {
         console.remark(remark);
     }
+    if let Some(folder) = exit.resumes {
+        return Ok(Ended::Continues(folder));
+    }
     let saved = exit.folder.map(|folder| format!("the session is saved; resume it with 'trupose resume {folder}'"));
     match exit.signal {
         None => {
             if let Some(saved) = saved {
                 console.remark(&saved);
             }
-            recorded.map(|()| ExitStatus::Accepted)
+            recorded.map(|()| Ended::Done(ExitStatus::Accepted))
         }
         Some(signal) => {
             let failure = Failure::new(ExitStatus::Signal(signal), exit.cause);

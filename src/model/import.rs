@@ -87,9 +87,9 @@ pub fn import(urdf: &UrdfChain<'_>, convention: Convention) -> Result<ImportedAr
     let agreement = prove(&chain, &limits, proof::IMPORT, |q| urdf.base_from_tip(q))?;
     let ranges = moving
         .iter()
-        .map(|(joint, _)| JointRange {
+        .map(|(joint, joint_type)| JointRange {
             limits: joint.limits,
-            planning_limits: joint.limits,
+            planning_limits: joint.limits.map(|limits| JointRange::usual_planning_limits(*joint_type, limits)),
             max_speed: joint.max_speed,
             pulses_per_degree: None,
         })

@@ -45,7 +45,8 @@ pub fn geometry_only(heading: &Heading<'_>, arm: &Arm<'_>) -> String {
         "    // acceptance: limits for the verification; none",
         "    // instrument: estimated from the residuals",
         "    // tracker: at (3000, 0, 1000) mm in the base, for planning only",
-        "    // bodies, floor_mm, keep_out: nothing is checked for collisions",
+        "    // bodies, keep_out: only the joints and the SMR are kept above the floor, nothing else is checked for collisions",
+        "    // floor_mm: at the height of the base",
         "    // payload, mounting: nothing on the flange, base on the floor",
     ] {
         lines.push(line.to_owned());
@@ -119,9 +120,8 @@ fn rest(lines: &mut Vec<String>, profile: &Profile) {
         number(to_mm(tracker.range.0)),
         number(to_mm(tracker.range.1))
     ));
-    if let Some(floor) = profile.floor() {
-        lines.push(format!("    floor_mm: {},", number(to_mm(floor))));
-    }
+    let floor = profile.floor().map_or_else(|| "None".to_owned(), |floor| number(to_mm(floor)));
+    lines.push(format!("    floor_mm: {floor},"));
     if !profile.bodies().is_empty() {
         lines.push("    bodies: [".to_owned());
         lines.extend(profile.bodies().iter().map(|body| {
@@ -242,7 +242,8 @@ fn joint_lines(
         }
     };
     interval("limits", range.limits);
-    interval("planning_limits", range.planning_limits.filter(|planning| Some(*planning) != range.limits));
+    let usual = range.limits.map(|limits| JointRange::usual_planning_limits(joint.joint_type, limits));
+    interval("planning_limits", range.planning_limits.filter(|planning| Some(*planning) != usual));
     second.extend(range.max_speed.map(|speed| format!("max_speed_{unit}_s: {}", edge(quantity, speed))));
     second.extend(range.pulses_per_degree.map(|pulses| format!("pulses_per_degree: {}", number(pulses))));
     let more = [second.join(", "), mass.map(mass_fields).unwrap_or_default()];

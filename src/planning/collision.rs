@@ -19,7 +19,7 @@ mod motion;
 
 use std::fmt;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 use thiserror::Error;
 
 pub use distance::Segment;
@@ -129,13 +129,15 @@ pub struct ArmShape<'a> {
     /// Least gap of each contact (m), parallel to `contacts`.
     clearances: Vec<f64>,
     reach: Reach,
+    /// Whether joint frames replace bodies that nobody has stated.
+    is_skeleton: bool,
 }
 
 impl<'a> ArmShape<'a> {
     /// The arm `chain` in `cell`, which must stay `clearance` (m) away from everything.
     ///
-    /// The SMR counts as a part of the arm if the arm has bodies at all. The tracker stands upright on the floor, or is a
-    /// ball if there is none.
+    /// The SMR counts as a part of the arm. The tracker stands upright on the floor, or is a ball if there is none. An arm without
+    /// bodies is a skeleton of its joint frames, which is checked against the floor, the boxes and the tracker only.
     ///
     /// # Errors
     /// A cell that makes no sense, or a tracker that some part touches wherever the arm is.
@@ -158,6 +160,7 @@ impl<'a> ArmShape<'a> {
             contacts: Vec::new(),
             clearances: Vec::new(),
             reach,
+            is_skeleton: cell.bodies.is_empty(),
         };
         shape.contacts = shape.all_contacts();
         let widest = shape.widest_gaps();
@@ -291,9 +294,10 @@ impl<'a> ArmShape<'a> {
 
     fn all_contacts(&self) -> Vec<Contact> {
         let mut contacts = Vec::new();
+        let is_checked = |one: &Solid, other: &Solid| !self.is_skeleton && one.link + 1 < other.link;
         for (first, one) in self.solids.iter().enumerate() {
             for (second, other) in self.solids.iter().enumerate() {
-                if one.link + 1 < other.link {
+                if is_checked(one, other) {
                     contacts.push(Contact::Arm(first, second));
                 }
             }
@@ -326,6 +330,8 @@ impl<'a> ArmShape<'a> {
         for (contact, &widest) in contacts.into_iter().zip(widest) {
             match contact {
                 Contact::Arm(..) if widest < motion::SHORTEST_STEP => continue,
+                // The lowest joints of a skeleton may be below the floor wherever the arm is.
+                _ if self.is_skeleton && widest < clearance => continue,
                 Contact::Arm(..) => self.clearances.push(clearance.min(widest / 2.0)),
                 _ => self.clearances.push(clearance),
             }
@@ -350,7 +356,7 @@ impl<'a> ArmShape<'a> {
     }
 }
 
-/// Bodies and SMR, in link frames.
+/// Bodies, or the joint frames if there are none, and the SMR, in link frames.
 fn solids(chain: &KinematicChain, cell: &Cell) -> Vec<Solid> {
     let body = |body: &super::Body| Solid {
         part: Part::Link(body.link),
@@ -359,12 +365,18 @@ fn solids(chain: &KinematicChain, cell: &Cell) -> Vec<Solid> {
         radius: body.radius,
     };
     let mut solids: Vec<Solid> = cell.bodies.iter().map(body).collect();
-    if !solids.is_empty() {
-        let line = Segment {
-            from: chain.flange() * Point3::from(Vector3::zeros()),
-            to: chain.flange() * cell.target.position_in_flange,
-        };
-        solids.push(Solid { part: Part::Target, link: chain.dof(), line, radius: SMR_RADIUS });
+    if solids.is_empty() {
+        solids = skeleton(chain);
     }
+    let line =
+        Segment { from: chain.flange() * Point3::origin(), to: chain.flange() * cell.target.position_in_flange };
+    solids.push(Solid { part: Part::Target, link: chain.dof(), line, radius: SMR_RADIUS });
     solids
+}
+
+/// A point at every joint frame but the first, which is part of the base. Links lie between two of them, so that an elbow below
+/// the floor is seen.
+fn skeleton(chain: &KinematicChain) -> Vec<Solid> {
+    let origin = Segment { from: Point3::origin(), to: Point3::origin() };
+    (2..=chain.dof()).map(|link| Solid { part: Part::Link(link), link, line: origin, radius: 0.0 }).collect()
 }

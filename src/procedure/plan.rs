@@ -239,7 +239,7 @@ impl<'a> Planner<'a> {
             return vec![Warning::new("not_checked", text, false)];
         }
         if self.profile.bodies().is_empty() {
-            let text = "the profile has no bodies, so the arm was not checked against itself, the floor or keep-out boxes: add 'bodies', or check every move by hand";
+            let text = "the profile has no bodies, so the arm was not checked against itself, and only its joints and the SMR against floor and boxes: add 'bodies', or check every move by hand";
             return vec![Warning::new("not_checked", text, false)];
         }
         Vec::new()

@@ -22,6 +22,11 @@ impl<'t> Fields<'t> {
         (!matches!(value.node, Node::Absent)).then_some(value)
     }
 
+    /// Whether a field is given, be it as `None`.
+    pub(super) fn states(&self, name: &str) -> bool {
+        self.fields.iter().any(|field| field.name == name)
+    }
+
     /// Decoded value of a field, or `default` if it is absent; `None` if it is invalid.
     pub(super) fn get_or<T>(&self, name: &str, default: T, decode: impl FnOnce(&'t Ast) -> Option<T>) -> Option<T> {
         match self.get(name) {

@@ -8,7 +8,7 @@
 //! | `base`, `flange`: `(xyz_mm, rpy_deg)` | identity; roll, pitch, yaw about fixed axes as in URDF |
 //! | joint `beta_deg` | the link has no β, and none is identified |
 //! | joint `direction`, `coupling` | +1, none |
-//! | joint `planning_limits_…` | the joint limits |
+//! | joint `planning_limits_…` | the joint limits, of a revolute joint those within ±180° |
 //! | `targets` | one target 'smr' at the flange origin, free (with a warning) |
 //! | target `uncertainty_mm`, `axis_in_flange` | 50 mm; +z of the flange |
 //! | joint `mass_kg`, `centre_mm` | no mass; both or none; the centre is in the frame at the end of the joint's link |
@@ -21,7 +21,7 @@
 //! | `instrument` | unknown; σ is estimated from the residuals |
 //! | `link`: `(address, options, robot, automatic)` | no proposal; the address is typed in the instrument step |
 //! | `tracker` | at (3000, 0, 1000) mm, 30°, 500 to 20000 mm |
-//! | `floor_mm` | no floor |
+//! | `floor_mm` | 0 under an upright arm, otherwise no floor; `None`: no floor |
 
 mod cell;
 mod joint;
@@ -33,7 +33,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use super::decode::{Fields, choice, direction, fields, list, not_negative, number, numbers, point, text};
 use super::diagnostic::{Diagnostic, Findings, ProfileErrors};
 use super::syntax::{self, Ast};
-use super::{FREE_TARGET_UNCERTAINTY, JointRange, Masses, Profile, Target, check};
+use super::{FREE_TARGET_UNCERTAINTY, JointRange, Masses, Mounting, Profile, Target, check};
 use crate::kinematics::{Convention, Joint, KinematicChain};
 use crate::units::{from_deg, from_mm};
 use joint::DecodedJoint;
@@ -102,7 +102,7 @@ fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let tracker = cell::tracker(&top, findings);
     let mounting = masses::mounting(&top, findings);
     let payload = masses::payload(&top, findings);
-    let floor = top.get("floor_mm").and_then(|ast| number(ast, findings)).map(from_mm);
+    let floor = floor(&top, mounting, findings);
     let keep_out = cell::keep_out(&top, findings);
     let known = joints.as_ref().map(|joints| joints.shapes.as_slice());
     let bodies = cell::bodies(&top, known.map(<[_]>::len), findings);
@@ -167,6 +167,15 @@ fn unzipped(joints: Vec<DecodedJoint>) -> (Vec<Joint>, Vec<JointRange>, Vec<bool
         has_beta.push(beta);
     }
     (chain_joints, ranges, has_beta)
+}
+
+/// Decodes the height of the floor (m).
+fn floor(top: &Fields<'_>, mounting: Option<Mounting>, findings: &mut Findings<'_>) -> Option<f64> {
+    match top.get("floor_mm") {
+        Some(ast) => number(ast, findings).map(from_mm),
+        None if top.states("floor_mm") || mounting != Some(Mounting::Floor) => None,
+        None => Some(0.0),
+    }
 }
 
 fn schema_number(top: &Fields<'_>, findings: &mut Findings<'_>) {

@@ -3,7 +3,7 @@
 //! Degrees and millimetres, as in the file. Every text ends with a line break.
 
 use super::diagnostic::joined;
-use super::{Diagnostic, JointRange, Level, Masses, Mounting, PARALLEL_TOLERANCE, Profile, ProfileErrors};
+use super::{Diagnostic, Gap, JointRange, Level, Masses, Mounting, PARALLEL_TOLERANCE, Profile, ProfileErrors};
 use crate::kinematics::{Convention, Joint, JointType, LinkMass, Loads};
 use crate::text::{counted, counted_as, printable, shortened, wrapped};
 use crate::units::{Quantity, to_deg, to_mm};
@@ -48,12 +48,19 @@ pub fn check_text(file_name: &str, outcome: &Result<(Profile, Vec<Diagnostic>), 
         Ok((profile, warnings)) => (warnings, 0, format!("profile '{}' can be used", profile.name())),
         Err(errors) => (&errors.diagnostics, errors.error_count(), "the profile cannot be used".to_owned()),
     };
+    let file = printable(file_name);
+    let gaps = outcome.as_ref().map(|(profile, _)| profile.gaps()).unwrap_or_default();
     let mut text = joined(diagnostics);
     if !diagnostics.is_empty() {
         text.push_str("\n\n");
     }
-    let file = printable(file_name);
-    let (errors, warnings) = (counted(errors, "error"), counted(diagnostics.len() - errors, "warning"));
+    for Gap { message, hint } in &gaps {
+        let lines = wrapped(&format!("{file}: warning: {message}"), WIDTH).into_iter();
+        let hint = wrapped(&format!("hint: {hint}"), WIDTH - 2).into_iter().map(|line| format!("  {line}"));
+        text.push_str(&finished(&lines.chain(hint).chain([String::new()]).collect::<Vec<_>>()));
+    }
+    let warnings = diagnostics.len() - errors + gaps.len();
+    let (errors, warnings) = (counted(errors, "error"), counted(warnings, "warning"));
     format!("{text}{file}: {verdict}: {errors}, {warnings}\n")
 }
 

@@ -12,6 +12,7 @@ use super::clock::Clock;
 use super::events::{Events, Message};
 use super::jobs;
 use super::links::LinkThread;
+use super::recent;
 use super::store_thread::{Command, StoreThread};
 use crate::link::RawLog;
 use crate::recording::{self, Live, Recorder, RecordingEvent};
@@ -141,6 +142,11 @@ impl Engine {
             pending: None,
             has_exited: false,
         })
+    }
+
+    /// Looks for sessions in a folder that can be continued, and offers them on the first screen.
+    pub fn offer_sessions(&self, root: PathBuf) {
+        recent::look(root, self.sender.clone());
     }
 
     pub const fn wizard(&self) -> &Wizard {

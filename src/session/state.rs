@@ -60,6 +60,12 @@ pub struct Session {
     pub plan: Option<PlanText>,
     /// Row of the plan that was measured, skipped or gone to last.
     pub shown: Option<usize>,
+    /// The last stop of the arm that is known.
+    pub last_stop: Option<Stop>,
+    /// Whether the program has run since that stop. In a break the arm may have been moved.
+    pub is_stop_certain: bool,
+    /// Row of the plan to which the operator goes through home.
+    pub through_home: Option<usize>,
     /// Everything that was measured.
     pub samples: Vec<Sample>,
     /// Measurements that gave no sample.
@@ -138,6 +144,19 @@ impl fmt::Display for SampleState {
             Self::Undone => "undone",
         })
     }
+}
+
+/// A stop of the arm.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stop {
+    /// Where this measurement was taken.
+    Sample(u64),
+    /// A configuration that the operator has driven through.
+    Passed {
+        pose: String,
+        /// Pendant values (rad, m).
+        configuration: Vec<f64>,
+    },
 }
 
 /// A measured point.
@@ -240,6 +259,7 @@ impl Session {
                 self.payload = None;
                 self.rows.clear();
                 self.shown = None;
+                self.last_stop = None;
                 self.plan = None;
             }
             Entry::Step(step) => self.step = *step,
@@ -255,6 +275,11 @@ impl Session {
             Entry::Payload(payload) => self.payload = Some(*payload),
             Entry::CirclePoint(point) => {
                 self.measurements = self.measurements.max(point.number);
+                if let Some(robot) = self.robot.as_ref().filter(|_| self.fits(&point.joints)) {
+                    let configuration = from_edge(&point.joints, &robot.joint_types);
+                    self.last_stop = Some(Stop::Passed { pose: "the last circle point".to_owned(), configuration });
+                    self.is_stop_certain = true;
+                }
                 self.circle_points.push(point.clone());
             }
             Entry::CirclesDiscarded => self.circle_points.clear(),
@@ -285,6 +310,19 @@ impl Session {
             Entry::Row(row) => {
                 self.rows.get(*row).ok_or_else(|| misfit("a row that is in no plan"))?;
                 self.shown = Some(*row);
+                self.through_home = None;
+            }
+            Entry::Passed { pose, joints } => {
+                let robot = self.robot.as_ref().filter(|_| self.fits(joints));
+                let robot = robot.ok_or_else(|| misfit("a stop that does not fit the robot"))?;
+                let configuration = from_edge(joints, &robot.joint_types);
+                self.last_stop = Some(Stop::Passed { pose: pose.clone(), configuration });
+                self.is_stop_certain = true;
+                self.through_home = None;
+            }
+            Entry::ThroughHome(row) => {
+                self.rows.get(*row).ok_or_else(|| misfit("a row that is in no plan"))?;
+                self.through_home = Some(*row);
             }
             Entry::Skipped { row, skipped } => {
                 self.rows.get_mut(*row).ok_or_else(|| misfit("a row that is in no plan"))?.skipped = *skipped;
@@ -311,6 +349,7 @@ impl Session {
             Entry::Resumed { .. } => {
                 self.resumed += 1;
                 self.closed = false;
+                self.is_stop_certain = false;
             }
             Entry::Closed { .. } => self.closed = true,
         }
@@ -435,6 +474,17 @@ impl Session {
         self.robot.as_ref().map_or_else(Vec::new, |robot| from_edge(&sample.joints, &robot.joint_types))
     }
 
+    /// Where the arm was last known to be: the stop in words and pendant values (rad, m). Corrections of its sample apply.
+    pub fn arm(&self) -> Option<(String, Vec<f64>)> {
+        match self.last_stop.as_ref()? {
+            Stop::Passed { pose, configuration } => Some((pose.clone(), configuration.clone())),
+            Stop::Sample(number) => {
+                let sample = self.sample(*number)?;
+                Some((format!("pose {}", self.pose_of(sample)), self.configuration_of(sample)))
+            }
+        }
+    }
+
     /// Standard deviation of a sample (m), where the instrument stated one.
     pub fn sigma_of(&self, sample: &Sample) -> Option<f64> {
         self.sigma_noted(&sample.noted)
@@ -498,6 +548,9 @@ impl Session {
         }
         self.measurements = noted.number;
         self.shown = Some(noted.row);
+        self.last_stop = Some(Stop::Sample(noted.number));
+        self.is_stop_certain = true;
+        self.through_home = None;
         // Most rows are measured once: of a large table not every sample need be looked through for every one.
         let again = if noted.row < self.rows_measured { self.samples.as_mut_slice() } else { &mut [] };
         for sample in again.iter_mut().filter(|sample| sample.row == noted.row) {

@@ -109,7 +109,10 @@ pub(super) fn live(live: &LiveView) -> Option<String> {
     let mut parts = Vec::new();
     parts.extend(live.rest_s.map(|seconds| format!("SMR at rest for {seconds:.1} s")));
     parts.extend(live.scatter_mm.map(|scatter| format!("scatter {scatter:.3} mm")));
-    parts.extend(live.from_predicted_mm.map(|distance| format!("{distance:.1} mm from predicted")));
+    parts.extend(match (&live.at_pose, live.from_predicted_mm) {
+        (Some(pose), _) => Some(format!("the robot is at pose {pose}")),
+        (None, distance) => distance.map(|distance| format!("{distance:.1} mm from predicted")),
+    });
     Some(parts.join(", "))
 }
 
@@ -129,6 +132,7 @@ mod tests {
             joints: None,
             joint_difference: None,
             is_still: None,
+            at_pose: None,
             down: None,
             track: Vec::new(),
         }

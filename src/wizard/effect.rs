@@ -4,6 +4,7 @@ use jiff::Timestamp;
 
 use super::intent::Intent;
 use super::notice::{Notice, Problem};
+use super::view::SessionCard;
 use crate::identification::Stage;
 use crate::procedure;
 use crate::procedure::identify::{Identified, IdentifyRequest};
@@ -39,6 +40,8 @@ pub enum Event {
     },
     /// The link's reading between measurements.
     Live(LiveReading),
+    /// Sessions that can be continued, the latest first.
+    Sessions(Vec<SessionCard>),
     /// A message that does not concern the calibration itself, such as a recording that stopped.
     Remark(Notice),
     /// The program has to end.

@@ -22,6 +22,8 @@ pub enum Intent {
     /// Choose a robot by the name of a bundled profile or the path of a file.
     ChooseProfile(String),
     NameSession(String),
+    /// Continue another session, by its folder.
+    ResumeSession(String),
     ChooseInstrument(InstrumentChoice),
     /// Choose where the SMR sits on the flange.
     ChooseTarget(TargetChoice),
@@ -56,6 +58,10 @@ pub enum Intent {
     MeasureAgain,
     /// Apply the proposed correction.
     ApplyRemedy,
+    /// The arm is at the stop on the way that is shown.
+    Passed,
+    /// Go through home to the pose shown.
+    ThroughHome,
     /// Skip the pose shown.
     Skip,
     /// Undo the last sample.
@@ -87,6 +93,7 @@ impl Intent {
             Self::Retry => "Retry",
             Self::ChooseProfile(_) => "ChooseProfile",
             Self::NameSession(_) => "NameSession",
+            Self::ResumeSession(_) => "ResumeSession",
             Self::ChooseInstrument(_) => "ChooseInstrument",
             Self::ChooseTarget(_) => "ChooseTarget",
             Self::StatePayload(_) => "StatePayload",
@@ -104,6 +111,8 @@ impl Intent {
             Self::LeaveOut => "LeaveOut",
             Self::MeasureAgain => "MeasureAgain",
             Self::ApplyRemedy => "ApplyRemedy",
+            Self::Passed => "Passed",
+            Self::ThroughHome => "ThroughHome",
             Self::Skip => "Skip",
             Self::Undo => "Undo",
             Self::GoToPose(_) => "GoToPose",

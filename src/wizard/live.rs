@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use nalgebra::{Point3, Vector3};
 
 use crate::kinematics::ForwardKinematics;
+use crate::session::plan::PoseKind;
 use crate::session::reading::LiveReading;
 use crate::session::state::Session;
 use crate::session::station;
@@ -27,6 +28,8 @@ const MOVED: f64 = 5.0 * MILLIMETRE;
 const NEAR: f64 = 30.0 * MILLIMETRE;
 /// The same as a multiple of the registration residual, if that is larger.
 const NEAR_SPREADS: f64 = 4.0;
+/// How much farther away than the nearest predicted position the next one has to be, so that a pose is recognised by it.
+const UNIQUE: f64 = 3.0;
 /// Largest difference of a joint from the plan at which the robot is at the planned configuration (rad).
 pub(super) const AS_PLANNED: f64 = 0.05 * DEGREE;
 
@@ -91,6 +94,13 @@ impl Live {
         Some(((registered.to_from_from * here - predicted).norm(), registered.rms))
     }
 
+    /// Whether the robot reports that it is at rest in a configuration.
+    pub(super) fn rests_at(&self, configuration: &[f64]) -> bool {
+        let Some(LiveReading { joints: Some(joints), is_still, .. }) = &self.latest else { return false };
+        let is_near = |(joint, wanted): (&f64, &f64)| (joint - wanted).abs() <= AS_PLANNED;
+        *is_still != Some(false) && joints.len() == configuration.len() && joints.iter().zip(configuration).all(is_near)
+    }
+
     /// The joint that is farthest from the plan, and its difference (rad).
     fn joint_difference(&self, session: &Session, row: usize) -> Option<(usize, f64)> {
         let joints = self.latest.as_ref()?.joints.as_ref()?;
@@ -102,12 +112,54 @@ impl Live {
         differences.enumerate().max_by(|(_, one), (_, other)| one.total_cmp(other))
     }
 
-    /// Whether to measure `row` automatically now.
-    pub(super) fn is_time(&self, session: &Session, row: usize) -> bool {
+    /// Whether SMR and robot have come to rest since the last measurement.
+    fn has_arrived(&self) -> bool {
         let Some(latest) = self.latest.as_ref().filter(|latest| latest.down.is_none()) else { return false };
         let smr_rests = self.rest().is_some_and(|(seconds, _)| seconds >= REST_TIME);
         let robot_rests = latest.is_still != Some(false);
-        self.measured_at.is_none() && smr_rests && robot_rests && self.is_at(session, row)
+        self.measured_at.is_none() && smr_rests && robot_rests
+    }
+
+    /// Whether to measure `row` automatically now.
+    pub(super) fn is_time(&self, session: &Session, row: usize) -> bool {
+        self.has_arrived() && self.is_at(session, row)
+    }
+
+    /// The open row at which the robot has come to rest, if that is not `shown`: by the joints that the robot reports, or else by
+    /// where the SMR is. A repeated pose is only expected where the plan has it.
+    pub(super) fn recognised(&self, session: &Session, shown: usize) -> Option<usize> {
+        if !self.has_arrived() || self.is_at(session, shown) {
+            return None;
+        }
+        let is_candidate = |row: &usize| {
+            let kind = session.rows.get(*row).map(|row| row.planned.kind);
+            *row != shown && kind.is_some_and(|kind| kind != PoseKind::Drift)
+        };
+        let (before, after): (Vec<usize>, Vec<usize>) =
+            session.open_rows().filter(is_candidate).partition(|row| *row < shown);
+        let mut rows = after.into_iter().chain(before);
+        if self.latest.as_ref().is_some_and(|latest| latest.joints.is_some()) {
+            let by_joints = |row: &usize| {
+                self.joint_difference(session, *row).is_some_and(|(_, difference)| difference <= AS_PLANNED)
+            };
+            return rows.find(by_joints).filter(|row| self.is_at(session, *row));
+        }
+        self.nearest(session, rows)
+    }
+
+    /// The row whose predicted position the SMR is at, if no other one is nearly as close.
+    fn nearest(&self, session: &Session, rows: impl Iterator<Item = usize>) -> Option<usize> {
+        let (_, here) = *self.points.back()?;
+        let registered = station::registration(session)?;
+        let here = registered.to_from_from * here;
+        let mut distances: Vec<(f64, usize)> = rows
+            .filter_map(|row| Some(((predicted(session, &session.rows.get(row)?.planned.configuration)? - here).norm(), row)))
+            .collect();
+        distances.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+        let limit = NEAR.max(NEAR_SPREADS * registered.rms);
+        let (nearest, row) = *distances.first()?;
+        let is_unique = distances.get(1).is_none_or(|(second, _)| *second > limit + UNIQUE * nearest);
+        (nearest <= limit && is_unique).then_some(row)
     }
 
     /// Whether the robot is at the pose of `row`. Without joint values, and before the tracker is registered, nothing tells
@@ -147,6 +199,10 @@ impl Live {
                 .and_then(|row| self.joint_difference(session, row))
                 .map(|(joint, difference)| (joint, to_deg(difference))),
             is_still: latest.is_still,
+            at_pose: row
+                .and_then(|row| self.recognised(session, row))
+                .and_then(|row| session.rows.get(row))
+                .map(|row| row.planned.pose.clone()),
             down: latest.down.clone(),
             track: self
                 .points

@@ -21,7 +21,7 @@ use jiff::Timestamp;
 use super::effect::{Answer, Request};
 use super::intent::{Intent, IntentInfo};
 use super::notice::{Notice, Problem};
-use super::view::Content;
+use super::view::{Content, SessionCard};
 use crate::profile::Profile;
 use crate::session::journal::Entry;
 use crate::session::plan::PlannedPose;
@@ -36,6 +36,8 @@ pub(super) struct Cx<'a> {
     /// Why the link to the instrument is down, while it is being reconnected.
     pub(super) down: Option<&'a str>,
     pub(super) now: Timestamp,
+    /// Sessions that can be continued instead of starting one.
+    pub(super) sessions: &'a [SessionCard],
 }
 
 impl Cx<'_> {
@@ -158,6 +160,20 @@ impl Phase {
     pub(super) const fn shown_row(&self) -> Option<usize> {
         match self {
             Self::Capture(step) => step.shown_row(),
+            Self::Profile(_)
+            | Self::Instrument(_)
+            | Self::Target(_)
+            | Self::Plan(_)
+            | Self::Identify(_)
+            | Self::Verify(_)
+            | Self::Deliver(_) => None,
+        }
+    }
+
+    /// Configuration of the stop on the way that is shown, if any.
+    pub(super) fn shown_stop(&self) -> Option<&[f64]> {
+        match self {
+            Self::Capture(step) => step.next_stop(),
             Self::Profile(_)
             | Self::Instrument(_)
             | Self::Target(_)

@@ -10,3 +10,4 @@ mod shutdown;
 mod stale;
 mod steps;
 mod units;
+mod way;

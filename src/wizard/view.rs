@@ -2,6 +2,7 @@
 //!
 //! Units are in the names. No residual of a fit is shown as an accuracy.
 
+use jiff::Timestamp;
 use serde::Serialize;
 
 use super::intent::{Intent, IntentInfo, PlanSettings};
@@ -15,6 +16,7 @@ use crate::session::journal::{FindingCause, PlanText};
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{About, Step};
+use crate::session::state::Session;
 use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummary, Warning, WorkspaceSummary};
 use crate::session::wire::LinkChoice;
 use crate::units::to_mm;
@@ -73,6 +75,8 @@ pub struct LiveView {
     pub joint_difference: Option<(usize, f64)>,
     /// Whether the robot is at rest, if it reports that.
     pub is_still: Option<bool>,
+    /// Pose at which the robot rests, if it is not the one shown.
+    pub at_pose: Option<String>,
     /// Reason why the instrument cannot be used.
     pub down: Option<String>,
     /// Readings of the last seconds.
@@ -157,6 +161,69 @@ pub struct ProfileView {
     pub session: String,
     /// Whether the robot can no longer be changed.
     pub is_fixed: bool,
+    /// Sessions that can be continued instead: folder, name, and what is known about them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<SessionChoice>,
+}
+
+/// A session on offer.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SessionChoice {
+    pub name: String,
+    pub folder: String,
+    pub robot: String,
+    /// How far it is, and how long ago it was left.
+    pub progress: String,
+}
+
+/// A session that can be continued.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SessionCard {
+    pub name: String,
+    pub folder: String,
+    /// Title of the robot.
+    pub robot: Option<String>,
+    pub step: Step,
+    /// Samples that count.
+    pub measured: usize,
+    /// Poses to measure, those measured included.
+    pub poses: usize,
+    /// Time of the last entry.
+    #[serde(skip)]
+    pub latest: Option<Timestamp>,
+}
+
+impl SessionCard {
+    /// The card of the session in a folder.
+    pub fn new(session: &Session, folder: String) -> Self {
+        let measured = session.counted().count();
+        Self {
+            name: session.name.clone(),
+            folder,
+            robot: session.robot.as_ref().map(|robot| robot.profile.title().to_owned()),
+            step: session.step,
+            measured,
+            poses: measured + session.open_rows().count(),
+            latest: session.latest,
+        }
+    }
+
+    /// How far the session is, and how long ago it was left.
+    pub fn progress(&self, now: Timestamp) -> String {
+        let far = if self.poses > 0 {
+            format!("{} of {} measured", self.measured, self.poses)
+        } else {
+            format!("step {}", self.step)
+        };
+        let ago = self.latest.map(|latest| now.duration_since(latest).as_secs_f64() / 60.0);
+        match ago {
+            Some(minutes) if minutes < 1.0 => format!("{far}, just now"),
+            Some(minutes) if minutes < 120.0 => format!("{far}, {minutes:.0} min ago"),
+            Some(minutes) if minutes < 48.0 * 60.0 => format!("{far}, {:.0} h ago", minutes / 60.0),
+            Some(minutes) => format!("{far}, {:.0} days ago", minutes / 1440.0),
+            None => far,
+        }
+    }
 }
 
 /// Summary of a robot profile.
@@ -324,10 +391,12 @@ pub struct CaptureView {
     pub row: Option<usize>,
     pub pose: Option<String>,
     pub kind: Option<PoseKind>,
-    /// Configuration to go to, in pendant values.
+    /// Configuration to go to next, in pendant values.
     pub joints: Vec<JointShown>,
-    /// Poses to pass through on the way.
+    /// Stops on the way to the pose; the configuration is that of the first one.
     pub on_the_way: Vec<String>,
+    /// Check of the move to that configuration.
+    pub move_check: MoveCheck,
     /// Point of the SMR in the robot base, from the nominal arm.
     pub predicted_point_in_base_mm: Option<[f64; 3]>,
     /// Samples that count.
@@ -361,6 +430,28 @@ pub struct CaptureView {
     pub notes: Vec<(Option<String>, String)>,
     /// Refused measurements: pose and reason.
     pub refused: Vec<(String, String)>,
+}
+
+/// Check of the move to the next configuration.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MoveCheck {
+    /// It is free of collisions.
+    Free {
+        /// Name of the stop where the arm is.
+        from: String,
+    },
+    /// Something is in the way, and no free way is known.
+    Blocked {
+        /// Name of the stop where the arm is.
+        from: String,
+        obstruction: String,
+    },
+    /// Nothing can be said.
+    NotChecked { reason: String },
+    /// The arm is there.
+    #[default]
+    Arrived,
 }
 
 /// A summary of a sample.
@@ -426,7 +517,11 @@ pub struct PredictionView {
     pub now_mm: f64,
     /// Predicted error with the rest of the plan.
     pub with_all_mm: Option<f64>,
-    /// Whether the remaining poses are not worth their time.
+    /// Largest error that the profile accepts, if it states one: RMS or mean.
+    pub limit_mm: Option<f64>,
+    /// Number of identification poses that are still open.
+    pub open: usize,
+    /// Whether the remaining poses are not worth their time: the error is well below the limit, or they hardly change it.
     pub is_enough: bool,
 }
 

@@ -158,11 +158,12 @@ fn what_is_left_out_has_the_documented_default() {
     let text = r#"(schema: 1, name: "x", title: "x", source: "x", convention: Standard, joints: [
         (name: "A", type: Revolute, alpha_deg: 90.0, a_mm: 0.0, d_mm: 0.0, theta_deg: 0.0)])"#;
     let outcome = Profile::parse(text, "x.ron");
-    assert!(check_text("x.ron", &outcome).ends_with("x.ron: profile 'x' can be used: 0 errors, 2 warnings\n"));
+    // Beside the two of reading: bodies, instrument, acceptance and tracker are not stated, and the SMR is on the last axis.
+    assert!(check_text("x.ron", &outcome).ends_with("x.ron: profile 'x' can be used: 0 errors, 7 warnings\n"));
     let (profile, warnings) = outcome.unwrap();
     assert!(warnings.iter().all(|warning| warning.severity == Severity::Warning));
     assert_eq!(*profile.tracker(), Tracker::default());
-    assert_eq!((profile.floor(), profile.instrument(), profile.bodies().len()), (None, None, 0));
+    assert_eq!((profile.floor(), profile.instrument(), profile.bodies().len()), (Some(0.0), None, 0));
     assert_eq!(profile.targets().len(), 1);
     assert!(profile.targets()[0].is_free());
     assert_eq!(profile.parameters(Level::Geometric).len(), 4 + 3);
@@ -192,4 +193,31 @@ fn the_link_of_the_cell_arrives_with_its_addresses_in_full() {
     assert_eq!(Profile::parse(&shown, "all.ron").unwrap().0, profile);
     let text = show_text(&profile);
     assert!(text.contains("link: emscon:tcp:192.168.0.2:700, robot at rtde:tcp:192.168.0.10:30004"), "{text}");
+}
+
+/// What a joint can turn beyond half a turn is for cables to decide, and an arm must not be planned below its own base.
+#[test]
+fn plans_stay_within_half_a_turn_and_above_the_floor_unless_stated() {
+    let of = |joint: &str, more: &str| {
+        let text = format!(
+            r#"(schema: 1, name: "x", title: "x", source: "x", convention: Standard, joints: [
+            (name: "A", type: Revolute, alpha_deg: 90.0, a_mm: 0.0, d_mm: 0.0, theta_deg: 0.0, {joint})], {more})"#
+        );
+        Profile::parse(&text, "x.ron").unwrap().0
+    };
+    let planning = |joint: &str| {
+        let (low, high) = of(joint, "").joints()[0].planning_limits.unwrap();
+        [low, high].map(|limit| limit.to_degrees().round())
+    };
+    assert_eq!(planning("limits_deg: (-400.0, 400.0)"), [-180.0, 180.0]);
+    assert_eq!(planning("limits_deg: (-90.0, 270.0)"), [-90.0, 180.0]);
+    assert_eq!(planning("limits_deg: (-120.0, 120.0)"), [-120.0, 120.0]);
+    assert_eq!(planning("limits_deg: (200.0, 300.0)"), [200.0, 300.0]);
+    assert_eq!(planning("limits_deg: (-400.0, 400.0), planning_limits_deg: (-200.0, 400.0)"), [-200.0, 400.0]);
+    let limits = "limits_deg: (-90.0, 90.0)";
+    assert_eq!(of(limits, "").floor(), Some(0.0));
+    assert_eq!(of(limits, "floor_mm: None").floor(), None);
+    assert_eq!(of(limits, "mounting: Ceiling").floor(), None);
+    let turning = of("limits_deg: (-400.0, 400.0)", "").gaps();
+    assert_eq!(turning[0].message, "A turns beyond 180 deg without 'planning_limits_deg'");
 }

@@ -39,6 +39,8 @@ impl Entry {
             }
             Self::Correction(correction) => correction_text(correction),
             Self::Row(row) => format!("went to row {} of the plan", row + 1),
+            Self::Passed { pose, .. } => format!("passed through '{pose}'"),
+            Self::ThroughHome(row) => format!("going through home to row {} of the plan", row + 1),
             Self::Skipped { row, skipped: true } => format!("row {} of the plan skipped", row + 1),
             Self::Skipped { row, skipped: false } => format!("row {} of the plan is to be measured after all", row + 1),
             Self::Note { pose: Some(pose), text } => format!("note to pose {pose}: {text}"),

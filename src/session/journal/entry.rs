@@ -74,6 +74,15 @@ pub enum Entry {
     Correction(Correction),
     /// The operator selected this row of the plan, from 0.
     Row(usize),
+    /// The operator has driven the arm through a configuration that is not measured, on the way to the next pose.
+    Passed {
+        /// Name of the stop, such as `home`.
+        pose: String,
+        /// Pendant joint values.
+        joints: Vec<f64>,
+    },
+    /// The operator wants to go through home to this row of the plan, from 0.
+    ThroughHome(usize),
     /// A row of the plan is skipped, or no longer skipped.
     Skipped {
         /// Row of the plan, from 0.

@@ -254,6 +254,8 @@ fn all_entries() -> Vec<Entry> {
         Entry::Refused { number: 9, pose: "7".to_owned(), reason: TRICKY.to_owned(), xyz_mm: Some((1.0, 2.0, 3.0)) },
         Entry::Refused { number: 10, pose: String::new(), reason: String::new(), xyz_mm: None },
         Entry::Row(3),
+        Entry::Passed { pose: TRICKY.to_owned(), joints: vec![1.5, -2.0] },
+        Entry::ThroughHome(3),
         Entry::Skipped { row: 3, skipped: true },
         Entry::Skipped { row: 3, skipped: false },
         Entry::Note { pose: Some(TRICKY.to_owned()), text: TRICKY.to_owned() },
@@ -303,6 +305,8 @@ fn variant(entry: &Entry) -> usize {
         Entry::About(_) => 20,
         Entry::Connected { .. } => 21,
         Entry::Payload(_) => 22,
+        Entry::Passed { .. } => 23,
+        Entry::ThroughHome(_) => 24,
     }
 }
 
@@ -310,7 +314,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 23);
+    assert_eq!(variants.len(), 25);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

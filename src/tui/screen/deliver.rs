@@ -7,6 +7,7 @@ use ratatui::layout::Rect;
 use super::page::{Page, Scroll};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome, verify};
 use crate::session::summary::VerdictStatus;
+use crate::text::counted;
 use crate::tui::dialog::Dialog;
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::theme::Role;
@@ -40,7 +41,7 @@ fn about(file: &str) -> &'static str {
     match file.rsplit(['/', '\\']).next().unwrap_or(file) {
         "plan.csv" => "the poses that were planned",
         "measurements.csv" => "all measurements, as input for any program",
-        "calibration.ron" => "the identified arm, to be applied",
+        "calibration.ron" => "the identified arm, input of 'compensate', 'export' and 'verify'",
         "report.json" => "all figures of this session, for other programs",
         "report.html" => "all figures of this session, to read and print",
         "drift.csv" => "the repeated measurements of the drift pose",
@@ -91,39 +92,56 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         page.gap();
         page.paragraph("calibration.ron is the identified arm; corrected.* and dh.csv are its geometry for other programs. report.html is for reading and printing, report.json has the same figures. plan.csv and measurements.csv are the data.", Role::Plain);
     } else {
-        page.title("Written");
-        for file in &content.files {
-            page.paragraph(&path(file), Role::Plain);
-            if rows >= EXPLAINED && !about(file).is_empty() {
-                page.marked(("    ", Role::Dim), about(file), Role::Dim);
-            }
-        }
+        page.title(&format!("Written: {} in {folder}", counted(content.files.len(), "file")));
         for reason in &content.left_out {
             page.marked(("Left out: ", Role::Warn), reason, Role::Plain);
         }
         if !content.left_out.is_empty() {
             page.paragraph("'trupose export --help' lists what can be done about it.", Role::Plain);
         }
-        page.title("What to do next");
-        let is_accepted = content.verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
-        if is_accepted {
-            let apply = "apply calibration.ron to the controller or the offline program";
-            page.marked(("1 ", Role::Dim), apply, Role::Plain);
-        } else {
-            let wait = "do not apply it yet: b goes back to Verify, which says what is missing";
-            page.marked(("1 ", Role::Dim), wait, Role::Warn);
+        next_steps(content, &path, folder, &mut page);
+        page.title("Files");
+        for file in &content.files {
+            page.paragraph(&path(file), Role::Plain);
+            if rows >= EXPLAINED && !about(file).is_empty() {
+                page.marked(("    ", Role::Dim), about(file), Role::Dim);
+            }
         }
-        page.marked(("2 ", Role::Dim), "verify with new points, later or after a collision:", Role::Plain);
-        let verify = format!(
-            "trupose verify --calibration {} --measurements NEW.csv --refit frame+target",
-            path("calibration.ron")
-        );
-        page.paragraph(&verify, Role::Plain);
-        page.marked(("3 ", Role::Dim), "measure more:", Role::Plain);
-        page.paragraph(&format!("trupose resume {folder}"), Role::Plain);
     }
     page.paragraph("Quitting is safe: every measurement is already in the journal.", Role::Ok);
     page
+}
+
+/// How to apply the result, pass it on and check it later, with commands to copy.
+fn next_steps(content: &DeliverView, path: &dyn Fn(&str) -> String, folder: &str, page: &mut Page) {
+    page.title("What to do next");
+    let calibration = path("calibration.ron");
+    let is_accepted = content.verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
+    let mut steps = Vec::new();
+    if is_accepted {
+        steps.push((
+            "correct a robot program, so that the arm goes where the program says:",
+            format!("trupose compensate --calibration {calibration} --program FILE --dialect krl --out NEW-FILE"),
+        ));
+        steps.push((
+            "or give the corrected arm to your offline software; other formats:",
+            format!("trupose export --calibration {calibration} --format dh-csv"),
+        ));
+    } else {
+        let wait = "do not apply it yet: b goes back to Verify, which says what is missing";
+        page.marked(("- ", Role::Dim), wait, Role::Warn);
+    }
+    steps.push(("read the report here:", format!("trupose session report --text {folder}")));
+    steps.push(("or copy it from this computer to yours:", format!("scp THIS-COMPUTER:{} .", path("report.html"))));
+    steps.push((
+        "verify with new points, later or after a collision:",
+        format!("trupose verify --calibration {calibration} --measurements NEW.csv --refit frame+target"),
+    ));
+    steps.push(("measure more:", format!("trupose resume {folder}")));
+    for (what, command) in steps {
+        page.marked(("- ", Role::Dim), what, Role::Plain);
+        page.marked(("    ", Role::Dim), &command, Role::Title);
+    }
 }
 
 impl Screen for DeliverScreen {

@@ -8,11 +8,12 @@ use super::page::{Page, picture, split};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::tui::dialog::Dialog;
 use crate::tui::form::TextField;
+use crate::tui::glyphs::shortened;
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::theme::Role;
 use crate::wizard::Intent;
-use crate::wizard::view::{Content, ProfileCard, ProfileView};
+use crate::wizard::view::{Content, ProfileCard, ProfileView, SessionChoice};
 
 /// Columns of the list.
 const LIST: u16 = 26;
@@ -24,6 +25,26 @@ const PICTURE_ROWS: u16 = 9;
 const ALL: u16 = 106;
 /// The entry after the bundled profiles.
 const FILE: &str = "file...";
+
+/// An entry of the list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Item<'a> {
+    /// A session to continue.
+    Session(&'a SessionChoice),
+    /// A bundled profile.
+    Robot(&'a str),
+    File,
+}
+
+impl<'a> Item<'a> {
+    fn name(self) -> &'a str {
+        match self {
+            Self::Session(session) => &session.name,
+            Self::Robot(name) => name,
+            Self::File => FILE,
+        }
+    }
+}
 
 #[derive(Clone, Debug)]
 pub(super) struct ProfileScreen {
@@ -47,17 +68,19 @@ const fn content<'a>(cx: &ScreenCx<'a>) -> Option<&'a ProfileView> {
 }
 
 impl ProfileScreen {
-    /// Names that contain every typed word, and the entry for a file.
-    fn entries<'a>(&self, content: &'a ProfileView) -> Vec<&'a str> {
+    /// Sessions to continue, unless a robot is being searched; names that contain every typed word; and the entry for a file.
+    fn entries<'a>(&self, content: &'a ProfileView) -> Vec<Item<'a>> {
         let wanted = self.search.text().to_lowercase();
         let fits = |name: &&str| wanted.split_whitespace().all(|word| name.to_lowercase().contains(word));
-        content.profiles.iter().map(String::as_str).filter(fits).chain([FILE]).collect()
+        let sessions = if self.is_typing { &[][..] } else { &content.sessions };
+        let robots = content.profiles.iter().map(String::as_str).filter(fits).map(Item::Robot);
+        sessions.iter().map(Item::Session).chain(robots).chain([Item::File]).collect()
     }
 
     /// Position of the cursor.
     fn place(&self, content: &ProfileView) -> usize {
         let entries = self.entries(content);
-        let chosen = content.chosen.as_ref().and_then(|card| entries.iter().position(|name| *name == card.name));
+        let chosen = content.chosen.as_ref().and_then(|card| entries.iter().position(|entry| *entry == Item::Robot(&card.name)));
         self.cursor.or(chosen).unwrap_or(0).min(entries.len().saturating_sub(1))
     }
 
@@ -73,9 +96,13 @@ impl ProfileScreen {
 
     fn load(&mut self, content: &ProfileView) -> ScreenOutcome {
         let place = self.place(content);
-        let entry = self.entries(content).get(place).copied().unwrap_or(FILE).to_owned();
+        let entry = self.entries(content).get(place).copied().unwrap_or(Item::File);
         *self = Self::default();
-        if entry == FILE { file() } else { ScreenOutcome::Intent(Intent::ChooseProfile(entry)) }
+        match entry {
+            Item::Session(session) => ScreenOutcome::Intent(Intent::ResumeSession(session.folder.clone())),
+            Item::Robot(name) => ScreenOutcome::Intent(Intent::ChooseProfile(name.to_owned())),
+            Item::File => file(),
+        }
     }
 
     fn type_key(&mut self, key: Key) -> bool {
@@ -102,7 +129,13 @@ impl Screen for ProfileScreen {
         let Some(content) = content(cx).filter(|content| !content.is_fixed) else { return Vec::new() };
         let mut items = vec![KeyHint::new("Up/Down", "choose", 2)];
         if self.loads(content) {
-            items.push(KeyHint::new("Enter", "show this robot", 0));
+            let place = self.place(content);
+            let label = match self.entries(content).get(place) {
+                Some(Item::Session(_)) => "continue this session",
+                Some(Item::File) => "profile from a file",
+                Some(Item::Robot(_)) | None => "show this robot",
+            };
+            items.push(KeyHint::new("Enter", label, 0));
         }
         if self.is_typing {
             items.push(KeyHint::new("Esc", "all robots", 1));
@@ -154,7 +187,13 @@ impl Screen for ProfileScreen {
         let Some(content) = content(cx) else { return };
         let parts = self.parts(content, cx, area);
         self.draw_list(content, cx, parts.list, buf);
-        let Some(card) = &content.chosen else { return introduction(cx, parts.text, buf) };
+        let Some(card) = &content.chosen else {
+            let entries = self.entries(content);
+            return match entries.get(self.place(content)) {
+                Some(Item::Session(session)) => session_page(session, cx, parts.text, buf),
+                _ => introduction(cx, parts.text, buf),
+            };
+        };
         card_page(card, content, cx, parts.text.width).draw(0, parts.text, buf);
         if let (Some(scene), Some(area)) = (cx.scene, parts.picture) {
             picture(cx, scene, area, buf);
@@ -206,14 +245,32 @@ impl ProfileScreen {
         let (entries, place) = (self.entries(content), self.place(content));
         let rows = usize::from(list.height);
         let first = place.saturating_sub(rows / 2).min(entries.len().saturating_sub(rows));
-        for (row, (index, name)) in (0..list.height).zip(entries.iter().enumerate().skip(first)) {
+        for (row, (index, item)) in (0..list.height).zip(entries.iter().enumerate().skip(first)) {
             let has_focus = index == place;
             let lead = if has_focus { theme.glyphs.pointer() } else { "  " };
             let column = paint::text(buf, list, (0, row), lead, theme.style(Role::Hint));
-            let role = if has_focus { Role::Focus } else { Role::Plain };
-            paint::text(buf, list, (column, row), &theme.glyphs.show(name), theme.style(role));
+            let role = match item {
+                _ if has_focus => Role::Focus,
+                Item::Session(_) => Role::Ok,
+                Item::Robot(_) | Item::File => Role::Plain,
+            };
+            let room = usize::from(list.width.saturating_sub(column));
+            let name = shortened(&theme.glyphs.show(item.name()), room, theme.glyphs);
+            paint::text(buf, list, (column, row), &name, theme.style(role));
         }
     }
+}
+
+/// What is known about a session that can be continued.
+fn session_page(session: &SessionChoice, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
+    let mut page = Page::new(cx.theme, area.width);
+    page.paragraph(&format!("Continue {}", session.name), Role::Title);
+    page.pair("robot", &session.robot);
+    page.pair("progress", &session.progress);
+    page.pair("folder", &session.folder);
+    page.gap();
+    page.paragraph("Enter continues this session. Down leads to the robots for a new one.", Role::Hint);
+    page.draw(0, area, buf);
 }
 
 fn introduction(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
@@ -225,7 +282,7 @@ fn introduction(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
     page.gap();
     page.paragraph("Move to your robot and press Enter to see it. Enter again uses it.", Role::Plain);
     page.gap();
-    page.paragraph("Is your robot not in the list? 'file...' loads a profile that you have written: 'trupose profile show NAME' prints one to start from.", Role::Dim);
+    page.paragraph("Is your robot not in the list? 'file...' loads a profile that you have written: 'trupose profile new --from NAME --out FILE' writes one to start from.", Role::Dim);
     page.gap();
     page.paragraph(
         "To rehearse without hardware, choose soochow, the arm of the method paper, and then the simulated cell.",

@@ -3,6 +3,7 @@
 mod checks;
 mod prediction;
 mod show;
+mod way;
 
 use super::plan::{measuring_pace, plan_request, plan_text};
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
@@ -20,8 +21,9 @@ use crate::wizard::intent::{Danger, Intent, IntentInfo, PlanSettings};
 use crate::wizard::live::AS_PLANNED;
 use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
-use crate::wizard::view::Content;
+use crate::wizard::view::{Content, MoveCheck};
 use prediction::Prediction;
+use way::{Way, Waypoint};
 pub(super) use prediction::fewest_samples;
 
 /// Number of poses that are suggested at a time.
@@ -31,6 +33,10 @@ const SUGGESTED: usize = 5;
 pub(in crate::wizard) struct CaptureStep {
     /// Row of the plan that is shown.
     row: Option<usize>,
+    /// The way to that row.
+    way: Way,
+    /// Row at which something was measured although stops were still ahead: the arm is there.
+    reached: Option<usize>,
     /// A reading that the checks hold back.
     held: Option<HeldReading>,
     /// Measurement number of the questioned sample, about which the operator has to decide.
@@ -75,6 +81,8 @@ impl CaptureStep {
         let fewest = fewest_samples(session);
         let mut step = Self {
             row: session.open_rows().find(|row| *row >= last).or_else(|| session.open_rows().next()),
+            way: Way::default(),
+            reached: None,
             held: None,
             questioned: None,
             measuring: false,
@@ -83,7 +91,29 @@ impl CaptureStep {
             expected: None,
         };
         step.question_last_doubt(session);
+        step.find_way(session);
         step
+    }
+
+    /// Finds the way to the row shown from where the arm is now.
+    fn find_way(&mut self, session: &Session) {
+        self.way = self.row.map_or_else(Way::default, |row| Way::to(row, session));
+        self.reached = self.reached.filter(|row| Some(*row) == self.row);
+    }
+
+    /// Stops before the pose shown, unless something was measured there already.
+    fn stops(&self) -> &[Waypoint] {
+        if self.reached.is_some() && self.reached == self.row { &[] } else { &self.way.stops }
+    }
+
+    /// Check of the next move. Whoever measures before the stops that are ahead has arrived without them.
+    fn move_check(&self) -> MoveCheck {
+        if self.way.stops.len() > self.stops().len() { MoveCheck::Arrived } else { self.way.check.clone() }
+    }
+
+    /// The configuration to go to next: that of a stop or of the pose shown.
+    pub(super) fn next_stop(&self) -> Option<&[f64]> {
+        self.stops().first().map(|stop| stop.configuration.as_slice())
     }
 
     /// Questions the last sample that is in doubt, if there is one, and shows its row.
@@ -106,6 +136,7 @@ impl CaptureStep {
     fn measure(&mut self, cx: &Cx<'_>, row: usize) -> Vec<Action> {
         let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
         self.measuring = true;
+        self.reached = Some(row);
         let pace = measuring_pace();
         let following = self.following(cx.session).and_then(|row| cx.session.rows.get(row));
         vec![Action::Ask(Request::Measure(MeasureRequest {
@@ -123,6 +154,7 @@ impl CaptureStep {
     fn take(&mut self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
         let (Some(row), Some(robot)) = (self.row, cx.robot()) else { return Vec::new() };
         let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
+        self.reached = Some(row);
         let number = cx.session.measurements + 1;
         let planned = &shown.planned;
         let reported = reading.configuration.as_deref().map(|values| to_edge(values, &robot.joint_types));
@@ -219,6 +251,57 @@ impl CaptureStep {
         let is_skipped = session.rows.get(row).is_some_and(|row| row.skipped);
         let unskip = is_skipped.then_some(Entry::Skipped { row, skipped: false });
         vec![Action::Write(unskip.into_iter().chain([Entry::Row(row)]).collect())]
+    }
+
+    /// Follows an entry that is on disk and in the session.
+    fn follow(&mut self, entry: &Entry, session: &Session) -> Vec<Action> {
+        match entry {
+            Entry::Sample(noted) => {
+                self.held = None;
+                if self.expected.take() != Some(noted.number) {
+                    self.prediction.restart(session);
+                }
+                self.question_last_doubt(session);
+                match (self.questioned, noted.findings.first()) {
+                    (Some(_), Some(finding)) => {
+                        return vec![Action::Say(Notice::attention(finding.message.clone()))];
+                    }
+                    (Some(_), None) => {}
+                    (None, _) => self.advance(session),
+                }
+                if let Some(factor) = noted.factor {
+                    return vec![Action::Say(other_unit(noted, factor))];
+                }
+            }
+            Entry::Decision { sample, decision } => {
+                self.prediction.restart(session);
+                match decision {
+                    Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
+                    Decision::Keep | Decision::LeaveOut => self.advance(session),
+                }
+                self.question_last_doubt(session);
+            }
+            Entry::Correction(correction) => {
+                self.prediction.restart(session);
+                // The order of the plan goes on from here, unless the sample turned out to be of another pose.
+                if self.row.is_none_or(|row| !session.is_open(row)) {
+                    self.advance(session);
+                }
+                self.question_last_doubt(session);
+                return vec![Action::Say(Notice::info(corrected(correction)))];
+            }
+            Entry::Row(row) => {
+                self.row = Some(*row);
+                self.held = None;
+            }
+            Entry::Skipped { skipped: true, .. } => self.advance(session),
+            Entry::PlanExtended(_) | Entry::Plan(_) => {
+                self.prediction.restart(session);
+                self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());
+            }
+            _ => {}
+        }
+        Vec::new()
     }
 
     fn manual_unit(cx: &Cx<'_>) -> Option<CoordinateUnit> {
@@ -330,6 +413,16 @@ impl Conditions<'_> {
         require(doubt.is_some_and(|(_, finding)| finding.remedy.is_some()), "no correction is proposed")
     }
 
+    /// A stop lies on the way to the pose.
+    fn on_the_way(&self) -> Condition {
+        require(!self.step.stops().is_empty(), "there is no stop on the way to this pose")
+    }
+
+    /// The way can be changed to one through home.
+    fn homeward(&self) -> Condition {
+        require(self.step.way.can_go_home, "the way goes through home already, or there is no home")
+    }
+
     fn held(&self) -> Condition {
         require(self.step.held.is_some(), "no reading is held back")
     }
@@ -363,6 +456,8 @@ impl StepMachine for CaptureStep {
             offer(Intent::Keep, "keep the sample", [is.questioned()]),
             offer(Intent::LeaveOut, "exclude this sample", [is.questioned()]).with_danger(Danger::DropsData),
             offer(Intent::ApplyRemedy, "apply the correction", [is.correctable()]),
+            offer(Intent::Passed, "the arm is there", [is.at_a_pose(), is.resolved(), is.on_the_way()]),
+            offer(Intent::ThroughHome, "go through home", [is.at_a_pose(), is.resolved(), is.homeward()]),
             offer(Intent::Skip, "skip this pose", [is.at_a_pose(), is.resolved()]),
             offer(Intent::Undo, "undo the last sample", [is.sampled()]).with_danger(Danger::DropsData),
             offer(
@@ -377,8 +472,10 @@ impl StepMachine for CaptureStep {
         let is_manual = Self::manual_unit(cx).is_some();
         let has_open = session.open_rows().next().is_some();
         let next = match (self.doubt(session), has_open) {
-            (Some(_), _) | (None, true) if is_manual => type_in,
+            (Some(_), _) if is_manual => type_in,
+            (None, true) if is_manual && self.stops().is_empty() => type_in,
             (Some(_), _) => Intent::MeasureAgain,
+            (None, true) if !self.stops().is_empty() => Intent::Passed,
             (None, true) => Intent::Measure,
             (None, false) => Intent::Next,
         };
@@ -430,6 +527,14 @@ impl StepMachine for CaptureStep {
                 let entry = remedy.map(|remedy| Entry::Correction(bounded(remedy, session)));
                 entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
             }
+            Intent::Passed => {
+                let (Some(robot), Some(stop)) = (cx.robot(), self.stops().first()) else { return Vec::new() };
+                let joints = to_edge(&stop.configuration, &robot.joint_types);
+                vec![Action::Write(vec![Entry::Passed { pose: stop.name.clone(), joints }])]
+            }
+            Intent::ThroughHome => {
+                self.row.map(|row| Action::Write(vec![Entry::ThroughHome(row)])).into_iter().collect()
+            }
             Intent::Skip => {
                 self.held = None;
                 self.row.map(|row| Action::Write(vec![Entry::Skipped { row, skipped: true }])).into_iter().collect()
@@ -476,51 +581,9 @@ impl StepMachine for CaptureStep {
     }
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
-        let session = cx.session;
-        match entry {
-            Entry::Sample(noted) => {
-                self.held = None;
-                if self.expected.take() != Some(noted.number) {
-                    self.prediction.restart(session);
-                }
-                self.question_last_doubt(session);
-                match (self.questioned, noted.findings.first()) {
-                    (Some(_), Some(finding)) => {
-                        return vec![Action::Say(Notice::attention(finding.message.clone()))];
-                    }
-                    (Some(_), None) => {}
-                    (None, _) => self.advance(session),
-                }
-                if let Some(factor) = noted.factor {
-                    return vec![Action::Say(other_unit(noted, factor))];
-                }
-            }
-            Entry::Decision { sample, decision } => {
-                self.prediction.restart(session);
-                match decision {
-                    Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
-                    Decision::Keep | Decision::LeaveOut => self.advance(session),
-                }
-                self.question_last_doubt(session);
-            }
-            Entry::Correction(correction) => {
-                self.prediction.restart(session);
-                self.row = session.open_rows().next();
-                self.question_last_doubt(session);
-                return vec![Action::Say(Notice::info(corrected(correction)))];
-            }
-            Entry::Row(row) => {
-                self.row = Some(*row);
-                self.held = None;
-            }
-            Entry::Skipped { skipped: true, .. } => self.advance(session),
-            Entry::PlanExtended(_) | Entry::Plan(_) => {
-                self.prediction.restart(session);
-                self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());
-            }
-            _ => {}
-        }
-        Vec::new()
+        let actions = self.follow(entry, cx.session);
+        self.find_way(cx.session);
+        actions
     }
 
     fn content(&self, cx: &Cx<'_>) -> Content {

@@ -9,7 +9,7 @@ use crate::text::printable;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::Notice;
-use crate::wizard::view::{Content, ProfileCard, ProfileView};
+use crate::wizard::view::{Content, ProfileCard, ProfileView, SessionCard, SessionChoice};
 
 /// The profile step with a profile that is loaded but not yet confirmed.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +27,20 @@ struct LoadedProfile {
 }
 
 impl ProfileStep {
+    /// Sessions on offer, as long as this one has no robot.
+    fn sessions(&self, cx: &Cx<'_>) -> Vec<SessionChoice> {
+        if self.chosen.is_some() || cx.robot().is_some() {
+            return Vec::new();
+        }
+        let choice = |card: &SessionCard| SessionChoice {
+            name: card.name.clone(),
+            folder: card.folder.clone(),
+            robot: card.robot.clone().unwrap_or_else(|| "no robot yet".to_owned()),
+            progress: card.progress(cx.now),
+        };
+        cx.sessions.iter().map(choice).collect()
+    }
+
     /// Name of the session: the operator's, or robot and date.
     fn session_name(&self, cx: &Cx<'_>) -> Option<String> {
         let chosen = self.chosen.as_ref()?;
@@ -48,11 +62,17 @@ impl StepMachine for ProfileStep {
         let named = cx.session.opened.is_some().then(|| "the session already has a name".to_owned());
         let first = builtin_names().next().unwrap_or_default().to_owned();
         let proposal = self.session_name(cx).unwrap_or_default();
-        vec![
+        let sessions = self.sessions(cx).into_iter().map(|session| {
+            let label = format!("continue {}, {}", session.name, session.progress);
+            IntentInfo::new(Intent::ResumeSession(session.folder), label)
+        });
+        let mut intents = vec![
             IntentInfo::new(Intent::Next, "use this robot").unless(none).default_action(),
             IntentInfo::new(Intent::ChooseProfile(first), "choose a robot").unless(fixed),
             IntentInfo::new(Intent::NameSession(proposal), "name the session").unless(named),
-        ]
+        ];
+        intents.extend(sessions);
+        intents
     }
 
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
@@ -95,7 +115,8 @@ impl StepMachine for ProfileStep {
         let Answer::Profile { source, text } = answer else { return Vec::new() };
         match Profile::parse(&text, &source) {
             Ok((profile, warnings)) => {
-                let warnings = warnings.iter().map(ToString::to_string).collect();
+                let gaps = profile.gaps().into_iter().map(|gap| gap.message);
+                let warnings = warnings.iter().map(ToString::to_string).chain(gaps).collect();
                 self.chosen = Some(Box::new(LoadedProfile { source, text, profile, warnings }));
                 Vec::new()
             }
@@ -117,6 +138,7 @@ impl StepMachine for ProfileStep {
                 None => self.session_name(cx).unwrap_or_default(),
             },
             is_fixed: cx.session.has_measurements(),
+            sessions: self.sessions(cx),
         })
     }
 }

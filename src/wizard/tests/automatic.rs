@@ -197,3 +197,43 @@ fn after_an_undo_the_smr_has_to_move_first() {
     assert!(cell.look(0.5, |_| sees(away)).is_none());
     assert_eq!(cell.is_measured(), "5");
 }
+
+/// The pose where the robot would be at a row of the plan.
+fn joints_of(cell: &Cell, pose: &str) -> Vec<f64> {
+    let rows = &cell.bench.wizard.session().rows;
+    rows.iter().find(|row| row.planned.pose == pose).unwrap().planned.configuration.clone()
+}
+
+#[test]
+fn a_robot_that_passed_over_a_pose_is_measured_where_it_is() {
+    let mut cell = Cell::with(true, 4);
+    assert_eq!(cell.bench.capture().pose.as_deref(), Some("5"));
+    let joints = joints_of(&cell, "9");
+    let there = seen_at(&joints);
+    let reports = |_| LiveReading { joints: Some(joints.clone()), is_still: Some(true), ..sees(there) };
+    let (_, effects) = cell.look(10.0, reports).expect("it is not recognised");
+    cell.bench.settle(effects);
+    assert_eq!(cell.bench.capture().pose.as_deref(), Some("9"));
+    assert_eq!(cell.bench.told(), "the robot is at pose 9, not at 5");
+    let (_, effects) = cell.look(10.0, reports).expect("it is not measured");
+    assert!(matches!(started(&effects), (_, Request::Measure(request)) if request.pose == "9"));
+    cell.bench.settle(effects);
+    // The order of the plan continues from there, and what was passed over comes last.
+    assert_eq!(cell.bench.capture().pose.as_deref(), Some("10"));
+    cell.bench.measure(usize::MAX);
+    let measured: Vec<String> = {
+        let session = cell.bench.wizard.session();
+        session.samples.iter().map(|sample| session.pose_of(sample).to_owned()).collect()
+    };
+    assert_eq!(measured[measured.len() - 4..], ["5", "6", "7", "8"]);
+}
+
+#[test]
+fn the_place_of_the_smr_tells_the_pose_where_the_robot_reports_nothing() {
+    let mut cell = Cell::with(true, 8);
+    let there = seen_at(&joints_of(&cell, "13"));
+    let (_, effects) = cell.look(10.0, |_| sees(there)).expect("it is not recognised");
+    cell.bench.settle(effects);
+    assert_eq!(cell.bench.capture().pose.as_deref(), Some("13"));
+    assert_eq!(cell.is_measured(), "13");
+}

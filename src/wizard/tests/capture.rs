@@ -22,13 +22,15 @@ fn the_first_pose_is_shown_with_all_that_can_be_done() {
     assert_eq!(
         offers(&bench.wizard),
         [
-            "Measure*",
+            "Measure",
             "TypeReading -- the instrument supplies the coordinates",
             "AcceptReading -- no reading is held back",
             "MeasureAgain -- no sample is in question",
             "Keep -- no sample is in question",
             "LeaveOut -- no sample is in question",
             "ApplyRemedy -- no correction is proposed",
+            "Passed*",
+            "ThroughHome -- the way goes through home already, or there is no home",
             "Skip",
             "Undo -- nothing has been measured yet",
             "GoToPose",

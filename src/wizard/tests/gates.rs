@@ -133,6 +133,7 @@ fn coordinates_are_typed_in_the_unit_that_was_chosen() {
     for unit in CoordinateUnit::ALL {
         let mut bench = Bench::with(&InstrumentChoice::Manual { unit }, Step::Capture);
         assert_eq!(blocked(&bench.wizard, "Measure"), "the coordinates are typed in");
+        bench.does(Intent::Passed);
         assert!(offers(&bench.wizard).contains(&"TypeReading*".to_owned()));
         let point = seen_at(&bench.wizard.session().rows[1].planned.configuration).coords / unit.size();
         bench.does(Intent::TypeReading(format!("x={:.9}; y={:.9}; z={:.9}", point.x, point.y, point.z)));

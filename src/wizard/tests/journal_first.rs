@@ -11,6 +11,7 @@ fn note(text: &str) -> Intent {
 #[test]
 fn nothing_is_shown_before_it_is_written() {
     let mut bench = Bench::at(Step::Capture);
+    bench.does(Intent::Passed);
     let session = bench.wizard.session().clone();
     let content = bench.wizard.view().content;
     let mut effects = bench.intend(Intent::Measure);

@@ -5,8 +5,8 @@ use crate::procedure::models::Models;
 use crate::session::journal::Entry;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, RecordedSet, Step, TargetChoice};
-use crate::wizard::view::Content;
-use crate::wizard::{Answer, Intent, PlanSettings, Request, Severity};
+use crate::wizard::view::{Content, SessionCard};
+use crate::wizard::{Answer, Event, Intent, PlanSettings, Request, Severity};
 
 fn text(name: &str) -> String {
     name.to_owned()
@@ -405,4 +405,22 @@ fn every_offer_has_a_label_and_at_most_one_is_the_default() {
         assert!(intents.iter().filter(|info| info.is_default).all(crate::wizard::IntentInfo::is_enabled));
         assert_eq!(bench.wizard.view().intents, intents);
     }
+}
+
+#[test]
+fn sessions_can_be_continued_until_a_robot_is_chosen() {
+    let other = Bench::at(Step::Capture);
+    let card = SessionCard::new(other.wizard.session(), "sessions/other".to_owned());
+    let mut bench = Bench::new();
+    assert!(bench.wizard.update(Event::Sessions(vec![card.clone()])).is_empty());
+    let offered = |bench: &Bench| bench.wizard.intents().into_iter().find(|info| info.intent.name() == "ResumeSession");
+    let Content::Profile(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.sessions[0].progress, "0 of 19 measured, just now");
+    let info = offered(&bench).unwrap();
+    assert_eq!(info.intent, Intent::ResumeSession("sessions/other".to_owned()));
+    let mut begun = bench.clone();
+    begun.does(Intent::ChooseProfile("soochow".to_owned()));
+    assert!(offered(&begun).is_none());
+    bench.does(info.intent);
+    assert_eq!((bench.wizard.resumes(), bench.exits), (Some("sessions/other"), 1));
 }

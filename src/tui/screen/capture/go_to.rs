@@ -13,8 +13,8 @@ use crate::tui::paint;
 use crate::tui::screen::ScreenCx;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::values;
-use crate::wizard::Intent;
-use crate::wizard::view::{CaptureView, FindingView, PairView};
+use crate::wizard::view::{CaptureView, FindingView, MoveCheck, PairView};
+use crate::wizard::{Intent, IntentInfo};
 
 /// Columns of the names of keys in the list of decisions.
 const KEYS: usize = 12;
@@ -33,6 +33,10 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     let role = if content.finding.is_some() { Role::Warn } else { Role::Title };
     lines.extend(joined(&heading(content), theme, room, is_tall).into_iter().map(|line| (line, role)));
     lines.extend(joined(&count(content, is_tall), theme, room, is_tall).into_iter().map(|line| (line, Role::Plain)));
+    if content.finding.is_none() && content.held.is_none() {
+        let warning = warning(cx, content).map(|text| wrapped(&theme.glyphs.show(&text), room));
+        lines.extend(warning.into_iter().flatten().map(|line| (line, Role::Warn)));
+    }
     lines.extend(panel(cx, content, room));
     // While a sample is questioned, only that and the configuration matter.
     let status = if content.finding.is_some() && !is_tall { Vec::new() } else { status(cx, content, is_tall) };
@@ -116,14 +120,39 @@ fn heading(content: &CaptureView) -> Vec<String> {
         return vec![format!("Pose {} is in question: {cause}", finding.pose), "decide before continuing".to_owned()];
     }
     let Some(pose) = &content.pose else { return vec!["All poses of the plan have been measured.".to_owned()] };
-    let mut parts = vec![format!("Go to pose {pose}")];
+    let mut parts = match content.on_the_way.split_first() {
+        None => vec![format!("Go to pose {pose}")],
+        Some((stop, [])) => vec![format!("Go to {stop} first"), format!("on the way to pose {pose}")],
+        Some((stop, rest)) => {
+            vec![format!("Go to {stop} first"), format!("then {} and pose {pose}", rest.join(", "))]
+        }
+    };
     parts.extend(content.kind.map(|kind| kind.name().to_owned()));
-    if !content.on_the_way.is_empty() {
-        parts.push(format!("through {}", content.on_the_way.join(", ")));
-    }
     let most = content.joints.iter().find(|joint| joint.moves_most);
     parts.extend(most.map(|joint| format!("{} moves most: {:.1} {}", joint.name, joint.moves, joint.unit)));
+    if let MoveCheck::Free { from } = &content.move_check {
+        parts.push(format!("checked from {from}"));
+    }
     parts
+}
+
+/// The warning about a move that is not known to be free.
+fn warning(cx: &ScreenCx<'_>, content: &CaptureView) -> Option<String> {
+    let mut text = match &content.move_check {
+        MoveCheck::Free { .. } | MoveCheck::Arrived => return None,
+        MoveCheck::Blocked { from, obstruction } => {
+            format!("Blocked: straight from {from}, {obstruction}. Move by hand in small steps.")
+        }
+        MoveCheck::NotChecked { reason } => format!("This move was not checked for collisions: {reason}."),
+    };
+    let home = keymap::key_hints(&cx.view.intents, cx.theme.glyphs);
+    let offers = |info: &IntentInfo| info.intent == Intent::ThroughHome && info.is_enabled();
+    if let Some(info) = cx.view.intents.iter().find(|info| offers(info))
+        && let Some(hint) = home.iter().find(|hint| hint.label == info.label && hint.blocked.is_none())
+    {
+        text.push_str(&format!(" '{}' goes through home.", hint.key));
+    }
+    Some(text)
 }
 
 fn count(content: &CaptureView, is_tall: bool) -> Vec<String> {
@@ -170,6 +199,8 @@ fn panel(cx: &ScreenCx<'_>, content: &CaptureView, room: usize) -> Vec<(String, 
     let mut lines = Vec::new();
     if let Some(finding) = &content.finding {
         lines.extend(question(cx, finding, room));
+    } else if let (Some(stop), None) = (content.on_the_way.first(), &content.held) {
+        lines.extend(choice(cx, &format!("the arm is at {stop}"), |intent| *intent == Intent::Passed));
     } else if let Some(reason) = &content.held {
         lines.push((format!("{}Reading held back, not counted yet", theme.glyphs.pointer()), Role::Warn));
         lines.extend(message(cx, reason, room));

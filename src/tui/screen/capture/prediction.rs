@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::text::{counted, wrapped};
+use crate::text::{counted, counted_as, wrapped};
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::Chart;
@@ -17,9 +17,27 @@ fn error(mm: f64) -> String {
     format!("{mm:.3} mm")
 }
 
-/// Whether the rest is worth the time.
-fn verdict(prediction: &PredictionView) -> &'static str {
-    if prediction.is_enough { "enough (rest gains < 5 %)" } else { "not enough yet" }
+/// Whether the rest is worth the time, against the limit if there is one.
+fn verdict(prediction: &PredictionView) -> String {
+    let Some(limit) = prediction.limit_mm else {
+        let said = if prediction.is_enough { "enough (rest gains < 5 %)" } else { "not enough yet" };
+        return said.to_owned();
+    };
+    let limit = format!("limit {limit:.2} mm");
+    if prediction.is_enough {
+        return format!("{limit}: enough");
+    }
+    match prediction.with_all_mm {
+        Some(all) if Some(all) > prediction.limit_mm => format!("{limit}: this plan does not reach it"),
+        _ => format!("{limit}: not enough yet"),
+    }
+}
+
+/// What the poses that are still open bring.
+fn rest(prediction: &PredictionView) -> Option<String> {
+    let all = prediction.with_all_mm.filter(|_| prediction.open > 0)?;
+    let poses = counted_as(prediction.open, "more pose makes", "more poses make");
+    Some(format!("{poses} it {}", error(all)))
 }
 
 /// The prediction in a line.
@@ -29,9 +47,8 @@ pub(super) fn in_short(prediction: &PredictionView, open: usize) -> String {
         // Nothing is left of the plan, so there is nothing to say about the rest.
         return format!("predicted error {now} with all poses of the plan");
     }
-    let all = prediction.with_all_mm.map(error);
-    let all = all.map_or_else(String::new, |all| format!(", {all} with all"));
-    format!("predicted error {now}{all}: {}", verdict(prediction))
+    let rest = rest(prediction).map_or_else(String::new, |rest| format!("; {rest}"));
+    format!("predicted error {now}, {}{rest}", verdict(prediction))
 }
 
 /// Draws the curve and its meaning.
@@ -47,11 +64,12 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
     let now = error(prediction.now_mm);
     lines.push((format!("now, {}: {now}", counted(content.identification, "identification pose")), Role::Title));
     if let Some(mm) = prediction.with_all_mm.filter(|_| content.open > 0) {
-        lines.push((format!("with all poses of the plan: {}", error(mm)), Role::Plain));
+        let rest = rest(prediction).unwrap_or_else(|| format!("with all poses of the plan: {}", error(mm)));
+        lines.push((rest, Role::Plain));
     }
     let role = if prediction.is_enough { Role::Ok } else { Role::Hint };
-    let said = if content.open == 0 { "all poses of the plan have been measured" } else { verdict(prediction) };
-    lines.push((said.to_owned(), role));
+    let said = if content.open == 0 { "all poses of the plan have been measured".to_owned() } else { verdict(prediction) };
+    lines.push((said, role));
     lines.push((MEANING.to_owned(), Role::Dim));
     let used = text(theme, &lines, room, area, buf);
 

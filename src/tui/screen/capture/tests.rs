@@ -7,6 +7,7 @@ use crate::session::set_up::Step;
 use crate::tui::dialog::DialogOutcome;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
+    MoveCheck,
     DriftView, FindingView, JointShown, LivePoint, LiveView, PairView, PredictionView, RowState, RowView, SampleView,
 };
 use crate::wizard::{IntentInfo, Notice};
@@ -44,7 +45,8 @@ fn normal() -> CaptureView {
         pose: Some("15".to_owned()),
         kind: Some(PoseKind::Identification),
         joints: joints(),
-        on_the_way: vec!["via3".to_owned()],
+        on_the_way: Vec::new(),
+        move_check: MoveCheck::Free { from: "pose 14".to_owned() },
         predicted_point_in_base_mm: None,
         measured: 12,
         open: 26,
@@ -66,6 +68,8 @@ fn normal() -> CaptureView {
             curve_mm: (9..=12).map(|n| (n, 0.3 / n as f64)).collect(),
             now_mm: 0.0250,
             with_all_mm: Some(0.0120),
+            limit_mm: Some(0.04),
+            open: 6,
             is_enough: false,
         }),
         typed_unit: None,
@@ -164,6 +168,30 @@ fn manual() -> ViewModel {
     of(CaptureView { typed_unit: Some("in".to_owned()), ..normal() })
 }
 
+/// A stop on the way, reached by a free move.
+fn on_the_way() -> ViewModel {
+    let mut view = of(CaptureView { on_the_way: vec!["home".to_owned(), "via3".to_owned()], ..normal() });
+    for info in &mut view.intents {
+        info.is_default = false;
+    }
+    view.intents.push(IntentInfo::new(Intent::Passed, "the arm is there").default_action());
+    view
+}
+
+/// A move that nobody has checked.
+fn not_checked() -> ViewModel {
+    let reason = "it is not known where the arm is now".to_owned();
+    let mut view = of(CaptureView { move_check: MoveCheck::NotChecked { reason }, ..normal() });
+    view.intents.push(IntentInfo::new(Intent::ThroughHome, "go through home"));
+    view
+}
+
+/// A move that would hit something.
+fn blocked() -> ViewModel {
+    let obstruction = "link 3 would touch the floor".to_owned();
+    of(CaptureView { move_check: MoveCheck::Blocked { from: "pose 14".to_owned(), obstruction }, ..normal() })
+}
+
 fn on(tab: Tab) -> CaptureScreen {
     CaptureScreen { tab, ..CaptureScreen::default() }
 }
@@ -174,9 +202,15 @@ fn states_at_80x24() {
     let go_to = on(Tab::GoTo);
     let usual = shown(&drawn(&go_to, &usual(), unicode, (80, 24)));
     insta::assert_snapshot!("normal", usual);
-    for (name, view) in
-        [("in_question", in_question()), ("held", held()), ("all_measured", all_measured()), ("manual", manual())]
-    {
+    for (name, view) in [
+        ("in_question", in_question()),
+        ("held", held()),
+        ("all_measured", all_measured()),
+        ("manual", manual()),
+        ("on_the_way", on_the_way()),
+        ("not_checked", not_checked()),
+        ("blocked", blocked()),
+    ] {
         let shown = shown(&drawn(&go_to, &view, unicode, (80, 24)));
         insta::assert_snapshot!(name, paint::differences(&usual, &shown));
     }
@@ -214,6 +248,7 @@ fn live() -> ViewModel {
         joints: Some(vec![0.0; 6]),
         joint_difference: Some((3, 0.062)),
         is_still: Some(true),
+        at_pose: None,
         down: None,
         track: track.collect(),
     };
@@ -324,9 +359,9 @@ proptest! {
     #[test]
     fn nothing_is_drawn_outside(
         x in 0_u16..60, y in 0_u16..30, width in 0_u16..140, height in 0_u16..50,
-        tab in 0_usize..5, state in 0_usize..5, ascii: bool,
+        tab in 0_usize..5, state in 0_usize..8, ascii: bool,
     ) {
-        let view = [|| of(normal()), in_question, held, all_measured, manual][state]();
+        let view = [|| of(normal()), in_question, held, all_measured, manual, on_the_way, not_checked, blocked][state]();
         let theme = themes()[usize::from(ascii)];
         prop_assert!(!leaks(&on(Tab::ALL[tab].0), &view, theme, Rect::new(x, y, width, height)));
     }

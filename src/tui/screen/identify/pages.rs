@@ -3,8 +3,7 @@
 use crate::identification::{SigmaSource, TerminationReason};
 use crate::session::joint_errors::shares_sentence;
 use crate::session::summary::{IdentificationSummary, ParameterSummary};
-use crate::text::counted;
-use crate::text::{decimals_for, fixed};
+use crate::text::{counted, counted_as, decimals_for, fixed};
 use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
 use crate::wizard::view::IdentifyView;
@@ -58,13 +57,22 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
             "there is no solution that can be applied; see the warnings.",
             Role::Plain,
         );
+    } else if content.is_current && !summary.warnings.is_empty() {
+        let blocks = summary.warnings.iter().filter(|warning| warning.blocks_acceptance).count();
+        let said = match blocks {
+            0 => "the arm is identified, with remarks.".to_owned(),
+            some => format!("the arm is identified, but {} the result from being accepted.", counted_as(some, "warning keeps", "warnings keep")),
+        };
+        let mark = if blocks == 0 { ("GOOD: ", Role::Ok) } else { ("CHECK: ", Role::Warn) };
+        page.marked(mark, &said, Role::Plain);
     }
     for warning in &summary.warnings {
         let mark = if warning.blocks_acceptance { ("WARNING ", Role::Warn) } else { ("note    ", Role::Title) };
         page.marked(mark, &warning.message, Role::Plain);
     }
     if summary.warnings.is_empty() && content.is_current && content.is_usable {
-        page.line(vec![("identified, no warnings".to_owned(), Role::Ok)]);
+        let used = counted(summary.samples.saturating_sub(summary.rejected.len()), "measurement");
+        page.marked(("GOOD: ", Role::Ok), &format!("{used} agree with one model of the arm."), Role::Plain);
     }
     page.gap();
     let rejected = match summary.rejected.len() {
@@ -80,6 +88,16 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
     if let Some(selection) = &summary.selection {
         page.pair("causes", &format!("{}; see page 3", shares_sentence(selection)));
     }
+    page.gap();
+    page.paragraph(
+        "The next step shows how accurate the arm is, at poses that the identification did not use. Page 2 has the mathematics.",
+        Role::Dim,
+    );
+}
+
+/// Figures for those who know the method.
+fn figures(summary: &IdentificationSummary, page: &mut Page) {
+    let constants = summary.constants().count();
     let rank = summary.rank.map_or_else(
         || "not clear from these samples".to_owned(),
         |rank| format!("{rank} of {constants} combinations are determined"),
@@ -109,11 +127,6 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
         TerminationReason::NonFinite => "FAILED: numbers that are not finite",
     };
     page.pair("solver", &format!("{ended} after {}", counted(summary.iterations.len(), "step")));
-    page.gap();
-    page.paragraph(
-        "The next step shows how accurate the arm is, at poses that the identification did not use.",
-        Role::Dim,
-    );
 }
 
 /// How well a parameter is determined.
@@ -127,8 +140,10 @@ fn found(parameter: &ParameterSummary) -> &'static str {
     }
 }
 
-/// The table of parameters.
+/// The mathematics of the result, and the table of parameters.
 pub(super) fn parameters(summary: &IdentificationSummary, page: &mut Page) {
+    figures(summary, page);
+    page.gap();
     let head =
         format!("{:<10}{:>4}{:>12}{:>12}{:>11}  {}", "parameter", "unit", "nominal", "deviation", "sigma", "found");
     page.line(vec![(head, Role::Dim)]);

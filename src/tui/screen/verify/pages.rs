@@ -20,6 +20,9 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
         page.marked(("UNKNOWN: ", Role::Warn), too_few, Role::Plain);
     }
     if let Some(verdict) = &content.verdict {
+        if let Some(verification) = &content.verification {
+            page.paragraph(&sentence(verification, verdict), role_of(verdict.status));
+        }
         status(verdict, "see below", page);
         limits(verdict, page);
     }
@@ -35,15 +38,47 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
     }
 }
 
+/// The result in a sentence: the accuracy, where it was measured, and what it was before.
+fn sentence(verification: &VerificationSummary, verdict: &Verdict) -> String {
+    let VerificationSummary { samples, independent, nominal, identified, .. } = verification;
+    let which = if *independent { "were not used to identify it" } else { "were used to identify it as well" };
+    let errors = identified.errors().into_iter().zip(nominal.errors());
+    let known = errors.filter_map(|((name, after), (_, before))| Some((name, after?, before?))).next();
+    let Some((name, after, before)) = known else {
+        return format!("Nothing can be said about the accuracy from {}.", counted(*samples, "pose"));
+    };
+    let quantity = if name.starts_with("distance") { " between poses" } else { "" };
+    let worst = verdict.checks.iter().find(|check| check.met == Some(false));
+    let limit = worst.map_or_else(String::new, |check| {
+        format!(", but {} must not exceed {} mm", check.quantity.words(), fixed(check.limit_mm, 3))
+    });
+    format!(
+        "The arm is accurate to {} mm{quantity} (rms; at most {} mm) on {} that {which}; before, it was {} mm{limit}.",
+        fixed(after.rms, 3),
+        fixed(after.max, 3),
+        counted(*samples, "pose"),
+        fixed(before.rms, 3),
+    )
+}
+
+/// The colour of a verdict.
+const fn role_of(status: VerdictStatus) -> Role {
+    match status {
+        VerdictStatus::Accepted => Role::Ok,
+        VerdictStatus::NotAccepted => Role::Alarm,
+        VerdictStatus::NotEvaluated => Role::Warn,
+    }
+}
+
 /// Beginning of a reason that refers to a warning by its code.
 const BY_CODE: &str = "see the warning '";
 
 /// The verdict in words. `place` says where the warnings can be read, because their codes are shown nowhere.
 pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut Page) {
-    let (mark, role) = match verdict.status {
-        VerdictStatus::Accepted => ("ACCEPTED: ", Role::Ok),
-        VerdictStatus::NotAccepted => ("NOT ACCEPTED: ", Role::Alarm),
-        VerdictStatus::NotEvaluated => ("NOT EVALUATED: ", Role::Warn),
+    let mark = match verdict.status {
+        VerdictStatus::Accepted => "ACCEPTED: ",
+        VerdictStatus::NotAccepted => "NOT ACCEPTED: ",
+        VerdictStatus::NotEvaluated => "NOT EVALUATED: ",
     };
     let by_code = verdict.reasons.iter().filter(|reason| reason.starts_with(BY_CODE)).count();
     let mut reasons: Vec<String> =
@@ -52,7 +87,7 @@ pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut 
         let verb = if by_code == 1 { "rules" } else { "rule" };
         reasons.push(format!("{} {verb} it out, {place}", counted(by_code, "warning")));
     }
-    page.marked((mark, role), &reasons.join("; "), Role::Plain);
+    page.marked((mark, role_of(verdict.status)), &reasons.join("; "), Role::Plain);
 }
 
 fn limits(verdict: &Verdict, page: &mut Page) {

@@ -12,6 +12,8 @@ use crate::session::state::Session;
 const FRESH_POSES: usize = 200;
 /// Seed of the fresh poses: the same for every session, so that figures can be compared.
 const FRESH_SEED: u64 = 0x5eed;
+/// Share of the acceptance limit that a prediction may reach. It knows nothing of what the model of the arm lacks.
+const MARGIN: f64 = 0.5;
 /// Relative improvement below which the rest of the plan is not worth the time.
 const WORTHWHILE: f64 = 0.05;
 
@@ -95,11 +97,12 @@ impl Prediction {
         self.curve.last().map(|(_, error)| *error)
     }
 
-    /// Whether the rest of the plan improves the error too little to be worth the time.
-    pub(super) fn is_enough(&self) -> bool {
-        match (self.now(), self.with_all) {
-            (Some(now), Some(with_all)) => with_all > (1.0 - WORTHWHILE) * now,
-            _ => false,
+    /// Whether the error is well below the limit (m), or the rest of the plan improves it too little to be worth the time.
+    pub(super) fn is_enough(&self, limit: Option<f64>) -> bool {
+        let Some(now) = self.now() else { return false };
+        match limit {
+            Some(limit) => now <= MARGIN * limit,
+            None => self.with_all.is_some_and(|with_all| with_all > (1.0 - WORTHWHILE) * now),
         }
     }
 }

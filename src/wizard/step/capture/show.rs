@@ -22,7 +22,8 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         pose: step.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.pose.clone()),
         kind: step.row.and_then(|row| session.rows.get(row)).map(|row| row.planned.kind),
         joints: joints(step, cx),
-        on_the_way: on_the_way(step, session),
+        on_the_way: step.stops().iter().map(|stop| stop.name.clone()).collect(),
+        move_check: step.move_check(),
         predicted_point_in_base_mm: step
             .row
             .and_then(|row| session.rows.get(row)?.planned.point_in_base)
@@ -44,7 +45,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
             worst: finding.worst.iter().map(|pair| pair_view(session, pair)).collect(),
         }),
         drift: drift(session),
-        prediction: prediction(step),
+        prediction: prediction(step, cx),
         typed_unit: CaptureStep::manual_unit(cx).map(|unit| unit.sign().to_owned()),
         too_few: has_enough(session, step.fewest).err(),
         rows,
@@ -53,15 +54,14 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
     }
 }
 
-/// The configuration to go to. The joint that moves most is marked.
+/// The configuration to go to next. The joint that moves most is marked.
 fn joints(step: &CaptureStep, cx: &Cx<'_>) -> Vec<JointShown> {
     let (Some(row), Some(robot)) = (step.row.and_then(|row| cx.session.rows.get(row)), cx.robot()) else {
         return Vec::new();
     };
-    let from = cx.session.samples.last().map(|sample| cx.session.configuration_of(sample));
-    let moves: Vec<f64> = row
-        .planned
-        .configuration
+    let configuration = step.next_stop().unwrap_or(&row.planned.configuration);
+    let from = cx.session.arm().map(|(_, arm)| arm);
+    let moves: Vec<f64> = configuration
         .iter()
         .enumerate()
         .map(|(index, value)| from.as_ref().and_then(|from| from.get(index)).map_or(0.0, |from| (value - from).abs()))
@@ -72,7 +72,7 @@ fn joints(step: &CaptureStep, cx: &Cx<'_>) -> Vec<JointShown> {
         .chain()
         .joints()
         .iter()
-        .zip(&row.planned.configuration)
+        .zip(configuration)
         .zip(&moves)
         .map(|((joint, value), moved)| {
             let quantity = joint.joint_type.quantity();
@@ -85,16 +85,6 @@ fn joints(step: &CaptureStep, cx: &Cx<'_>) -> Vec<JointShown> {
             }
         })
         .collect()
-}
-
-/// Names of the rows to pass through before the one shown.
-fn on_the_way(step: &CaptureStep, session: &Session) -> Vec<String> {
-    let Some(row) = step.row else { return Vec::new() };
-    let before = session.rows.get(..row).unwrap_or_default();
-    let passed = before.iter().rev().take_while(|row| row.active && !row.planned.kind.is_measured());
-    let mut names: Vec<String> = passed.map(|row| row.planned.pose.clone()).collect();
-    names.reverse();
-    names
 }
 
 fn row_view(session: &Session, index: usize) -> Option<RowView> {
@@ -153,13 +143,20 @@ fn drift(session: &Session) -> Vec<DriftView> {
     found
 }
 
-fn prediction(step: &CaptureStep) -> Option<PredictionView> {
+fn prediction(step: &CaptureStep, cx: &Cx<'_>) -> Option<PredictionView> {
     let prediction = &step.prediction;
+    let acceptance = cx.robot()?.profile.acceptance();
+    let limit = acceptance.position_rms.or(acceptance.position_mean);
+    let is_identification = |row: &usize| {
+        cx.session.rows.get(*row).is_some_and(|row| row.planned.kind == PoseKind::Identification)
+    };
     Some(PredictionView {
         curve_mm: prediction.curve.iter().map(|(poses, error)| (*poses, to_mm(*error))).collect(),
         now_mm: to_mm(prediction.now()?),
         with_all_mm: prediction.with_all.map(to_mm),
-        is_enough: prediction.is_enough(),
+        limit_mm: limit.map(to_mm),
+        open: cx.session.open_rows().filter(is_identification).count(),
+        is_enough: prediction.is_enough(limit),
     })
 }
 
