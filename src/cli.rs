@@ -33,11 +33,54 @@ pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
 pub use session::SessionCommand;
 pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
 
+/// The help of the program: commands by purpose, and examples.
+const HELP: &str = "\
+{about-with-newline}
+{usage-heading} {usage}
+
+Guided calibration:
+  wizard       Guided calibration in the terminal; the same as no command at all
+  resume       Continue a session where it ended
+  demo         Calibrate a simulated robot, without a terminal
+  replay       Step through a session, entry by entry, without changing it
+  session      List, show or export sessions
+
+Step by step:
+  profile      List, show, write or check robot profiles
+  plan         Plan which poses to measure, and in which order
+  program      Write a robot program that visits the poses of a plan
+  identify     Identify the kinematic errors of a robot from measured points
+  constraints  The same from direct distances, without coordinates
+  verify       Verify a calibration on other measured points
+
+Apply the result:
+  compensate   Correct targets or programs so that the real arm reaches them
+  export       Write the identified arm as a profile, URDF or table
+
+Instruments and recordings:
+  link         Test the link to an instrument
+  simulate     Simulate an instrument or a robot's controller on a wire
+  record       Make, compact or check recordings for the 3D viewer
+
+Shell:
+  completions  Print the completions of a shell
+  man          Print the manual page, or write the pages of all commands
+  help         Print the help of a command
+
+Options:
+{options}
+
+Examples:
+  trupose                                      start or continue a calibration
+  trupose demo                                 see one, simulated
+  trupose plan --profile ur10e --out plan.csv  choose the poses for an arm
+";
+
 /// Makes an industrial arm accurate: identifies its kinematic errors from distances between measured points.
 ///
 /// Without a command it opens the guided calibration in the terminal.
 #[derive(Debug, Parser)]
-#[command(name = "trupose", version, about, max_term_width = 80, args_conflicts_with_subcommands = true)]
+#[command(name = "trupose", version, about, max_term_width = 80, args_conflicts_with_subcommands = true, help_template = HELP)]
 pub struct Cli {
     /// The command; none opens the wizard.
     #[command(subcommand)]
@@ -154,26 +197,35 @@ pub struct ReplayArgs {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Identify the kinematic errors of a robot from measured points
+    #[command(after_help = "Example:\n  trupose identify --profile ur10e --measurements points.csv --out results")]
     Identify(IdentifyArgs),
     /// Verify a calibration on other measured points
+    #[command(after_help = "Example:\n  trupose verify --calibration results/calibration.ron --measurements later.csv --refit frame+target")]
     Verify(VerifyArgs),
     /// Identify from direct distances: shared points (ball and sockets) or measured lengths, no coordinates
     Constraints(ConstraintsArgs),
     /// Plan which poses to measure, and in which order
+    #[command(after_help = "Example:\n  trupose plan --profile ur10e --poses 60 --out plan.csv")]
     Plan(PlanArgs),
     /// Write a robot program that visits the poses of a plan
+    #[command(after_help = "Example:\n  trupose program --profile ur10e --plan plan.csv --dialect urscript --out program")]
     Program(ProgramArgs),
     /// Correct targets so that the real arm reaches them
+    #[command(after_help = "Example:\n  trupose compensate --calibration calibration.ron --program part.src --dialect krl --out corrected.src")]
     Compensate(compensate::CompensateArgs),
     /// Write the identified arm as a profile, URDF or table
+    #[command(after_help = "Example:\n  trupose export --calibration calibration.ron --format dh-csv")]
     Export(compensate::ExportArgs),
     /// Guided calibration in the terminal; the same as no command at all
     Wizard(WizardArgs),
     /// Calibrate a simulated robot from profile to result, without a terminal
+    #[command(after_help = "Example:\n  trupose demo --seed 7")]
     Demo(DemoArgs),
     /// Continue a session where it ended
+    #[command(after_help = "Example:\n  trupose resume\n  trupose resume ur10e-20260301")]
     Resume(ResumeArgs),
     /// Step through a session, entry by entry, without changing it
+    #[command(after_help = "Example:\n  trupose replay sessions/ur10e-20260301-0915")]
     Replay(ReplayArgs),
     /// List, show or export sessions
     #[command(subcommand)]
@@ -181,7 +233,7 @@ pub enum Command {
     /// Make, compact or check recordings for the 3D viewer
     #[command(subcommand)]
     Record(RecordCommand),
-    /// List, show or check robot profiles
+    /// List, show, write or check robot profiles
     #[command(subcommand)]
     Profile(ProfileCommand),
     /// Test the link to an instrument
@@ -359,21 +411,39 @@ pub struct ConstraintsArgs {
 /// Arguments of `plan`.
 #[derive(Args, Debug)]
 pub struct PlanArgs {
-    /// Options of recordings.
-    #[command(flatten)]
-    pub record: RecordArgs,
     /// Robot profile: a file, or the name of a shipped one ('trupose profile list')
     #[arg(long, value_name = "NAME|FILE")]
     pub profile: String,
-    /// Score the poses of this plan or list instead of choosing new ones
-    #[arg(long, value_name = "CSV", conflicts_with_all = ["poses", "objective", "include", "out"])]
-    pub check: Option<PathBuf>,
     /// Number of new poses to identify from; those of '--include' are added
     #[arg(long, value_name = "N", default_value_t = PlanRequest::default().poses)]
     pub poses: usize,
     /// Number of poses to verify with
     #[arg(long, value_name = "N", default_value_t = PlanRequest::default().verification)]
     pub verification: usize,
+    /// File for the plan
+    #[arg(long, value_name = "CSV")]
+    pub out: Option<PathBuf>,
+    /// Repeat the first pose after every N poses to detect drift; 0: never
+    #[arg(long, value_name = "N", default_value_t = PlanRequest::default().drift_every)]
+    pub drift_every: usize,
+    /// Percentage of the full joint speed that the program will use
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * Pace::default().speed, value_parser = speed_percent)]
+    pub speed_percent: f64,
+    /// Narrow a joint, such as 'j2=-30..60' (degrees, sliding joints mm); may be repeated
+    #[arg(long = "limit", value_name = "JOINT=LOW..HIGH", allow_hyphen_values = true)]
+    pub limits: Vec<JointLimit>,
+    /// Keep the reflector inside a box in the robot base, such as '500..1500,-800..800,200..1600' (mm, x,y,z)
+    #[arg(long = "box", value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub region: Option<BoxMm>,
+    /// Poses that must be included because they are already measured (any table with q1… columns and a pose column)
+    #[arg(long, value_name = "CSV")]
+    pub include: Option<PathBuf>,
+    /// Score the poses of this plan or list instead of choosing new ones
+    #[arg(long, value_name = "CSV", conflicts_with_all = ["poses", "objective", "include", "out"])]
+    pub check: Option<PathBuf>,
+    /// Standard deviation of a measured coordinate [default: of the profile's instrument]
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub sigma_mm: Option<f64>,
     /// Number of candidates to choose from
     #[arg(long, value_name = "N", default_value_t = PlanRequest::default().candidates, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(10..=1_000_000))]
     pub candidates: usize,
@@ -389,15 +459,6 @@ pub struct PlanArgs {
     /// Threads to search with [default: one per core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=256))]
     pub threads: Option<usize>,
-    /// Narrow a joint, such as 'j2=-30..60' (degrees, sliding joints mm); may be repeated
-    #[arg(long = "limit", value_name = "JOINT=LOW..HIGH", allow_hyphen_values = true)]
-    pub limits: Vec<JointLimit>,
-    /// Keep the reflector inside a box in the robot base, such as '500..1500,-800..800,200..1600' (mm, x,y,z)
-    #[arg(long = "box", value_name = "X,Y,Z", allow_hyphen_values = true)]
-    pub region: Option<BoxMm>,
-    /// Poses that must be included because they are already measured (any table with q1… columns and a pose column)
-    #[arg(long, value_name = "CSV")]
-    pub include: Option<PathBuf>,
     /// Check joint limits only, no collisions and no line of sight
     #[arg(long)]
     pub no_filters: bool,
@@ -410,27 +471,18 @@ pub struct PlanArgs {
     /// What will be identified
     #[arg(long, value_enum, default_value_t)]
     pub level: Level,
-    /// Standard deviation of a measured coordinate [default: of the profile's instrument]
-    #[arg(long, value_name = "MM", value_parser = positive)]
-    pub sigma_mm: Option<f64>,
-    /// Repeat the first pose after every N poses to detect drift; 0: never
-    #[arg(long, value_name = "N", default_value_t = PlanRequest::default().drift_every)]
-    pub drift_every: usize,
-    /// Percentage of the full joint speed that the program will use
-    #[arg(long, value_name = "PERCENT", default_value_t = 100.0 * Pace::default().speed, value_parser = speed_percent)]
-    pub speed_percent: f64,
     /// Wait before the first reading of a pose
     #[arg(long, value_name = "S", default_value_t = Pace::default().settle, value_parser = positive)]
     pub settle_s: f64,
     /// Readings per pose, one second each
     #[arg(long, value_name = "N", default_value_t = Pace::default().shots, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub shots: u32,
-    /// File for the plan
-    #[arg(long, value_name = "CSV")]
-    pub out: Option<PathBuf>,
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
+    /// Options of recordings.
+    #[command(flatten)]
+    pub record: RecordArgs,
 }
 
 /// Arguments of `program`.

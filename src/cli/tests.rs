@@ -34,3 +34,25 @@ fn limits_and_boxes_are_ranges() {
         assert!(wrong.parse::<BoxMm>().is_err(), "{wrong}");
     }
 }
+
+/// The overview is written by hand, because clap does not group commands.
+#[test]
+fn the_overview_has_every_command_once() {
+    let command = Cli::command();
+    let mut listed: Vec<&str> =
+        HELP.lines().filter_map(|line| line.strip_prefix("  ")?.split_once("  ").map(|(name, _)| name)).collect();
+    listed.retain(|name| !name.contains(' ') && *name != "help" && *name != "trupose");
+    let mut commands: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+    listed.sort_unstable();
+    commands.sort_unstable();
+    assert_eq!(listed, commands);
+    assert!(HELP.lines().all(|line| line.chars().count() <= 80));
+}
+
+#[test]
+fn options_are_in_the_order_of_use() {
+    let command = Cli::command();
+    let plan = command.find_subcommand("plan").unwrap();
+    let options: Vec<&str> = plan.get_arguments().map(|argument| argument.get_id().as_str()).take(4).collect();
+    assert_eq!(options, ["profile", "poses", "verification", "out"]);
+}

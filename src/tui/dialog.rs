@@ -71,7 +71,7 @@ impl Dialog {
             Intent::TypeReading(_) => Some(ask::coordinates(view, "")),
             Intent::StatePayload(payload) => Some(ask::payload(payload)),
             Intent::About(about) => Some(ask::about(about)),
-            Intent::Note(_) => text("Note", "", Intent::Note),
+            Intent::Note(_) => text(&note_label(view), "", Intent::Note),
             Intent::GoToPose(_) => choose_pose(view),
             Intent::SuggestPoses(count) => {
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
@@ -188,9 +188,20 @@ fn choose_instrument(view: &ViewModel) -> Dialog {
     Dialog::Choice { list: ChoiceList::new("Instrument", labels, 0), intents }
 }
 
+/// The label of a note, with the pose that it will be attached to.
+fn note_label(view: &ViewModel) -> String {
+    match &view.content {
+        Content::Capture(content) => match &content.pose {
+            Some(pose) => format!("Note to pose {pose}"),
+            None => "Note".to_owned(),
+        },
+        _ => "Note".to_owned(),
+    }
+}
+
 fn choose_pose(view: &ViewModel) -> Option<Dialog> {
     let Content::Capture(content) = &view.content else { return None };
-    let labels = content.rows.iter().map(|row| format!("{}  {:?}  {:?}", row.pose, row.kind, row.state)).collect();
+    let labels = content.rows.iter().map(|row| format!("{}  {}  {}", row.pose, row.kind, row.state.words())).collect();
     let shown = content.rows.iter().position(|row| Some(row.row) == content.row);
     let intents = content.rows.iter().map(|row| Intent::GoToPose(row.pose.clone())).collect();
     Some(Dialog::Choice { list: ChoiceList::new("Pose", labels, shown.unwrap_or(0)), intents })
@@ -212,7 +223,9 @@ fn confirm(intent: &Intent, info: &IntentInfo, view: &ViewModel) -> Option<Dialo
             None => vec!["Quit the program?".to_owned(), "Nothing has been measured yet; nothing is lost.".to_owned()],
         },
     };
-    Some(Dialog::Confirm { intent: intent.clone(), lines, is_yes: false })
+    // Before there is a session nothing can be lost.
+    let is_yes = info.danger == Danger::Leaves && view.header.folder.is_none();
+    Some(Dialog::Confirm { intent: intent.clone(), lines, is_yes })
 }
 
 fn capitalised(text: &str) -> String {

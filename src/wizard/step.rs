@@ -148,7 +148,7 @@ impl Phase {
             Step::Profile => Self::Profile(profile::ProfileStep::default()),
             Step::Instrument => Self::Instrument(instrument::InstrumentStep),
             Step::Target => Self::Target(target::TargetStep::enter(session)),
-            Step::Plan => Self::Plan(plan::PlanStep::default()),
+            Step::Plan => Self::Plan(plan::PlanStep::enter(session)),
             Step::Capture => Self::Capture(Box::new(capture::CaptureStep::enter(session))),
             Step::Identify => Self::Identify(identify::IdentifyStep::enter(session)),
             Step::Verify => Self::Verify(identify::VerifyStep),

@@ -538,6 +538,18 @@ pub enum RowState {
     Skipped,
 }
 
+impl RowState {
+    /// The state in a word.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Open => "open",
+            Self::Measured => "done",
+            Self::LeftOut => "excluded",
+            Self::Skipped => "skipped",
+        }
+    }
+}
+
 /// A row of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RowView {

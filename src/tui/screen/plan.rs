@@ -213,7 +213,8 @@ impl PlanScreen {
         self.form.draw(cx.theme, settings, buf);
         let left = (SETTINGS + GAP).min(area.width);
         let figures = Rect { x: area.x + left, width: area.width - left, ..paint::band(area, 0, TOP) };
-        figures::draw(cx.theme, content, self.search.is_running(), figures, buf);
+        let folder = cx.view.header.folder.as_deref();
+        figures::draw(cx.theme, content, folder, self.search.is_running(), figures, buf);
         let below = paint::band(area, TOP, area.height);
         if self.search.is_running() {
             self.search.draw(cx.theme, below, buf);

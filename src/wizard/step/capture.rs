@@ -5,7 +5,7 @@ mod prediction;
 mod show;
 mod way;
 
-use super::plan::{measuring_pace, plan_request, plan_text};
+use super::plan::{PLAN_FILE, measuring_pace, plan_request, plan_text, write_plan};
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::session::journal::{
     Correction, Decision, Entry, FindingCause, FindingText, Line, MeasuredText, from_xyz_mm, to_edge, to_xyz_mm,
@@ -269,6 +269,10 @@ impl CaptureStep {
                     (Some(_), None) => {}
                     (None, _) => self.advance(session),
                 }
+                let is_again = |sample: &Sample| sample.row == noted.row && sample.state == SampleState::Superseded;
+                if self.questioned.is_none() && noted.factor.is_none() && session.samples.iter().any(is_again) {
+                    return vec![Action::Say(Notice::info(format!("pose {} fits now", noted.pose)))];
+                }
                 if let Some(factor) = noted.factor {
                     return vec![Action::Say(other_unit(noted, factor))];
                 }
@@ -294,10 +298,20 @@ impl CaptureStep {
                 self.row = Some(*row);
                 self.held = None;
             }
-            Entry::Skipped { skipped: true, .. } => self.advance(session),
+            Entry::Skipped { row, skipped: true } => {
+                self.advance(session);
+                let pose = session.rows.get(*row).map_or("?", |row| row.planned.pose.as_str());
+                let notice = Notice::info(format!("pose {pose} is skipped")).hint("go to it to measure it after all");
+                return vec![Action::Say(notice)];
+            }
+            Entry::Note { pose, .. } => {
+                let about = pose.as_ref().map_or_else(String::new, |pose| format!(" to pose {pose}"));
+                return vec![Action::Say(Notice::info(format!("note{about} saved")))];
+            }
             Entry::PlanExtended(_) | Entry::Plan(_) => {
                 self.prediction.restart(session);
                 self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());
+                return write_plan(session).into_iter().collect();
             }
             _ => {}
         }
@@ -563,6 +577,10 @@ impl StepMachine for CaptureStep {
         let was_measuring = std::mem::take(&mut self.measuring);
         match answer {
             Answer::Measured(reading) if was_measuring => self.take(&reading, cx),
+            Answer::Delivered { .. } => vec![Action::Say(
+                Notice::info(format!("the plan is saved as {PLAN_FILE} in the folder of the session"))
+                    .hint("make the robot program from it, and drive it once by hand at reduced speed before measuring"),
+            )],
             Answer::Planned { summary, rows, .. } => {
                 let new: Vec<_> = rows.into_iter().filter(|row| row.kind != PoseKind::Home).collect();
                 let origin = format!("{} suggested poses", new.iter().filter(|row| row.kind.is_measured()).count());

@@ -3,10 +3,12 @@
 use super::{Action, Cx, StepMachine, offer, require, with_default};
 use crate::planning::order::Pace;
 use crate::procedure::plan::PlanRequest;
+use crate::session::export::plan_csv;
 use crate::session::journal::{Entry, PlanText};
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::Step;
+use crate::session::state::Session;
 use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo, PlanSettings};
@@ -27,6 +29,17 @@ struct Proposal {
     plan: PlanText,
     /// All its numbers, if poses were chosen.
     summary: Option<Box<PlanSummary>>,
+}
+
+impl PlanStep {
+    /// Enters the step with the numbers of the plan that is being measured, if there is one.
+    pub(super) fn enter(session: &Session) -> Self {
+        let count = |kind| session.rows.iter().filter(|row| row.active && row.planned.kind == kind).count();
+        let (poses, verification) = (count(PoseKind::Identification), count(PoseKind::Verification));
+        let usual = PlanSettings::default();
+        let settings = if poses > 0 { PlanSettings { poses, verification, ..usual } } else { usual };
+        Self { settings, ..Self::default() }
+    }
 }
 
 /// A plan as it is written to the journal.
@@ -52,6 +65,16 @@ pub(super) fn measured_poses(cx: &Cx<'_>) -> Vec<PlannedPose> {
 /// whether the robot was at rest.
 pub(super) fn measuring_pace() -> Pace {
     Pace { shots: 3, ..Pace::default() }
+}
+
+/// Name of the file with the plan in the session's folder.
+pub(super) const PLAN_FILE: &str = "plan.csv";
+
+/// Writes the plan beside the journal: robot programs are made from it before anything is measured.
+pub(super) fn write_plan(session: &Session) -> Option<Action> {
+    let robot = session.robot.as_ref()?;
+    let files = vec![(PLAN_FILE.to_owned(), plan_csv(session, robot))];
+    Some(Action::Ask(Request::Deliver { files, left_out: Vec::new() }))
 }
 
 /// The request for a plan with these settings.
@@ -150,6 +173,13 @@ impl StepMachine for PlanStep {
         self.proposal = Some(Proposal { plan, summary });
         let Some((first, rest)) = warnings.split_first() else { return Vec::new() };
         vec![Action::Say(Notice { hints: rest.to_vec(), ..Notice::attention(first) })]
+    }
+
+    fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
+        match entry {
+            Entry::Plan(_) => write_plan(cx.session).into_iter().collect(),
+            _ => Vec::new(),
+        }
     }
 
     fn content(&self, cx: &Cx<'_>) -> Content {

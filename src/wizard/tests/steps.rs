@@ -424,3 +424,27 @@ fn sessions_can_be_continued_until_a_robot_is_chosen() {
     bench.does(info.intent);
     assert_eq!((bench.wizard.resumes(), bench.exits), (Some("sessions/other"), 1));
 }
+
+/// Robot programs are made before anything is measured.
+#[test]
+fn an_accepted_plan_is_written_beside_the_journal() {
+    let mut bench = Bench::at(Step::Plan);
+    bench.does(Intent::MakePlan(PlanSettings::default()));
+    let effects = bench.intend(Intent::AcceptPlan);
+    let (id, lines) = super::bench::appended(&effects);
+    let effects = bench.written(id, lines);
+    let (_, Request::Deliver { files, .. }) = started(&effects) else { panic!() };
+    assert_eq!(files.len(), 1);
+    assert_eq!(files[0].0, "plan.csv");
+    assert_eq!(files[0].1.lines().count(), 1 + bench.wizard.session().rows.len());
+    bench.settle(effects);
+    assert_eq!(bench.told(), "the plan is saved as plan.csv in the folder of the session");
+    // It is no result.
+    assert!(bench.wizard.session().delivered.is_empty());
+    // Suggested poses are in it as well.
+    bench.measure(9);
+    let rows = bench.wizard.session().rows.len();
+    bench.does(Intent::SuggestPoses(2));
+    assert!(bench.wizard.session().rows.len() > rows);
+    assert!(bench.told().starts_with("the plan is saved"));
+}

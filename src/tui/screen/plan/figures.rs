@@ -30,7 +30,7 @@ pub(super) fn time(minutes: f64) -> String {
 }
 
 /// Draws the proposal, else the plan being measured, else a hint.
-pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: Rect, buf: &mut Buffer) {
+pub(super) fn draw(theme: Theme, content: &PlanView, folder: Option<&str>, is_searching: bool, area: Rect, buf: &mut Buffer) {
     let mut lines = match (&content.proposal, &content.accepted) {
         (Some(figures), _) => {
             let is_narrow = area.width < COMPARED;
@@ -43,6 +43,7 @@ pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: R
             let mut lines = vec![(Role::Title, "This plan is being measured".to_owned())];
             lines.extend(numbers(figures, None, area.width < COMPARED));
             lines.push(named("measured", &format!("{}, {} left", content.measured, content.left)));
+            lines.extend(folder.map(|folder| program(folder, usize::from(area.width))).into_iter().flatten());
             lines
         }
         (None, None) => {
@@ -56,6 +57,13 @@ pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: R
         let line = shortened(&theme.glyphs.show(line), usize::from(area.width), theme.glyphs);
         paint::text(buf, area, (0, row), &line, theme.style(*role));
     }
+}
+
+/// How the robot program of the plan is made.
+fn program(folder: &str, room: usize) -> Vec<(Role, String)> {
+    let plan = format!("{}/plan.csv", folder.trim_end_matches('/'));
+    let text = format!("robot program: trupose program --profile NAME --plan {plan} --dialect krl --out program");
+    wrapped(&text, room).into_iter().map(|line| (Role::Hint, line)).collect()
 }
 
 fn named(name: &str, value: &str) -> (Role, String) {
