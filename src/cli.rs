@@ -200,7 +200,9 @@ pub enum Command {
     #[command(after_help = "Example:\n  trupose identify --profile ur10e --measurements points.csv --out results")]
     Identify(IdentifyArgs),
     /// Verify a calibration on other measured points
-    #[command(after_help = "Example:\n  trupose verify --calibration results/calibration.ron --measurements later.csv --refit frame+target")]
+    #[command(
+        after_help = "Example:\n  trupose verify --calibration results/calibration.ron --measurements later.csv --refit frame+target"
+    )]
     Verify(VerifyArgs),
     /// Identify from direct distances: shared points (ball and sockets) or measured lengths, no coordinates
     Constraints(ConstraintsArgs),
@@ -208,10 +210,14 @@ pub enum Command {
     #[command(after_help = "Example:\n  trupose plan --profile ur10e --poses 60 --out plan.csv")]
     Plan(PlanArgs),
     /// Write a robot program that visits the poses of a plan
-    #[command(after_help = "Example:\n  trupose program --profile ur10e --plan plan.csv --dialect urscript --out program")]
+    #[command(
+        after_help = "Example:\n  trupose program --profile ur10e --plan plan.csv --dialect urscript --out program"
+    )]
     Program(ProgramArgs),
     /// Correct targets so that the real arm reaches them
-    #[command(after_help = "Example:\n  trupose compensate --calibration calibration.ron --program part.src --dialect krl --out corrected.src")]
+    #[command(
+        after_help = "Example:\n  trupose compensate --calibration calibration.ron --program part.src --dialect krl --out corrected.src"
+    )]
     Compensate(compensate::CompensateArgs),
     /// Write the identified arm as a profile, URDF or table
     #[command(after_help = "Example:\n  trupose export --calibration calibration.ron --format dh-csv")]

@@ -284,13 +284,24 @@ impl Wizard {
     }
 
     fn cx(&self) -> Cx<'_> {
-        Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now, sessions: &self.sessions }
+        Cx {
+            session: &self.session,
+            connection: self.connection.as_ref(),
+            down: self.live.down(),
+            now: self.now,
+            sessions: &self.sessions,
+        }
     }
 
     /// The step, mutable, beside what it may read.
     fn phase_and_cx(&mut self) -> (&mut Phase, Cx<'_>) {
-        let cx =
-            Cx { session: &self.session, connection: self.connection.as_ref(), down: self.live.down(), now: self.now, sessions: &self.sessions };
+        let cx = Cx {
+            session: &self.session,
+            connection: self.connection.as_ref(),
+            down: self.live.down(),
+            now: self.now,
+            sessions: &self.sessions,
+        };
         (&mut self.phase, cx)
     }
 

@@ -133,7 +133,8 @@ pub(super) fn find(wanted: Option<&Path>, root: &Path) -> Result<PathBuf, Failur
     if wanted.exists() || wanted.components().count() != 1 {
         return Ok(wanted.to_owned());
     }
-    let name = |folder: &PathBuf| folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name =
+        |folder: &PathBuf| folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let beginning = wanted.to_string_lossy();
     let mut found = recent::by_age(root);
     found.retain(|folder| name(folder).starts_with(&*beginning));

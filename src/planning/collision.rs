@@ -368,8 +368,7 @@ fn solids(chain: &KinematicChain, cell: &Cell) -> Vec<Solid> {
     if solids.is_empty() {
         solids = skeleton(chain);
     }
-    let line =
-        Segment { from: chain.flange() * Point3::origin(), to: chain.flange() * cell.target.position_in_flange };
+    let line = Segment { from: chain.flange() * Point3::origin(), to: chain.flange() * cell.target.position_in_flange };
     solids.push(Solid { part: Part::Target, link: chain.dof(), line, radius: SMR_RADIUS });
     solids
 }

@@ -153,7 +153,9 @@ impl Live {
         let registered = station::registration(session)?;
         let here = registered.to_from_from * here;
         let mut distances: Vec<(f64, usize)> = rows
-            .filter_map(|row| Some(((predicted(session, &session.rows.get(row)?.planned.configuration)? - here).norm(), row)))
+            .filter_map(|row| {
+                Some(((predicted(session, &session.rows.get(row)?.planned.configuration)? - here).norm(), row))
+            })
             .collect();
         distances.sort_by(|(one, _), (other, _)| one.total_cmp(other));
         let limit = NEAR.max(NEAR_SPREADS * registered.rms);

@@ -80,7 +80,8 @@ impl ProfileScreen {
     /// Position of the cursor.
     fn place(&self, content: &ProfileView) -> usize {
         let entries = self.entries(content);
-        let chosen = content.chosen.as_ref().and_then(|card| entries.iter().position(|entry| *entry == Item::Robot(&card.name)));
+        let chosen =
+            content.chosen.as_ref().and_then(|card| entries.iter().position(|entry| *entry == Item::Robot(&card.name)));
         self.cursor.or(chosen).unwrap_or(0).min(entries.len().saturating_sub(1))
     }
 

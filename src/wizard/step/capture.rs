@@ -23,8 +23,8 @@ use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
 use crate::wizard::view::{Content, MoveCheck};
 use prediction::Prediction;
-use way::{Way, Waypoint};
 pub(super) use prediction::fewest_samples;
+use way::{Way, Waypoint};
 
 /// Number of poses that are suggested at a time.
 const SUGGESTED: usize = 5;
@@ -578,8 +578,9 @@ impl StepMachine for CaptureStep {
         match answer {
             Answer::Measured(reading) if was_measuring => self.take(&reading, cx),
             Answer::Delivered { .. } => vec![Action::Say(
-                Notice::info(format!("the plan is saved as {PLAN_FILE} in the folder of the session"))
-                    .hint("make the robot program from it, and drive it once by hand at reduced speed before measuring"),
+                Notice::info(format!("the plan is saved as {PLAN_FILE} in the folder of the session")).hint(
+                    "make the robot program from it, and drive it once by hand at reduced speed before measuring",
+                ),
             )],
             Answer::Planned { summary, rows, .. } => {
                 let new: Vec<_> = rows.into_iter().filter(|row| row.kind != PoseKind::Home).collect();

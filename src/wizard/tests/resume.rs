@@ -100,9 +100,8 @@ fn resuming_is_journaled_then_said_then_the_instrument_is_connected() {
     assert_eq!(bench.wizard.view().header.instrument.as_deref(), Some("bench instrument"));
     assert_eq!(bench.wizard.session().resumed, 1);
     // Each shows a message of its own.
-    let without_message = |wizard: &Wizard| -> Vec<String> {
-        offers(wizard).into_iter().filter(|offer| offer != "Dismiss").collect()
-    };
+    let without_message =
+        |wizard: &Wizard| -> Vec<String> { offers(wizard).into_iter().filter(|offer| offer != "Dismiss").collect() };
     assert_eq!(without_message(&bench.wizard), without_message(&full.wizard));
     bench.measure(1);
     assert_eq!(bench.wizard.session().samples.len(), 1);

@@ -68,7 +68,8 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
         lines.push((rest, Role::Plain));
     }
     let role = if prediction.is_enough { Role::Ok } else { Role::Hint };
-    let said = if content.open == 0 { "all poses of the plan have been measured".to_owned() } else { verdict(prediction) };
+    let said =
+        if content.open == 0 { "all poses of the plan have been measured".to_owned() } else { verdict(prediction) };
     lines.push((said, role));
     lines.push((MEANING.to_owned(), Role::Dim));
     let used = text(theme, &lines, room, area, buf);

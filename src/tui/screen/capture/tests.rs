@@ -7,8 +7,8 @@ use crate::session::set_up::Step;
 use crate::tui::dialog::DialogOutcome;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
-    MoveCheck,
-    DriftView, FindingView, JointShown, LivePoint, LiveView, PairView, PredictionView, RowState, RowView, SampleView,
+    DriftView, FindingView, JointShown, LivePoint, LiveView, MoveCheck, PairView, PredictionView, RowState, RowView,
+    SampleView,
 };
 use crate::wizard::{IntentInfo, Notice};
 

@@ -61,7 +61,10 @@ pub(super) fn result(content: &IdentifyView, summary: &IdentificationSummary, pa
         let blocks = summary.warnings.iter().filter(|warning| warning.blocks_acceptance).count();
         let said = match blocks {
             0 => "the arm is identified, with remarks.".to_owned(),
-            some => format!("the arm is identified, but {} the result from being accepted.", counted_as(some, "warning keeps", "warnings keep")),
+            some => format!(
+                "the arm is identified, but {} the result from being accepted.",
+                counted_as(some, "warning keeps", "warnings keep")
+            ),
         };
         let mark = if blocks == 0 { ("GOOD: ", Role::Ok) } else { ("CHECK: ", Role::Warn) };
         page.marked(mark, &said, Role::Plain);

@@ -30,7 +30,14 @@ pub(super) fn time(minutes: f64) -> String {
 }
 
 /// Draws the proposal, else the plan being measured, else a hint.
-pub(super) fn draw(theme: Theme, content: &PlanView, folder: Option<&str>, is_searching: bool, area: Rect, buf: &mut Buffer) {
+pub(super) fn draw(
+    theme: Theme,
+    content: &PlanView,
+    folder: Option<&str>,
+    is_searching: bool,
+    area: Rect,
+    buf: &mut Buffer,
+) {
     let mut lines = match (&content.proposal, &content.accepted) {
         (Some(figures), _) => {
             let is_narrow = area.width < COMPARED;

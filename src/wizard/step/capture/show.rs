@@ -147,9 +147,8 @@ fn prediction(step: &CaptureStep, cx: &Cx<'_>) -> Option<PredictionView> {
     let prediction = &step.prediction;
     let acceptance = cx.robot()?.profile.acceptance();
     let limit = acceptance.position_rms.or(acceptance.position_mean);
-    let is_identification = |row: &usize| {
-        cx.session.rows.get(*row).is_some_and(|row| row.planned.kind == PoseKind::Identification)
-    };
+    let is_identification =
+        |row: &usize| cx.session.rows.get(*row).is_some_and(|row| row.planned.kind == PoseKind::Identification);
     Some(PredictionView {
         curve_mm: prediction.curve.iter().map(|(poses, error)| (*poses, to_mm(*error))).collect(),
         now_mm: to_mm(prediction.now()?),

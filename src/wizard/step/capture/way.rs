@@ -95,12 +95,8 @@ fn candidates(
     let vias = |stops: &[Waypoint]| stops.iter().filter(|stop| is_via(stop)).cloned().collect::<Vec<_>>();
     let (leaving, arriving) = (vias(&after_arm), vias(&before));
     let home = home.as_slice();
-    let around = [
-        home.to_vec(),
-        [home, &arriving].concat(),
-        [&leaving, home].concat(),
-        [&leaving, home, &arriving].concat(),
-    ];
+    let around =
+        [home.to_vec(), [home, &arriving].concat(), [&leaving, home].concat(), [&leaving, home, &arriving].concat()];
     if through_home {
         return around.to_vec();
     }
