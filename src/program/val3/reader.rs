@@ -403,7 +403,7 @@ impl Application<'_> {
         let original = Variable::read(tokens, start);
         let ends = |end: usize| tokens.get(end).is_none_or(|token| token.kind == Kind::LineEnd);
         if let Some(original) = original.filter(|original| ends(original.end)) {
-            findings.copies.push((variable.key, original.key));
+            findings.copies.push((variable.element(), original.element()));
         }
     }
 
@@ -449,8 +449,7 @@ impl Application<'_> {
             }
             let variable = Variable::read(tokens, part.start).filter(|variable| variable.end == part.end);
             if let Some(variable) = variable {
-                // Without an index, the first element is meant.
-                let key = if tokens.is(part.start + 1, b'[') { variable.key.clone() } else { variable.first() };
+                let key = variable.element();
                 if let Some(father) = self.father(&key) {
                     frame = father;
                 }
@@ -459,8 +458,7 @@ impl Application<'_> {
             }
             let is_offset = tokens.is_word(part.start, "appro") || tokens.is_word(part.start, "compose");
             if let Some(base) = Variable::read(tokens, part.start + 2).filter(|_| is_offset) {
-                let key = if tokens.is(part.start + 3, b'[') { base.key } else { base.first() };
-                findings.other_uses.push(OtherUse { key, reason: Reason::OffsetBase });
+                findings.other_uses.push(OtherUse { key: base.element(), reason: Reason::OffsetBase });
             }
             let reason = if is_offset { Reason::Offset } else { Reason::Computed };
             points.push(Point::Left { name: Some(tokens.source(part)), reason });
@@ -510,6 +508,11 @@ impl Variable {
             tokens.str(at + 2).clone_into(&mut key.element);
         }
         Some(Self { name: shown, key, end })
+    }
+
+    /// The element that is meant: without an index, the first.
+    fn element(&self) -> Key {
+        if self.name.ends_with(']') { self.key.clone() } else { self.first() }
     }
 
     /// The first element.
