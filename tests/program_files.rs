@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use trupose::kinematics::ForwardKinematics;
 use trupose::profile::{Profile, builtin};
-use trupose::program::motion::{Command, Companion, Goal, MoveKind, ReadOptions, Reason, Scan, Setting};
+use trupose::program::motion::{Command, Companion, Goal, Hint, MoveKind, ReadOptions, Reason, Scan, Setting};
 use trupose::program::rewrite::{rewrite, scan};
 use trupose::program::{Dialect, Robot};
 
@@ -474,5 +475,40 @@ fn the_examples_of_the_page_give_what_it_says() {
         let (code, stated) = block(name);
         let found = described(&found(dialect, arm, code.as_bytes(), Vec::new()));
         assert_eq!(found, stated, "{name}:\n{found}");
+    }
+}
+
+#[test]
+fn signs_of_computed_and_taught_points_are_reported() {
+    let own = own(Dialect::Rapid, include_str!("programs/rapid.txt"));
+    let offline = own.iter().find(|own| own.title.contains("offline")).unwrap();
+    let hints = found(Dialect::Rapid, ABB, offline.text.as_bytes(), Vec::new()).hints;
+    assert!(hints.iter().any(|hint| hint.to_string() == "line 1: written by RobotStudio"), "{hints:?}");
+    let target = |x: f64, y: f64| format!("LIN {{X {x},Y {y},Z {},A 0,B 90,C 0,S 18,T 2}}\n", x + 100.0);
+    let program = |step: f64| (0..8).map(|index| target(step * f64::from(index + 1), step)).collect::<String>();
+    for (step, computed) in [(10.0, true), (10.123, false)] {
+        let scan = found(Dialect::Krl, KUKA, program(step).as_bytes(), Vec::new());
+        let said: Vec<_> = scan.hints.iter().filter_map(Hint::is_computed).collect();
+        assert_eq!(said, [computed], "{:?}", scan.hints);
+        assert!(scan.hints.contains(&Hint::AbsoluteAccuracy { line: 1 }));
+    }
+}
+
+#[test]
+fn flanges_of_shipped_profiles_are_those_of_the_controllers() {
+    // Position of the flange (mm), and its x and z axes, at the pose that the makers' manuals draw.
+    for (arm, degrees, position, x, z) in [
+        (ABB, [0.0; 6], [374.0, 0.0, 630.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]),
+        (KUKA, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0], [525.0, 0.0, 890.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]),
+        (FANUC, [0.0; 6], [465.0, 0.0, 365.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]),
+        (STAUBLI, [0.0; 6], [0.0, 20.0, 670.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+    ] {
+        let profile = profile(arm);
+        let base_from_flange = ForwardKinematics::new(profile.chain()).base_from_flange(&degrees.map(f64::to_radians));
+        let world_from_flange = profile.base_from_world().inverse() * base_from_flange;
+        let found = world_from_flange.translation.vector * 1000.0;
+        assert!((found - Vector3::from(position)).norm() < 1e-6, "{arm}: {found}");
+        assert!((world_from_flange.rotation * Vector3::x() - Vector3::from(x)).norm() < 1e-9, "{arm}");
+        assert!((world_from_flange.rotation * Vector3::z() - Vector3::from(z)).norm() < 1e-9, "{arm}");
     }
 }

@@ -6,6 +6,8 @@
 //! | field | default |
 //! |---|---|
 //! | `base`, `flange`: `(xyz_mm, rpy_deg)` | identity; roll, pitch, yaw about fixed axes as in URDF |
+//! | `controller_world`: `(xyz_mm, rpy_deg)` | identity; the frame of the controller's Cartesian positions, in the base |
+//! | joint `aliases` | none; further names, such as those of a URDF, for trajectories of ROS |
 //! | joint `beta_deg` | the link has no β, and none is identified |
 //! | joint `direction`, `coupling` | +1, none |
 //! | joint `planning_limits_…` | the joint limits, of a revolute joint those within ±180° |

@@ -12,6 +12,9 @@ use super::super::lexer::{Kind, Number, Rules, Tokens};
 use super::super::motion::{Form, Hint, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
 
+/// More routines than a file can have: their numbers differ between files.
+const ROUTINES: usize = 1 << 24;
+
 const RULES: Rules = Rules { comment: b";", quotes: b"\"'", in_words: b"$#" };
 
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
@@ -59,7 +62,7 @@ struct Line<'t, 'a> {
 }
 
 fn each_line<'a>(tokens: &Tokens<'a>, file: usize, mut work: impl FnMut(&Line<'_, 'a>)) {
-    let (mut at, mut scope, mut scopes) = (0, 0, file << 32);
+    let (mut at, mut scope, mut scopes) = (0, 0, file.saturating_mul(ROUTINES));
     while at < tokens.len() {
         let is_end = |place: &usize| tokens.get(*place).is_some_and(|token| token.kind == Kind::LineEnd);
         let end = (at..tokens.len()).find(is_end).unwrap_or(tokens.len());

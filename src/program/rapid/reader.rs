@@ -12,6 +12,9 @@ use super::super::lexer::{Kind, Rules, Tokens, Value};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
 
+/// More routines than a file can have: their numbers differ between files.
+const ROUTINES: usize = 1 << 24;
+
 const RULES: Rules = Rules { comment: b"!", quotes: b"\"", in_words: b"" };
 
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
@@ -132,7 +135,7 @@ impl<'a> Module<'a> {
         let mut at = 0;
         let mut scope = 0;
         // Routines have the same numbers in both passes.
-        self.scopes = file << 32;
+        self.scopes = file.saturating_mul(ROUTINES);
         while at < tokens.len() {
             at = tokens.skip_line_ends(at);
             let Some(word) = tokens.word(at).map(str::to_ascii_lowercase) else {
