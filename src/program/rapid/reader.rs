@@ -68,6 +68,8 @@ struct Module<'a> {
     tools: HashMap<String, Result<Isometry3<f64>, Reason>>,
     frames: HashMap<String, Result<Isometry3<f64>, Reason>>,
     scopes: usize,
+    /// A program displacement moves all targets.
+    is_displaced: bool,
 }
 
 /// One instruction or declaration, without the block keywords in front of it.
@@ -122,6 +124,7 @@ impl<'a> Module<'a> {
             tools: HashMap::new(),
             frames: HashMap::new(),
             scopes: 0,
+            is_displaced: false,
         }
     }
 
@@ -212,8 +215,9 @@ impl<'a> Module<'a> {
     }
 
     /// Notes values of positions, and motions.
-    fn find(&self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
+    fn find(&mut self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
         if statement.is_routine {
+            self.is_displaced = false;
             findings.motions.push(None);
             return;
         }
@@ -225,6 +229,11 @@ impl<'a> Module<'a> {
             return;
         }
         let word = tokens.word(range.start).unwrap_or_default().to_ascii_lowercase();
+        match word.as_str() {
+            "pdispon" | "pdispset" => self.is_displaced = true,
+            "pdispoff" => self.is_displaced = false,
+            _ => {}
+        }
         let assign = range.clone().find(|at| tokens.is(*at, b':') && tokens.is(at + 1, b'='));
         let has_arguments = !tokens.is(range.start + 1, b':') && !tokens.is(range.start + 1, b'(');
         match (Instruction::named(&word).filter(|_| has_arguments), assign) {
@@ -377,6 +386,9 @@ impl<'a> Module<'a> {
         let mut points = Vec::new();
         for head in arguments.heads.iter().skip(instruction.first).take(instruction.points) {
             points.push(self.point(statement, findings, head.clone(), instruction.is_joints));
+        }
+        if self.is_displaced && !instruction.is_joints {
+            points = points.into_iter().map(|point| displaced(findings, point)).collect();
         }
         let Some(point) = points.pop() else { return };
         findings.motions.push(Some(Motion {
@@ -609,6 +621,23 @@ impl Arguments {
             }
         }
         arguments
+    }
+}
+
+/// A point under a program displacement, which is an offset.
+fn displaced(findings: &mut Findings, point: Point) -> Point {
+    match point {
+        Point::Variable { key, name } => {
+            findings.other_uses.push(OtherUse { key, reason: Reason::OffsetBase });
+            Point::Left { name: Some(name), reason: Reason::Offset }
+        }
+        Point::Here(index) => {
+            if let Some(definition) = findings.definitions.get_mut(index) {
+                definition.content = Err(Reason::Offset);
+            }
+            Point::Here(index)
+        }
+        Point::Left { .. } | Point::Current => point,
     }
 }
 
