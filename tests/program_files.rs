@@ -395,7 +395,7 @@ fn broken_programs_never_panic_and_change_only_in_numbers() {
         let profile = profile(arm);
         let robot = with(&profile);
         let options = ReadOptions { companions: companions.clone(), ..ReadOptions::default() };
-        for _ in 0..40 {
+        for _ in 0..15 {
             let mut broken = text.clone();
             for _ in 0..=dice.roll(4) {
                 if broken.len() < 2 {

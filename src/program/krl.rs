@@ -3,6 +3,7 @@
 //! `WAIT SEC` and `HALT` stop the advance run. Cells with external axes must add `E1` to `E6`: an axis that is missing in the
 //! aggregate keeps its position. Arms with seven axes have another controller, which is programmed in Java.
 
+mod aggregate;
 mod reader;
 
 use super::names::{MAX_NAME, identifier};

@@ -3,6 +3,7 @@
 //! RAPID has no speed in percent for a single move. Full speed is taken as 2500 mm/s and 500 deg/s at the tool, the usual limit
 //! of `vmax` and the value in the predefined speeds, so that 10 % is 250 mm/s.
 
+mod instruction;
 mod reader;
 
 use super::names::{MAX_NAME, identifier};
