@@ -503,8 +503,12 @@ fn poses_of_one_arm_configuration_are_said_not_to_carry_over() {
     let mut bench = Bench::builtin("abb_irb120", 26);
     let one_side = |configurations: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
         let mut configurations = configurations;
-        configurations.iter_mut().for_each(|q| q[4] = q[4].abs() + 5.0 * DEGREE);
-        configurations.into_iter().filter(|q| q[2] < 30.0 * DEGREE && q[1].abs() < 60.0 * DEGREE).collect()
+        for q in &mut configurations {
+            q[1] = 30.0 * DEGREE + 0.2 * q[1];
+            q[2] *= 0.3;
+            q[4] = q[4].abs() + 5.0 * DEGREE;
+        }
+        configurations
     };
     let (known, fresh) = (bench.configurations(120), bench.configurations(60));
     let both = (bench.measured(&known, 0), bench.measured(&fresh, 0));
