@@ -21,6 +21,7 @@ mod verify;
 mod wizard;
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use crate::cli::{Cli, Command, EstimationArgs, PayloadArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
@@ -54,6 +55,17 @@ impl<O: Write, E: Write> Console<O, E> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Prints lines for people. Names of files and texts from elsewhere in them cannot disturb a terminal.
+    fn say(&mut self, text: &str) -> Result<(), Failure> {
+        let lines: Vec<String> = text.split('\n').map(printable).collect();
+        self.print(&lines.join("\n"))
+    }
+
+    /// Prints the name of a file that was written.
+    fn say_written(&mut self, path: &Path) -> Result<(), Failure> {
+        self.say(&format!("written: {}\n", path.display()))
     }
 
     /// Prints a remark. A closed stderr is not a failure.
@@ -136,6 +148,12 @@ fn payload_of(args: &PayloadArgs, profile: &Profile) -> Result<Option<PayloadTex
             .hint("add 'weight_kg', or 'mass_kg' and 'centre_mm' of the joints, to the profile"));
     }
     Ok(payload)
+}
+
+/// The failure if the system refuses a thread, a signal handler or an open file: no defect of this program.
+fn refused(error: &io::Error) -> Failure {
+    Failure::new(ExitStatus::Store, format!("the system refuses what the program needs: {error}"))
+        .hint("close other programs, or raise the limits of processes and open files ('ulimit -a' shows them)")
 }
 
 /// A JSON object as printed: indented, with a line break at the end.

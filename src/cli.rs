@@ -307,6 +307,9 @@ pub struct EstimationArgs {
     /// Rows to identify from, such as 'pose % 17 == 0' or "position != 'left'"
     #[arg(long = "use", value_name = "CONDITION")]
     pub filter: Option<String>,
+    /// Use a table although it has changed since this program wrote it, because the change was made on purpose
+    #[arg(long)]
+    pub edited: bool,
     /// How outliers are treated
     #[arg(long, value_enum, default_value_t)]
     pub estimator: Estimator,
@@ -371,6 +374,9 @@ pub struct VerifyArgs {
     /// Calibration to verify (calibration.ron)
     #[arg(long, value_name = "RON")]
     pub calibration: PathBuf,
+    /// Use calibration or table although it has changed since this program wrote it, because the change was made on purpose
+    #[arg(long)]
+    pub edited: bool,
     /// Measured points: CSV with units in the column names
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,

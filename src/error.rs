@@ -19,7 +19,7 @@ pub enum ExitStatus {
     Instrument,
     /// No usable solution.
     Numerical,
-    /// Files of a result or session could not be read or written.
+    /// Files of a result or session could not be read or written, or the system refuses what the program needs.
     Store,
     /// A defect of this program.
     Internal,

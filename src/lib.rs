@@ -25,6 +25,7 @@
 //! called *the method paper* throughout.
 
 pub mod app;
+pub mod checksum;
 pub mod cli;
 pub mod compensation;
 pub mod error;

@@ -31,6 +31,19 @@ pub enum StoreError {
         /// Error of the system.
         source: io::Error,
     },
+    /// Some of several files were replaced, the others are unchanged.
+    #[error("only a part of the files was written: {} new, {} NOT written", listed_or_none(written), listed_or_none(missing))]
+    Partly {
+        /// Names of the files that were replaced.
+        written: Vec<String>,
+        /// Names of the files that were not.
+        missing: Vec<String>,
+        /// Error of the system.
+        source: io::Error,
+    },
+    /// A link, a folder or a device where a session's own file belongs.
+    #[error("'{}' is not a file but a link, a folder or a device; inside a session's folder nothing is written through it", path.display())]
+    NotOwn { path: PathBuf },
     /// Writing to a device or pipe failed.
     #[error("cannot write to '{}'", path.display())]
     Into {
@@ -39,6 +52,19 @@ pub enum StoreError {
         /// Error of the system.
         source: io::Error,
     },
+}
+
+fn listed_or_none(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// What happens with links where files are replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Links {
+    /// The file behind a link is replaced, and a device or pipe is written to: the user has named the path.
+    Followed,
+    /// They are refused: the path is inside a folder that may come from elsewhere.
+    Refused,
 }
 
 /// Largest file that is read (bytes); a million rows are a tenth of it.
@@ -78,35 +104,107 @@ pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
     replace_bytes(path, text.as_bytes())
 }
 
+/// Replaces several files. All of them are written beside the old ones and synced first, so that a full disk leaves every old file
+/// as it was.
+///
+/// # Errors
+/// All old files are unchanged, or [`StoreError::Partly`] says which.
+pub fn replace_all<'a>(
+    files: impl IntoIterator<Item = (PathBuf, &'a [u8])>,
+    links: Links,
+) -> Result<(), StoreError> {
+    let staged = files.into_iter().map(|(path, bytes)| Staged::new(path, bytes, links)).collect::<Result<Vec<_>, _>>()?;
+    let mut waiting = staged.into_iter();
+    let mut written = Vec::new();
+    while let Some(staged) = waiting.next() {
+        let path = staged.path.clone();
+        match staged.commit() {
+            Ok(()) => written.push(name_of(&path)),
+            Err(error) if written.is_empty() && waiting.len() == 0 => return Err(error),
+            Err(StoreError::Write { source, .. } | StoreError::Into { source, .. }) => {
+                let missing = std::iter::once(name_of(&path)).chain(waiting.map(|staged| name_of(&staged.path)));
+                return Err(StoreError::Partly { written, missing: missing.collect(), source });
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// A file that is about to be replaced.
+struct Staged<'a> {
+    path: PathBuf,
+    bytes: &'a [u8],
+    to: Destination,
+    /// The new file beside the old one, on disk.
+    temporary: Option<tempfile::NamedTempFile>,
+}
+
+impl<'a> Staged<'a> {
+    fn new(path: PathBuf, bytes: &'a [u8], links: Links) -> Result<Self, StoreError> {
+        let failed = |source| StoreError::Write { path: path.clone(), source };
+        let to = match links {
+            Links::Followed => destination(&path).map_err(failed)?,
+            Links::Refused => match fs::symlink_metadata(&path) {
+                Ok(found) if !found.is_file() => return Err(StoreError::NotOwn { path }),
+                _ => Destination::File(path.clone()),
+            },
+        };
+        let temporary = match &to {
+            Destination::File(file) => Some(beside(file, bytes).map_err(failed)?),
+            Destination::Other(_) | Destination::Out | Destination::Err => None,
+        };
+        Ok(Self { path, bytes, to, temporary })
+    }
+
+    fn commit(self) -> Result<(), StoreError> {
+        let Self { path, bytes, to, temporary } = self;
+        let into = |written: io::Result<()>| written.map_err(|source| StoreError::Into { path: path.clone(), source });
+        match to {
+            Destination::File(file) => put(temporary, &file).map_err(|source| StoreError::Write { path, source }),
+            Destination::Other(place) => {
+                into(OpenOptions::new().append(true).open(place).and_then(|mut file| file.write_all(bytes)))
+            }
+            Destination::Out => into(write_out(io::stdout().lock(), bytes)),
+            Destination::Err => into(write_out(io::stderr().lock(), bytes)),
+        }
+    }
+}
+
 /// As [`replace`], for bytes.
 ///
 /// # Errors
 /// A step failed; the old file is unchanged.
 pub fn replace_bytes(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
-    let failed = |source| StoreError::Write { path: path.to_owned(), source };
-    let into = |written: io::Result<()>| written.map_err(|source| StoreError::Into { path: path.to_owned(), source });
-    match destination(path).map_err(failed)? {
-        Destination::File(file) => replace_file(&file, bytes).map_err(failed),
-        Destination::Other(place) => {
-            into(OpenOptions::new().append(true).open(place).and_then(|mut file| file.write_all(bytes)))
-        }
-        Destination::Out => into(write_out(io::stdout().lock(), bytes)),
-        Destination::Err => into(write_out(io::stderr().lock(), bytes)),
-    }
+    replace_all([(path.to_owned(), bytes)], Links::Followed)
 }
 
 fn write_out(mut out: impl io::Write, bytes: &[u8]) -> io::Result<()> {
     out.write_all(bytes).and_then(|()| out.flush())
 }
 
-fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    let mut file = temporary().tempfile_in(folder)?;
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
+}
+
+/// A temporary file with these bytes, synced, in the folder of `path`.
+fn beside(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
+    let mut file = temporary().tempfile_in(folder_of(path))?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
+    Ok(file)
+}
+
+/// Renames a temporary file to `path`.
+fn put(temporary: Option<tempfile::NamedTempFile>, path: &Path) -> io::Result<()> {
+    let Some(file) = temporary else { return Ok(()) };
     file.persist(path).map_err(|failed| failed.error)?;
     // Sync the folder too, so that the rename survives a power cut.
-    File::open(folder)?.sync_all()
+    File::open(folder_of(path))?.sync_all()
 }
 
 /// What a path refers to.

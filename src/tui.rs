@@ -40,7 +40,8 @@ use ratatui::backend::{Backend as _, CrosstermBackend};
 use ratatui::layout::{Position, Rect};
 
 use crate::runtime::{CompletedIntent, Engine, signals};
-use crate::wizard::Wizard;
+use crate::session::journal::Entry;
+use crate::wizard::{Activity, Wizard};
 use input::Input;
 use terminal::TerminalGuard;
 use theme::Theme;
@@ -83,6 +84,8 @@ pub struct Exit {
     pub folder: Option<String>,
     /// Folder of another session to continue.
     pub resumes: Option<String>,
+    /// What was not saved, one description for each entry.
+    pub unsaved: Vec<String>,
     /// Messages that could not be printed while the screen was up.
     pub remarks: Vec<String>,
 }
@@ -91,7 +94,8 @@ impl Exit {
     fn of(wizard: &Wizard, signal: Option<i32>, remarks: Vec<String>) -> Self {
         let cause = wizard.ended().unwrap_or("ended").to_owned();
         let resumes = wizard.resumes().map(str::to_owned);
-        Self { cause, signal, folder: wizard.folder().map(str::to_owned), resumes, remarks }
+        let unsaved = wizard.unsaved().iter().map(Entry::describe).collect();
+        Self { cause, signal, folder: wizard.folder().map(str::to_owned), resumes, unsaved, remarks }
     }
 }
 
@@ -178,7 +182,7 @@ impl Driver<'_> {
             }
             let pace = if is_by_key && !has_picture { FRAME_OF_KEY } else { FRAME };
             let mut early = drawn.map_or(Duration::ZERO, |drawn| pace.saturating_sub(since(drawn)));
-            if is_due && !self.engine.wizard().is_idle() {
+            if is_due && self.engine.wizard().activity() == Activity::Working {
                 early = early.max(SETTLE.saturating_sub(since(*changed.get_or_insert_with(now))));
             }
             if self.ui.take_bell() && terminal::ring().is_err() {

@@ -56,6 +56,17 @@ pub fn program() -> String {
     format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
 }
 
+/// What a driver can wait for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activity {
+    /// Neither a request nor a write is running.
+    Idle,
+    /// A request or a write is running, and will be answered.
+    Working,
+    /// A write has failed. Nothing happens before the operator retries or quits.
+    Stuck,
+}
+
 /// The guided calibration.
 #[derive(Clone, Debug)]
 pub struct Wizard {
@@ -77,6 +88,8 @@ pub struct Wizard {
     /// Folder of the session to continue after the end.
     resumes: Option<String>,
     ended: Option<String>,
+    /// Entries that were not on disk when the program ended.
+    unsaved: Vec<Entry>,
 }
 
 #[derive(Clone, Debug)]
@@ -122,6 +135,7 @@ impl Wizard {
             sessions: Vec::new(),
             resumes: None,
             ended: None,
+            unsaved: Vec::new(),
         }
     }
 
@@ -138,7 +152,7 @@ impl Wizard {
         ));
         if torn_bytes > 0 {
             notice = notice.hint(format!(
-                "the end of the journal was incomplete or damaged ({torn_bytes} bytes) and was set aside as 'journal.torn-…'. Nothing that was shown as saved is affected"
+                "the last write to the journal was interrupted: {torn_bytes} bytes were set aside as 'journal.torn-…'. An entry that was not completely on disk was never shown as saved"
             ));
         }
         wizard.actions.push_back(Action::Write(vec![Entry::Resumed { program: program(), torn_bytes }]));
@@ -161,9 +175,18 @@ impl Wizard {
         self.folder.as_deref()
     }
 
-    /// Whether neither a request nor a write is running: only an intent, a tick or a shutdown changes anything.
-    pub const fn is_idle(&self) -> bool {
-        self.busy.is_none() && self.writing.is_none()
+    /// What is going on. Only an intent, a tick or a shutdown ends [`Activity::Idle`] and [`Activity::Stuck`].
+    pub fn activity(&self) -> Activity {
+        match (&self.writing, &self.busy) {
+            (Some(writing), _) if writing.failed.is_some() => Activity::Stuck,
+            (Some(_), _) | (None, Some(_)) => Activity::Working,
+            (None, None) => Activity::Idle,
+        }
+    }
+
+    /// Entries that are not known to be on disk although the program has ended: a write that failed, or that was not waited for.
+    pub fn unsaved(&self) -> &[Entry] {
+        &self.unsaved
     }
 
     /// Why the program ends, if it does.
@@ -221,7 +244,8 @@ impl Wizard {
         }
         let is_wanted =
             matches!(&self.session.instrument, Some(InstrumentChoice::Linked(choice)) if choice.is_automatic);
-        let Some(row) = self.phase.shown_row().filter(|_| is_wanted && self.is_idle() && self.ended.is_none()) else {
+        let is_free = self.activity() == Activity::Idle && self.ended.is_none();
+        let Some(row) = self.phase.shown_row().filter(|_| is_wanted && is_free) else {
             return Vec::new();
         };
         let can_measure =
@@ -254,7 +278,7 @@ impl Wizard {
             return Vec::new();
         }
         let quit = IntentInfo::new(Intent::Quit, "quit").with_danger(Danger::Leaves);
-        if self.is_stuck() {
+        if self.activity() == Activity::Stuck {
             return vec![IntentInfo::new(Intent::Retry, "retry").default_action(), quit];
         }
         let mut intents = Vec::new();
@@ -305,16 +329,11 @@ impl Wizard {
         (&mut self.phase, cx)
     }
 
-    /// Whether a write has failed and the operator must decide.
-    fn is_stuck(&self) -> bool {
-        self.writing.as_ref().is_some_and(|writing| writing.failed.is_some())
-    }
-
     fn on_intent(&mut self, intent: Intent) -> Vec<Effect> {
         if self.ended.is_some() {
             return Vec::new();
         }
-        if self.is_stuck() {
+        if self.activity() == Activity::Stuck {
             return if intent == Intent::Retry {
                 self.retry_write()
             } else if intent == Intent::Quit {
@@ -407,6 +426,7 @@ impl Wizard {
         match (event, writing.what) {
             (StoreEvent::Failed { message, .. }, what) => {
                 if self.ended.is_some() {
+                    self.writing = Some(Writing { what, ..writing });
                     self.drop_everything();
                     return vec![Effect::Exit];
                 }
@@ -414,7 +434,7 @@ impl Wizard {
                 let saved = counted_as(self.session.samples.len(), "sample is", "samples are");
                 self.notice = Some(
                     Notice::stop(format!("could not save: {message}"))
-                        .hint(format!("{saved} already saved; nothing has been lost"))
+                        .hint(format!("{saved} already saved; this change is kept until it can be saved too"))
                         .hint("free some disk space and retry, or quit and resume the session later"),
                 );
                 writing.failed = Some(message);
@@ -546,7 +566,7 @@ impl Wizard {
         }
         // A pending write is awaited, so that an opened session is closed cleanly.
         let has_session = self.session.opened.is_some() || self.writing.is_some();
-        if !has_session || self.is_stuck() {
+        if !has_session || self.activity() == Activity::Stuck {
             return self.end(cause);
         }
         let mut effects = self.cancel();
@@ -569,12 +589,21 @@ impl Wizard {
         effects
     }
 
-    /// Forgets all pending work, so that answers that still arrive are ignored.
+    /// Forgets all pending work, so that answers that still arrive are ignored. Entries that were not written are remembered.
     fn drop_everything(&mut self) {
         self.busy = None;
-        self.writing = None;
         self.waiting.clear();
-        self.actions.clear();
+        let writing = self.writing.take().map(|writing| match writing.what {
+            Write::Folder { entries, .. } => entries,
+            Write::Lines(lines) => lines.into_iter().map(|line| line.entry).collect(),
+        });
+        let queued = self.actions.drain(..).filter_map(|action| match action {
+            Action::Write(entries) | Action::Create { entries, .. } => Some(entries),
+            Action::Ask(_) | Action::Disconnect | Action::Say(_) | Action::Exit => None,
+        });
+        // The closing entry tells nothing that the operator could miss.
+        let is_missed = |entry: &Entry| !matches!(entry, Entry::Closed { .. });
+        self.unsaved.extend(writing.into_iter().chain(queued).flatten().filter(is_missed));
     }
 }
 

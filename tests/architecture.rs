@@ -9,16 +9,17 @@ use crate::support::root;
 const LAYERS: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("units", &[]),
+    ("checksum", &[]),
     ("geometry", &["units"]),
     ("kinematics", &["units", "geometry"]),
     ("identification", &["units", "geometry", "kinematics"]),
     ("planning", &["units", "geometry", "kinematics", "identification"]),
     ("inverse", &["units", "kinematics"]),
     ("compensation", &["units", "kinematics", "inverse"]),
-    ("profile", &["units", "geometry", "kinematics"]),
-    ("session", &["units", "geometry", "kinematics", "identification", "planning", "profile"]),
+    ("profile", &["checksum", "units", "geometry", "kinematics"]),
+    ("session", &["checksum", "units", "geometry", "kinematics", "identification", "planning", "profile"]),
     ("program", &["units", "kinematics", "inverse", "session"]),
-    ("model", &["units", "kinematics", "profile", "session"]),
+    ("model", &["checksum", "units", "kinematics", "profile", "session"]),
     ("search", &["planning"]),
     ("link", &["units", "geometry", "kinematics", "planning", "profile", "session"]),
     ("store", &["units", "geometry", "profile", "session"]),
@@ -27,7 +28,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("error", &[]),
     (
         "procedure",
-        &[
+        &["checksum", 
             "units",
             "geometry",
             "kinematics",
@@ -41,7 +42,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     ("wizard", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "procedure"]),
-    ("runtime", &["profile", "session", "procedure", "link", "store", "recording", "wizard"]),
+    ("runtime", &["checksum", "profile", "session", "procedure", "link", "store", "recording", "wizard"]),
     ("script", &["session", "wizard", "runtime"]),
     (
         "tui",
@@ -53,7 +54,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ),
     (
         "app",
-        &[
+        &["checksum", 
             "cli",
             "compensation",
             "error",

@@ -106,3 +106,39 @@ fn a_session_is_replayed_without_a_terminal_and_not_changed() {
     assert_eq!(run(place.path(), &["replay", "sessions/none", "--print"], "").status.code(), Some(5));
     assert_eq!(fs::read(&file).unwrap(), bytes);
 }
+
+/// Runs plain lines with a limit of the size of files: a disk that is full at exactly that byte.
+#[cfg(unix)]
+fn limited(folder: &Path, blocks: u64, input: &str) -> Output {
+    let program = command(folder, &[]).get_program().to_owned();
+    let limited =
+        format!("ulimit -f {blocks}; exec '{}' wizard --plain --no-recording", program.to_str().expect("a path"));
+    let mut shell = std::process::Command::new("timeout");
+    shell.args(["60", "sh", "-c", &limited]).current_dir(folder).env("TERM", "dumb").env("LANG", "C");
+    let mut child = shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdin.take().unwrap().write_all(input.as_bytes()));
+    child.wait_with_output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_journal_that_cannot_grow_stops_the_lines_and_is_never_called_saved() {
+    let whole = place();
+    assert_eq!(run(whole.path(), &["wizard", "--no-recording"], &demo()).status.code(), Some(0));
+    let full = fs::metadata(whole.path().join("sessions/s/journal.ron")).unwrap().len() / 512;
+    for blocks in [full / 2, full * 2 / 3] {
+        let place = place();
+        let output = limited(place.path(), blocks, &demo());
+        let (said, errors) = (text(&output.stdout), text(&output.stderr).replace("\n  ", " "));
+        assert_eq!(output.status.code(), Some(5), "{errors}\n{said}");
+        for part in ["STOP: could not save", "NOT SAVED", "Retry", "Quit"] {
+            assert!(said.contains(part), "{part}:\n{said}");
+        }
+        assert!(errors.contains("NOT saved: "), "{errors}");
+        assert!(errors.contains("the session is saved up to there") && errors.contains("trupose resume"), "{errors}");
+        let journal = read_journal(&place.path().join("sessions/s")).unwrap();
+        assert_eq!(journal.torn_bytes, 0);
+        let resumed = run(place.path(), &["resume", "sessions/s", "--plain"], "Quit\n");
+        assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
+    }
+}

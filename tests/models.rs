@@ -67,6 +67,7 @@ fn calibrated(profile: &Profile) -> CalibratedArm {
         lost: None,
         joint_errors: Vec::new(),
         about: vec!["Identified geometry of a test".to_owned()],
+        edited: None,
         cautions: Vec::new(),
         untold: Vec::new(),
         profile: profile.clone(),

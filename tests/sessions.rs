@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Output, Stdio};
@@ -18,7 +18,7 @@ use serde_json::Value;
 use trupose::session::journal::{Entry, Journal, Line, Sum, encode};
 use trupose::session::set_up::Step;
 use trupose::session::state::Session;
-use trupose::store::session::read_journal;
+use trupose::store::session::{SessionFolder, read_journal};
 
 /// Steps of the script by step of the wizard.
 const STEPS: [(Step, &[&str]); 8] = [
@@ -683,5 +683,83 @@ fn exported_tables_are_those_of_the_session_and_identify_the_same_arm() {
     for (name, value) in &expected {
         // The table has nanometres, the journal all digits.
         assert!((found[name] - value).abs() < 1e-5, "{name}: {} and {value}", found[name]);
+    }
+}
+
+// ------------------------------------------------------------------------------------------------------------------- links
+
+/// A folder that comes from elsewhere, in a zip or on a stick, must not lead the program to another file of the user.
+#[cfg(unix)]
+#[test]
+fn links_in_a_session_are_never_written_through() {
+    use std::os::unix::fs::symlink;
+    const PRECIOUS: &str = "precious\n";
+    let place = finished();
+    let victim = place.path("victim");
+    fs::write(&victim, PRECIOUS).unwrap();
+    assert_eq!(place.run(&["record", "rebuild", "sessions/s"]).status.code(), Some(0));
+    for (name, arguments) in [
+        (".lock", &["record", "rebuild", "sessions/s"][..]),
+        (".lock", &["resume", "sessions/s", "--plain"]),
+        (".lock", &["session", "report", "sessions/s"]),
+        ("journal.ron", &["resume", "sessions/s", "--plain"]),
+        ("recording.rrd", &["record", "rebuild", "sessions/s"]),
+        ("report.html", &["session", "report", "sessions/s"]),
+        ("report.json", &["session", "report", "sessions/s"]),
+    ] {
+        let (own, kept) = (place.session().join(name), place.path("kept"));
+        fs::rename(&own, &kept).unwrap();
+        // The linked journal is a good one: it must not grow.
+        let to = if name == "journal.ron" { &kept } else { &victim };
+        let before = fs::read(to).unwrap();
+        symlink(to, &own).unwrap();
+        let output = place.run(arguments);
+        let errors = text(&output.stderr).replace("\n  ", " ");
+        assert_eq!(output.status.code(), Some(5), "{name} {arguments:?}: {errors}");
+        assert!(errors.contains(name) && errors.contains("is not a file but a link"), "{errors}");
+        assert_eq!(fs::read(to).unwrap(), before, "{name} {arguments:?}");
+        assert!(fs::symlink_metadata(&own).unwrap().is_symlink());
+        fs::rename(&kept, &own).unwrap();
+    }
+    // A hard link cannot be told from a file, but what it holds can.
+    let lock = place.session().join(".lock");
+    fs::remove_file(&lock).unwrap();
+    fs::hard_link(&victim, &lock).unwrap();
+    assert_eq!(place.run(&["record", "rebuild", "sessions/s"]).status.code(), Some(0));
+    assert_eq!(fs::read_to_string(&victim).unwrap(), PRECIOUS);
+    // The end of a journal that is set aside does not follow a link either, and is not lost because of it.
+    fs::remove_file(&lock).unwrap();
+    symlink(place.path("new"), place.session().join("journal.torn-1")).unwrap();
+    fs::OpenOptions::new().append(true).open(place.session().join("journal.ron")).unwrap().write_all(b"(\"torn").unwrap();
+    assert_eq!(place.run(&["record", "rebuild", "sessions/s"]).status.code(), Some(0));
+    assert!(!place.path("new").exists());
+    assert_eq!(fs::read(place.session().join("journal.torn-2")).unwrap(), b"(\"torn");
+}
+
+#[test]
+fn a_report_is_not_written_while_another_program_holds_the_session() {
+    let place = finished();
+    let (held, _) = SessionFolder::open(&place.session()).unwrap();
+    let output = place.run(&["session", "report", "sessions/s"]);
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(5), "{errors}");
+    assert!(errors.contains("is open in another program") && errors.contains("--out"), "{errors}");
+    assert_eq!(place.run(&["session", "report", "sessions/s", "--out", "r.html"]).status.code(), Some(0));
+    drop(held);
+}
+
+#[test]
+fn temporary_files_of_a_killed_run_go_with_the_next_command() {
+    let place = finished();
+    let left = place.session().join(".trupose-x1y2z3");
+    for arguments in [&["session", "show", "sessions/s"][..], &["session", "list"], &["replay", "sessions/s", "--csv"]] {
+        fs::write(&left, "half a report").unwrap();
+        let (held, _) = SessionFolder::open(&place.session()).unwrap();
+        fs::write(&left, "of a program that runs").unwrap();
+        place.run(arguments);
+        assert!(left.exists(), "{arguments:?}");
+        drop(held);
+        assert_eq!(place.run(arguments).status.code(), Some(0));
+        assert!(!left.exists(), "{arguments:?}");
     }
 }

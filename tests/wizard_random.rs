@@ -219,7 +219,8 @@ impl Cell {
             return Answer::Cancelled;
         }
         if self.chance(8) {
-            return Answer::Failed(Problem { message: self.text(), hints: vec![self.text()] });
+            let message = self.text();
+            return Answer::Failed(Problem::new(message).hint(self.text()));
         }
         match request {
             Request::LoadProfile { source } => {
@@ -258,7 +259,7 @@ impl Cell {
             Request::Model(request) => Answer::Modelled(Box::new(models(request))),
             Request::Deliver { files, left_out } => {
                 let files = files.iter().map(|(name, _)| name.clone()).collect();
-                Answer::Delivered { files, left_out: left_out.clone() }
+                Answer::Delivered { files, sums: Vec::new(), left_out: left_out.clone() }
             }
         }
     }

@@ -40,7 +40,7 @@ pub(super) fn run<O: Write, E: Write>(
         return Err(Failure::new(ExitStatus::Usage, message)
             .hint("write to another file: corrected targets must not be corrected a second time"));
     }
-    let (calibration, mut arm) = export::calibration(&args.calibration, console)?;
+    let (calibration, mut arm) = export::calibration(&args.calibration, args.edited, console)?;
     if let Some(payload) = payload_of(&args.payload, &arm.profile)? {
         arm.identified = arm.identified.with_payload(payload.mass());
         if !arm.identified.chain.is_loaded() {

@@ -7,6 +7,7 @@ use std::path::Path;
 use super::load::now;
 use super::progress::Progress;
 use super::{Console, advice, estimation_settings, load, payload_of, record, to_json};
+use crate::checksum::{self, Syntax};
 use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::checks;
@@ -19,7 +20,7 @@ use crate::session::calibration::Calibration;
 use crate::session::measurements::Row;
 use crate::session::state::Session;
 use crate::session::summary::{IdentificationSummary, InputRole, VerdictStatus, VerificationMode};
-use crate::store;
+use crate::store::{self, Links};
 
 pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let estimation = &args.estimation;
@@ -55,10 +56,12 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     let mut set = sample_set(&rows, profile, file, &identification.table.warnings)?;
     let file = verification.as_ref().map(|loaded| loaded.input.file.as_str());
     let odd = verification.as_ref().map_or(&[][..], |loaded| &loaded.table.warnings);
-    let verification_set = sample_set(&verification_rows, profile, file, odd)?;
+    let mut verification_set = sample_set(&verification_rows, profile, file, odd)?;
     // A result is simulated if either of its tables is.
     let of_verification = || verification.as_ref().and_then(|loaded| loaded.simulated.clone());
     set.warnings.extend(identification.simulated.clone().or_else(of_verification));
+    load::settle_changes(&mut set.warnings, estimation.edited);
+    load::settle_changes(&mut verification_set.warnings, estimation.edited);
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
     let payload = payload_of(&estimation.payload, &loaded.profile)?;
     let request = IdentifyRequest {
@@ -173,17 +176,16 @@ fn save(
     let mut files = Vec::new();
     if let Some(calibration) = calibration {
         let text = calibration.to_text().map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
-        let file = folder.join("calibration.ron");
-        store::replace(&file, &text).map_err(store_failure)?;
-        summary.written.push(file.display().to_string());
         files.push(("calibration.ron".to_owned(), text));
     }
-    let (json, html) = (folder.join(REPORT_JSON), folder.join(REPORT_HTML));
-    summary.written.extend([&json, &html].map(|file| file.display().to_string()));
+    let names = files.iter().map(|(name, _)| name.as_str()).chain([REPORT_JSON, REPORT_HTML]);
+    summary.written = names.map(|name| folder.join(name).display().to_string()).collect();
     let mut document = report::Document::of_tables(session, &files);
     document.result = Some(summary.clone());
-    store::replace(&json, &to_json(&document)?).map_err(store_failure)?;
-    store::replace(&html, &report::report_html(&document)).map_err(store_failure)
+    files.push((REPORT_JSON.to_owned(), checksum::with_sum(&to_json(&document)?, Syntax::Json)));
+    files.push((REPORT_HTML.to_owned(), checksum::with_sum(&report::report_html(&document), Syntax::Html)));
+    let files = files.iter().map(|(name, text)| (folder.join(name), text.as_bytes()));
+    store::replace_all(files, Links::Followed).map_err(store_failure)
 }
 
 /// The exit status of a verdict: `NotAccepted` only if limits were checked and are not met.

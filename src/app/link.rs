@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::Console;
+use super::{Console, refused};
 use crate::cli::{LinkCommand, LinkTestArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::link::protocol::CONTROLLER;
@@ -45,7 +45,7 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
     let ended = Arc::new(AtomicBool::new(false));
     let signalled = Arc::clone(&ended);
     signals::on_signal(move |_signal| signalled.store(true, Ordering::Relaxed))
-        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+        .map_err(|error| refused(&error))?;
     let keep_going = || !ended.load(Ordering::Relaxed);
     let usage = |message: String| Failure::new(ExitStatus::Usage, message);
     let log = raw_log(args.raw_log.as_deref())?;
@@ -60,23 +60,23 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
         is_automatic: false,
     };
     let mut wired = Wired::new(&choice, log.as_ref()).map_err(|error| usage(error.to_string()))?;
-    console.print(&format!("connecting to {address}\n"))?;
+    console.say(&format!("connecting to {address}\n"))?;
     let mut on_event = |event: LinkEvent| console.remark(&event_text(&event));
     let connected = wired.connect_while(&keep_going, &mut on_event);
     if let Some(identity) = wired.identity() {
         // The instrument may answer even if the robot does not.
-        console.print(&format!("connected: {}\n", identity.name))?;
+        console.say(&format!("connected: {}\n", identity.name))?;
     }
     connected.map_err(|error| problem(&error, "cannot connect"))?;
     let identity = wired.identity().cloned().unwrap_or_default();
     for item in &identity.checked {
-        console.print(&format!("checked: {item}\n"))?;
+        console.say(&format!("checked: {item}\n"))?;
     }
     if let Some(robot) = &args.robot {
-        console.print(&format!("robot: {robot} reports its joint angles\n"))?;
+        console.say(&format!("robot: {robot} reports its joint angles\n"))?;
     }
     if let Some(reflector) = &identity.reflector {
-        console.print(&format!(
+        console.say(&format!(
             "reflector: {} (number {}), surface offset {:.3} mm; check that it is the one on the robot\n",
             reflector.name,
             reflector.id,
@@ -84,10 +84,10 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
         ))?;
     }
     for note in &identity.notes {
-        console.print(&format!("note: {note}\n"))?;
+        console.say(&format!("note: {note}\n"))?;
     }
     for warning in &identity.warnings {
-        console.print(&format!("WARNING: {warning}\n"))?;
+        console.say(&format!("WARNING: {warning}\n"))?;
     }
     watch(args, &mut wired, console, &keep_going)?;
     if args.shots > 0 {
@@ -120,26 +120,26 @@ fn test_robot<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let mut robot = WiredRobot::new(address, args.options.as_deref(), log)
         .map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
-    console.print(&format!("connecting to {address}\n"))?;
+    console.say(&format!("connecting to {address}\n"))?;
     let mut on_event = |event: LinkEvent| console.remark(&event_text(&event));
     let identity = robot.connect_while(keep_going, &mut on_event).map_err(|error| problem(&error, "cannot connect"))?;
-    console.print(&format!("connected: {}\n", identity.name))?;
+    console.say(&format!("connected: {}\n", identity.name))?;
     for item in &identity.checked {
-        console.print(&format!("checked: {item}\n"))?;
+        console.say(&format!("checked: {item}\n"))?;
     }
     for warning in &identity.warnings {
-        console.print(&format!("WARNING: {warning}\n"))?;
+        console.say(&format!("WARNING: {warning}\n"))?;
     }
     let until = Instant::now() + Duration::try_from_secs_f64(args.seconds).unwrap_or_default();
     while Instant::now() < until && keep_going() {
         let (live, events) = robot.watch(LINE_INTERVAL.min(until.saturating_duration_since(Instant::now())));
         for event in events {
-            console.print(&format!("{}\n", event_text(&event)))?;
+            console.say(&format!("{}\n", event_text(&event)))?;
         }
         if let Some(cause) = live.down {
             return Err(is_down(&cause));
         }
-        console.print(&format!(
+        console.say(&format!(
             "{}\n",
             joints_text(&live).unwrap_or_else(|| "no joint angles for one second".to_owned())
         ))?;
@@ -171,9 +171,9 @@ fn watch<O: Write, E: Write>(
             return Ok(());
         };
         for event in events {
-            console.print(&format!("{}\n", event_text(&event)))?;
+            console.say(&format!("{}\n", event_text(&event)))?;
         }
-        console.print(&format!("sees: {}\n", live_text(&live)))?;
+        console.say(&format!("sees: {}\n", live_text(&live)))?;
         if let Some(cause) = live.down {
             return Err(is_down(&cause));
         }
@@ -232,7 +232,7 @@ fn shoot<O: Write, E: Write>(
             .map_err(|error| problem(&error, &format!("shot {number} of {count} failed")))?;
         let point = reading.point;
         let sigma = reading.sigma.map_or_else(String::new, |sigma| format!(", stated sigma {:.4} mm", to_mm(sigma)));
-        console.print(&format!(
+        console.say(&format!(
             "shot {number}: x {:.4}  y {:.4}  z {:.4} mm, {:.3} m away, {:.1} s{sigma}\n",
             to_mm(point.x),
             to_mm(point.y),
@@ -247,7 +247,7 @@ fn shoot<O: Write, E: Write>(
     let square = readings.iter().map(|reading| (reading.point.coords - mean).norm_squared()).sum::<f64>() / shots;
     let scatter = to_mm(square.sqrt());
     if readings.len() > 1 {
-        console.print(&format!("scatter of {count} shots: {scatter:.4} mm\n"))?;
+        console.say(&format!("scatter of {count} shots: {scatter:.4} mm\n"))?;
     }
     let stated = readings.iter().filter_map(|reading| reading.sigma).fold(0.0, f64::max);
     if readings.len() > 1 && scatter > SCATTER_MM.max(SCATTER_SIGMAS * to_mm(stated)) {

@@ -1,16 +1,20 @@
 //! Reading the files that commands name.
 
+use std::io::Write;
 use std::path::Path;
 
+use super::Console;
+use crate::checksum::{self, Finding};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::PointSample;
 use crate::kinematics::Place;
 use crate::procedure::{input_file, joint_types};
 use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
+use crate::session::calibration::{Calibration, Integrity};
 use crate::session::export::simulation_of_table;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, Measurements, Row, read_as};
-use crate::session::summary::{InputFile, InputRole, Warning};
+use crate::session::summary::{CHANGED_TABLE, InputFile, InputRole, Warning};
 use crate::store;
 use crate::text::counted;
 
@@ -55,6 +59,53 @@ pub(super) fn parse_profile(text: String, file: &str) -> Result<LoadedProfile, F
             let count = counted(errors.error_count(), "error");
             Err(Failure::new(ExitStatus::Usage, format!("profile '{file}' has {count}\n\n{errors}\n")))
         }
+    }
+}
+
+/// A calibration with the text it came from and the robot inside.
+#[derive(Clone, Debug)]
+pub(super) struct LoadedCalibration {
+    pub(super) calibration: Calibration,
+    pub(super) text: String,
+    pub(super) profile: Profile,
+}
+
+/// A calibration file. One that has changed since it was written is refused unless the change is `edited` on purpose.
+pub(super) fn calibration<O: Write, E: Write>(
+    path: &Path,
+    edited: bool,
+    console: &mut Console<O, E>,
+) -> Result<LoadedCalibration, Failure> {
+    let file = path.display().to_string();
+    let text = text(path)?;
+    let calibration = Calibration::parse(&text).map_err(|error| {
+        let failure = Failure::new(ExitStatus::Usage, format!("'{file}' is not a usable calibration: {error}"));
+        match checksum::check(&text) {
+            Finding::Changed => failure.hint("the file has changed since it was written: take an intact copy"),
+            Finding::Intact | Finding::Missing => failure.hint("a calibration is written by 'trupose identify --out DIR'"),
+        }
+    })?;
+    match (calibration.integrity, calibration.edited()) {
+        (_, Some(said)) if !edited => {
+            return Err(Failure::new(ExitStatus::Usage, format!("'{file}': {said}"))
+                .hint("take an intact copy of the file: a changed digit moves the robot")
+                .hint("if the change was made on purpose, give '--edited'; every result then says so"));
+        }
+        (Integrity::Unchecked, _) => console.remark(&format!(
+            "note: '{file}' is of an earlier version, without a check sum: a change in it would not be noticed"
+        )),
+        (Integrity::Intact | Integrity::Changed(_), _) => {}
+    }
+    let profile = parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?.profile;
+    Ok(LoadedCalibration { calibration, text, profile })
+}
+
+/// Says of warnings about changed tables that the change was `edited` on purpose, or how to say so.
+pub(super) fn settle_changes(warnings: &mut [Warning], edited: bool) {
+    for warning in warnings.iter_mut().filter(|warning| warning.code == CHANGED_TABLE) {
+        let addition = if edited { "it was used because '--edited' was given" } else { "give '--edited' if that was on purpose" };
+        warning.message = format!("{}; {addition}", warning.message);
+        warning.blocks_acceptance = !edited;
     }
 }
 

@@ -40,7 +40,7 @@ pub(super) fn man<O: Write, E: Write>(args: &ManArgs, console: &mut Console<O, E
         store::replace_bytes(&folder.join(name), &text).map_err(store_failure)?;
         written += 1;
     }
-    console.print(&format!("written: {written} pages into {}\n", folder.display()))?;
+    console.say(&format!("written: {written} pages into {}\n", folder.display()))?;
     Ok(ExitStatus::Accepted)
 }
 

@@ -11,7 +11,7 @@ use std::thread;
 
 use super::load::{self, LoadedProfile, now};
 use super::progress::{Progress, Stopwatch};
-use super::{Console, advice, record, to_json};
+use super::{Console, advice, record, refused, to_json};
 use crate::cli::PlanArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::planning::Stage;
@@ -79,7 +79,7 @@ pub(super) fn run<O: Write, E: Write>(args: &PlanArgs, console: &mut Console<O, 
 fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&flag))
-        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+        .map_err(|error| refused(&error))?;
     Ok(flag)
 }
 
@@ -154,7 +154,7 @@ fn choose<O: Write, E: Write>(
             let told = |progress| tell(&sender, progress);
             procedure::plan(&loaded.profile, &loaded.text, request, keep_going, &told)
         });
-        let worker = worker.map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+        let worker = worker.map_err(|error| refused(&error))?;
         let mut lines = Progress::new(&mut console.err);
         while let Ok(progress) = receiver.recv() {
             match progress {

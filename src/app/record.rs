@@ -6,6 +6,7 @@ use std::path::Path;
 use jiff::Timestamp;
 
 use super::script::session_failure;
+use super::session::torn;
 use super::{Console, load};
 use crate::cli::RecordCommand;
 use crate::error::{ExitStatus, Failure};
@@ -33,9 +34,12 @@ pub(super) fn run<O: Write, E: Write>(
     let RecordCommand::Rebuild { folder } = command;
     // The folder is held so that no other program records into it meanwhile.
     let (_held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
+    if let Some(note) = torn(folder, &journal) {
+        console.remark(&note);
+    }
     let Written { path, bytes } = recording::rebuild(folder, &journal.lines).map_err(|error| failure(&error))?;
     let samples = journal.lines.iter().filter(|line| matches!(line.entry, Entry::Sample(_))).count();
-    console.print(&format!(
+    console.say(&format!(
         "written: {}\n{bytes} bytes, {}, {}\n",
         path.display(),
         counted_as(journal.lines.len(), "journal entry", "journal entries"),
@@ -43,7 +47,7 @@ pub(super) fn run<O: Write, E: Write>(
     ))?;
     let old_parts = recording::remove_old_parts(folder);
     if old_parts > 0 {
-        console.print(&format!("removed: {} of an earlier version\n", counted(old_parts, "part")))?;
+        console.say(&format!("removed: {} of an earlier version\n", counted(old_parts, "part")))?;
     }
     Ok(ExitStatus::Accepted)
 }

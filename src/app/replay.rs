@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::script::session_failure;
-use super::{Console, record, wizard};
+use super::{Console, record, session, wizard};
 use crate::cli::{ReplayArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
 use crate::recording;
@@ -12,13 +12,16 @@ use crate::report;
 use crate::session::export;
 use crate::session::journal::Journal;
 use crate::session::state::{SampleState, Session};
-use crate::store::session::read_journal;
+use crate::store::session::{read_journal, tidy};
 use crate::text::printable;
 use crate::tui::replay::{self, Replay};
 use crate::units::to_mm;
 
 pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let mut journal = journal(&args.folder)?;
+    if let Some(note) = session::torn(&args.folder, &journal) {
+        console.remark(&note);
+    }
     let damaged = |error: &dyn std::error::Error| {
         Failure::new(ExitStatus::Store, format!("session '{}': {error}", args.folder.display()))
     };
@@ -58,7 +61,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
         Replay::new(journal, report::identification_text, options.theme).map_err(|error| damaged(&error))?;
     shown.go(place.map_or(0, |place| place - 1));
     let signal = replay::run(shown, options)
-        .map_err(|error| Failure::new(ExitStatus::Internal, format!("the terminal cannot be used: {error}")))?;
+        .map_err(|error| Failure::new(ExitStatus::Store, format!("the terminal cannot be used: {error}")))?;
     signal.map_or(Ok(ExitStatus::Accepted), |signal| {
         Err(Failure::new(ExitStatus::Signal(signal), format!("ended by signal {signal}")))
     })
@@ -67,6 +70,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
 /// Reads the journal of a session's folder, or the one that a recording carries.
 fn journal(path: &Path) -> Result<Journal, Failure> {
     if !path.is_file() {
+        tidy(path);
         return read_journal(path).map_err(|error| session_failure(&error));
     }
     recording::read(path).map_err(|error| record::failure(&error))

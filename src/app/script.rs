@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
 
-use super::{Console, link, load};
+use super::{Console, link, load, refused, wizard};
 use crate::cli::{DemoArgs, RecordingArgs, ScriptArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::recording::Live;
@@ -30,7 +30,7 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let text = load::text(file)?;
     let script = parse(&text, &file.display().to_string(), args)?;
-    let engine = Engine::new(live_options(clock(&script), args, console)?).map_err(|error| internal(&error))?;
+    let engine = Engine::new(live_options(clock(&script), args, console)?).map_err(|error| refused(&error))?;
     play(engine, &script, args, console)
 }
 
@@ -45,7 +45,7 @@ pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O,
         script_args.values.push(("wires".to_owned(), wires));
     }
     let script = parse(DEMO, "demo", &script_args)?;
-    let engine = Engine::new(live_options(clock(&script), &script_args, console)?).map_err(|error| internal(&error))?;
+    let engine = Engine::new(live_options(clock(&script), &script_args, console)?).map_err(|error| refused(&error))?;
     play(engine, &script, &script_args, console)
 }
 
@@ -158,7 +158,7 @@ pub(super) fn open(folder: &Path, options: Options) -> Result<Engine, Failure> {
     let (held, journal) = SessionFolder::open(folder).map_err(|error| session_failure(&error))?;
     let session = Session::of(&journal)
         .map_err(|error| Failure::new(ExitStatus::Store, format!("session '{}': {error}", folder.display())))?;
-    Engine::resume(held, session, journal, options).map_err(|error| internal(&error))
+    Engine::resume(held, session, journal, options).map_err(|error| refused(&error))
 }
 
 /// The failure that a session error means, with hints.
@@ -172,9 +172,13 @@ pub(super) fn session_failure(error: &SessionError) -> Failure {
             failure.hint("the program stopped before anything was saved: the folder can be deleted")
         }
         SessionError::Journal { source: JournalError::NotAJournal, .. } => failure.hint("is this the right folder?"),
-        SessionError::Journal { .. } => {
-            failure.hint("nothing was changed; copy the folder, then cut the journal before the damaged line to save what is before it")
-        }
+        SessionError::Journal { source: JournalError::Damaged { line, .. }, .. } => failure
+            .hint("nothing was changed; take an intact copy of the journal if there is one")
+            .hint(format!(
+                "to continue without this line and those after it, copy the folder and keep the lines before it: 'head -n {} journal.ron > journal.new'",
+                line.saturating_sub(1)
+            )),
+        SessionError::Journal { .. } => failure,
         SessionError::Store(StoreError::Write { source, .. })
             if matches!(source.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem) =>
         {
@@ -182,6 +186,7 @@ pub(super) fn session_failure(error: &SessionError) -> Failure {
                 "it belongs to another user or is read-only: run as that user, or copy the folder and resume the copy",
             )
         }
+        SessionError::Store(StoreError::NotOwn { .. }) => failure.hint("a folder that comes from elsewhere may lead to other files: remove the link"),
         SessionError::Store(_) => failure,
     }
 }
@@ -196,7 +201,7 @@ fn play<O: Write, E: Write>(
     args: &ScriptArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let received = signals::watch(engine.sender()).map_err(|error| internal(&error))?;
+    let received = signals::watch(engine.sender()).map_err(|error| refused(&error))?;
     let format = if args.json { Format::Json } else { Format::Text };
     let transcript = Transcript::new(&mut console.out, format, script.clock.is_some());
     let reopen = |folder: &str| {
@@ -207,22 +212,25 @@ fn play<O: Write, E: Write>(
         Ok(engine)
     };
     let mut runner = Runner::new(engine, transcript, &reopen);
-    let signalled = |saved: bool| {
-        let saved = if saved { "the session is saved" } else { "no session was started" };
-        received
-            .signal()
-            .map(|signal| Failure::new(ExitStatus::Signal(signal), format!("ended by signal {signal}; {saved}")))
-    };
     let outcome = runner.run(script);
-    let has_session = runner.session().opened.is_some();
+    let unsaved = runner.unsaved();
+    let saved = match (unsaved.is_empty(), runner.session().opened) {
+        (false, _) => wizard::not_saved(&unsaved),
+        (true, Some(_)) => "the session is saved".to_owned(),
+        (true, None) => "no session was started".to_owned(),
+    };
+    let signalled = |cause: &str| {
+        received.signal().map(|signal| Failure::new(ExitStatus::Signal(signal), format!("{cause}; {saved}")))
+    };
     // A closed terminal sends SIGHUP: that is the cause, not the failed write.
     let output = |error: std::io::Error| {
-        signalled(has_session).unwrap_or_else(|| match error.kind() {
+        let cause = received.signal().map_or_else(String::new, |signal| format!("ended by signal {signal}"));
+        signalled(&cause).unwrap_or_else(|| match error.kind() {
             std::io::ErrorKind::BrokenPipe => Failure::new(
                 ExitStatus::Store,
-                "the reader of the transcript has gone, so the script was stopped; the session is saved",
+                format!("the reader of the transcript has gone, so the script was stopped; {saved}"),
             ),
-            _ => Failure::new(ExitStatus::Store, format!("cannot write the transcript: {error}")),
+            _ => Failure::new(ExitStatus::Store, format!("cannot write the transcript: {error}; {saved}")),
         })
     };
     let outcome = outcome.map_err(output)?;
@@ -247,11 +255,7 @@ fn play<O: Write, E: Write>(
             let status = if not_saved { ExitStatus::Store } else { ExitStatus::NotAccepted };
             Err(Failure::new(status, format!("script step {step}: {message}")))
         }
-        Outcome::Ended { cause } => match (signalled(has_session), has_session) {
-            (Some(failure), true) => Err(Failure::new(failure.status, format!("{cause}; the session is saved"))),
-            (Some(failure), false) => Err(Failure::new(failure.status, format!("{cause}; no session was started"))),
-            (None, _) => Ok(ExitStatus::Accepted),
-        },
+        Outcome::Ended { cause } => signalled(&cause).map_or(Ok(ExitStatus::Accepted), Err),
     }
 }
 

@@ -1,22 +1,23 @@
 //! `trupose session list | show | export | report`: sessions on disk, without locking them.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::script::session_failure;
 use super::{Console, to_json};
+use crate::checksum::{self, Finding};
 use crate::cli::SessionCommand;
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::{deliver, models};
 use crate::report::identification_text;
 use crate::session::export;
-use crate::session::journal::{Journal, instrument_text, target_text};
+use crate::session::journal::{self, Journal, instrument_text, target_text};
 use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::session::state::{SampleState, Session};
-use crate::store;
-use crate::store::session::{folders, read_journal};
-use crate::text::printable;
+use crate::store::session::{SessionError, folders, hold, read_journal, tidy};
+use crate::store::{self, Links};
+use crate::text::{causes, counted, printable};
 
 pub(super) fn run<O: Write, E: Write>(
     command: &SessionCommand,
@@ -31,8 +32,31 @@ pub(super) fn run<O: Write, E: Write>(
     }
 }
 
+/// The session of a folder. Says what is left out of an interrupted last write.
+fn session<O: Write, E: Write>(folder: &Path, console: &mut Console<O, E>) -> Result<Session, Failure> {
+    let (journal, session) = load(folder)?;
+    if let Some(note) = torn(folder, &journal) {
+        console.remark(&note);
+    }
+    Ok(session)
+}
+
+/// The note about an interrupted last write.
+pub(super) fn torn(folder: &Path, journal: &Journal) -> Option<String> {
+    (journal.torn_bytes > 0).then(|| {
+        format!(
+            "note: the last write to '{}' was interrupted: {} from line {} of {} on are left out",
+            folder.display(),
+            counted(journal.torn_bytes, "byte"),
+            journal.lines.len() + 1,
+            journal::FILE_NAME,
+        )
+    })
+}
+
 /// The session of a folder with its journal.
-pub(super) fn load(folder: &Path) -> Result<(Journal, Session), Failure> {
+fn load(folder: &Path) -> Result<(Journal, Session), Failure> {
+    tidy(folder);
     let journal = read_journal(folder).map_err(|error| session_failure(&error))?;
     let session = Session::of(&journal)
         .map_err(|error| Failure::new(ExitStatus::Store, format!("session '{}': {error}", folder.display())))?;
@@ -51,7 +75,10 @@ fn list<O: Write, E: Write>(root: &Path, console: &mut Console<O, E>) -> Result<
     for folder in found {
         let name = folder.file_name().map_or_else(String::new, |name| printable(&name.to_string_lossy()));
         match load(&folder) {
-            Ok((_, session)) => {
+            Ok((journal, session)) => {
+                if let Some(note) = torn(&folder, &journal) {
+                    console.remark(&note);
+                }
                 let robot = session.robot.as_ref().map_or("-", |robot| robot.profile.name());
                 let latest = session.latest.map_or_else(String::new, |time| time.to_string());
                 let step = session.step.to_string();
@@ -137,8 +164,11 @@ fn show<O: Write, E: Write>(
     if journal.torn_bytes > 0 {
         line(
             "note",
-            format!("{} bytes of an incomplete last entry will be dropped when it is resumed", journal.torn_bytes),
+            format!("{} bytes of an interrupted last write are set aside when it is resumed", journal.torn_bytes),
         );
+    }
+    for (name, value) in delivered_files(folder, &session) {
+        line(name, value);
     }
     for note in &session.notes {
         line(
@@ -157,26 +187,62 @@ fn show<O: Write, E: Write>(
     Ok(ExitStatus::Accepted)
 }
 
+/// What `session show` says about the files that were delivered: whether they are as they were written.
+fn delivered_files(folder: &Path, session: &Session) -> Vec<(&'static str, String)> {
+    let mut lines = Vec::new();
+    let (mut intact, mut without) = (0, 0);
+    for (index, name) in session.delivered.iter().enumerate() {
+        let said = |what: &str| ("file", format!("{name}: {what}"));
+        let text = match store::read(&folder.join(name)) {
+            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
+            Err(error) => {
+                lines.push(said(&format!("NOT readable: {}", causes(&error))));
+                continue;
+            }
+        };
+        let is_delivered = session.delivered_sums.get(index).map(|sum| *sum == checksum::sum(&text));
+        match (is_delivered, checksum::check(&text)) {
+            (_, Finding::Changed) => lines.push(said("CHANGED since it was written")),
+            (Some(false), Finding::Intact) => lines.push(said("written again since it was delivered")),
+            (Some(false), Finding::Missing) => lines.push(said("CHANGED since it was delivered")),
+            (Some(true), _) | (None, Finding::Intact) => intact += 1,
+            (None, Finding::Missing) => without += 1,
+        }
+    }
+    if intact > 0 {
+        lines.insert(0, ("files", format!("{} as written", counted(intact, "file"))));
+    }
+    if without > 0 {
+        let of = "of an earlier version, without check sums: a change in them would not be noticed";
+        lines.insert(0, ("files", format!("{} {of}", counted(without, "file"))));
+    }
+    lines
+}
+
 /// Writes the report of a session from its journal, also for sessions of earlier versions.
 fn report<O: Write, E: Write>(
     folder: &Path,
     out: Option<&Path>,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let (_, session) = load(folder)?;
+    let session = session(folder, console)?;
     let internal = |message: String| Failure::new(ExitStatus::Internal, message);
     let mut files = deliver::data_files(&session).map_err(internal)?;
     files.extend(models::delivered(&session));
-    let failure = |error: store::StoreError| Failure::from_error(ExitStatus::Store, &error);
-    for (name, text) in deliver::reports(&session, &files).map_err(internal)? {
-        let place = folder.join(&name);
-        let file = match (out, place.extension()) {
-            (Some(out), Some(extension)) => out.with_extension(extension),
-            _ => place,
-        };
-        store::replace(&file, &text).map_err(failure)?;
-        console.print(&format!("written: {}\n", file.display()))?;
-    }
+    // The folder is held, so that no other program writes the same files.
+    let (_held, links) = match out {
+        Some(_) => (None, Links::Followed),
+        None => (Some(hold(folder).map_err(|error| in_use(&error))?), Links::Refused),
+    };
+    let place = |(name, text): (String, String)| {
+        let place = folder.join(name);
+        match (out, place.extension()) {
+            (Some(out), Some(extension)) => (out.with_extension(extension), text),
+            _ => (place, text),
+        }
+    };
+    let reports: Vec<_> = deliver::reports(&session, &files).map_err(internal)?.into_iter().map(place).collect();
+    write_all(&reports, links, console)?;
     if session.identified.is_none() {
         console.remark("nothing has been identified in this session yet; the report says so");
     } else if !session.is_current() {
@@ -185,9 +251,34 @@ fn report<O: Write, E: Write>(
     Ok(ExitStatus::Accepted)
 }
 
+/// The failure of a command that writes into a folder that another program may hold.
+fn in_use(error: &SessionError) -> Failure {
+    let failure = session_failure(error);
+    match error {
+        SessionError::Locked { .. } => failure.hint("or write to another place with '--out'"),
+        SessionError::Store(_)
+        | SessionError::Journal { .. }
+        | SessionError::NotASession { .. } => failure,
+    }
+}
+
+/// Writes all files or says which are missing.
+fn write_all<O: Write, E: Write>(
+    files: &[(PathBuf, String)],
+    links: Links,
+    console: &mut Console<O, E>,
+) -> Result<(), Failure> {
+    store::replace_all(files.iter().map(|(path, text)| (path.clone(), text.as_bytes())), links)
+        .map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+    for (path, _) in files {
+        console.say_written(path)?;
+    }
+    Ok(())
+}
+
 /// Prints the report as text.
 fn print_report<O: Write, E: Write>(folder: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let (_, session) = load(folder)?;
+    let session = session(folder, console)?;
     let Some(result) = &session.identified else {
         let message = format!("nothing has been identified in session '{}' yet", folder.display());
         return Err(Failure::new(ExitStatus::Numerical, message)
@@ -206,7 +297,7 @@ fn export_tables<O: Write, E: Write>(
     out: Option<&Path>,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let (_, session) = load(folder)?;
+    let session = session(folder, console)?;
     let robot = session
         .robot
         .as_ref()
@@ -225,10 +316,7 @@ fn export_tables<O: Write, E: Write>(
         ("measurements.csv", export::measurements_csv(&session, robot)),
     ];
     let drift = export::drift_csv(&session, robot).map(|text| ("drift.csv", text));
-    for (name, text) in tables.into_iter().chain(drift) {
-        let file = out.join(name);
-        store::replace(&file, &text).map_err(failure)?;
-        console.print(&format!("written: {}\n", file.display()))?;
-    }
+    let files: Vec<_> = tables.into_iter().chain(drift).map(|(name, text)| (out.join(name), text)).collect();
+    write_all(&files, Links::Followed, console)?;
     Ok(ExitStatus::Accepted)
 }

@@ -5,7 +5,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-use super::{Console, load, payload_of};
+use super::{Console, load, payload_of, refused};
 use crate::cli::SimulateArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::link::{LinkError, Served};
@@ -71,13 +71,13 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     let mut served = Served::new(profile, &simulation, args.protocol, args.listen.as_deref(), &args.faults)
         .map_err(|error| usage(&error))?;
     route.go(&mut served).map_err(|error| usage(&error))?;
-    console.print(&format!("listening: {}\n", served.address()))?;
+    console.say(&format!("listening: {}\n", served.address()))?;
     if let Some(options) = served.options() {
-        console.print(&format!("options: {options}\n"))?;
+        console.say(&format!("options: {options}\n"))?;
     }
     if let Some(listen) = &args.robot {
         let address = served.listen_for_robot(profile, listen).map_err(|error| usage(&error))?;
-        console.print(&format!("robot: {address}\n"))?;
+        console.say(&format!("robot: {address}\n"))?;
     }
     console.remark(served.title());
     console.remark(&format!("the robot is at {}", route.text()));
@@ -86,7 +86,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     let signalled = sender.clone();
     // The receiver is gone once this function has returned.
     signals::on_signal(move |_signal| drop(signalled.send(Order::End)))
-        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+        .map_err(|error| refused(&error))?;
     read_lines(sender)?;
     let (mut seen, mut quiet) = (0, 0);
     loop {
@@ -150,7 +150,7 @@ fn read_lines(sender: Sender<Order>) -> Result<(), Failure> {
         .name("simulate-orders".to_owned())
         .spawn(read)
         .map(drop)
-        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))
+        .map_err(|error| refused(&error))
 }
 
 /// The measured rows of the plan; without a plan one pose in the middle of the joint ranges.

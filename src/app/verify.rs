@@ -20,7 +20,7 @@ use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
 use crate::session::measurements::Row;
 use crate::session::set_up::PayloadText;
-use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
+use crate::session::summary::{CHANGED_CALIBRATION, InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
 use crate::text;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
@@ -31,13 +31,8 @@ const MOVED: f64 = 10.0;
 
 pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let file = args.calibration.display().to_string();
-    let text = load::text(&args.calibration)?;
-    let calibration = Calibration::parse(&text).map_err(|error| {
-        Failure::new(ExitStatus::Usage, format!("'{file}' is not a usable calibration: {error}"))
-            .hint("a calibration is written by 'trupose identify --out DIR'")
-    })?;
-    let loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
-    let profile = &calibration.mounted_on(&loaded.profile);
+    let load::LoadedCalibration { calibration, text, profile } = load::calibration(&args.calibration, args.edited, console)?;
+    let profile = &calibration.mounted_on(&profile);
     let measured = load::measurements(&args.measurements, args.layout, profile, InputRole::Verification)?;
     let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;
     let (measured_rows, _) = load::split(&measured.table, filter.as_ref())?;
@@ -65,6 +60,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let mut warnings = checks::table_warnings(None, &measured.table.warnings);
     let configurations = measured_rows.iter().map(|row| (row.line, row.configuration.as_slice()));
     warnings.extend(checks::limit_warning(profile, None, configurations));
+    warnings.extend(calibration.edited().map(|said| Warning::new(CHANGED_CALIBRATION, said, false)));
     warnings.extend(carried_over(&calibration));
     let of_calibration = calibration.warnings.iter().find(|warning| warning.code == SIMULATED);
     warnings.extend(measured.simulated.as_ref().or(of_calibration).cloned());
@@ -96,6 +92,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     warnings.extend(checks::few_warning(samples.len(), poses));
     let named = rows.iter().zip(&identified_errors.vectors);
     warnings.extend(checks::far_warning(named.map(|(row, error)| (row.pose.as_str(), row.line, error))));
+    load::settle_changes(&mut warnings, args.edited);
     let mut verification = point_verification(
         joints,
         &samples,

@@ -3,7 +3,7 @@
 use std::io::{IsTerminal as _, Write, stdin, stdout};
 use std::path::Path;
 
-use super::{Console, script};
+use super::{Console, refused, script};
 use crate::cli::{ColorArg, ScriptArgs, TerminalArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
 use crate::runtime::{Clock, CompletedIntent, Engine};
@@ -23,7 +23,7 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
     let mut engine = Engine::new(script::live_options(Clock::System, args, console)?)
-        .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+        .map_err(|error| refused(&error))?;
     match profile {
         Some(profile) => engine.intend(Intent::ChooseProfile(profile.to_owned())),
         None => engine.offer_sessions(args.sessions.clone()),
@@ -117,14 +117,21 @@ fn play<O: Write, E: Write>(
         Surface::Lines(glyphs) => tui::lines::run(engine, stdin(), &mut console.out, glyphs, &mut at_end),
     };
     let exit =
-        exit.map_err(|error| Failure::new(ExitStatus::Internal, format!("the terminal cannot be used: {error}")))?;
+        exit.map_err(|error| Failure::new(ExitStatus::Store, format!("the terminal cannot be used: {error}")))?;
     for remark in &exit.remarks {
         console.remark(remark);
+    }
+    let resume = exit.folder.map(|folder| format!("resume it with 'trupose resume {folder}'"));
+    if !exit.unsaved.is_empty() {
+        let status = exit.signal.map_or(ExitStatus::Store, ExitStatus::Signal);
+        let failure = Failure::new(status, format!("{}; {}", exit.cause, not_saved(&exit.unsaved)));
+        let resume = resume.map(|resume| format!("the session is saved up to there; {resume}"));
+        return Err(resume.into_iter().fold(failure, Failure::hint));
     }
     if let Some(folder) = exit.resumes {
         return Ok(Ended::Continues(folder));
     }
-    let saved = exit.folder.map(|folder| format!("the session is saved; resume it with 'trupose resume {folder}'"));
+    let saved = resume.map(|resume| format!("the session is saved; {resume}"));
     match exit.signal {
         None => {
             if let Some(saved) = saved {
@@ -137,6 +144,11 @@ fn play<O: Write, E: Write>(
             Err(saved.into_iter().fold(failure, Failure::hint))
         }
     }
+}
+
+/// The sentence about entries that are in no file.
+pub(super) fn not_saved(unsaved: &[String]) -> String {
+    format!("NOT saved: {}", unsaved.join("; "))
 }
 
 /// Writes the operator's actions as a script.

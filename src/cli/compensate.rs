@@ -19,6 +19,9 @@ pub struct CompensateArgs {
     /// Calibration to apply (calibration.ron)
     #[arg(long, value_name = "RON")]
     pub calibration: PathBuf,
+    /// Use it although it has changed since this program wrote it, because the change was made on purpose
+    #[arg(long)]
+    pub edited: bool,
     /// Targets: joint values, or positions with an orientation; CSV with units in the column names
     #[arg(long, value_name = "CSV", required_unless_present_any = ["program", "stream"], conflicts_with_all = ["program", "stream"])]
     pub targets: Option<PathBuf>,
@@ -125,6 +128,9 @@ pub struct ExportArgs {
     /// Calibration to export (calibration.ron)
     #[arg(long, value_name = "RON")]
     pub calibration: PathBuf,
+    /// Use it although it has changed since this program wrote it, because the change was made on purpose
+    #[arg(long)]
+    pub edited: bool,
     /// Format of the model
     #[arg(long, value_enum)]
     pub format: Format,

@@ -9,6 +9,7 @@ use super::tables::{read_csv, read_json, read_ur, write_csv, write_json, write_u
 use super::transforms::{is_coupled, link_values, motion, number, roll_pitch_yaw};
 use super::urdf::Urdf;
 use super::{ModelError, corrections, urdf_write};
+use crate::checksum;
 use crate::kinematics::{Arm, ForwardKinematics, JointType, KinematicChain, ParameterId};
 use crate::profile::{Profile, Target};
 use crate::session::calibration::Calibration;
@@ -78,8 +79,10 @@ pub struct CalibratedArm {
     pub joint_errors: Vec<JointErrorSummary>,
     /// A few lines about the origin of the result and its verdict.
     pub about: Vec<String>,
-    /// Reasons not to apply it: it was not accepted, or nothing was measured.
+    /// Reasons not to apply it: it was changed or not accepted, or nothing was measured.
     pub cautions: Vec<String>,
+    /// That the calibration was changed after it was written, in words.
+    pub edited: Option<String>,
     /// Constants of the last link that the data determine only in combination with others, with their standard deviations.
     /// Orientations, and tool points away from the measured target, are as uncertain.
     pub untold: Vec<String>,
@@ -106,7 +109,8 @@ impl CalibratedArm {
         let untold = untold(calibration, profile.chain().dof());
         let lost = (!calibration.geometric.is_empty()).then(|| lost(calibration));
         let joint_errors = calibration.joint_errors.clone();
-        Ok(Self { profile, identified, geometry, lost, joint_errors, about, cautions, untold })
+        let edited = calibration.edited();
+        Ok(Self { profile, identified, geometry, lost, joint_errors, about, cautions, edited, untold })
     }
 
     /// The targets at the positions that were identified with the geometry alone.
@@ -142,7 +146,7 @@ fn cautions(calibration: &Calibration) -> Vec<String> {
         .then(|| format!("this calibration was not accepted: {}", verdict.reasons.join("; ")));
     let warnings = calibration.warnings.iter();
     let serious = warnings.filter(|warning| warning.blocks_acceptance || warning.code == SIMULATED);
-    refused.into_iter().chain(serious.map(|warning| warning.message.clone())).collect()
+    calibration.edited().into_iter().chain(refused).chain(serious.map(|warning| warning.message.clone())).collect()
 }
 
 /// What the formats of geometry lose of a calibration with errors of joints.
@@ -220,7 +224,7 @@ pub fn export(arm: &CalibratedArm, format: Format, options: &ExportOptions<'_>) 
             let (read, _) =
                 Profile::parse(&text, format.file_name()).map_err(|errors| ModelError::ReadBack(errors.to_string()))?;
             let agreement = proven(read.chain())?;
-            (text, agreement)
+            (checksum::with_sum(&text, checksum::Syntax::Ron), agreement)
         }
         Format::DhCsv => {
             let text = write_csv(&arm.about, identified)?;

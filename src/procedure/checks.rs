@@ -15,7 +15,7 @@ use crate::profile::Profile;
 use crate::report::number;
 use crate::session::TableProblem;
 use crate::session::advice::Advice;
-use crate::session::summary::{VerificationSummary, Warning};
+use crate::session::summary::{CHANGED_TABLE, VerificationSummary, Warning};
 use crate::text::counted;
 use crate::units::{MICROMETRE, Quantity, to_mm};
 
@@ -41,7 +41,11 @@ const SHOWN: usize = 3;
 /// Warnings about what the reader of a table found odd; they name `file` if it is given.
 pub(crate) fn table_warnings(file: Option<&str>, problems: &[TableProblem]) -> Vec<Warning> {
     let place = file.map_or_else(String::new, |file| format!("'{file}', "));
-    problems.iter().map(|problem| Warning::new("table", format!("{place}{problem}"), false)).collect()
+    let warning = |problem: &TableProblem| {
+        let (code, blocks) = if problem.is_change() { (CHANGED_TABLE, true) } else { ("table", false) };
+        Warning::new(code, format!("{place}{problem}"), blocks)
+    };
+    problems.iter().map(warning).collect()
 }
 
 /// The first `shown` of many findings, with the number of the others.

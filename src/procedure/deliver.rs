@@ -1,5 +1,6 @@
 //! The result files of a session: tables, calibration and report.
 
+use crate::checksum::{self, Syntax};
 use crate::report::{Document, report_html};
 use crate::session::export;
 use crate::session::state::Session;
@@ -54,5 +55,8 @@ pub fn reports(session: &Session, files: &[(String, String)]) -> Result<Vec<(Str
         result.written = names.map(str::to_owned).collect();
     }
     let json = serde_json::to_string_pretty(&document).map_err(|error| error.to_string())?;
-    Ok(vec![(REPORT_JSON.to_owned(), json + "\n"), (REPORT_HTML.to_owned(), report_html(&document))])
+    Ok(vec![
+        (REPORT_JSON.to_owned(), checksum::with_sum(&(json + "\n"), Syntax::Json)),
+        (REPORT_HTML.to_owned(), checksum::with_sum(&report_html(&document), Syntax::Html)),
+    ])
 }

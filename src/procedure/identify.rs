@@ -369,6 +369,7 @@ fn calibration(
     };
     Calibration {
         schema: calibration::SCHEMA,
+        integrity: calibration::Integrity::Intact,
         provenance: summary.provenance.clone(),
         settings: summary.settings.clone(),
         sigma: summary.sigma.clone(),

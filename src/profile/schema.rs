@@ -30,12 +30,15 @@ mod joint;
 mod masses;
 mod parameters;
 
+use std::ops::Range;
+
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::decode::{Fields, choice, direction, fields, list, not_negative, number, numbers, point, text};
-use super::diagnostic::{Diagnostic, Findings, ProfileErrors};
+use super::diagnostic::{Diagnostic, Findings, ProfileErrors, Span};
 use super::syntax::{self, Ast};
 use super::{FREE_TARGET_UNCERTAINTY, JointRange, Masses, Mounting, Profile, Target, check};
+use crate::checksum::{self, Finding};
 use crate::kinematics::{Convention, Joint, KinematicChain};
 use crate::units::{from_deg, from_mm};
 use joint::DecodedJoint;
@@ -73,6 +76,12 @@ const FIELDS: &[&str] = &[
 pub(super) fn parse(text: &str, file_name: &str) -> Result<(Profile, Vec<Diagnostic>), ProfileErrors> {
     let mut findings = Findings::new(text, file_name);
     let profile = syntax::parse(text, &mut findings).and_then(|tree| profile(&tree, &mut findings));
+    if checksum::check(text) == Finding::Changed
+        && let Some(Range { start, end }) = checksum::place(text)
+    {
+        let hint = "remove this line if the change was made on purpose";
+        findings.warning(Span { start, end }, "the profile was changed after the program wrote it", hint.to_owned());
+    }
     let failed = findings.has_errors();
     let diagnostics = findings.into_diagnostics();
     match profile {

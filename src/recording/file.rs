@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::blueprint::Purpose;
 use super::{RecordingError, rrd};
 use crate::session::journal::Line;
-use crate::store;
+use crate::store::{self, Links};
 
 /// Name of the recording in a session's folder.
 pub const FILE_NAME: &str = "recording.rrd";
@@ -29,7 +29,7 @@ pub struct Written {
 pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<Written, RecordingError> {
     let path = folder.join(FILE_NAME);
     let bytes = rrd::encode(lines, Purpose::Capture)?;
-    store::replace_bytes(&path, &bytes)?;
+    store::replace_all([(path.clone(), bytes.as_slice())], Links::Refused)?;
     Ok(Written { path, bytes: bytes.len() })
 }
 

@@ -21,7 +21,7 @@ use crate::session::journal::{Journal, Line};
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
 use crate::text::counted;
-use crate::wizard::{Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard};
+use crate::wizard::{Activity, Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard};
 
 /// Capacity of the channel of events. When it is full, a thread waits with its answer, and progress reports are dropped.
 const EVENT_CAPACITY: usize = 256;
@@ -182,9 +182,14 @@ impl Engine {
         if is_possible && !matches!(intent, Intent::Cancel | Intent::Quit) {
             self.complete_pending();
             self.pending = Some(intent.clone());
-        } else if self.wizard.is_idle() {
+            return;
+        }
+        match self.wizard.activity() {
             // The next notice is about this intent, which is refused or only stops something.
-            self.complete_pending();
+            Activity::Idle => self.complete_pending(),
+            // It was not carried out, because its entry is not on disk and never will be.
+            Activity::Stuck if *intent == Intent::Quit => self.pending = None,
+            Activity::Working | Activity::Stuck => {}
         }
     }
 
@@ -331,11 +336,9 @@ impl Engine {
             request => jobs::start(id, request, flag, self.sender.clone()),
         };
         if !is_started {
-            let answer = Answer::Failed(crate::wizard::Problem {
-                message: "the program cannot start a thread".to_owned(),
-                hints: vec!["the system may be out of memory or processes".to_owned()],
-            });
-            self.sender.offer(Event::Answer { id, answer });
+            let problem = crate::wizard::Problem::new("the program cannot start a thread")
+                .hint("the system may be out of memory or processes");
+            self.sender.offer(Event::Answer { id, answer: Answer::Failed(problem) });
         }
     }
 }
@@ -380,7 +383,7 @@ mod tests {
         engine.intend(Intent::Next);
         for profile in ["missing", "soochow"] {
             engine.intend(Intent::ChooseProfile(profile.to_owned()));
-            while !engine.wizard().is_idle() {
+            while engine.wizard().activity() == Activity::Working {
                 assert!(engine.wait(Duration::from_mins(1)));
             }
         }
@@ -395,7 +398,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut engine = Engine::new(Options::unrecorded(folder.path().to_owned(), Clock::System)).unwrap();
         let settle = |engine: &mut Engine| {
-            while !engine.wizard().is_idle() {
+            while engine.wizard().activity() == Activity::Working {
                 assert!(engine.wait(Duration::from_mins(1)));
             }
         };

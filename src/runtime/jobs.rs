@@ -26,10 +26,8 @@ pub(super) fn start(id: RequestId, request: Request, cancelled: Arc<AtomicBool>,
     let work = move || {
         let job = Job { id, cancelled, events: events.clone() };
         let answer = catch_unwind(AssertUnwindSafe(|| job.run(request))).unwrap_or_else(|_panic| {
-            Answer::Failed(Problem {
-                message: "a defect of this program has stopped the work; the session is intact".to_owned(),
-                hints: vec!["please report it with the files of the session".to_owned()],
-            })
+            let what = "a defect of this program has stopped the work; the session is intact";
+            Answer::Failed(Problem::new(what).hint("please report it with the files of the session"))
         });
         events.send(Event::Answer { id, answer });
     };
@@ -92,10 +90,9 @@ impl Job {
 
 /// Reads a text file.
 fn read(path: &Path) -> Result<String, Problem> {
-    let bytes = store::read(path).map_err(|error| Problem { message: causes(&error), hints: Vec::new() })?;
-    String::from_utf8(bytes).map_err(|_error| Problem {
-        message: format!("'{}' is not UTF-8 text", path.display()),
-        hints: vec!["save it as UTF-8".to_owned()],
+    let bytes = store::read(path).map_err(|error| Problem::new(causes(&error)))?;
+    String::from_utf8(bytes).map_err(|_error| {
+        Problem::new(format!("'{}' is not UTF-8 text", path.display())).hint("save it as UTF-8")
     })
 }
 
@@ -105,10 +102,8 @@ fn load_profile(source: String) -> Result<Answer, Problem> {
         None if Path::new(&source).is_file() => read(Path::new(&source))?,
         None => {
             let names: Vec<&str> = builtin_names().collect();
-            return Err(Problem {
-                message: format!("there is no profile or file '{source}'"),
-                hints: vec![format!("shipped profiles: {}", names.join(", "))],
-            });
+            return Err(Problem::new(format!("there is no profile or file '{source}'"))
+                .hint(format!("shipped profiles: {}", names.join(", "))));
         }
     };
     Ok(Answer::Profile { source, text })
@@ -117,7 +112,7 @@ fn load_profile(source: String) -> Result<Answer, Problem> {
 fn load_plan(file: &str, profile: &Profile) -> Result<Answer, Problem> {
     let text = read(Path::new(file))?;
     let listed = plan::read(&text, file, &procedure::joint_types(profile))
-        .map_err(|errors| Problem { message: errors.to_string(), hints: Vec::new() })?;
+        .map_err(|errors| Problem::new(errors.to_string()))?;
     Ok(Answer::Planned { summary: None, rows: listed.rows, origin: format!("the poses of '{file}'") })
 }
 

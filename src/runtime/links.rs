@@ -149,7 +149,7 @@ fn failed(error: &LinkError) -> Answer {
         LinkError::NoReading { .. } => vec!["skip the pose, or take the poses of the recording as plan".to_owned()],
         _ => Vec::new(),
     };
-    Answer::Failed(Problem { message: error.to_string(), hints })
+    Answer::Failed(Problem { hints, ..Problem::new(error.to_string()) })
 }
 
 /// A link with the answer to its connection.

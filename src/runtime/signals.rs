@@ -4,7 +4,7 @@
 //! and a signal between the two is not lost.
 
 use std::io;
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
@@ -60,6 +60,16 @@ pub fn watch(events: Events) -> io::Result<SignalWatch> {
         noted.report(signal);
     })?;
     Ok(watch)
+}
+
+/// Makes a write beyond the limit of the size of files an error with a message, as on a full disk, instead of the end of the program.
+pub fn keep_large_files_an_error() {
+    #[cfg(unix)]
+    {
+        // Any handler keeps the signal from ending the process. Without one, the program is as safe, but cannot say what happened.
+        let ignored = Arc::new(AtomicBool::new(false));
+        drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored));
+    }
 }
 
 /// Calls `handle` for every SIGINT, SIGTERM and SIGHUP, on a thread of its own.

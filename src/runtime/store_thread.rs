@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use super::events::Events;
+use crate::checksum;
 use crate::session::journal::Line;
 use crate::store::session::{SessionError, SessionFolder};
 use crate::text::causes;
@@ -91,12 +92,14 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
 
 fn replace(held: Option<&SessionFolder>, files: &[(String, String)], left_out: Vec<String>) -> Answer {
     let Some(folder) = held else {
-        return Answer::Failed(Problem { message: "the session has no folder".to_owned(), hints: Vec::new() });
+        return Answer::Failed(Problem::unwritten("the session has no folder"));
     };
-    for (name, text) in files {
-        if let Err(error) = folder.replace(name, text) {
-            return Answer::Failed(Problem { message: causes(&error), hints: Vec::new() });
-        }
+    match folder.replace(files) {
+        Ok(()) => Answer::Delivered {
+            files: files.iter().map(|(name, _)| name.clone()).collect(),
+            sums: files.iter().map(|(_, text)| checksum::sum(text)).collect(),
+            left_out,
+        },
+        Err(error) => Answer::Failed(Problem::unwritten(causes(&error))),
     }
-    Answer::Delivered { files: files.iter().map(|(name, _)| name.clone()).collect(), left_out }
 }

@@ -7,10 +7,11 @@ use super::expectation::Check;
 use super::grammar::{OnFinding, Script, ScriptStep};
 use super::transcript::Transcript;
 use crate::runtime::{Engine, Output};
+use crate::session::journal::Entry;
 use crate::session::state::Session;
 use crate::session::summary::IdentificationSummary;
 use crate::text::shortened;
-use crate::wizard::{Intent, IntentInfo, Severity, ViewModel};
+use crate::wizard::{Activity, Intent, IntentInfo, Severity, ViewModel};
 
 /// Longest time without any event while a request is running. A search reports far more often.
 const PATIENCE: Duration = Duration::from_mins(5);
@@ -86,6 +87,11 @@ impl<'a, W: Write> Runner<'a, W> {
         self.engine.wizard().folder()
     }
 
+    /// What was not saved before the end, one description for each entry.
+    pub fn unsaved(&self) -> Vec<String> {
+        self.engine.wizard().unsaved().iter().map(Entry::describe).collect()
+    }
+
     /// Intents that were executed, in order, as steps of a script.
     pub fn done(&self) -> &[ScriptStep] {
         &self.done
@@ -158,13 +164,23 @@ impl<'a, W: Write> Runner<'a, W> {
         if self.engine.wizard().ended().is_none() {
             self.engine.intend(Intent::Quit);
         }
-        while !self.engine.has_exited() && self.engine.wait(PATIENCE) {}
+        while !self.engine.has_exited() {
+            if self.engine.wizard().activity() == Activity::Stuck {
+                // The entry before the end cannot be written, so quitting would wait for it forever.
+                self.engine.shut_down("the session cannot be written");
+            } else if !self.engine.wait(PATIENCE) {
+                break;
+            }
+        }
     }
 
     fn step(&mut self, step: &ScriptStep) -> Result<(), Stop> {
         match step {
             ScriptStep::Do(intent) => match self.perform(intent)? {
                 None => Ok(()),
+                Some(failure) if self.engine.wizard().notice().is_some_and(|notice| notice.is_unwritten) => {
+                    Err(Stop::NotSaved(failure))
+                }
                 Some(failure) => Err(Stop::Failed(failure)),
             },
             ScriptStep::Fails(intent, text) => self.check_failure(intent, text),
@@ -238,23 +254,22 @@ impl<'a, W: Write> Runner<'a, W> {
             if let Some(cause) = self.engine.wizard().ended() {
                 return Err(Stop::Ended(cause.to_owned()));
             }
-            if self.engine.wizard().is_idle() {
-                return Ok(());
-            }
-            if self.view().is_stopped() {
-                let notice = self.engine.wizard().notice();
-                let text = notice.map_or_else(String::new, |notice| {
-                    std::iter::once(notice.what.as_str())
-                        .chain(notice.hints.iter().map(String::as_str))
-                        .collect::<Vec<_>>()
-                        .join("; ")
-                });
-                return Err(Stop::NotSaved(text));
+            match self.engine.wizard().activity() {
+                Activity::Idle => return Ok(()),
+                Activity::Stuck => return Err(Stop::NotSaved(self.notice_text())),
+                Activity::Working => {}
             }
             if !self.engine.wait(PATIENCE) {
                 return Err(Stop::Failed(format!("nothing happened for {} s", PATIENCE.as_secs())));
             }
         }
+    }
+
+    /// The current message with its hints.
+    fn notice_text(&self) -> String {
+        let notice = self.engine.wizard().notice();
+        let parts = notice.map(|notice| std::iter::once(&notice.what).chain(&notice.hints).cloned().collect::<Vec<_>>());
+        parts.unwrap_or_default().join("; ")
     }
 
     fn report(&mut self) -> io::Result<()> {

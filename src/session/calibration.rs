@@ -7,16 +7,26 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::set_up::PayloadText;
+use super::sha256;
 use super::summary::{
     IdentificationSettings, JointErrorSummary, ParameterSummary, Provenance, SelectionSummary, SigmaSummary, Verdict,
     Warning, WorkspaceSummary,
 };
+use crate::checksum::{self, Finding};
 use crate::kinematics::{Arm, JointTerm, KinematicChain, KinematicsError, LoadScale, ParameterId, ParameterUnit};
 use crate::profile::{Profile, Target};
 use crate::units::{from_mm, to_mm};
 
 /// Version of the layout.
-pub const SCHEMA: u32 = 1;
+///
+/// 2: the file carries a check sum of its content, and may have errors of joints. 1: without a sum.
+pub const SCHEMA: u32 = 2;
+
+/// Last version of the layout whose files have no check sum.
+const LAST_WITHOUT_SUM: u32 = 1;
+
+/// Largest deviation of a parameter, in its unit: a hundred metres, or many turns.
+const LARGEST_DEVIATION: f64 = 1e5;
 
 /// A pose in the file: position in mm, unit quaternion as (x, y, z, w).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,6 +110,29 @@ impl TryFrom<String> for SampleText {
     }
 }
 
+/// Whether a calibration is as this program wrote it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Integrity {
+    /// Its check sum fits, or it was never a file.
+    #[default]
+    Intact,
+    /// An earlier version wrote it, without a check sum.
+    Unchecked,
+    /// It has changed since.
+    Changed(Change),
+}
+
+/// How a changed calibration shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum Change {
+    #[error("its content does not fit its check sum")]
+    Content,
+    #[error("its check sum is missing")]
+    SumIsMissing,
+    #[error("the profile inside is not the one whose SHA-256 it states")]
+    Profile,
+}
+
 /// An identified robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -152,6 +185,9 @@ pub struct Calibration {
     pub loads: Option<LoadsText>,
     /// The profile, as it was read.
     pub profile: String,
+    /// Whether the file was as this program wrote it.
+    #[serde(skip)]
+    pub integrity: Integrity,
 }
 
 /// The largest loads over the joint ranges at the payload of the identification: a coefficient of compliance or tilt is the angle at
@@ -247,6 +283,9 @@ pub enum CalibrationError {
     /// A number that is not finite.
     #[error("parameter '{parameter}' has a number that is not finite")]
     NotFinite { parameter: ParameterId },
+    /// A number that no robot has.
+    #[error("parameter '{parameter}' deviates by {deviation:e}, which no arm does")]
+    Absurd { parameter: ParameterId, deviation: f64 },
     /// A unit that a parameter cannot have.
     #[error("parameter '{parameter}' has the unit '{unit}'; it must be '{}'", parameter.unit())]
     Unit { parameter: ParameterId, unit: ParameterUnit },
@@ -337,6 +376,14 @@ impl Calibration {
         arm.with(self.parameters.iter().zip(deviations).map(inside))
     }
 
+    /// That it was changed after it was written, in words; none if it was not, or if that cannot be known.
+    pub fn edited(&self) -> Option<String> {
+        match self.integrity {
+            Integrity::Changed(change) => Some(format!("this calibration was changed after it was written: {change}")),
+            Integrity::Intact | Integrity::Unchecked => None,
+        }
+    }
+
     /// The text of the file.
     ///
     /// # Errors
@@ -345,7 +392,8 @@ impl Calibration {
         // Raw strings keep the profile readable inside the calibration.
         let layout = ron::ser::PrettyConfig::new().indentor("    ".to_owned()).escape_strings(false);
         let text = ron::ser::to_string_pretty(self, layout)?;
-        Ok(format!("// Calibration of '{}' by {}.\n{text}\n", self.provenance.profile, self.provenance.program))
+        let text = format!("// Calibration of '{}' by {}.\n{text}\n", self.provenance.profile, self.provenance.program);
+        Ok(checksum::with_sum(&text, checksum::Syntax::Ron))
     }
 
     /// Reads the text of a file.
@@ -359,11 +407,12 @@ impl Calibration {
         {
             return Err(CalibrationError::Schema { found: schema, program: provenance.program });
         }
-        let calibration: Self = ron::from_str(text).map_err(|error| CalibrationError::Syntax {
+        let mut calibration: Self = ron::from_str(text).map_err(|error| CalibrationError::Syntax {
             line: error.span.start.line,
             column: error.span.start.col,
             message: error.code.to_string(),
         })?;
+        calibration.integrity = calibration.integrity_in(text);
         for parameter in calibration.parameters.iter().chain(&calibration.geometric) {
             check_parameter(parameter)?;
         }
@@ -394,6 +443,27 @@ impl Calibration {
     }
 }
 
+impl Calibration {
+    /// What the check sums of the file `text` say.
+    fn integrity_in(&self, text: &str) -> Integrity {
+        match checksum::check(text) {
+            Finding::Intact => Integrity::Intact,
+            Finding::Changed => Integrity::Changed(Change::Content),
+            Finding::Missing if self.schema > LAST_WITHOUT_SUM => Integrity::Changed(Change::SumIsMissing),
+            // At least the profile has had a sum in every version.
+            Finding::Missing if !self.has_its_profile() => Integrity::Changed(Change::Profile),
+            Finding::Missing => Integrity::Unchecked,
+        }
+    }
+
+    /// Whether the profile inside is the one of the stated SHA-256, also if an editor has changed the line breaks of the file.
+    fn has_its_profile(&self) -> bool {
+        let unix = self.profile.replace("\r\n", "\n");
+        let windows = unix.replace('\n', "\r\n");
+        [&self.profile, &unix, &windows].iter().any(|text| sha256(text.as_bytes()) == self.provenance.profile_sha256)
+    }
+}
+
 /// What every version of the file begins with.
 #[derive(Deserialize)]
 struct Heading {
@@ -406,6 +476,9 @@ fn check_parameter(parameter: &ParameterSummary) -> Result<(), CalibrationError>
     let ParameterSummary { id, unit, .. } = *parameter;
     if !(parameter.nominal.is_finite() && parameter.deviation.is_finite()) {
         return Err(CalibrationError::NotFinite { parameter: id });
+    }
+    if parameter.deviation.abs() > LARGEST_DEVIATION {
+        return Err(CalibrationError::Absurd { parameter: id, deviation: parameter.deviation });
     }
     if unit != id.unit() {
         return Err(CalibrationError::Unit { parameter: id, unit });

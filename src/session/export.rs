@@ -4,6 +4,7 @@ use super::journal::from_edge;
 use super::measurements::{self, Row as MeasuredRow};
 use super::plan::{self, PoseKind};
 use super::state::{Robot, Session};
+use crate::checksum::{self, Syntax};
 
 /// How the comment begins that says of a table that nothing was measured.
 const SIMULATED_MARK: &str = "# SIMULATED: ";
@@ -23,7 +24,7 @@ pub fn plan_csv(session: &Session, robot: &Robot) -> String {
     };
     let rows = (0..session.rows.len()).filter(is_in);
     let rows: Vec<_> = rows.filter_map(|index| session.rows.get(index)).map(|row| row.planned.clone()).collect();
-    plan::write(&rows, &robot.joint_types)
+    checksum::with_sum(&plan::write(&rows, &robot.joint_types), Syntax::Csv)
 }
 
 /// The samples that count as a table that `trupose identify` reads: identification poses, then verification poses. A column
@@ -60,5 +61,5 @@ fn table(session: &Session, robot: &Robot, of: &[PoseKind]) -> String {
     let table = measurements::write(&rows, &robot.joint_types);
     let lines: Vec<String> = table.lines().zip(kinds).map(|(line, kind)| format!("{line},{kind}")).collect();
     let mark = session.simulation().map(|said| format!("{SIMULATED_MARK}{said}\n")).unwrap_or_default();
-    mark + &lines.join("\n") + "\n"
+    checksum::with_sum(&(mark + &lines.join("\n") + "\n"), Syntax::Csv)
 }

@@ -7,8 +7,9 @@
 //! A line is a RON tuple: check sum, number from 1, time in UTC, [`Entry`]. The check sum is the first half of the SHA-256 of
 //! the check sum of the line before and of the rest of this line: a line that is changed, lost or moved shows itself.
 //!
-//! The session **is** the fold of its journal ([`super::state::Session`]). A last line that is not complete, as a crash or a
-//! full disk leaves it, is dropped and reported; damage anywhere else is an error that names the line.
+//! The session **is** the fold of its journal ([`super::state::Session`]). A last write that is not complete, as a crash or a full
+//! disk leaves it, is dropped and reported: a line without its line break, or zeros where a page was lost. Any other damage is an
+//! error that names the line, also in the last one: a line that is complete was on disk, and may have been acknowledged.
 //!
 //! The layout has a version, [`SCHEMA`], in the first entry. A later version that changes the meaning of an entry gets a new
 //! number, and [`read`] is the place where older ones are brought up to date; fields that are merely added have a default.
@@ -28,6 +29,8 @@ pub use entry::{
     PlanText, PlannedText, PointErrorText, from_edge, from_xyz_mm, to_edge, to_length_mm, to_xyz_mm,
 };
 
+use crate::text::{printable, shortened};
+
 /// Version of the layout of journals.
 pub const SCHEMA: u32 = 1;
 
@@ -39,6 +42,9 @@ const BEGIN: &[u8] = b"(\"";
 
 /// Bytes of a check sum in hexadecimal.
 const SUM_DIGITS: usize = 16;
+
+/// Columns of a damaged entry in a message.
+const LONGEST_READING: usize = 100;
 
 /// An entry with its place and time.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,8 +137,8 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
             Ok((line, _)) => {
                 return Err(damaged(number, format!("it has number {}", line.number)));
             }
-            // A crash leaves damage at the end only. A line whose check sum fits is not torn, whatever it says.
-            Err(LineError::Text(_)) if after.is_empty() => break,
+            Err(LineError::Text(_)) if is_interrupted_write(rest) => break,
+            Err(LineError::Text(what)) => return Err(damaged(number, with_reading(what, text))),
             Err(error) => return Err(error.at(number)),
         }
         if let [Line { entry: Entry::Opened { schema, program, .. }, .. }] = journal.lines.as_slice()
@@ -146,6 +152,29 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
         None if bytes.starts_with(BEGIN) || BEGIN.starts_with(bytes) => Err(JournalError::Empty),
         Some(Entry::Opened { .. }) => Ok(journal),
         _ => Err(JournalError::NotAJournal),
+    }
+}
+
+/// Whether `rest`, which begins with a line that cannot be read, is what a power cut leaves of the last write.
+///
+/// A file system may keep a later page of a write and lose an earlier one, which then reads as zeros. All lines of one write have the
+/// same time. A line that ends in a line break and has no zeros was complete on disk, so it has been damaged since.
+fn is_interrupted_write(rest: &[u8]) -> bool {
+    let mut times = rest
+        .split(|byte| *byte == b'\n')
+        .filter_map(|line| Some(Parts::of(std::str::from_utf8(line).ok()?)?.time));
+    let first = times.next();
+    rest.contains(&0) && times.all(|time| Some(time) == first)
+}
+
+/// What is wrong with a line, with what can still be read of it: the operator looks for a pose, not for a line.
+fn with_reading(what: &str, line: &[u8]) -> String {
+    let text = String::from_utf8_lossy(line);
+    let entry = Parts::of(&text).and_then(|parts| ron::from_str::<Entry>(parts.entry).ok());
+    let pose = || text.split_once("pose:\"").and_then(|(_, after)| after.split_once('"')).map(|(pose, _)| pose.to_owned());
+    match entry {
+        Some(entry) => format!("{what}; it reads '{}'", shortened(&entry.describe(), LONGEST_READING)),
+        None => pose().map_or_else(|| what.to_owned(), |pose| format!("{what}; it is about pose '{}'", printable(&pose))),
     }
 }
 

@@ -98,7 +98,7 @@ pub fn read_as(
     joints: &[JointType],
 ) -> Result<Measurements, TableErrors> {
     let (text, mut problems) = decode(content.as_ref(), file)?;
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<TableProblem> = table::changed(&text).into_iter().collect();
     let split = match layout {
         Layout::Named => split_named(&text, joints, &mut problems),
         Layout::RoboDk => imported::split_robodk(&text, joints, &mut problems, &mut warnings),

@@ -91,7 +91,8 @@ pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Resu
     if problems.is_empty() && !rows.iter().any(|(_, row)| row.kind.is_measured()) {
         problems.push(Defect::NothingToMeasure.of_table());
     }
-    let warnings = consistency(&rows, joints, &mut problems);
+    let mut warnings: Vec<TableProblem> = table::changed(&text).into_iter().collect();
+    warnings.extend(consistency(&rows, joints, &mut problems));
     if problems.is_empty() {
         Ok(Plan { rows: rows.into_iter().map(|(_, row)| row).collect(), warnings })
     } else {

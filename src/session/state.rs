@@ -85,6 +85,8 @@ pub struct Session {
     pub step: Step,
     pub identified: Option<Box<IdentifiedText>>,
     pub delivered: Vec<String>,
+    /// Their check sums, in the same order; none where an earlier version wrote them.
+    pub delivered_sums: Vec<String>,
     /// Models that were left out of them, with the reason.
     pub left_out: Vec<String>,
     /// Number of times it was resumed.
@@ -342,8 +344,9 @@ impl Session {
                 self.delivered.clear();
                 self.left_out.clear();
             }
-            Entry::Delivered { files, left_out } => {
+            Entry::Delivered { files, left_out, sums } => {
                 self.delivered.clone_from(files);
+                self.delivered_sums.clone_from(sums);
                 self.left_out.clone_from(left_out);
             }
             Entry::Resumed { .. } => {

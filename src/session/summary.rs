@@ -191,6 +191,11 @@ pub struct RejectedSummary {
 /// Code of the warning that nothing was measured: the points come from a simulated cell.
 pub const SIMULATED: &str = "simulated";
 
+/// Code of the warning that a table has changed since this program wrote it.
+pub const CHANGED_TABLE: &str = "changed_table";
+/// Code of the warning that a calibration has changed since this program wrote it.
+pub const CHANGED_CALIBRATION: &str = "changed_calibration";
+
 /// A warning to read before the numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Warning {

@@ -16,6 +16,7 @@ pub(super) use encoding::decode;
 pub(super) use number::Numbers;
 pub use problem::{Defect, TableErrors, TableProblem};
 
+use crate::checksum::{self, Finding};
 use crate::text::printable;
 
 /// One line of a table, split into cells.
@@ -117,6 +118,11 @@ pub(super) fn split(text: &str, shape: Shape, problems: &mut Vec<TableProblem>) 
         }
     }
     table
+}
+
+/// The warning about a table of this program that has changed since it was written.
+pub(super) fn changed(text: &str) -> Option<TableProblem> {
+    (checksum::check(text) == Finding::Changed).then(|| Defect::Changed.of_table())
 }
 
 /// Lines that are neither blank nor comments.

@@ -5,12 +5,12 @@
 //! starts with it, and a reader drops the incomplete end.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Seek as _, SeekFrom, Write as _};
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::{StoreError, TEMPORARY, create_folder, read, replace};
+use super::{Links, StoreError, TEMPORARY, create_folder, read, replace_all};
 use crate::session::journal::{self, FILE_NAME, Journal, JournalError, Line, Sum};
 
 /// Name of the lock file, which is locked while a program uses the folder.
@@ -28,6 +28,9 @@ const TORN_NAME: &str = "journal.torn";
 
 /// Largest number appended to a name that is taken.
 const MOST_OF_ONE_NAME: usize = 1000;
+
+/// Most bytes of a process number in a lock file, line break included.
+const LONGEST_NUMBER: u64 = 32;
 
 /// A session that cannot be opened or written.
 #[derive(Debug, Error)]
@@ -224,11 +227,7 @@ impl SessionFolder {
             return Err(SessionError::NotASession { folder: folder.to_owned() });
         }
         let lock = lock(folder)?;
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .open(&path)
-            .map_err(|source| StoreError::Write { path: path.clone(), source })?;
+        let file = open_own(OpenOptions::new().read(true).write(true), &path)?;
         lock_journal(&file, folder, &path)?;
         let bytes = read(&path)?;
         let journal = journal::read(&bytes).map_err(|source| SessionError::Journal { path: path.clone(), source })?;
@@ -259,12 +258,37 @@ impl SessionFolder {
         written.map_err(|source| StoreError::Write { path, source })
     }
 
-    /// Replaces a result file.
+    /// Replaces result files, given by name and text.
     ///
     /// # Errors
-    /// The previous file is unchanged.
-    pub fn replace(&self, name: &str, text: &str) -> Result<(), StoreError> {
-        replace(&self.folder.join(name), text)
+    /// The error says whether all of the previous files are unchanged.
+    pub fn replace(&self, files: &[(String, String)]) -> Result<(), StoreError> {
+        replace_all(files.iter().map(|(name, text)| (self.folder.join(name), text.as_bytes())), Links::Refused)
+    }
+}
+
+/// A folder that no other program of this kind writes to as long as this value lives.
+#[derive(Debug)]
+pub struct HeldFolder {
+    /// Keeps the folder locked.
+    _lock: File,
+}
+
+/// Holds the folder of a session to replace result files in it, without opening its journal to write.
+///
+/// # Errors
+/// Another program uses it, or it cannot be locked.
+pub fn hold(folder: &Path) -> Result<HeldFolder, SessionError> {
+    let lock = lock(folder)?;
+    remove_leftovers(folder);
+    Ok(HeldFolder { _lock: lock })
+}
+
+/// Removes what a killed program left in a session's folder, unless a program uses it now. Errors are ignored, so that a session on
+/// a read-only disk can be looked at.
+pub fn tidy(folder: &Path) {
+    if leftovers(folder).next().is_some() {
+        drop(hold(folder));
     }
 }
 
@@ -299,20 +323,23 @@ pub fn folders(root: &Path) -> Result<Vec<PathBuf>, StoreError> {
     Ok(found)
 }
 
-/// Removes temporary files of a program that ended while it replaced a file. The folder must be locked. Errors are ignored.
+/// Temporary files of a program that ended while it replaced a file.
+fn leftovers(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_temporary = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().starts_with(TEMPORARY);
+    entries.filter(is_temporary).map(|entry| entry.path())
+}
+
+/// Removes temporary files. The folder must be locked. Errors are ignored.
 fn remove_leftovers(folder: &Path) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten() {
-        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
-            drop(fs::remove_file(entry.path()));
-        }
-    }
+    leftovers(folder).for_each(|path| drop(fs::remove_file(path)));
 }
 
 /// Keeps a copy of the incomplete end before it is cut off. It was never acknowledged, so a failed copy is ignored.
 fn set_aside(folder: &Path, torn: &[u8]) {
     let mut names = (1..=MOST_OF_ONE_NAME).map(|number| folder.join(format!("{TORN_NAME}-{number}")));
-    let Some(path) = names.find(|path| !path.exists()) else { return };
+    // A link counts as taken wherever it leads.
+    let Some(path) = names.find(|path| fs::symlink_metadata(path).is_err()) else { return };
     drop(OpenOptions::new().write(true).create_new(true).open(path).and_then(|mut file| file.write_all(torn)));
 }
 
@@ -320,20 +347,43 @@ fn set_aside(folder: &Path, torn: &[u8]) {
 fn lock(folder: &Path) -> Result<File, SessionError> {
     let path = folder.join(LOCK_NAME);
     let failed = |source| StoreError::Write { path: path.clone(), source };
-    let mut file =
-        OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+    let mut file = open_own(OpenOptions::new().read(true).write(true).create(true).truncate(false), &path)?;
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
-            let process = fs::read_to_string(&path).ok().map(|text| text.trim().to_owned());
-            let process = process.filter(|text| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit()));
+            let process = process_in(&mut file).filter(|text| !text.is_empty());
             return Err(SessionError::Locked { folder: folder.to_owned(), process });
         }
         Err(TryLockError::Error(source)) => return Err(failed(source).into()),
     }
-    // The process number is only for messages, so a full disk must not prevent resuming.
-    drop(file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id())));
+    // The process number is only for messages, so a full disk must not prevent resuming. A file with anything else is not ours.
+    if process_in(&mut file).is_some() {
+        drop(file.set_len(0).and_then(|()| file.rewind()).and_then(|()| writeln!(file, "{}", std::process::id())));
+    }
     Ok(file)
+}
+
+/// The process number in a lock file, empty in a new one; none if the file holds anything else.
+fn process_in(file: &mut File) -> Option<String> {
+    let mut text = String::new();
+    file.take(LONGEST_NUMBER).read_to_string(&mut text).ok()?;
+    let number = text.trim();
+    number.bytes().all(|byte| byte.is_ascii_digit()).then(|| number.to_owned())
+}
+
+/// Opens a file of a session's folder to write it. A folder may come from elsewhere, so a link in it must not lead the program to
+/// another file of the user.
+fn open_own(options: &mut OpenOptions, path: &Path) -> Result<File, StoreError> {
+    if fs::symlink_metadata(path).is_ok_and(|found| !found.is_file()) {
+        return Err(StoreError::NotOwn { path: path.to_owned() });
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt as _;
+        // The check above gives the better message; this one cannot be outrun.
+        options.custom_flags(rustix::fs::OFlags::NOFOLLOW.bits().cast_signed());
+    }
+    options.open(path).map_err(|source| StoreError::Write { path: path.to_owned(), source })
 }
 
 /// Locks the journal itself, because the folder's lock is lost if its file is removed.

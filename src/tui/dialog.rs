@@ -214,6 +214,12 @@ fn confirm(intent: &Intent, info: &IntentInfo, view: &ViewModel) -> Option<Dialo
             format!("{}?", capitalised(&info.label)),
             "It will no longer count. It stays in the journal; nothing is deleted.".to_owned(),
         ],
+        Danger::Leaves if view.header.is_unsaved => {
+            let lost = "The last change is NOT saved and will be lost.".to_owned();
+            let saved = format!("{} entries are saved.", view.header.saved_entries);
+            let resume = view.header.folder.iter().map(|folder| format!("Resume later with: trupose resume {folder}"));
+            ["Quit the program?".to_owned(), lost, saved].into_iter().chain(resume).collect()
+        }
         Danger::Leaves => match &view.header.folder {
             Some(folder) => vec![
                 "Quit the program?".to_owned(),

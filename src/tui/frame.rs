@@ -119,7 +119,7 @@ fn header(header: &Header, theme: Theme, area: Rect, buf: &mut Buffer) {
         None => "not saved yet: no session".to_owned(),
     }];
     if header.session.is_some() {
-        parts.push(if header.is_saving { "saving" } else { "saved" }.to_owned());
+        parts.push(header.saving().to_owned());
     }
     if header.samples > 0 {
         parts.push(text::counted(header.samples, "sample"));

@@ -1,7 +1,7 @@
 //! The wizard in plain lines, for terminals that cannot move their cursor, for screen readers and for pipes.
 //!
 //! The view is printed, then a line is read: a number from the list, followed by a value if one is needed, or an intent as in
-//! scripts. The next line is read only when the wizard is idle again, so that lines can come from a file.
+//! scripts. The next line is read only when no work is running, so that lines can come from a file.
 
 use std::io::{self, BufRead as _, BufReader, Read, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -13,7 +13,7 @@ use super::{AtEnd, Exit, IDLE, LAST_ENTRY};
 use crate::runtime::{Engine, Events, signals};
 use crate::text::counted;
 use crate::wizard::view::ViewModel;
-use crate::wizard::{Intent, IntentInfo, Notice, Severity};
+use crate::wizard::{Activity, Intent, IntentInfo, Notice, Severity};
 
 /// Capacity of the channel. Further lines wait in the pipe.
 const WAITING: usize = 64;
@@ -127,10 +127,10 @@ impl<W: Write> Driver<'_, W> {
         }
     }
 
-    /// Waits until the wizard is idle, and prints what is running.
+    /// Waits until the wizard is idle or needs the operator, and prints what is running.
     fn settle(&mut self) -> io::Result<()> {
         let mut said = None;
-        while !self.engine.has_exited() && !self.engine.wizard().is_idle() {
+        while !self.engine.has_exited() && self.engine.wizard().activity() == Activity::Working {
             let busy = self.engine.wizard().view().busy.map(|busy| busy.what);
             if busy.is_some() && busy != said {
                 self.say(&format!("{} ...", busy.unwrap_or_default()))?;
@@ -163,7 +163,7 @@ fn page(view: &ViewModel, has_all: bool) -> Vec<String> {
     let mut parts = vec![header.robot.clone().unwrap_or_else(|| "no robot yet".to_owned())];
     parts.push(header.session.as_ref().map_or_else(
         || "not saved yet".to_owned(),
-        |session| format!("session {session}, {}", if header.is_saving { "saving" } else { "saved" }),
+        |session| format!("session {session}, {}", header.saving()),
     ));
     if header.samples > 0 {
         parts.push(counted(header.samples, "sample"));

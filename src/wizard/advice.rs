@@ -32,6 +32,6 @@ pub(super) fn words(advice: Advice) -> String {
 
 impl From<ProcedureError> for Problem {
     fn from(error: ProcedureError) -> Self {
-        Self { message: causes(&error), hints: error.advice().iter().copied().map(words).collect() }
+        Self { hints: error.advice().iter().copied().map(words).collect(), ..Self::new(causes(&error)) }
     }
 }

@@ -107,6 +107,8 @@ pub enum Answer {
     Delivered {
         /// Names of the files.
         files: Vec<String>,
+        /// Check sums of the files, in their order.
+        sums: Vec<String>,
         /// Models that were left out, with the reason.
         left_out: Vec<String>,
     },

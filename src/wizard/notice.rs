@@ -23,23 +23,30 @@ pub struct Notice {
     pub what: String,
     /// Possible remedies.
     pub hints: Vec<String>,
+    /// Whether it is about results that could not be written.
+    #[serde(skip)]
+    pub is_unwritten: bool,
 }
 
 impl Notice {
+    fn new(severity: Severity, what: impl Into<String>) -> Self {
+        Self { severity, what: what.into(), hints: Vec::new(), is_unwritten: false }
+    }
+
     pub fn info(what: impl Into<String>) -> Self {
-        Self { severity: Severity::Info, what: what.into(), hints: Vec::new() }
+        Self::new(Severity::Info, what)
     }
 
     pub fn attention(what: impl Into<String>) -> Self {
-        Self { severity: Severity::Attention, what: what.into(), hints: Vec::new() }
+        Self::new(Severity::Attention, what)
     }
 
     pub fn error(what: impl Into<String>) -> Self {
-        Self { severity: Severity::Error, what: what.into(), hints: Vec::new() }
+        Self::new(Severity::Error, what)
     }
 
     pub fn stop(what: impl Into<String>) -> Self {
-        Self { severity: Severity::Stop, what: what.into(), hints: Vec::new() }
+        Self::new(Severity::Stop, what)
     }
 
     /// Adds a remedy.
@@ -57,10 +64,31 @@ pub struct Problem {
     pub message: String,
     /// Possible remedies.
     pub hints: Vec<String>,
+    /// Whether results could not be written.
+    pub is_unwritten: bool,
+}
+
+impl Problem {
+    /// A problem without remedies.
+    pub fn new(message: impl Into<String>) -> Self {
+        Self { message: message.into(), ..Self::default() }
+    }
+
+    /// Results that could not be written.
+    pub fn unwritten(message: impl Into<String>) -> Self {
+        Self { is_unwritten: true, ..Self::new(message) }
+    }
+
+    /// Adds a remedy.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hints.push(hint.into());
+        self
+    }
 }
 
 impl From<Problem> for Notice {
     fn from(problem: Problem) -> Self {
-        Self { severity: Severity::Error, what: problem.message, hints: problem.hints }
+        Self { hints: problem.hints, is_unwritten: problem.is_unwritten, ..Self::error(problem.message) }
     }
 }

@@ -220,7 +220,7 @@ impl Phase {
         match answer {
             Answer::Failed(problem) => each!(self, step => step.on_failure(problem, cx)),
             Answer::Cancelled => {
-                let problem = super::Problem { message: "cancelled".to_owned(), hints: Vec::new() };
+                let problem = super::Problem::new("cancelled");
                 each!(self, step => step.on_failure(problem, cx))
             }
             answer => each!(self, step => step.on_answer(answer, cx)),

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::intent::{Intent, IntentInfo, PlanSettings};
 use super::notice::{Notice, Severity};
-use super::{RequestProgress, Wizard};
+use super::{Activity, RequestProgress, Wizard};
 use crate::identification::{self, Iteration};
 use crate::planning::{Figures, Stage};
 use crate::procedure::plan;
@@ -51,6 +51,17 @@ impl ViewModel {
     /// Whether the operator has to resolve something before continuing.
     pub fn is_stopped(&self) -> bool {
         self.notice.as_ref().is_some_and(|notice| notice.severity == Severity::Stop)
+    }
+}
+
+impl Header {
+    /// Whether everything so far is in the journal, in a word.
+    pub const fn saving(&self) -> &'static str {
+        match (self.is_unsaved, self.is_saving) {
+            (true, _) => "NOT SAVED",
+            (false, true) => "saving",
+            (false, false) => "saved",
+        }
     }
 }
 
@@ -112,6 +123,8 @@ pub struct Header {
     pub saved_entries: u64,
     /// Whether an entry is being written.
     pub is_saving: bool,
+    /// Whether the last change could not be saved.
+    pub is_unsaved: bool,
 }
 
 /// The running request, if any.
@@ -625,7 +638,8 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
             samples: session.counted().count(),
             elapsed_min: elapsed,
             saved_entries: session.lines,
-            is_saving: wizard.writing.is_some(),
+            is_saving: wizard.activity() == Activity::Working && wizard.writing.is_some(),
+            is_unsaved: wizard.activity() == Activity::Stuck,
         },
         purpose: purpose(step),
         content: wizard.phase.content(&wizard.cx()),

@@ -77,7 +77,7 @@ pub(super) fn run<O: Write, E: Write>(
         parts.push(Part { path, scan, results, corrected });
     }
     check_paths(args, &parts)?;
-    let mut report = Report::default();
+    let mut report = Report { edited: job.arm.edited.clone(), ..Report::default() };
     for part in &parts {
         add(job, part, &mut report);
     }
@@ -207,7 +207,7 @@ fn write<O: Write, E: Write>(
         store::replace_bytes(&path, &part.corrected).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         report.written.push(path.display().to_string());
         if !args.json {
-            console.print(&format!("written: {}\n", path.display()))?;
+            console.say_written(&path)?;
         }
     }
     Ok(())

@@ -48,6 +48,9 @@ pub(super) struct Report {
     /// Moves between corrected targets, with the largest deviation of the path.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) paths: Vec<PathReport>,
+    /// That the calibration was changed after it was written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) edited: Option<String>,
     /// Files that were written.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) written: Vec<String>,

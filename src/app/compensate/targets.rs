@@ -62,7 +62,7 @@ pub(super) fn run<O: Write, E: Write>(
     }
     let reached = rows.iter().filter(|row| row.is_usable()).count();
     let position_only = rows.iter().filter(|row| row.is_usable() && row.done.status == Status::PositionOnly).count();
-    let text = text(&rows, job.joints(), &table.extra);
+    let text = text(&rows, job.joints(), &table.extra, job.arm.edited.as_deref());
     if let Some(path) = &args.record {
         picture::write(path, rows.iter().filter_map(|row| Some((row.target.pose.clone(), row.poses?))))?;
     }
@@ -70,6 +70,7 @@ pub(super) fn run<O: Write, E: Write>(
         targets: rows.into_iter().map(|row| row.report).collect(),
         corrected: reached,
         left: table.rows.len() - reached,
+        edited: job.arm.edited.clone(),
         ..Report::default()
     };
     if let Some(path) = &args.out {
@@ -79,7 +80,7 @@ pub(super) fn run<O: Write, E: Write>(
     report.written.extend(args.record.iter().map(|path| path.display().to_string()));
     match (&args.out, args.json) {
         (_, true) => console.print(&to_json(&report)?)?,
-        (Some(path), false) => console.print(&format!("written: {}\n", path.display()))?,
+        (Some(path), false) => console.say_written(path)?,
         (None, false) => console.print(&text)?,
     }
     for line in report.lines() {
@@ -143,8 +144,10 @@ fn goal(goal: &TargetGoal) -> Goal {
     }
 }
 
-fn text(rows: &[Row<'_>], joints: &[Joint], extra: &[String]) -> String {
-    let mut lines = vec![header(joints, extra)];
+/// The table of commands, and before it that the calibration was edited.
+fn text(rows: &[Row<'_>], joints: &[Joint], extra: &[String], edited: Option<&str>) -> String {
+    let mut lines: Vec<String> = edited.iter().map(|said| format!("# WARNING: {said}")).collect();
+    lines.push(header(joints, extra));
     lines.extend(rows.iter().map(|row| line(row, joints)));
     lines.join("\n") + "\n"
 }

@@ -7,7 +7,10 @@ use super::super::diagnostic::Findings;
 use super::super::syntax::Ast;
 use super::super::wire::{LinkSettings, WireAddress};
 use super::super::{Acceptance, Capsule, Instrument, KeepOut, Tracker};
-use crate::units::{MICROMETRE, Quantity, from_deg, from_mm};
+use crate::units::{MICROMETRE, MILLIMETRE, Quantity, from_deg, from_mm, to_mm};
+
+/// Largest acceptance limit that can be meant (m).
+const LARGEST_LIMIT: f64 = 100.0 * MILLIMETRE;
 
 pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Acceptance> {
     const FIELDS: [&str; 6] = [
@@ -23,6 +26,8 @@ pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
     let limits =
         FIELDS.map(|name| inside.get_or(name, None, |ast| positive(ast, findings).map(|limit| Some(from_mm(limit)))));
     let [position_mean, position_rms, position_max, distance_mean, distance_rms, distance_max] = limits;
+    check_limits(ast, "position", [position_mean, position_rms, position_max], findings);
+    check_limits(ast, "distance", [distance_mean, distance_rms, distance_max], findings);
     Some(Acceptance {
         position_mean: position_mean?,
         position_rms: position_rms?,
@@ -31,6 +36,21 @@ pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
         distance_rms: distance_rms?,
         distance_max: distance_max?,
     })
+}
+
+/// Warns about limits of one error that cannot be meant.
+fn check_limits(ast: &Ast, of: &str, [mean, rms, max]: [Option<Option<f64>>; 3], findings: &mut Findings<'_>) {
+    let named = [("mean", mean.flatten()), ("rms", rms.flatten()), ("max", max.flatten())];
+    let set: Vec<(&str, f64)> = named.into_iter().filter_map(|(name, limit)| Some((name, limit?))).collect();
+    // The mean of an error is never above its rms, nor that above its maximum.
+    for (lower, upper) in set.iter().zip(set.iter().skip(1)).filter(|(lower, upper)| lower.1 > upper.1) {
+        let message = format!("'{of}_{}_mm' is above '{of}_{}_mm' and so never decides", lower.0, upper.0);
+        findings.warning(ast.span, message, "are the two exchanged?".to_owned());
+    }
+    for (name, limit) in set.iter().filter(|(_, limit)| *limit > LARGEST_LIMIT) {
+        let message = format!("'{of}_{name}_mm' is {} mm, which every arm meets", to_mm(*limit));
+        findings.warning(ast.span, message, "limits are in mm".to_owned());
+    }
 }
 
 /// Decodes the instrument; `None` if it is absent or invalid.

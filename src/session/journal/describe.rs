@@ -47,8 +47,8 @@ impl Entry {
             Self::Note { pose: None, text } => format!("note: {text}"),
             Self::About(about) => format!("for the report: {}", about_text(about)),
             Self::Identified(result) => result_text(&result.summary, result.calibration.is_some()),
-            Self::Delivered { files, left_out } if left_out.is_empty() => format!("written: {}", files.join(", ")),
-            Self::Delivered { files, left_out } => {
+            Self::Delivered { files, left_out, .. } if left_out.is_empty() => format!("written: {}", files.join(", ")),
+            Self::Delivered { files, left_out, .. } => {
                 format!("written: {}; left out: {}", files.join(", "), left_out.join("; "))
             }
             Self::Resumed { program, torn_bytes: 0 } => format!("resumed by {program}"),

@@ -108,6 +108,9 @@ pub enum Entry {
         /// Models that cannot express this arm, with the reason.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         left_out: Vec<String>,
+        /// Check sums of the files, in their order; none in journals of earlier versions.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        sums: Vec<String>,
     },
     /// The session was resumed.
     Resumed {

@@ -16,6 +16,9 @@ const SHOWN_CHARACTERS: usize = 60;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Defect {
+    /// The check sum of a table that this program wrote does not fit.
+    #[error("the table has changed since the program wrote it: a number or a row may be wrong")]
+    Changed,
     /// Text in UTF-16, as spreadsheets write "Unicode text".
     #[error("the file is UTF-16 text; save it as 'CSV UTF-8'")]
     Utf16,
@@ -372,6 +375,13 @@ pub struct TableProblem {
     pub column: Option<String>,
     /// What is wrong and what to do.
     pub defect: Defect,
+}
+
+impl TableProblem {
+    /// Whether the table has changed since this program wrote it.
+    pub fn is_change(&self) -> bool {
+        self.defect == Defect::Changed
+    }
 }
 
 impl fmt::Display for TableProblem {

@@ -385,7 +385,7 @@ fn what_a_killed_program_left_half_written_is_removed() {
     let mut folder = SessionFolder::create(root.path(), "s").unwrap();
     let path = folder.path().to_owned();
     folder.append(&[line(1)]).unwrap();
-    folder.replace("report.json", "{}").unwrap();
+    folder.replace(&[("report.json".to_owned(), "{}".to_owned())]).unwrap();
     fs::write(path.join(".trupose-a1B2c3"), "{").unwrap();
     // Not by somebody who does not hold the folder.
     assert!(SessionFolder::open(&path).is_err());

@@ -39,7 +39,7 @@ fn journal() -> Journal {
     let after = [Intent::Next, Intent::Identify, Intent::Quit];
     for intent in before.into_iter().chain(measure).chain(after) {
         engine.intend(intent);
-        while !engine.wizard().is_idle() {
+        while engine.wizard().activity() == crate::wizard::Activity::Working {
             assert!(engine.wait(Duration::from_mins(2)), "nothing happens");
         }
     }

@@ -108,7 +108,9 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             }
         }
     }
-    page.paragraph("Quitting is safe: every measurement is already in the journal.", Role::Ok);
+    if !cx.view.header.is_unsaved {
+        page.paragraph("Quitting is safe: every measurement is already in the journal.", Role::Ok);
+    }
     page
 }
 

@@ -184,7 +184,7 @@ impl Walk {
         if let Command::Intent(intent) = self.ui.on_input(Input::Key(key), &view) {
             self.engine.intend(intent);
         }
-        while !self.engine.wizard().is_idle() {
+        while self.engine.wizard().activity() == crate::wizard::Activity::Working {
             assert!(self.engine.wait(Duration::from_mins(2)), "nothing happens");
         }
         let view = self.engine.wizard().view();

@@ -51,12 +51,12 @@ impl StepMachine for DeliverStep {
         match answer {
             // The step may have been left meanwhile and entered again with other samples.
             Answer::Modelled(models) if cx.session.is_current() => vec![write_files(cx, *models)],
-            Answer::Delivered { files, left_out } => {
+            Answer::Delivered { files, sums, left_out } => {
                 let notice = (!left_out.is_empty()).then(|| {
                     let hint = "all other files were written";
                     Action::Say(Notice::info(format!("left out: {}", left_out.join("; "))).hint(hint))
                 });
-                let write = Action::Write(vec![Entry::Delivered { files, left_out }]);
+                let write = Action::Write(vec![Entry::Delivered { files, left_out, sums }]);
                 std::iter::once(write).chain(notice).collect()
             }
             _ => Vec::new(),

@@ -154,7 +154,7 @@ pub(super) fn answer(request: &Request) -> Answer {
         Request::Model(request) => Answer::Modelled(Box::new(models(request))),
         Request::Deliver { files, left_out } => {
             let files = files.iter().map(|(name, _)| name.clone()).collect();
-            Answer::Delivered { files, left_out: left_out.clone() }
+            Answer::Delivered { files, sums: Vec::new(), left_out: left_out.clone() }
         }
     }
 }
@@ -174,7 +174,7 @@ fn circles() -> Vec<CircleConfigurations> {
 }
 
 pub(super) fn failure(message: &str) -> Answer {
-    Answer::Failed(Problem { message: message.to_owned(), hints: Vec::new() })
+    Answer::Failed(Problem::new(message))
 }
 
 /// The id and request of the only `Start` among the effects.

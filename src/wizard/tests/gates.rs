@@ -9,7 +9,7 @@ use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
 use crate::session::state::SampleState;
 use crate::session::wire::LinkChoice;
 use crate::units::MILLIMETRE;
-use crate::wizard::{Answer, Effect, Event, Intent, Request, Severity};
+use crate::wizard::{Activity, Answer, Effect, Event, Intent, Request, Severity};
 
 /// Measures the pose shown; the instrument gives what `change` makes of a good reading.
 fn measure(bench: &mut Bench, change: impl FnOnce(&mut Reading)) -> Vec<Effect> {
@@ -318,7 +318,7 @@ fn while_the_link_is_down_nothing_is_measured_and_nothing_waits_to_be() {
     assert_eq!(told, "not now: the link is down: the connection is lost: closed; reconnecting");
     // It comes back: what was asked for before is not done now.
     assert!(bench.wizard.update(look(None)).is_empty());
-    assert!(bench.wizard.is_idle());
+    assert_eq!(bench.wizard.activity(), Activity::Idle);
     let (_, request) = started(&bench.intend(Intent::Measure));
     assert!(matches!(request, Request::Measure(_)));
 }

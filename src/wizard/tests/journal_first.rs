@@ -2,7 +2,7 @@
 
 use super::bench::{Bench, appended, fold, offers, started, state, texts};
 use crate::session::set_up::Step;
-use crate::wizard::{Effect, Event, Intent, Severity, StoreEvent};
+use crate::wizard::{Activity, Effect, Event, Intent, Severity, StoreEvent};
 
 fn note(text: &str) -> Intent {
     Intent::Note(text.to_owned())
@@ -22,7 +22,7 @@ fn nothing_is_shown_before_it_is_written() {
     let view = bench.wizard.view();
     assert_eq!((bench.wizard.session(), &view.content), (&session, &content));
     assert_eq!((view.header.samples, view.header.saved_entries, view.header.is_saving), (0, session.lines, true));
-    assert!(!bench.wizard.is_idle());
+    assert_eq!(bench.wizard.activity(), Activity::Working);
     assert!(bench.written(id, lines).is_empty());
     let view = bench.wizard.view();
     assert_eq!((view.header.samples, view.header.saved_entries, view.header.is_saving), (1, session.lines + 1, false));
@@ -99,7 +99,7 @@ fn a_full_disk_stops_everything_but_trying_again_and_leaving() {
     assert!(bench.failed(id).is_empty());
     let notice = bench.wizard.notice().unwrap();
     assert_eq!((notice.severity, notice.what.as_str()), (Severity::Stop, "could not save: no space left"));
-    assert_eq!(notice.hints[0], "3 samples are already saved; nothing has been lost");
+    assert_eq!(notice.hints[0], "3 samples are already saved; this change is kept until it can be saved too");
     assert!(bench.wizard.view().is_stopped());
     assert_eq!(offers(&bench.wizard), ["Retry*", "Quit"]);
     assert_eq!(*bench.wizard.session(), session);

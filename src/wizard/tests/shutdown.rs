@@ -3,7 +3,7 @@
 use super::bench::{Bench, appended, fold, started, state, texts};
 use crate::session::journal::Entry;
 use crate::session::set_up::Step;
-use crate::wizard::{Answer, Effect, Event, Intent, PlanSettings, StoreEvent};
+use crate::wizard::{Activity, Answer, Effect, Event, Intent, PlanSettings, StoreEvent};
 
 fn shut_down(bench: &mut Bench) -> Vec<Effect> {
     bench.wizard.update(Event::Shutdown { cause: "SIGTERM".to_owned() })
@@ -12,7 +12,7 @@ fn shut_down(bench: &mut Bench) -> Vec<Effect> {
 /// After the end nothing happens any more.
 fn is_over(bench: &mut Bench) {
     assert_eq!(bench.wizard.ended(), Some("SIGTERM"));
-    assert!(bench.wizard.is_idle());
+    assert_eq!(bench.wizard.activity(), Activity::Idle);
     assert!(bench.wizard.intents().is_empty());
     let before = state(&bench.wizard);
     assert_eq!(texts(&shut_down(bench)), ["exit"], "told again, it does not wait");

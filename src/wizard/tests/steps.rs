@@ -6,7 +6,7 @@ use crate::session::journal::Entry;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, RecordedSet, Step, TargetChoice};
 use crate::wizard::view::{Content, SessionCard};
-use crate::wizard::{Answer, Event, Intent, PlanSettings, Request, Severity};
+use crate::wizard::{Activity, Answer, Event, Intent, PlanSettings, Request, Severity};
 
 fn text(name: &str) -> String {
     name.to_owned()
@@ -249,7 +249,7 @@ fn poses_of_another_arm_are_never_written() {
     assert!(bench.intend(Intent::AcceptPlan).is_empty());
     assert_eq!(*bench.wizard.session(), before);
     assert_eq!(bench.wizard.notice().unwrap().severity, Severity::Stop);
-    assert!(bench.wizard.is_idle());
+    assert_eq!(bench.wizard.activity(), Activity::Idle);
 }
 
 #[test]
