@@ -69,7 +69,8 @@ pub fn check(text: &str) -> Finding {
 
 /// Place of the line of the sum in a text, in bytes.
 pub fn place(text: &str) -> Option<Range<usize>> {
-    let start: usize = text.split_inclusive('\n').take(HEAD).take_while(|line| !line.contains(MARK)).map(str::len).sum();
+    let start: usize =
+        text.split_inclusive('\n').take(HEAD).take_while(|line| !line.contains(MARK)).map(str::len).sum();
     let line = text.get(start..)?.lines().next().filter(|line| line.contains(MARK))?;
     Some(start..start + line.len())
 }

@@ -32,7 +32,11 @@ pub enum StoreError {
         source: io::Error,
     },
     /// Some of several files were replaced, the others are unchanged.
-    #[error("only a part of the files was written: {} new, {} NOT written", listed_or_none(written), listed_or_none(missing))]
+    #[error(
+        "only a part of the files was written: {} new, {} NOT written",
+        listed_or_none(written),
+        listed_or_none(missing)
+    )]
     Partly {
         /// Names of the files that were replaced.
         written: Vec<String>,
@@ -67,8 +71,8 @@ pub enum Links {
     Refused,
 }
 
-/// Largest file that is read (bytes); a million rows are a tenth of it.
-const LARGEST: u64 = 1 << 30;
+/// Largest file that is read (bytes): several times the largest table.
+const LARGEST: u64 = 256 << 20;
 
 /// Reads a file.
 ///
@@ -76,13 +80,16 @@ const LARGEST: u64 = 1 << 30;
 /// It cannot be read, or is too large.
 pub fn read(path: &Path) -> Result<Vec<u8>, StoreError> {
     let read = || -> io::Result<Vec<u8>> {
+        let too_large = || io::Error::new(io::ErrorKind::FileTooLarge, format!("larger than {} MiB", LARGEST >> 20));
+        let file = File::open(path)?;
+        // A file tells its length, so that its bytes need not be in memory first.
+        if file.metadata()?.len() > LARGEST {
+            return Err(too_large());
+        }
         let mut bytes = Vec::new();
         // The limit allows pipes but stops at endless devices.
-        File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > LARGEST {
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("larger than {} MiB", LARGEST >> 20)));
-        }
-        Ok(bytes)
+        file.take(LARGEST + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > LARGEST { Err(too_large()) } else { Ok(bytes) }
     };
     read().map_err(|source| StoreError::Read { path: path.to_owned(), source })
 }
@@ -109,11 +116,9 @@ pub fn replace(path: &Path, text: &str) -> Result<(), StoreError> {
 ///
 /// # Errors
 /// All old files are unchanged, or [`StoreError::Partly`] says which.
-pub fn replace_all<'a>(
-    files: impl IntoIterator<Item = (PathBuf, &'a [u8])>,
-    links: Links,
-) -> Result<(), StoreError> {
-    let staged = files.into_iter().map(|(path, bytes)| Staged::new(path, bytes, links)).collect::<Result<Vec<_>, _>>()?;
+pub fn replace_all<'a>(files: impl IntoIterator<Item = (PathBuf, &'a [u8])>, links: Links) -> Result<(), StoreError> {
+    let staged =
+        files.into_iter().map(|(path, bytes)| Staged::new(path, bytes, links)).collect::<Result<Vec<_>, _>>()?;
     let mut waiting = staged.into_iter();
     let mut written = Vec::new();
     while let Some(staged) = waiting.next() {

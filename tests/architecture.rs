@@ -28,7 +28,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("error", &[]),
     (
         "procedure",
-        &["checksum", 
+        &[
+            "checksum",
             "units",
             "geometry",
             "kinematics",
@@ -54,7 +55,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ),
     (
         "app",
-        &["checksum", 
+        &[
+            "checksum",
             "cli",
             "compensation",
             "error",

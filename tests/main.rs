@@ -19,6 +19,8 @@ mod compensate;
 mod docs;
 mod estimation;
 mod example;
+#[cfg(unix)]
+mod faults;
 mod gravity;
 mod inverse;
 mod joint_errors;

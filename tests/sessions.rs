@@ -730,7 +730,12 @@ fn links_in_a_session_are_never_written_through() {
     // The end of a journal that is set aside does not follow a link either, and is not lost because of it.
     fs::remove_file(&lock).unwrap();
     symlink(place.path("new"), place.session().join("journal.torn-1")).unwrap();
-    fs::OpenOptions::new().append(true).open(place.session().join("journal.ron")).unwrap().write_all(b"(\"torn").unwrap();
+    fs::OpenOptions::new()
+        .append(true)
+        .open(place.session().join("journal.ron"))
+        .unwrap()
+        .write_all(b"(\"torn")
+        .unwrap();
     assert_eq!(place.run(&["record", "rebuild", "sessions/s"]).status.code(), Some(0));
     assert!(!place.path("new").exists());
     assert_eq!(fs::read(place.session().join("journal.torn-2")).unwrap(), b"(\"torn");
@@ -752,7 +757,8 @@ fn a_report_is_not_written_while_another_program_holds_the_session() {
 fn temporary_files_of_a_killed_run_go_with_the_next_command() {
     let place = finished();
     let left = place.session().join(".trupose-x1y2z3");
-    for arguments in [&["session", "show", "sessions/s"][..], &["session", "list"], &["replay", "sessions/s", "--csv"]] {
+    for arguments in [&["session", "show", "sessions/s"][..], &["session", "list"], &["replay", "sessions/s", "--csv"]]
+    {
         fs::write(&left, "half a report").unwrap();
         let (held, _) = SessionFolder::open(&place.session()).unwrap();
         fs::write(&left, "of a program that runs").unwrap();

@@ -44,8 +44,7 @@ pub(super) fn raw_log(path: Option<&Path>) -> Result<Option<RawLog>, Failure> {
 fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let ended = Arc::new(AtomicBool::new(false));
     let signalled = Arc::clone(&ended);
-    signals::on_signal(move |_signal| signalled.store(true, Ordering::Relaxed))
-        .map_err(|error| refused(&error))?;
+    signals::on_signal(move |_signal| signalled.store(true, Ordering::Relaxed)).map_err(|error| refused(&error))?;
     let keep_going = || !ended.load(Ordering::Relaxed);
     let usage = |message: String| Failure::new(ExitStatus::Usage, message);
     let log = raw_log(args.raw_log.as_deref())?;
@@ -139,10 +138,8 @@ fn test_robot<O: Write, E: Write>(
         if let Some(cause) = live.down {
             return Err(is_down(&cause));
         }
-        console.say(&format!(
-            "{}\n",
-            joints_text(&live).unwrap_or_else(|| "no joint angles for one second".to_owned())
-        ))?;
+        console
+            .say(&format!("{}\n", joints_text(&live).unwrap_or_else(|| "no joint angles for one second".to_owned())))?;
     }
     if !keep_going() {
         return Err(ended_early());

@@ -82,7 +82,9 @@ pub(super) fn calibration<O: Write, E: Write>(
         let failure = Failure::new(ExitStatus::Usage, format!("'{file}' is not a usable calibration: {error}"));
         match checksum::check(&text) {
             Finding::Changed => failure.hint("the file has changed since it was written: take an intact copy"),
-            Finding::Intact | Finding::Missing => failure.hint("a calibration is written by 'trupose identify --out DIR'"),
+            Finding::Intact | Finding::Missing => {
+                failure.hint("a calibration is written by 'trupose identify --out DIR'")
+            }
         }
     })?;
     match (calibration.integrity, calibration.edited()) {
@@ -103,7 +105,8 @@ pub(super) fn calibration<O: Write, E: Write>(
 /// Says of warnings about changed tables that the change was `edited` on purpose, or how to say so.
 pub(super) fn settle_changes(warnings: &mut [Warning], edited: bool) {
     for warning in warnings.iter_mut().filter(|warning| warning.code == CHANGED_TABLE) {
-        let addition = if edited { "it was used because '--edited' was given" } else { "give '--edited' if that was on purpose" };
+        let addition =
+            if edited { "it was used because '--edited' was given" } else { "give '--edited' if that was on purpose" };
         warning.message = format!("{}; {addition}", warning.message);
         warning.blocks_acceptance = !edited;
     }

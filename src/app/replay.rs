@@ -7,7 +7,6 @@ use super::script::session_failure;
 use super::{Console, record, session, wizard};
 use crate::cli::{ReplayArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
-use crate::recording;
 use crate::report;
 use crate::session::export;
 use crate::session::journal::Journal;
@@ -73,7 +72,7 @@ fn journal(path: &Path) -> Result<Journal, Failure> {
         tidy(path);
         return read_journal(path).map_err(|error| session_failure(&error));
     }
-    recording::read(path).map_err(|error| record::failure(&error))
+    record::journal(path)
 }
 
 /// Lists the entries, then the measured points with the errors of both arms once these are known.

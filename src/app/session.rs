@@ -256,9 +256,7 @@ fn in_use(error: &SessionError) -> Failure {
     let failure = session_failure(error);
     match error {
         SessionError::Locked { .. } => failure.hint("or write to another place with '--out'"),
-        SessionError::Store(_)
-        | SessionError::Journal { .. }
-        | SessionError::NotASession { .. } => failure,
+        SessionError::Store(_) | SessionError::Journal { .. } | SessionError::NotASession { .. } => failure,
     }
 }
 

@@ -85,8 +85,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     let (sender, orders) = channel();
     let signalled = sender.clone();
     // The receiver is gone once this function has returned.
-    signals::on_signal(move |_signal| drop(signalled.send(Order::End)))
-        .map_err(|error| refused(&error))?;
+    signals::on_signal(move |_signal| drop(signalled.send(Order::End))).map_err(|error| refused(&error))?;
     read_lines(sender)?;
     let (mut seen, mut quiet) = (0, 0);
     loop {
@@ -146,11 +145,7 @@ fn read_lines(sender: Sender<Order>) -> Result<(), Failure> {
             }
         }
     };
-    thread::Builder::new()
-        .name("simulate-orders".to_owned())
-        .spawn(read)
-        .map(drop)
-        .map_err(|error| refused(&error))
+    thread::Builder::new().name("simulate-orders".to_owned()).spawn(read).map(drop).map_err(|error| refused(&error))
 }
 
 /// The measured rows of the plan; without a plan one pose in the middle of the joint ranges.

@@ -20,7 +20,9 @@ use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
 use crate::session::measurements::Row;
 use crate::session::set_up::PayloadText;
-use crate::session::summary::{CHANGED_CALIBRATION, InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning};
+use crate::session::summary::{
+    CHANGED_CALIBRATION, InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning,
+};
 use crate::text;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
@@ -31,7 +33,8 @@ const MOVED: f64 = 10.0;
 
 pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let file = args.calibration.display().to_string();
-    let load::LoadedCalibration { calibration, text, profile } = load::calibration(&args.calibration, args.edited, console)?;
+    let load::LoadedCalibration { calibration, text, profile } =
+        load::calibration(&args.calibration, args.edited, console)?;
     let profile = &calibration.mounted_on(&profile);
     let measured = load::measurements(&args.measurements, args.layout, profile, InputRole::Verification)?;
     let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;

@@ -43,6 +43,11 @@ use crate::kinematics::{Convention, Joint, KinematicChain};
 use crate::units::{from_deg, from_mm};
 use joint::DecodedJoint;
 
+/// Longest text of a profile (bytes): a hundred times the longest one that is shipped.
+const LARGEST: usize = 1 << 20;
+/// Longest title or source (characters).
+const LONGEST_LINE: usize = 1000;
+
 /// Schema version that this program reads and writes.
 const SCHEMA: f64 = 1.0;
 
@@ -74,6 +79,12 @@ const FIELDS: &[&str] = &[
 
 /// See [`Profile::parse`].
 pub(super) fn parse(text: &str, file_name: &str) -> Result<(Profile, Vec<Diagnostic>), ProfileErrors> {
+    if text.len() > LARGEST {
+        let mut findings = Findings::new("", file_name);
+        let what = format!("the text has {} bytes; a profile has at most {LARGEST}", text.len());
+        findings.error(Span { start: 0, end: 0 }, what, None);
+        return Err(ProfileErrors { diagnostics: findings.into_diagnostics() });
+    }
     let mut findings = Findings::new(text, file_name);
     let profile = syntax::parse(text, &mut findings).and_then(|tree| profile(&tree, &mut findings));
     if checksum::check(text) == Finding::Changed
@@ -90,12 +101,27 @@ pub(super) fn parse(text: &str, file_name: &str) -> Result<(Profile, Vec<Diagnos
     }
 }
 
+/// A text for people, one line.
+fn line(ast: &Ast, findings: &mut Findings<'_>) -> Option<String> {
+    let text = text(ast, findings)?;
+    let characters = text.chars().count();
+    if characters > LONGEST_LINE {
+        findings.error(
+            ast.span,
+            format!("the text has {characters} characters, at most {LONGEST_LINE} are allowed"),
+            None,
+        );
+        return None;
+    }
+    Some(text)
+}
+
 fn profile(tree: &Ast, findings: &mut Findings<'_>) -> Option<Profile> {
     let top = fields(tree, "the profile", FIELDS, findings)?;
     schema_number(&top, findings);
     let name = top.require("name", "\"my-robot\"", findings).and_then(|ast| short_name(ast, findings));
-    let title = top.require("title", "\"Maker and type\"", findings).and_then(|ast| text(ast, findings));
-    let source = top.require("source", "\"where the numbers come from\"", findings).and_then(|ast| text(ast, findings));
+    let title = top.require("title", "\"Maker and type\"", findings).and_then(|ast| line(ast, findings));
+    let source = top.require("source", "\"where the numbers come from\"", findings).and_then(|ast| line(ast, findings));
     let convention = top.require("convention", "Standard", findings).and_then(|ast| {
         let choices = [("Standard", Convention::Standard), ("Modified", Convention::Modified)];
         choice(ast, &choices, findings)

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read as _};
 use std::iter;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
@@ -14,6 +14,11 @@ use rerun::{TextDocument, TimelineName};
 use super::{RecordingError, names};
 use crate::session::journal::{self, Journal};
 use crate::store::StoreError;
+
+/// First bytes of every recording of the library.
+const MAGIC: &[u8] = b"RRF";
+/// Bytes at the beginning that name the program (the library's message about the store comes first).
+const HEAD: u64 = 1024;
 
 /// Reads the journal that the recording at `path` carries. Its lines have check sums, so damage elsewhere in the file does not
 /// matter.
@@ -34,10 +39,13 @@ pub fn read(path: &Path) -> Result<Journal, RecordingError> {
     journal::read(text.as_bytes()).map_err(|source| RecordingError::Journal { path: path.to_owned(), source })
 }
 
-/// Returns whether the file at `path` begins like a recording of this program.
+/// Returns whether the file at `path` begins like a recording of this program. It only compares bytes: the library may fail at
+/// damaged ones.
 pub fn is_recording(path: &Path) -> bool {
-    matches!(decoded(path).next(), Some(LogMsg::SetStoreInfo(info))
-        if info.info.store_id.application_id().as_str() == names::APPLICATION)
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    let name = names::APPLICATION.as_bytes();
+    read.is_ok() && head.starts_with(MAGIC) && head.windows(name.len()).any(|part| part == name)
 }
 
 /// Returns the messages of the file at `path`, up to the first that cannot be decoded.

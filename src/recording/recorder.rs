@@ -156,8 +156,9 @@ impl<R: Fn(RecordingEvent)> Work<R> {
     }
 
     fn add(&mut self, lines: Vec<Line>) {
-        if let (Some(live), Some(first)) = (self.live, lines.first()) {
-            self.live = None;
+        if let Some(first) = lines.first()
+            && let Some(live) = self.live.take()
+        {
             match LiveView::start(live, first) {
                 Ok(view) => self.view = Some(view),
                 Err(error) => (self.report)(RecordingEvent::LiveFailed(causes(&error))),

@@ -21,7 +21,9 @@ use crate::session::journal::{Journal, Line};
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
 use crate::text::counted;
-use crate::wizard::{Activity, Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard};
+use crate::wizard::{
+    Activity, Answer, Effect, Event, Intent, Notice, Request, RequestId, Severity, StoreEvent, Wizard,
+};
 
 /// Capacity of the channel of events. When it is full, a thread waits with its answer, and progress reports are dropped.
 const EVENT_CAPACITY: usize = 256;

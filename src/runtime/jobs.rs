@@ -91,9 +91,8 @@ impl Job {
 /// Reads a text file.
 fn read(path: &Path) -> Result<String, Problem> {
     let bytes = store::read(path).map_err(|error| Problem::new(causes(&error)))?;
-    String::from_utf8(bytes).map_err(|_error| {
-        Problem::new(format!("'{}' is not UTF-8 text", path.display())).hint("save it as UTF-8")
-    })
+    String::from_utf8(bytes)
+        .map_err(|_error| Problem::new(format!("'{}' is not UTF-8 text", path.display())).hint("save it as UTF-8"))
 }
 
 fn load_profile(source: String) -> Result<Answer, Problem> {
@@ -111,8 +110,8 @@ fn load_profile(source: String) -> Result<Answer, Problem> {
 
 fn load_plan(file: &str, profile: &Profile) -> Result<Answer, Problem> {
     let text = read(Path::new(file))?;
-    let listed = plan::read(&text, file, &procedure::joint_types(profile))
-        .map_err(|errors| Problem::new(errors.to_string()))?;
+    let listed =
+        plan::read(&text, file, &procedure::joint_types(profile)).map_err(|errors| Problem::new(errors.to_string()))?;
     Ok(Answer::Planned { summary: None, rows: listed.rows, origin: format!("the poses of '{file}'") })
 }
 

@@ -268,7 +268,8 @@ impl<'a, W: Write> Runner<'a, W> {
     /// The current message with its hints.
     fn notice_text(&self) -> String {
         let notice = self.engine.wizard().notice();
-        let parts = notice.map(|notice| std::iter::once(&notice.what).chain(&notice.hints).cloned().collect::<Vec<_>>());
+        let parts =
+            notice.map(|notice| std::iter::once(&notice.what).chain(&notice.hints).cloned().collect::<Vec<_>>());
         parts.unwrap_or_default().join("; ")
     }
 

@@ -160,9 +160,8 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
 /// A file system may keep a later page of a write and lose an earlier one, which then reads as zeros. All lines of one write have the
 /// same time. A line that ends in a line break and has no zeros was complete on disk, so it has been damaged since.
 fn is_interrupted_write(rest: &[u8]) -> bool {
-    let mut times = rest
-        .split(|byte| *byte == b'\n')
-        .filter_map(|line| Some(Parts::of(std::str::from_utf8(line).ok()?)?.time));
+    let mut times =
+        rest.split(|byte| *byte == b'\n').filter_map(|line| Some(Parts::of(std::str::from_utf8(line).ok()?)?.time));
     let first = times.next();
     rest.contains(&0) && times.all(|time| Some(time) == first)
 }
@@ -171,10 +170,13 @@ fn is_interrupted_write(rest: &[u8]) -> bool {
 fn with_reading(what: &str, line: &[u8]) -> String {
     let text = String::from_utf8_lossy(line);
     let entry = Parts::of(&text).and_then(|parts| ron::from_str::<Entry>(parts.entry).ok());
-    let pose = || text.split_once("pose:\"").and_then(|(_, after)| after.split_once('"')).map(|(pose, _)| pose.to_owned());
+    let pose =
+        || text.split_once("pose:\"").and_then(|(_, after)| after.split_once('"')).map(|(pose, _)| pose.to_owned());
     match entry {
         Some(entry) => format!("{what}; it reads '{}'", shortened(&entry.describe(), LONGEST_READING)),
-        None => pose().map_or_else(|| what.to_owned(), |pose| format!("{what}; it is about pose '{}'", printable(&pose))),
+        None => {
+            pose().map_or_else(|| what.to_owned(), |pose| format!("{what}; it is about pose '{}'", printable(&pose)))
+        }
     }
 }
 

@@ -19,6 +19,13 @@ pub use problem::{Defect, TableErrors, TableProblem};
 use crate::checksum::{self, Finding};
 use crate::text::printable;
 
+/// Most lines of a table: a hundred times a long calibration.
+const MOST_ROWS: usize = 250_000;
+/// Most bytes of a line.
+const LONGEST_LINE: usize = 64 * 1024;
+/// Most columns of a table.
+const MOST_COLUMNS: usize = 1000;
+
 /// One line of a table, split into cells.
 #[derive(Debug)]
 pub(super) struct Record {
@@ -59,6 +66,11 @@ pub(super) enum Shape {
 /// Splits `text` into records. Rows with a wrong number of cells or an open quotation mark go to `problems` instead.
 pub(super) fn split(text: &str, shape: Shape, problems: &mut Vec<TableProblem>) -> Table {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    // Looked at before anything is taken apart, which would multiply the memory.
+    if let Some(problem) = beyond_limits(text) {
+        problems.push(problem);
+        return Table { header: None, records: Vec::new(), decimal_comma: false };
+    }
     let separator = match shape {
         Shape::Named => separator(content_lines(text).next()),
         Shape::Fixed { .. } => separator(content_lines(text).nth(1)),
@@ -102,6 +114,10 @@ pub(super) fn split(text: &str, shape: Shape, problems: &mut Vec<TableProblem>) 
             while cells.last().is_some_and(String::is_empty) {
                 cells.pop();
             }
+            if cells.len() > MOST_COLUMNS {
+                problems.push(Defect::TooManyColumns { columns: cells.len(), most: MOST_COLUMNS }.at(line));
+                break;
+            }
             width = width.or(Some(cells.len()));
             table.header = Some(Record { line, cells });
             continue;
@@ -118,6 +134,17 @@ pub(super) fn split(text: &str, shape: Shape, problems: &mut Vec<TableProblem>) 
         }
     }
     table
+}
+
+/// Why a text is far too large to be a table of measurements, if it is.
+fn beyond_limits(text: &str) -> Option<TableProblem> {
+    let rows = text.bytes().filter(|byte| *byte == b'\n').count();
+    if rows > MOST_ROWS {
+        return Some(Defect::TooManyRows { rows, most: MOST_ROWS }.of_table());
+    }
+    let is_break = |byte: &u8| matches!(byte, b'\n' | b'\r');
+    let (index, long) = text.as_bytes().split(is_break).enumerate().find(|(_, line)| line.len() > LONGEST_LINE)?;
+    Some(Defect::LongLine { bytes: long.len(), most: LONGEST_LINE }.at(index + 1))
 }
 
 /// The warning about a table of this program that has changed since it was written.
@@ -227,6 +254,21 @@ mod tests {
             assert_eq!(lines(&text), (expected, vec![]), "{ending:?}");
         }
         assert_eq!(lines("a,b\r1,2\r\r3,4"), (vec![1, 2, 4], vec![]));
+    }
+
+    #[test]
+    fn absurd_tables_are_refused_before_they_are_taken_apart() {
+        let columns = |count: usize| (0..count).map(|index| format!("c{index}")).collect::<Vec<_>>().join(",");
+        let row = format!("{}\n", "1,".repeat(LONGEST_LINE));
+        for (text, reason) in [
+            (columns(MOST_COLUMNS + 1), "line 1: the line has 1001 columns; at most 1000 are read"),
+            (format!("a,b\n{row}"), "line 2: the line has 131072 bytes; at most 65536 are read"),
+            (format!("a,b\n{}", "1,2\n".repeat(MOST_ROWS)), "the table has 250001 lines; at most 250000 are read"),
+        ] {
+            let (read, problems) = lines(&text);
+            assert!(read.len() <= 1 && problems.len() == 1 && problems[0].starts_with(reason), "{problems:?}");
+        }
+        assert_eq!(lines(&columns(MOST_COLUMNS)), (vec![1], vec![]));
     }
 
     #[test]

@@ -161,10 +161,12 @@ fn page(view: &ViewModel, has_all: bool) -> Vec<String> {
     let header = &view.header;
     let mut lines = vec![String::new(), format!("step {} of {}: {}", header.number, header.steps, header.step)];
     let mut parts = vec![header.robot.clone().unwrap_or_else(|| "no robot yet".to_owned())];
-    parts.push(header.session.as_ref().map_or_else(
-        || "not saved yet".to_owned(),
-        |session| format!("session {session}, {}", header.saving()),
-    ));
+    parts.push(
+        header
+            .session
+            .as_ref()
+            .map_or_else(|| "not saved yet".to_owned(), |session| format!("session {session}, {}", header.saving())),
+    );
     if header.samples > 0 {
         parts.push(counted(header.samples, "sample"));
     }

@@ -159,7 +159,9 @@ fn on_panic(owner: ThreadId, info: &PanicHookInfo<'_>) {
 fn panic_text(info: &str, thread: Option<&str>, folder: Option<&str>) -> String {
     let head = format!("error: internal error in thread '{}': {info}", thread.unwrap_or("unnamed"));
     match folder {
-        Some(folder) => format!("{head}\nhint: whatever was shown as saved is in your session; continue with 'trupose resume {folder}'"),
+        Some(folder) => format!(
+            "{head}\nhint: whatever was shown as saved is in your session; continue with 'trupose resume {folder}'"
+        ),
         None => format!("{head}\nhint: nothing was measured yet; start again with 'trupose'"),
     }
 }

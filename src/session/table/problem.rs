@@ -16,6 +16,15 @@ const SHOWN_CHARACTERS: usize = 60;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Defect {
+    /// More rows than any calibration has.
+    #[error("the table has {rows} lines; at most {most} are read: select those of the calibration first")]
+    TooManyRows { rows: usize, most: usize },
+    /// A line that is no row of a table.
+    #[error("the line has {bytes} bytes; at most {most} are read: is this a table with one row for each pose?")]
+    LongLine { bytes: usize, most: usize },
+    /// More columns than any table has.
+    #[error("the line has {columns} columns; at most {most} are read: is this a table with one row for each pose?")]
+    TooManyColumns { columns: usize, most: usize },
     /// The check sum of a table that this program wrote does not fit.
     #[error("the table has changed since the program wrote it: a number or a row may be wrong")]
     Changed,

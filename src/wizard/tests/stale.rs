@@ -13,7 +13,10 @@ fn strangers(id: RequestId) -> Vec<Event> {
             id,
             answer: Answer::Connected { identity: "another".to_owned(), warnings: Vec::new(), recorded: Vec::new() },
         },
-        Event::Answer { id, answer: Answer::Delivered { files: vec!["x".to_owned()], sums: Vec::new(), left_out: Vec::new() } },
+        Event::Answer {
+            id,
+            answer: Answer::Delivered { files: vec!["x".to_owned()], sums: Vec::new(), left_out: Vec::new() },
+        },
         Event::Progress { id, progress: RequestProgress::Search(crate::procedure::plan::Progress::Searching) },
         Event::Store(StoreEvent::Written { id }),
         Event::Store(StoreEvent::Failed { id, message: "late".to_owned() }),
