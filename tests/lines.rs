@@ -92,7 +92,7 @@ fn a_session_is_replayed_without_a_terminal_and_not_changed() {
     assert!(all.starts_with(part.split("\n\n").next().unwrap()));
     let table = text(&replay(&["--csv"]).stdout);
     assert_eq!(table, fs::read_to_string(place.path().join("sessions/s/measurements.csv")).unwrap());
-    assert_eq!(text(&replay(&["--csv", "--entry", &sample.to_string()]).stdout).lines().count(), 3);
+    assert_eq!(text(&replay(&["--csv", "--entry", &sample.to_string()]).stdout).lines().count(), 4);
 
     for (arguments, code, message) in [
         (&["--print", "--entry", "0"][..], 2, "the session has no entry 0"),
