@@ -101,7 +101,7 @@ pub(super) fn import_urdf<O: Write, E: Write>(
     match &args.out {
         Some(path) => {
             store::replace(path, &profile).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
-            console.say_written(&path)?;
+            console.say_written(path)?;
         }
         None => console.print(&profile)?,
     }

@@ -138,6 +138,8 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
                 return Err(damaged(number, format!("it has number {}", line.number)));
             }
             Err(LineError::Text(_)) if is_interrupted_write(rest) => break,
+            // Another file has no line that could be damaged.
+            Err(LineError::Text(_)) if journal.lines.is_empty() && !bytes.starts_with(BEGIN) => break,
             Err(LineError::Text(what)) => return Err(damaged(number, with_reading(what, text))),
             Err(error) => return Err(error.at(number)),
         }
