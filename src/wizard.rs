@@ -239,12 +239,12 @@ impl Wizard {
         let last_sample = self.session.samples.last().map(|sample| self.session.point_of(sample));
         self.live.take(reading, last_sample);
         let has_passed = self.phase.shown_stop().is_some_and(|stop| self.live.rests_at(stop));
-        if has_passed && self.is_idle() && self.ended.is_none() {
+        let is_free = self.activity() == Activity::Idle && self.ended.is_none();
+        if has_passed && is_free {
             return self.on_intent(Intent::Passed);
         }
         let is_wanted =
             matches!(&self.session.instrument, Some(InstrumentChoice::Linked(choice)) if choice.is_automatic);
-        let is_free = self.activity() == Activity::Idle && self.ended.is_none();
         let Some(row) = self.phase.shown_row().filter(|_| is_wanted && is_free) else {
             return Vec::new();
         };

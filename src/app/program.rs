@@ -79,7 +79,7 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
         for file in &program.files {
             let path = folder.join(&file.file_name);
             store::replace(&path, &file.text).map_err(store_failure)?;
-            console.say_written(path)?;
+            console.say_written(&path)?;
         }
     } else {
         let several = program.files.len() > 1;

@@ -207,7 +207,7 @@ fn write<O: Write, E: Write>(
         store::replace_bytes(&path, &part.corrected).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         report.written.push(path.display().to_string());
         if !args.json {
-            console.say_written(path)?;
+            console.say_written(&path)?;
         }
     }
     Ok(())
