@@ -361,7 +361,8 @@ fn what_speaks_against_a_calibration_is_said_wherever_it_is_applied() {
     assert!(fs::read_to_string(&out).unwrap().contains("WARNING: this calibration was not accepted"));
     let targets = folder.path().join("t.csv");
     fs::write(&targets, "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,40,50,60\n").unwrap();
-    let output = trupose(&["compensate", "--calibration", &calibration, "--targets", targets.to_str().unwrap(), "--edited"]);
+    let output =
+        trupose(&["compensate", "--calibration", &calibration, "--targets", targets.to_str().unwrap(), "--edited"]);
     assert!(output.status.success());
     assert!(String::from_utf8(output.stderr).unwrap().contains("WARNING: this calibration was not accepted"));
     // Those of a simulated cell are for no real arm, and a later verification says so too.

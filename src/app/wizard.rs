@@ -22,8 +22,8 @@ pub(super) fn run<O: Write, E: Write>(
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
-    let mut engine = Engine::new(script::live_options(Clock::System, args, console)?)
-        .map_err(|error| refused(&error))?;
+    let mut engine =
+        Engine::new(script::live_options(Clock::System, args, console)?).map_err(|error| refused(&error))?;
     match profile {
         Some(profile) => engine.intend(Intent::ChooseProfile(profile.to_owned())),
         None => engine.offer_sessions(args.sessions.clone()),
