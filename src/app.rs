@@ -5,6 +5,7 @@ mod compensate;
 mod constraints;
 mod export;
 mod identify;
+mod iso9283;
 mod link;
 mod load;
 mod manual;
@@ -109,6 +110,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Verify(args) => verify::run(&args, console),
         Command::Constraints(args) => constraints::run(&args, console),
         Command::Plan(args) => plan::run(&args, console),
+        Command::Iso9283(command) => iso9283::run(&command, console),
         Command::Program(args) => program::run(&args, console),
         Command::Record(command) => record::run(&command, console),
         Command::Compensate(args) => compensate::run(&args, console),

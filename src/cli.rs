@@ -7,6 +7,7 @@ mod session;
 mod terminal;
 
 pub mod compensate;
+pub mod iso9283;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -214,6 +215,9 @@ pub enum Command {
         after_help = "Example:\n  trupose program --profile ur10e --plan plan.csv --dialect urscript --out program"
     )]
     Program(ProgramArgs),
+    /// Test the arm with the definitions of ISO 9283: plan the poses, evaluate the points
+    #[command(subcommand)]
+    Iso9283(iso9283::Iso9283Command),
     /// Correct targets so that the real arm reaches them
     #[command(
         after_help = "Example:\n  trupose compensate --calibration calibration.ron --program part.src --dialect krl --out corrected.src"

@@ -32,6 +32,7 @@ pub mod error;
 pub mod geometry;
 pub mod identification;
 pub mod inverse;
+pub mod iso9283;
 pub mod kinematics;
 pub mod link;
 pub mod model;

@@ -14,6 +14,7 @@ pub mod deliver;
 mod error;
 pub mod identify;
 mod intervals;
+pub mod iso9283;
 mod joint_errors;
 pub mod models;
 pub mod plan;

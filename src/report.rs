@@ -6,6 +6,7 @@
 
 mod document;
 mod html;
+mod iso9283;
 mod plan;
 mod tables;
 mod text;
@@ -16,5 +17,6 @@ pub use document::{
     PredictionPart, ResultState, RobotPart, SessionPart, TemperaturePart,
 };
 pub use html::report_html;
+pub use iso9283::test_text;
 pub use plan::plan_text;
 pub use text::{identification_text, verification_text};

@@ -13,6 +13,7 @@ pub mod calibration;
 pub mod constraints;
 pub mod export;
 pub mod filter;
+pub mod iso9283;
 pub mod joint_errors;
 pub mod journal;
 pub mod measurements;

@@ -23,6 +23,7 @@ mod example;
 mod faults;
 mod gravity;
 mod inverse;
+mod iso9283;
 mod joint_errors;
 mod kinematics;
 mod lines;
