@@ -122,12 +122,14 @@ fn next_steps(content: &DeliverView, path: &dyn Fn(&str) -> String, folder: &str
     let mut steps = Vec::new();
     if is_accepted {
         steps.push((
-            "correct a robot program, so that the arm goes where the program says:",
-            format!("trupose compensate --calibration {calibration} --program FILE --dialect krl --out NEW-FILE"),
+            "correct a robot program whose points were computed, not taught, so that the arm goes where it says:",
+            format!(
+                "trupose compensate --calibration {calibration} --program FILE --dialect krl --points computed --out NEW-FILE"
+            ),
         ));
         steps.push((
             "or give the corrected arm to your offline software; other formats:",
-            format!("trupose export --calibration {calibration} --format dh-csv"),
+            format!("trupose export --calibration {calibration} --format dh-csv --out dh.csv"),
         ));
     } else {
         let wait = "do not apply it yet: b goes back to Verify, which says what is missing";
