@@ -112,7 +112,8 @@ mod tests {
             assert_eq!(check(text), Finding::Missing);
             for (at, digit) in written.char_indices().filter(|(_, c)| c.is_ascii_hexdigit()) {
                 let other = if digit == '7' { "8" } else { "7" };
-                let changed = [&written[..at], other, &written[at + 1..]].concat();
+                let mut changed = written.clone();
+                changed.replace_range(at..=at, other);
                 let expected = if changed.contains(MARK) { Finding::Changed } else { Finding::Missing };
                 assert_eq!(check(&changed), expected, "{changed}");
             }

@@ -220,9 +220,9 @@ impl<'a> InverseKinematics<'a> {
     /// The same pose with every joint within its limits by full turns, where that is possible.
     pub fn turned_into_limits(&self, q: &[f64]) -> Vec<f64> {
         let mut turned = q.to_vec();
-        for index in 0..turned.len() {
+        for (index, value) in turned.iter_mut().enumerate() {
             if self.turns_alone(index) {
-                turned[index] = self.within(index, turned[index]);
+                *value = self.within(index, *value);
             }
         }
         turned
@@ -320,9 +320,9 @@ impl<'a> InverseKinematics<'a> {
                 .collect();
             let found = search.from(&start, &Goal::Pose(*base_from_flange));
             let mut q = found.q.clone();
-            for joint in 0..q.len() {
+            for (joint, value) in q.iter_mut().enumerate() {
                 if self.turns_alone(joint) {
-                    q[joint] -= TAU * (q[joint] / TAU).round();
+                    *value -= TAU * (*value / TAU).round();
                 }
             }
             if found.reaches(EXACT) && !solutions.iter().any(|known| is_same(known, &q)) {
@@ -371,6 +371,7 @@ impl<'a> InverseKinematics<'a> {
         }
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "a float to integer cast saturates")]
     fn turns_of(&self, joint: usize, value: f64) -> Vec<f64> {
         if !self.turns_alone(joint) {
             return vec![value];

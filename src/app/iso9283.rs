@@ -49,18 +49,18 @@ fn write_plan<O: Write, E: Write>(args: &TestPlanArgs, console: &mut Console<O, 
         let [x, y, z] = point.coords.map(|value| fixed(to_mm(value), 1)).into();
         format!("({x}, {y}, {z})")
     };
-    let mut text = format!(
+    let mut text = vec![format!(
         "cube with an edge of {} mm, centre {} mm in the base, plane {}\n",
         fixed(to_mm(test.cube.edge), 0),
         mm(&test.cube.centre),
         args.plane
-    );
+    )];
     for (number, point) in (1..).zip(&test.poses) {
-        text.push_str(&format!("P{number} at {} mm\n", mm(point)));
+        text.push(format!("P{number} at {} mm\n", mm(point)));
     }
     let measured = test.rows.iter().filter(|row| row.kind.is_measured()).count();
-    text.push_str(&format!("written: {} ({} to measure)\n", args.out.display(), counted(measured, "pose")));
-    console.print(&text)?;
+    text.push(format!("written: {} ({} to measure)\n", args.out.display(), counted(measured, "pose")));
+    console.print(&text.concat())?;
     console.remark(
         "note: whether the tracker sees the reflector at all five poses is not checked; look before the test, the flange keeps its orientation",
     );

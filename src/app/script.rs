@@ -178,7 +178,6 @@ pub(super) fn session_failure(error: &SessionError) -> Failure {
                 "to continue without this line and those after it, copy the folder and keep the lines before it: 'head -n {} journal.ron > journal.new'",
                 line.saturating_sub(1)
             )),
-        SessionError::Journal { .. } => failure,
         SessionError::Store(StoreError::Write { source, .. })
             if matches!(source.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem) =>
         {
@@ -187,7 +186,7 @@ pub(super) fn session_failure(error: &SessionError) -> Failure {
             )
         }
         SessionError::Store(StoreError::NotOwn { .. }) => failure.hint("a folder that comes from elsewhere may lead to other files: remove the link"),
-        SessionError::Store(_) => failure,
+        SessionError::Journal { .. } | SessionError::Store(_) => failure,
     }
 }
 

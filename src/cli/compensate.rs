@@ -15,6 +15,7 @@ use crate::units::{from_deg, from_mm};
 
 /// Arguments of `compensate`.
 #[derive(Args, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub struct CompensateArgs {
     /// Calibration to apply (calibration.ron)
     #[arg(long, value_name = "RON")]

@@ -88,13 +88,13 @@ impl RejectionReason {
             return Some(Self::Sign { axis });
         }
         // One to nine units of some digit; a unit must be far larger than the scatter, or any difference would do.
-        let units = (-1..=3).map(|power| 10_f64.powi(power) * MILLIMETRE).filter(|unit| *unit > COARSE * close);
+        let mut units = (-1..=3).map(|power| 10_f64.powi(power) * MILLIMETRE).filter(|unit| *unit > COARSE * close);
         let by = |unit: f64| {
             let count = (off[axis] / unit).round();
             let fits = (1.0..=9.0).contains(&count.abs()) && (off[axis] - count * unit).abs() < close;
             fits.then_some(count * unit)
         };
-        units.filter_map(by).next().map(|by| Self::Digit { axis, by })
+        units.find_map(by).map(|by| Self::Digit { axis, by })
     }
 }
 

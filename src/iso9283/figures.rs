@@ -144,6 +144,7 @@ fn about<T: Clone>(value: f64, from: &[T], figure: impl Fn(&[T]) -> f64) -> Esti
         })
         .collect();
     resampled.sort_by(f64::total_cmp);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last index")]
     let at = |share: f64| resampled[((RESAMPLES - 1) as f64 * share).round() as usize];
     Estimate { value, low: at(TAIL), high: at(1.0 - TAIL) }
 }

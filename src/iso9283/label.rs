@@ -29,7 +29,7 @@ pub struct UnknownLabel(String);
 impl fmt::Display for Label {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "c{:02}-P{}", self.cycle, self.pose)?;
-        let letter = self.direction.and_then(|direction| char::from_digit(9 + direction as u32, 36));
+        let letter = self.direction.and_then(|direction| char::from_digit(u32::try_from(9 + direction).ok()?, 36));
         letter.map_or(Ok(()), |letter| write!(f, "{letter}"))
     }
 }

@@ -61,7 +61,7 @@ mod tests {
     fn persistent_names_lead_to_their_devices_and_a_missing_folder_has_none() {
         let folder = tempfile::tempdir().unwrap();
         let device = folder.path().join("ttyUSB7");
-        fs::write(&device, "").unwrap();
+        fs::File::create_new(&device).unwrap();
         let links = folder.path().join("by-id");
         fs::create_dir(&links).unwrap();
         std::os::unix::fs::symlink(&device, links.join("usb-maker-if00")).unwrap();

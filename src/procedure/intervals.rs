@@ -101,6 +101,7 @@ fn widening(poses: usize) -> f64 {
 
 fn interval(mut resampled: Vec<f64>, estimate: f64, widened: f64) -> Option<[f64; 2]> {
     resampled.sort_by(f64::total_cmp);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last index")]
     let at = |share: f64| resampled.get(((resampled.len().saturating_sub(1)) as f64 * share).round() as usize).copied();
     let (low, high) = (at(TAIL)?, at(1.0 - TAIL)?);
     Some([(estimate + (low - estimate) * widened).max(0.0), estimate + (high - estimate) * widened])

@@ -145,7 +145,7 @@ impl<'a> Workspace<'a> {
             return None;
         }
         let total = costs.iter().map(|cost| cost * cost).sum::<f64>().sqrt();
-        let beyond = self.limit_below(profile.acceptance(), total, LARGEST_PER_RMS * total, self.nominal.map(to_mm));
+        let beyond = limit_below(profile.acceptance(), total, LARGEST_PER_RMS * total, self.nominal.map(to_mm));
         let direction = combinations * spread.eigenvectors.column(worst);
         let message = format!(
             "poor excitation: {} of parameters {} on the expected deviations more than on the data, which leaves {} mm rms over the workspace{}; what matters most is the change {}. Spread the poses over the joint ranges, or use a planned pose set",
@@ -186,30 +186,7 @@ impl<'a> Workspace<'a> {
     /// The limit that the prediction exceeds, in words.
     fn beyond(&self, acceptance: &Acceptance, nominal_mm: Option<f64>) -> Option<String> {
         let WorkspaceSummary { rms_mm, p95_mm, .. } = self.summary;
-        self.limit_below(acceptance, rms_mm, p95_mm, nominal_mm)
-    }
-
-    /// The limit that an error of `rms_mm`, and `p95_mm` at 95 % of the configurations, exceeds, in words.
-    fn limit_below(
-        &self,
-        acceptance: &Acceptance,
-        rms_mm: f64,
-        p95_mm: f64,
-        nominal_mm: Option<f64>,
-    ) -> Option<String> {
-        let limits = [
-            (acceptance.position_mean, MEAN_PER_RMS * rms_mm, "mean"),
-            (acceptance.position_rms, rms_mm, "rms"),
-            (acceptance.position_max, p95_mm, "largest"),
-        ];
-        let limit = limits.into_iter().find_map(|(limit, value, name)| {
-            let limit = to_mm(limit?);
-            (value > limit).then(|| format!("the limit of {} mm ({name})", number(limit, 3)))
-        });
-        limit.or_else(|| {
-            let nominal = nominal_mm.filter(|nominal| rms_mm > *nominal)?;
-            Some(format!("the {} mm of the nominal arm where it was measured", number(nominal, 2)))
-        })
+        limit_below(acceptance, rms_mm, p95_mm, nominal_mm)
     }
 
     /// The joint that leaves the measured poses with the largest predicted error.
@@ -284,4 +261,21 @@ fn difference(one: &Arm, other: &Arm, measured: &[&Place], places: &[&Place]) ->
     let moved = register(pairs)?.to_from_from;
     let errors = of(one, places).iter().zip(of(other, places)).map(|(from, to)| (moved * from - to).norm()).collect();
     ErrorStatistics::new(errors).map(|statistics| statistics.rms)
+}
+
+/// The limit that an error of `rms_mm`, and `p95_mm` at 95 % of the configurations, exceeds, in words.
+fn limit_below(acceptance: &Acceptance, rms_mm: f64, p95_mm: f64, nominal_mm: Option<f64>) -> Option<String> {
+    let limits = [
+        (acceptance.position_mean, MEAN_PER_RMS * rms_mm, "mean"),
+        (acceptance.position_rms, rms_mm, "rms"),
+        (acceptance.position_max, p95_mm, "largest"),
+    ];
+    let limit = limits.into_iter().find_map(|(limit, value, name)| {
+        let limit = to_mm(limit?);
+        (value > limit).then(|| format!("the limit of {} mm ({name})", number(limit, 3)))
+    });
+    limit.or_else(|| {
+        let nominal = nominal_mm.filter(|nominal| rms_mm > *nominal)?;
+        Some(format!("the {} mm of the nominal arm where it was measured", number(nominal, 2)))
+    })
 }

@@ -44,6 +44,7 @@ pub struct FanucConfig {
 
 /// Yaskawa manipulator type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a digit of the line RCONF")]
 pub struct Rconf {
     pub is_no_flip: bool,
     pub is_lower_arm: bool,

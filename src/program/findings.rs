@@ -3,7 +3,7 @@
 //! Readers note every value of a position type ([`Definition`]) and every motion instruction ([`Motion`]), in all files.
 //! [`Findings::resolve`] connects them by name.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::configuration::Configuration;
 use super::motion::{
@@ -51,7 +51,7 @@ pub(super) struct Definition {
 }
 
 /// Identity of a variable: names are compared as the language does.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
     /// The routine that declares it; 0: the module.
     pub(super) scope: usize,
@@ -127,7 +127,7 @@ pub(super) struct Findings {
     pub(super) left: Vec<LeftAlone>,
     /// Tool and frame of definitions that are targets although no motion names them, such as the positions of a FANUC program:
     /// they belong to their program alone, and an instruction may compute their number.
-    pub(super) always: HashMap<usize, [Result<Setting, Reason>; 2]>,
+    pub(super) always: BTreeMap<usize, [Result<Setting, Reason>; 2]>,
 }
 
 /// Tool and frame of the moves to a variable.
@@ -181,8 +181,8 @@ impl Findings {
     /// Connects moves and definitions.
     pub(super) fn resolve(mut self, source: &Source<'_>) -> Result<Scan, ProgramError> {
         let names = Names::new(&self.definitions, &self.copies);
-        let mut uses: HashMap<Key, Uses> = HashMap::new();
-        let mut here: HashMap<usize, Uses> = HashMap::new();
+        let mut uses: BTreeMap<Key, Uses> = BTreeMap::new();
+        let mut here: BTreeMap<usize, Uses> = BTreeMap::new();
         for motion in self.motions.iter().flatten() {
             for point in std::iter::once(&motion.point).chain(&motion.via) {
                 match point {
@@ -204,7 +204,7 @@ impl Findings {
             }
         }
         let mut scan = Scan::default();
-        let mut target_of: HashMap<usize, usize> = HashMap::new();
+        let mut target_of: BTreeMap<usize, usize> = BTreeMap::new();
         let mut order: Vec<usize> = (0..self.definitions.len()).collect();
         order.sort_by_key(|index| self.definitions.get(*index).map(Definition::place));
         for index in order {
@@ -238,7 +238,7 @@ impl Findings {
         Ok(scan)
     }
 
-    fn moves(&mut self, source: &Source<'_>, names: &Names, target_of: &HashMap<usize, usize>, scan: &mut Scan) {
+    fn moves(&mut self, source: &Source<'_>, names: &Names, target_of: &BTreeMap<usize, usize>, scan: &mut Scan) {
         let mut path = 0;
         let mut is_new = true;
         for motion in std::mem::take(&mut self.motions) {
@@ -301,17 +301,17 @@ impl Definition {
 
 /// Definitions by name.
 struct Names {
-    by_key: HashMap<Key, Vec<usize>>,
+    by_key: BTreeMap<Key, Vec<usize>>,
     /// Variables with their scope.
-    variables: HashSet<(usize, String)>,
+    variables: BTreeSet<(usize, String)>,
     /// The original of each copy.
-    originals: HashMap<Key, Key>,
+    originals: BTreeMap<Key, Key>,
 }
 
 impl Names {
     fn new(definitions: &[Definition], copies: &[(Key, Key)]) -> Self {
-        let mut by_key: HashMap<Key, Vec<usize>> = HashMap::new();
-        let mut variables = HashSet::new();
+        let mut by_key: BTreeMap<Key, Vec<usize>> = BTreeMap::new();
+        let mut variables = BTreeSet::new();
         for (index, definition) in definitions.iter().enumerate() {
             let key = &definition.key;
             if key.name.is_empty() {
@@ -323,7 +323,7 @@ impl Names {
                 by_key.entry(key.variable()).or_default().push(index);
             }
         }
-        let mut names = Self { by_key, variables, originals: HashMap::new() };
+        let mut names = Self { by_key, variables, originals: BTreeMap::new() };
         names.originals = copies.iter().map(|(copy, original)| (names.scoped(copy), original.clone())).collect();
         names
     }

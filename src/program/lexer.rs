@@ -215,7 +215,7 @@ pub(super) struct Number {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Number(Number),
-    List(Vec<Value>),
+    List(Vec<Self>),
     /// Range of tokens.
     Other(Range<usize>),
 }

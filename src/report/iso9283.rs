@@ -9,42 +9,42 @@ const WIDTH: usize = 80;
 /// The result of a test as text.
 pub fn test_text(summary: &TestSummary) -> String {
     let provenance = &summary.provenance;
-    let mut text = format!(
+    let mut text = vec![format!(
         "Pose and distance figures with the definitions of ISO 9283:1998\n{} ({})\n  {}, {}\n",
         printable(&provenance.robot),
         printable(&provenance.profile),
         provenance.program,
         provenance.created
-    );
+    )];
     for (name, given) in [("load", &summary.load), ("speed", &summary.speed)] {
         let given = given.as_deref().map_or_else(|| "not stated".to_owned(), printable);
-        text.push_str(&format!("  {name}: {given}\n"));
+        text.push(format!("  {name}: {given}\n"));
     }
     let frame = match summary.frame {
         FrameSource::Fitted => "fitted to these same poses",
         FrameSource::Calibration => "as at the identification",
     };
-    text.push_str(&format!("  place of the instrument: {frame}\n\n"));
+    text.push(format!("  place of the instrument: {frame}\n\n"));
     let cycles: Vec<usize> = summary.poses.iter().map(|pose| pose.cycles).collect();
     let cycles = match (cycles.iter().min(), cycles.iter().max()) {
         (Some(fewest), Some(most)) if fewest < most => format!("{fewest} to {most} cycles"),
         (Some(all), _) => counted(*all, "cycle"),
         (None, _) => String::new(),
     };
-    text.push_str(&format!("Poses, {cycles} (mm; in brackets the 95 % interval)\n"));
-    text.push_str(&row(["", "accuracy AP", "AP, corrected", "repeatability RP"]));
+    text.push(format!("Poses, {cycles} (mm; in brackets the 95 % interval)\n"));
+    text.push(row(["", "accuracy AP", "AP, corrected", "repeatability RP"]));
     for pose in &summary.poses {
-        text.push_str(&row([
+        text.push(row([
             &pose.pose,
             &accuracy(Some(&pose.nominal_mm)),
             &accuracy(pose.identified_mm.as_ref()),
             &estimate(&pose.repeatability_mm),
         ]));
     }
-    text.push_str("\nDistances (mm); they do not depend on where the instrument stands\n");
-    text.push_str(&row(["", "accuracy AD", "AD, corrected", "repeatability RD"]));
+    text.push("\nDistances (mm); they do not depend on where the instrument stands\n".to_owned());
+    text.push(row(["", "accuracy AD", "AD, corrected", "repeatability RD"]));
     for distance in &summary.distances {
-        text.push_str(&row([
+        text.push(row([
             &format!("{}-{}", distance.from, distance.to),
             &accuracy(Some(&distance.nominal_mm)),
             &accuracy(distance.identified_mm.as_ref()),
@@ -52,7 +52,7 @@ pub fn test_text(summary: &TestSummary) -> String {
         ]));
     }
     for row in &summary.directions {
-        text.push_str(&format!(
+        text.push(format!(
             "\n{}: accuracy varies by {} mm with {} directions of approach (vAP)",
             row.pose,
             fixed(row.variation_mm, 3),
@@ -60,15 +60,15 @@ pub fn test_text(summary: &TestSummary) -> String {
         ));
     }
     if let Some(drift) = summary.drift_mm {
-        text.push_str(&format!("\nthe accuracy of P1 changes by {} mm over the cycles (dAP)", fixed(drift, 3)));
+        text.push(format!("\nthe accuracy of P1 changes by {} mm over the cycles (dAP)", fixed(drift, 3)));
     }
-    text.push_str("\n\n\"Corrected\": what is left when the identified arm corrects the commands.\n");
-    text.push_str("What differs from the procedure of the standard:\n");
+    text.push("\n\n\"Corrected\": what is left when the identified arm corrects the commands.\n".to_owned());
+    text.push("What differs from the procedure of the standard:\n".to_owned());
     for deviation in &summary.deviations {
         let lines = wrapped(&format!("- {deviation}"), WIDTH - 2);
-        text.push_str(&lines.iter().map(|line| format!("  {line}\n")).collect::<String>());
+        text.extend(lines.iter().map(|line| format!("  {line}\n")));
     }
-    text
+    text.concat()
 }
 
 fn row([name, before, after, repeatability]: [&str; 4]) -> String {

@@ -53,6 +53,8 @@ pub(super) fn look(root: PathBuf, events: Events) {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]
@@ -61,8 +63,8 @@ mod tests {
         for (name, age) in [("a", 30), ("b", 10), ("c", 20)] {
             let folder = root.path().join(name);
             fs::create_dir(&folder).unwrap();
-            let journal = fs::File::create(folder.join("journal.ron")).unwrap();
-            journal.set_modified(SystemTime::now() - std::time::Duration::from_secs(age)).unwrap();
+            let journal = fs::File::create_new(folder.join("journal.ron")).unwrap();
+            journal.set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000 - age)).unwrap();
         }
         fs::create_dir(root.path().join("no-session")).unwrap();
         let names: Vec<String> =

@@ -256,13 +256,7 @@ impl Session {
                 if self.has_measurements() {
                     return Err(misfit("another profile after measuring has begun"));
                 }
-                self.robot = Some(robot(line.number, source, sha256, text)?);
-                self.target = None;
-                self.payload = None;
-                self.rows.clear();
-                self.shown = None;
-                self.last_stop = None;
-                self.plan = None;
+                self.change_robot(robot(line.number, source, sha256, text)?);
             }
             Entry::Step(step) => self.step = *step,
             Entry::Instrument(instrument) => {
@@ -277,11 +271,7 @@ impl Session {
             Entry::Payload(payload) => self.payload = Some(*payload),
             Entry::CirclePoint(point) => {
                 self.measurements = self.measurements.max(point.number);
-                if let Some(robot) = self.robot.as_ref().filter(|_| self.fits(&point.joints)) {
-                    let configuration = from_edge(&point.joints, &robot.joint_types);
-                    self.last_stop = Some(Stop::Passed { pose: "the last circle point".to_owned(), configuration });
-                    self.is_stop_certain = true;
-                }
+                self.pass("the last circle point", &point.joints);
                 self.circle_points.push(point.clone());
             }
             Entry::CirclesDiscarded => self.circle_points.clear(),
@@ -315,11 +305,7 @@ impl Session {
                 self.through_home = None;
             }
             Entry::Passed { pose, joints } => {
-                let robot = self.robot.as_ref().filter(|_| self.fits(joints));
-                let robot = robot.ok_or_else(|| misfit("a stop that does not fit the robot"))?;
-                let configuration = from_edge(joints, &robot.joint_types);
-                self.last_stop = Some(Stop::Passed { pose: pose.clone(), configuration });
-                self.is_stop_certain = true;
+                self.pass(pose, joints).ok_or_else(|| misfit("a stop that does not fit the robot"))?;
                 self.through_home = None;
             }
             Entry::ThroughHome(row) => {
@@ -356,6 +342,32 @@ impl Session {
             }
             Entry::Closed { .. } => self.closed = true,
         }
+        self.advance(line);
+        Ok(())
+    }
+
+    /// Starts again with another robot, for which nothing is planned yet.
+    fn change_robot(&mut self, robot: Robot) {
+        self.robot = Some(robot);
+        self.target = None;
+        self.payload = None;
+        self.rows.clear();
+        self.shown = None;
+        self.last_stop = None;
+        self.plan = None;
+    }
+
+    /// Moves the arm to a stop; `None` if its joint values do not fit the robot.
+    fn pass(&mut self, pose: &str, joints: &[f64]) -> Option<()> {
+        let robot = self.robot.as_ref().filter(|_| self.fits(joints))?;
+        let configuration = from_edge(joints, &robot.joint_types);
+        self.last_stop = Some(Stop::Passed { pose: pose.to_owned(), configuration });
+        self.is_stop_certain = true;
+        Some(())
+    }
+
+    /// Moves on to the time of a line.
+    fn advance(&mut self, line: &Line) {
         if let (Some(before), false) = (self.last, matches!(line.entry, Entry::Resumed { .. })) {
             let seconds = line.time.duration_since(before).as_secs_f64();
             self.worked += if (0.0..LONGEST_STEP).contains(&seconds) { seconds } else { 0.0 };
@@ -363,7 +375,6 @@ impl Session {
         self.last = Some(line.time);
         self.lines = line.number;
         self.latest = self.latest.max(Some(line.time));
-        Ok(())
     }
 
     /// Position of the SMR on the flange, if it is not that of the profile.

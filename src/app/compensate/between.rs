@@ -82,6 +82,11 @@ pub(super) fn deviation(
     start: &[f64],
 ) -> Option<PathReport> {
     let courses = [Course::new(meant), Course::new(commanded)];
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the cast saturates, and no length is negative"
+    )]
     let samples = ((courses[0].length() / SPACING).ceil() as usize).clamp(FEWEST, MOST);
     let mut near = [start.to_vec(), start.to_vec()];
     let mut largest = [0.0_f64; 2];

@@ -73,7 +73,8 @@ impl Pose {
         let rotation = match (self.quaternion_xyzw, self.rpy_deg, self.rotation_vector_rad) {
             (Some([x, y, z, w]), None, None) => {
                 let quaternion = Quaternion::new(w, x, y, z);
-                if !((quaternion.norm() - 1.0).abs() <= QUATERNION_TOLERANCE) {
+                let is_unit = (quaternion.norm() - 1.0).abs() <= QUATERNION_TOLERANCE;
+                if !is_unit {
                     return Err(format!("a quaternion has length {:.4} instead of 1", quaternion.norm()));
                 }
                 UnitQuaternion::from_quaternion(quaternion)

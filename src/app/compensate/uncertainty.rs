@@ -1,6 +1,6 @@
 //! How well a calibration knows the arm at a target: the error that its own samples predict there.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Point3};
 
@@ -23,7 +23,7 @@ impl Uncertainty {
     pub(super) fn new(calibration: &Calibration, arm: &CalibratedArm) -> Option<Self> {
         let dof = arm.identified.chain.dof();
         let joints = arm.identified.chain.joints();
-        let mut seen = HashSet::new();
+        let mut seen = BTreeSet::new();
         let mut places = Vec::new();
         for sample in &calibration.samples {
             let is_usable = sample.joints.len() == dof && sample.target < arm.identified.targets.len();

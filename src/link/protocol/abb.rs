@@ -122,16 +122,16 @@ impl Abb {
         self.phase = Phase::Waiting(now);
         let AbbOptions { user, password, unit } = &self.options;
         let uri = format!("/rw/motionsystem/mechunits/{unit}/jointtarget");
-        let mut request = format!("GET {uri} HTTP/1.1\r\nHost: controller\r\nAccept: application/xhtml+xml\r\n");
+        let mut request = vec![format!("GET {uri} HTTP/1.1\r\nHost: controller\r\nAccept: application/xhtml+xml\r\n")];
         if let Some(challenge) = &mut self.challenge {
             let answer = challenge.answer(user, password, "GET", &uri, CLIENT_NONCE);
-            request.push_str(&format!("Authorization: {answer}\r\n"));
+            request.push(format!("Authorization: {answer}\r\n"));
         }
         if !self.cookies.is_empty() {
-            request.push_str(&format!("Cookie: {}\r\n", self.cookies.join("; ")));
+            request.push(format!("Cookie: {}\r\n", self.cookies.join("; ")));
         }
-        request.push_str("\r\n");
-        self.outbox.send(request.into_bytes());
+        request.push("\r\n".to_owned());
+        self.outbox.send(request.concat().into_bytes());
     }
 
     fn take(&mut self, response: &Response, now: Moment) {

@@ -57,7 +57,7 @@ impl Response {
     /// A content whose length the head states, with that length.
     fn sized(&self, rest: &[u8]) -> Result<Option<(Vec<u8>, usize)>, String> {
         let stated = self.headers("content-length").next();
-        let length = stated.map_or(Ok(0), |text| text.parse().map_err(|_| "its length cannot be read".to_owned()))?;
+        let length = stated.map_or(Some(0), |text| text.parse().ok()).ok_or("its length cannot be read")?;
         if length > MAX_RESPONSE {
             return Err(format!("its content has {length} bytes"));
         }

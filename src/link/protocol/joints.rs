@@ -180,7 +180,7 @@ impl JointLines {
         self.errors.reset();
         self.phase = Phase::Receiving { joints: count, since: now };
         self.outbox.push(ProtocolEvent::Joints(JointState {
-            controller_time: line.time.unwrap_or_else(|| now.as_secs_f64()),
+            controller_time: line.time.unwrap_or(now.as_secs_f64()),
             stopped: line.stopped,
             ..JointState::at(line.positions)
         }));

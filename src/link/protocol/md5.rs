@@ -2,7 +2,7 @@
 
 /// Digest of a text, as 32 hexadecimal digits.
 pub fn md5_hex(text: &str) -> String {
-    digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+    digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
 }
 
 /// Left rotations of the four rounds.

@@ -136,14 +136,15 @@ fn response(status: &str, headers: &str, body: &str) -> Vec<u8> {
 /// The content of the answer for joint values (rad).
 fn joint_target(positions: &[f64], fault: Option<AbbFault>) -> String {
     let joints = if fault == Some(AbbFault::MissingAxis) { 5 } else { 6 };
-    let mut items = String::new();
+    let mut items = Vec::new();
     for joint in 1..=joints {
         let angle = positions.get(joint - 1).copied().unwrap_or(0.0).to_degrees();
         let value =
             if fault == Some(AbbFault::NotANumber) && joint == 6 { "NaN".to_owned() } else { format!("{angle:.7}") };
-        items.push_str(&format!("<span class=\"rax_{joint}\">{value}</span>\n"));
+        items.push(format!("<span class=\"rax_{joint}\">{value}</span>\n"));
     }
-    items.push_str("<span class=\"eax_a\">8.9999998E+09</span>\n");
+    items.push("<span class=\"eax_a\">8.9999998E+09</span>\n".to_owned());
+    let items = items.concat();
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<html xmlns=\"http://www.w3.org/1999/xhtml\">\n<body>\n<div class=\"state\">\n\
          <ul><li class=\"ms-jointtarget\" title=\"ROB_1 SIMULATED\">\n{items}</li></ul>\n</div>\n</body>\n</html>\n"

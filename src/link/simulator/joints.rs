@@ -62,7 +62,7 @@ impl JointsSimulator {
         if fault == Some(JointsFault::NotANumber)
             && let Some(last) = values.last_mut()
         {
-            *last = "NaN".to_owned();
+            "NaN".clone_into(last);
         }
         let unit = match fault {
             Some(JointsFault::NoUnit) => "",

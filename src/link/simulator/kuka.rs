@@ -106,7 +106,7 @@ fn axes(positions: &[f64], fault: Option<KukaFault>) -> String {
     if fault == Some(KukaFault::NotANumber)
         && let Some(last) = fields.last_mut()
     {
-        *last = "A6 1.#INF".to_owned();
+        "A6 1.#INF".clone_into(last);
     }
     fields.extend((1..=6).map(|axis| format!("E{axis} 0.0")));
     format!("{{E6AXIS: {}}}", fields.join(", "))

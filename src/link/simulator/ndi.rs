@@ -121,6 +121,7 @@ impl NdiSimulator {
 
     /// Puts the tracker on a serial line at this speed, opened by the other side at `peer` (baud).
     #[cfg(test)]
+    #[must_use]
     pub fn on_serial_line(mut self, speed: u32, peer: u32) -> Self {
         self.line = Some(Line { own: speed, peer, resets: 0 });
         self
@@ -166,11 +167,11 @@ impl NdiSimulator {
             "INIT:" => self.initialise(),
             // The only reply that clients do not parse, so it marks the tracker as simulated.
             "APIREV:" => "G.003.001 SIMULATED".to_owned(),
-            "PHSR:00" => self.handles(true, "001"),
+            "PHSR:00" => Self::handles(true, "001"),
             "PHSR:01" => "00".to_owned(),
-            "PHSR:02" => self.handles(!self.is_initialised, "001"),
-            "PHSR:03" => self.handles(self.is_initialised && !self.is_enabled, "011"),
-            "PHSR:04" => self.handles(self.is_enabled, "031"),
+            "PHSR:02" => Self::handles(!self.is_initialised, "001"),
+            "PHSR:03" => Self::handles(self.is_initialised && !self.is_enabled, "011"),
+            "PHSR:04" => Self::handles(self.is_enabled, "031"),
             // What clients ask about the tool and the version, load as its definition, or let sound.
             "PHINF:0A0001" => format!("02000000NDI         001000000012{}", if self.is_enabled { "1" } else { "0" }),
             "PHF:0A" => "OKAY".to_owned(),
@@ -213,7 +214,7 @@ impl NdiSimulator {
     }
 
     /// The list of port handles, if it has one.
-    fn handles(&self, has_one: bool, status: &str) -> String {
+    fn handles(has_one: bool, status: &str) -> String {
         if has_one { format!("01{HANDLE:02X}{status}") } else { "00".to_owned() }
     }
 

@@ -176,6 +176,8 @@ impl RtdeSimulator {
 
     /// Sets up a recipe from a frequency and names. It is accepted only if every name is known.
     fn set_up(&mut self, content: &[u8]) {
+        const JOINTS: &[&str] = &["actual_q"];
+        const MODES: &[&str] = &["robot_mode", "safety_mode", "safety_status"];
         let Some((frequency, names)) = content.split_first_chunk::<8>() else { return };
         let names = String::from_utf8_lossy(names);
         let mut fields = Vec::new();
@@ -185,8 +187,6 @@ impl RtdeSimulator {
             fields.extend(kind.map(|kind| (name.to_owned(), kind)));
             types.push(kind.map_or("NOT_FOUND", Kind::name));
         }
-        const JOINTS: &[&str] = &["actual_q"];
-        const MODES: &[&str] = &["robot_mode", "safety_mode", "safety_status"];
         for (fault, affected, answer) in [
             (RtdeFault::NotFound, JOINTS, "NOT_FOUND"),
             (RtdeFault::NoSafetyStatus, &["safety_status"], "NOT_FOUND"),

@@ -26,8 +26,8 @@ pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
     let limits =
         FIELDS.map(|name| inside.get_or(name, None, |ast| positive(ast, findings).map(|limit| Some(from_mm(limit)))));
     let [position_mean, position_rms, position_max, distance_mean, distance_rms, distance_max] = limits;
-    check_limits(ast, "position", [position_mean, position_rms, position_max], findings);
-    check_limits(ast, "distance", [distance_mean, distance_rms, distance_max], findings);
+    check_limits(ast, "position", [position_mean, position_rms, position_max].map(Option::flatten), findings);
+    check_limits(ast, "distance", [distance_mean, distance_rms, distance_max].map(Option::flatten), findings);
     Some(Acceptance {
         position_mean: position_mean?,
         position_rms: position_rms?,
@@ -39,8 +39,8 @@ pub(super) fn acceptance(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
 }
 
 /// Warns about limits of one error that cannot be meant.
-fn check_limits(ast: &Ast, of: &str, [mean, rms, max]: [Option<Option<f64>>; 3], findings: &mut Findings<'_>) {
-    let named = [("mean", mean.flatten()), ("rms", rms.flatten()), ("max", max.flatten())];
+fn check_limits(ast: &Ast, of: &str, [mean, rms, max]: [Option<f64>; 3], findings: &mut Findings<'_>) {
+    let named = [("mean", mean), ("rms", rms), ("max", max)];
     let set: Vec<(&str, f64)> = named.into_iter().filter_map(|(name, limit)| Some((name, limit?))).collect();
     // The mean of an error is never above its rms, nor that above its maximum.
     for (lower, upper) in set.iter().zip(set.iter().skip(1)).filter(|(lower, upper)| lower.1 > upper.1) {

@@ -235,7 +235,7 @@ fn joint_range(inside: &Fields<'_>, joint_type: JointType, findings: &mut Findin
     let limits = limits?;
     is_valid.then_some(JointRange {
         limits,
-        planning_limits: planning?.or(limits.map(|limits| JointRange::usual_planning_limits(joint_type, limits))),
+        planning_limits: planning?.or_else(|| Some(JointRange::usual_planning_limits(joint_type, limits?))),
         max_speed: max_speed?,
         pulses_per_degree: pulses_per_degree?,
     })

@@ -197,6 +197,7 @@ fn the_link_of_the_cell_arrives_with_its_addresses_in_full() {
 
 /// What a joint can turn beyond half a turn is for cables to decide, and an arm must not be planned below its own base.
 #[test]
+#[expect(clippy::float_cmp, reason = "rounded to whole degrees")]
 fn plans_stay_within_half_a_turn_and_above_the_floor_unless_stated() {
     let of = |joint: &str, more: &str| {
         let text = format!(

@@ -1,6 +1,6 @@
 //! Reads FANUC TP programs (`.LS`): positions of group 1 and the motion lines that use them; frames of `.VA` files.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::Isometry3;
@@ -14,7 +14,7 @@ use super::super::orientation::Orientation;
 
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let mut findings = Findings::default();
-    let mut frames = HashMap::new();
+    let mut frames = BTreeMap::new();
     for (_, text) in source.files() {
         known_frames(text, &mut frames);
     }
@@ -134,7 +134,7 @@ fn mentions(text: &str) -> Vec<Mention<'_>> {
     found
 }
 
-fn motion(statement: &Statement, positions: &HashMap<String, Position>, findings: &mut Findings) {
+fn motion(statement: &Statement, positions: &BTreeMap<String, Position>, findings: &mut Findings) {
     let text = statement.text.as_str();
     let all = mentions(text);
     let way = match text.as_bytes() {
@@ -208,10 +208,10 @@ fn key(number: &str) -> Key {
 fn positions(
     source: &Source<'_>,
     findings: &mut Findings,
-    frames: &HashMap<String, Isometry3<f64>>,
-) -> HashMap<String, Position> {
+    frames: &BTreeMap<String, Isometry3<f64>>,
+) -> BTreeMap<String, Position> {
     let text = source.program;
-    let mut positions = HashMap::new();
+    let mut positions = BTreeMap::new();
     let mut is_positions = false;
     let mut open: Option<Header> = None;
     for (line, place) in lines(text) {
@@ -262,8 +262,8 @@ impl Header {
 fn close(
     source: &Source<'_>,
     findings: &mut Findings,
-    frames: &HashMap<String, Isometry3<f64>>,
-    positions: &mut HashMap<String, Position>,
+    frames: &BTreeMap<String, Isometry3<f64>>,
+    positions: &mut BTreeMap<String, Position>,
     header: Option<Header>,
     end: usize,
 ) {
@@ -321,7 +321,7 @@ fn group(text: &[u8], range: Range<usize>) -> Option<Range<usize>> {
 struct Body {
     /// Name and place of the number, with the blanks in front of it.
     numbers: Vec<(String, Range<usize>, Option<f64>)>,
-    words: HashMap<String, String>,
+    words: BTreeMap<String, String>,
 }
 
 impl Body {
@@ -455,15 +455,21 @@ fn find(text: &[u8], mark: &[u8]) -> Option<usize> {
     text.windows(mark.len()).position(|window| window == mark)
 }
 
-/// `[1,5] =`: the number of an entry of group 1, or `Some(None)` for another group.
-fn entry(line: &str) -> Option<Option<u32>> {
+/// The beginning of an entry, as `[1,5] =`.
+struct Entry {
+    number: u32,
+    /// Whether it belongs to group 1, the arm.
+    is_of_arm: bool,
+}
+
+fn entry(line: &str) -> Option<Entry> {
     let (inside, rest) = line.trim().strip_prefix('[')?.split_once(']')?;
     if !rest.trim_start().starts_with('=') {
         return None;
     }
     let (group, number) = inside.split_once(',')?;
     let number = number.trim().parse().ok()?;
-    Some((group.trim() == "1").then_some(number))
+    Some(Entry { number, is_of_arm: group.trim() == "1" })
 }
 
 /// Positions registers of a `posreg.va`.
@@ -471,7 +477,7 @@ fn registers(text: &[u8]) -> Vec<LeftAlone> {
     let mut left = Vec::new();
     for (line, place) in lines(text) {
         let content = latin(text.get(place).unwrap_or_default());
-        if let Some(Some(number)) = entry(&content) {
+        if let Some(Entry { number, is_of_arm: true }) = entry(&content) {
             left.push(LeftAlone { line, name: Some(format!("PR[{number}]")), reason: Reason::Register });
         }
     }
@@ -479,7 +485,7 @@ fn registers(text: &[u8]) -> Vec<LeftAlone> {
 }
 
 /// Tools and frames of a variable file: `$MNUTOOL` and `$MNUFRAME`.
-fn known_frames(text: &[u8], frames: &mut HashMap<String, Isometry3<f64>>) {
+fn known_frames(text: &[u8], frames: &mut BTreeMap<String, Isometry3<f64>>) {
     if find(text, b"$MNUTOOL").is_none() && find(text, b"$MNUFRAME").is_none() {
         return;
     }
@@ -497,8 +503,8 @@ fn known_frames(text: &[u8], frames: &mut HashMap<String, Isometry3<f64>>) {
             open = None;
         }
         let Some(kind) = kind else { continue };
-        if let Some(number) = entry(&line) {
-            open = number.map(|number| (format!("{kind}[{number}]"), Vec::new()));
+        if let Some(Entry { number, is_of_arm }) = entry(&line) {
+            open = is_of_arm.then(|| (format!("{kind}[{number}]"), Vec::new()));
             continue;
         }
         let Some((name, values)) = open.as_mut() else { continue };

@@ -1,7 +1,7 @@
 //! Reads INFORM jobs (`.JBI`): positions in pulses, angles or coordinates, and the moves that use them; tools and user frames of
 //! `TOOL.CND` and `UFRAME.CND`.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::Isometry3;
@@ -14,11 +14,11 @@ use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
 
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
-    let mut frames = HashMap::new();
+    let mut frames = BTreeMap::new();
     for (_, text) in source.files() {
         known_frames(text, &mut frames);
     }
-    let mut job = Job { source, frames, settings: HashMap::new(), has_base: false, state: State::default() };
+    let mut job = Job { source, frames, settings: BTreeMap::new(), has_base: false, state: State::default() };
     let mut findings = Findings::default();
     let text = source.program;
     job.has_base = lines(text).any(|(_, _, line)| line.starts_with("BC") || line.starts_with("BP"));
@@ -74,9 +74,9 @@ struct State {
 
 struct Job<'a> {
     source: &'a Source<'a>,
-    frames: HashMap<String, Isometry3<f64>>,
+    frames: BTreeMap<String, Isometry3<f64>>,
     /// Tool and frame of each position.
-    settings: HashMap<String, [Result<Setting, Reason>; 2]>,
+    settings: BTreeMap<String, [Result<Setting, Reason>; 2]>,
     /// Base axes, such as a track, carry the arm.
     has_base: bool,
     state: State,
@@ -185,7 +185,6 @@ impl Job<'_> {
             "MOVJ" => Some(Way::Joint),
             "MOVL" | "MOVS" | "EIMOVL" => Some(Way::Linear),
             "MOVC" | "EIMOVC" => Some(Way::Circular),
-            "IMOV" => None,
             "SFTON" | "SFTOF" => {
                 *is_shifted = name == "SFTON";
                 None
@@ -257,7 +256,7 @@ fn rconf(text: &str) -> Option<Rconf> {
 }
 
 /// Tools of `TOOL.CND` (the first row of numbers) and user frames of `UFRAME.CND` (`///BUSER`).
-fn known_frames(text: &[u8], frames: &mut HashMap<String, Isometry3<f64>>) {
+fn known_frames(text: &[u8], frames: &mut BTreeMap<String, Isometry3<f64>>) {
     let mut open: Option<String> = None;
     for (_, _, line) in lines(text) {
         if let Some(number) = line.strip_prefix("//TOOL ") {

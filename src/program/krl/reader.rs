@@ -1,6 +1,6 @@
 //! Reads KRL: aggregates of position types and the motion instructions that use them, in `.src` and `.dat` files.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use nalgebra::Isometry3;
@@ -126,11 +126,11 @@ impl Type {
 
 struct Module<'a> {
     source: &'a Source<'a>,
-    types: HashMap<(usize, String), Type>,
-    parameters: HashSet<(usize, String)>,
+    types: BTreeMap<(usize, String), Type>,
+    parameters: BTreeSet<(usize, String)>,
     /// Frames by lower-case name, such as `tool_data[1]`.
-    frames: HashMap<String, Isometry3<f64>>,
-    frame_data: HashMap<String, FrameData>,
+    frames: BTreeMap<String, Isometry3<f64>>,
+    frame_data: BTreeMap<String, FrameData>,
     state: State,
     /// The only tool and base that a file sets.
     set: State,
@@ -176,10 +176,10 @@ impl<'a> Module<'a> {
     fn new(source: &'a Source<'a>) -> Self {
         Self {
             source,
-            types: HashMap::new(),
-            parameters: HashSet::new(),
-            frames: HashMap::new(),
-            frame_data: HashMap::new(),
+            types: BTreeMap::new(),
+            parameters: BTreeSet::new(),
+            frames: BTreeMap::new(),
+            frame_data: BTreeMap::new(),
             state: State::default(),
             set: State::default(),
             routine: 0,

@@ -1,6 +1,6 @@
 //! Reads RAPID: `robtarget` and `jointtarget` data and the motion instructions that use them.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use nalgebra::Isometry3;
@@ -63,11 +63,11 @@ struct Module<'a> {
     source: &'a Source<'a>,
     /// Number of each axis of the controller, in the order of the arm.
     axes: Vec<usize>,
-    types: HashMap<(usize, String), Type>,
+    types: BTreeMap<(usize, String), Type>,
     /// Parameters of routines that are positions.
-    parameters: HashSet<(usize, String)>,
-    tools: HashMap<String, Result<Isometry3<f64>, Reason>>,
-    frames: HashMap<String, Result<Isometry3<f64>, Reason>>,
+    parameters: BTreeSet<(usize, String)>,
+    tools: BTreeMap<String, Result<Isometry3<f64>, Reason>>,
+    frames: BTreeMap<String, Result<Isometry3<f64>, Reason>>,
     scopes: usize,
     /// A program displacement moves all targets.
     is_displaced: bool,
@@ -120,10 +120,10 @@ impl<'a> Module<'a> {
         Self {
             source,
             axes: axes(source),
-            types: HashMap::new(),
-            parameters: HashSet::new(),
-            tools: HashMap::new(),
-            frames: HashMap::new(),
+            types: BTreeMap::new(),
+            parameters: BTreeSet::new(),
+            tools: BTreeMap::new(),
+            frames: BTreeMap::new(),
             scopes: 0,
             is_displaced: false,
         }
@@ -331,7 +331,7 @@ impl<'a> Module<'a> {
     /// Notes positions that are handed to a routine.
     fn call(&self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
         let routine = statement.tokens.name(statement.range.start);
-        self.other_uses(statement, findings, statement.range.start + 1..statement.range.end, routine);
+        self.other_uses(statement, findings, statement.range.start + 1..statement.range.end, routine.as_deref());
     }
 
     fn other_uses(
@@ -339,7 +339,7 @@ impl<'a> Module<'a> {
         statement: &Statement<'_, 'a>,
         findings: &mut Findings,
         range: Range<usize>,
-        routine: Option<String>,
+        routine: Option<&str>,
     ) {
         let tokens = statement.tokens;
         let mut is_offset = false;
@@ -353,9 +353,9 @@ impl<'a> Module<'a> {
             if !self.kind_of(&key).is_some_and(Type::is_position) {
                 continue;
             }
-            let reason = match &routine {
+            let reason = match routine {
                 _ if is_offset => Reason::OffsetBase,
-                Some(routine) => Reason::PassedTo(routine.clone()),
+                Some(routine) => Reason::PassedTo(routine.to_owned()),
                 None => continue,
             };
             findings.other_uses.push(OtherUse { key, reason });
@@ -562,7 +562,7 @@ fn setting(
     tokens: &Tokens<'_>,
     range: Option<Range<usize>>,
     own: &str,
-    known: &HashMap<String, Result<Isometry3<f64>, Reason>>,
+    known: &BTreeMap<String, Result<Isometry3<f64>, Reason>>,
 ) -> Result<Setting, Reason> {
     let Some(range) = range else { return Ok(Setting::Named(own.to_owned())) };
     let name = if range.len() == 1 { tokens.name(range.start).unwrap_or_default() } else { tokens.source(range) };

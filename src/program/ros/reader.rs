@@ -67,7 +67,7 @@ impl Trajectories<'_> {
                     match (key.as_str(), child) {
                         ("points", Node::List(points)) => points.iter().for_each(|point| self.point(point, names)),
                         (_, Node::Map(_)) if is_publisher && child.get("positions").is_some() => {
-                            self.point(child, names)
+                            self.point(child, names);
                         }
                         _ => self.visit(child, names, depth + 1),
                     }
@@ -87,13 +87,11 @@ impl Trajectories<'_> {
         let found = scalars.filter(|names| !names.is_empty())?;
         let order = self.order(&found);
         self.is_any_known |= order.is_some();
-        Some(match order {
-            Some(order) => Names::Arm(order, found.len()),
-            None => {
-                self.foreign.get_or_insert(found);
-                Names::Foreign
-            }
-        })
+        let Some(order) = order else {
+            self.foreign.get_or_insert(found);
+            return Some(Names::Foreign);
+        };
+        Some(Names::Arm(order, found.len()))
     }
 
     fn order(&self, found: &[String]) -> Option<Vec<usize>> {

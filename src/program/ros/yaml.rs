@@ -7,7 +7,7 @@ use std::ops::Range;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Node {
     Scalar(Scalar),
-    List(Vec<Node>),
+    List(Vec<Self>),
     Map(Vec<Entry>),
 }
 
@@ -273,10 +273,7 @@ impl Reader<'_> {
                     self.step();
                     break;
                 }
-                Some(b',') => {
-                    self.step();
-                    continue;
-                }
+                Some(b',') => self.step(),
                 // A bracket that does not fit: the file is broken here.
                 Some(b']' | b'}') => {
                     self.step();

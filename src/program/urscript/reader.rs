@@ -1,6 +1,6 @@
 //! Reads URScript: literal joint vectors and poses, and the motion functions that use them, as PolyScope and people write them.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::Isometry3;
@@ -21,7 +21,7 @@ const TCP: &str = "tcp";
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let files: Vec<Tokens<'_>> = source.files().map(|(_, text)| Tokens::new(text, RULES)).collect();
     let mut findings = Findings::default();
-    let mut script = Script { joints: source.robot.chain.dof(), constants: HashMap::new() };
+    let mut script = Script { joints: source.robot.chain.dof(), constants: BTreeMap::new() };
     for (file, tokens) in files.iter().enumerate() {
         script.collect(tokens, &statement_ends(tokens), file);
     }
@@ -52,11 +52,13 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     findings.resolve(source)
 }
 
+/// Literal value of a variable with the place of the assignment.
+type Assigned = ((usize, usize), Constant);
+
 /// Constants of all files.
 struct Script {
     joints: usize,
-    /// Literal values of each variable with the place of the assignment.
-    constants: HashMap<String, Vec<((usize, usize), Constant)>>,
+    constants: BTreeMap<String, Vec<Assigned>>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -421,10 +423,9 @@ impl Instruction {
     fn named(name: &str) -> Option<Self> {
         let (way, keywords): (Way, &'static [&'static str]) = match name {
             "movej" | "optimovej" => (Way::Joint, &["q"]),
-            "movel" | "movep" | "optimovel" => (Way::Linear, &["pose"]),
+            "movel" | "movep" | "optimovel" | "servoc" | "servol" => (Way::Linear, &["pose"]),
             "movec" => (Way::Circular, &["pose_via", "pose_to"]),
             "servoj" => (Way::Streamed, &["q"]),
-            "servoc" | "servol" => (Way::Linear, &["pose"]),
             _ => return None,
         };
         Some(Self { way, keywords })

@@ -1,6 +1,6 @@
 //! Reads VAL3: joints and points in data files (`.dtx`, of both XML forms), and the moves of programs (`.pgx`) that use them.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::Isometry3;
@@ -17,7 +17,7 @@ const RULES: Rules = Rules { comment: b"//", quotes: b"\"", in_words: b"" };
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let files: Vec<Xml<'_>> = source.files().map(|(_, text)| Xml::read(text)).collect();
     let mut application =
-        Application { source, frames: HashMap::new(), tools: HashMap::new(), fathers: HashMap::new() };
+        Application { source, frames: BTreeMap::new(), tools: BTreeMap::new(), fathers: BTreeMap::new() };
     let mut findings = Findings::default();
     for (file, xml) in files.iter().enumerate() {
         application.data(xml, file, &mut findings);
@@ -65,17 +65,14 @@ impl Tag {
         let mut behind =
             self.attributes.iter().find(|(name, _)| name == "key").map_or(self.name_end, |(_, key)| key.end + 1);
         for name in names {
-            match self.place(name) {
-                Some(place) => {
-                    let value = as_str(text, place.clone()).trim().parse::<f64>().ok();
-                    numbers.push(value.filter(|value| value.is_finite()).ok_or(Reason::Unreadable)?);
-                    behind = place.end + 1;
-                    slots.push(Slot::at(place));
-                }
-                None => {
-                    numbers.push(0.0);
-                    slots.push(Slot { attribute: Some(name.clone()), ..Slot::at(behind..behind) });
-                }
+            if let Some(place) = self.place(name) {
+                let value = as_str(text, place.clone()).trim().parse::<f64>().ok();
+                numbers.push(value.filter(|value| value.is_finite()).ok_or(Reason::Unreadable)?);
+                behind = place.end + 1;
+                slots.push(Slot::at(place));
+            } else {
+                numbers.push(0.0);
+                slots.push(Slot { attribute: Some(name.clone()), ..Slot::at(behind..behind) });
             }
         }
         Ok((slots, numbers))
@@ -172,6 +169,7 @@ fn next(text: &[u8], from: usize, mark: &[u8]) -> Option<usize> {
     rest.windows(mark.len()).position(|window| window == mark).map(|at| from + at)
 }
 
+#[expect(clippy::naive_bytecount, reason = "every byte is counted once")]
 fn newlines(text: &[u8], range: Range<usize>) -> usize {
     text.get(range).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count()
 }
@@ -219,10 +217,10 @@ struct Open {
 
 struct Application<'a> {
     source: &'a Source<'a>,
-    frames: HashMap<String, Child>,
-    tools: HashMap<String, Child>,
+    frames: BTreeMap<String, Child>,
+    tools: BTreeMap<String, Child>,
     /// Frame of each point, by `name[index]`.
-    fathers: HashMap<String, Option<String>>,
+    fathers: BTreeMap<String, Option<String>>,
 }
 
 const POSE: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -329,7 +327,7 @@ impl Application<'_> {
     }
 
     /// The frame or tool of this name in the world or the flange, through all that it is relative to.
-    fn chain(known: &HashMap<String, Child>, name: &str, root: &str) -> Setting {
+    fn chain(known: &BTreeMap<String, Child>, name: &str, root: &str) -> Setting {
         let mut pose = Isometry3::identity();
         let mut at = indexed(name);
         for _ in 0..DEEPEST {
@@ -357,12 +355,10 @@ impl Application<'_> {
                     "movel" => self.motion(tokens, file, findings, at, Way::Linear, inside),
                     "movec" => self.motion(tokens, file, findings, at, Way::Circular, inside),
                     _ if tokens.is_word(at.wrapping_sub(1), "call") => {
-                        for place in inside {
-                            let Some(argument) = tokens.name(place) else { continue };
-                            let key = Key { scope: 0, name: argument, element: String::new() };
-                            let reason = Reason::PassedTo(name.to_owned());
-                            findings.other_uses.push(OtherUse { key, reason });
-                        }
+                        findings.other_uses.extend(inside.filter_map(|place| {
+                            let key = Key { scope: 0, name: tokens.name(place)?, element: String::new() };
+                            Some(OtherUse { key, reason: Reason::PassedTo(name.to_owned()) })
+                        }));
                     }
                     _ => {}
                 }

@@ -142,13 +142,11 @@ fn target(session: &Session) -> Option<String> {
 
 /// What the flange carried: as stated in the session, else as the profile says.
 fn payload(session: &Session) -> Option<String> {
-    match session.payload {
-        Some(stated) => Some(stated.to_string()),
-        None => {
-            let of_profile = session.robot.as_ref()?.profile.payload()?;
-            Some(format!("as the profile says: {}", PayloadText::of(of_profile)))
-        }
+    if let Some(stated) = session.payload {
+        return Some(stated.to_string());
     }
+    let of_profile = session.robot.as_ref()?.profile.payload()?;
+    Some(format!("as the profile says: {}", PayloadText::of(of_profile)))
 }
 
 fn temperature(session: &Session) -> Option<TemperaturePart> {

@@ -150,8 +150,9 @@ impl Orientation {
             UnitQuaternion::from_axis_angle(&axis, angle)
         };
         match (self.form, values) {
-            (Form::FixedXyz, &[x, y, z]) => Ok(UnitQuaternion::from_euler_angles(x, y, z)),
-            (Form::MovingZyx, &[z, y, x]) => Ok(UnitQuaternion::from_euler_angles(x, y, z)),
+            (Form::FixedXyz, &[x, y, z]) | (Form::MovingZyx, &[z, y, x]) => {
+                Ok(UnitQuaternion::from_euler_angles(x, y, z))
+            }
             (Form::RotationVector, &[x, y, z]) => Ok(UnitQuaternion::from_scaled_axis(Vector3::new(x, y, z))),
             (Form::Fixed([one, two, three]), &[a, b, c]) => Ok(about(three, c) * about(two, b) * about(one, a)),
             (Form::Moving([one, two, three]), &[a, b, c]) => Ok(about(one, a) * about(two, b) * about(three, c)),

@@ -311,7 +311,7 @@ fn latin_1_names_do_not_spoil_a_line() {
     let parser = LineParser::new(Preset::NameXyz.options()).unwrap();
     match parser.read(b"Pr\xFCfpunkt,1,2,3") {
         Ok(ParsedLine::Point(shot)) => {
-            assert!(shot.remarks.iter().any(|remark| remark.text == "Pr\u{fc}fpunkt"), "{shot:?}")
+            assert!(shot.remarks.iter().any(|remark| remark.text == "Pr\u{fc}fpunkt"), "{shot:?}");
         }
         other => panic!("{other:?}"),
     }

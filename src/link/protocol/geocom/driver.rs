@@ -505,14 +505,13 @@ impl SetUpResult {
         let scaled = |ppm: f64| Err(Failure::Scaled(1.0 + ppm * 1e-6));
         match self.air {
             Some(air) if (corrections.total - air).abs() > SCALE_TOLERANCE => return scaled(corrections.total - air),
-            Some(_) => {}
             None if !POSSIBLE_AIR.contains(&corrections.total) => return scaled(corrections.total),
             None if corrections.total.abs() > SUSPICIOUS_AIR => self.warnings.push(format!(
                 "distances are corrected by {:.1} ppm in all, and the instrument does not report how much of it is for the air: \
                  make sure that no scale or map projection is set",
                 corrections.total
             )),
-            None => {}
+            Some(_) | None => {}
         }
         self.checked.push(format!("correction of distances: {:.2} ppm for the air, no scale", corrections.total));
         Ok(())

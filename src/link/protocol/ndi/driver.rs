@@ -196,7 +196,7 @@ impl NdiProtocol {
         match (std::mem::replace(&mut self.phase, Phase::Closed), error) {
             (Phase::Closed, _) => {}
             // Even an error shows that the speed is right.
-            (Phase::Line(step), _) => self.next_line_step(self.line.map(|line| line.answered(step)), now),
+            (Phase::Line(step), _) => self.next_line_step(self.line.and_then(|line| line.answered(step)), now),
             (Phase::SetUp(step), Some(code)) if !step.is_optional() => self.lose(failure_of_error(code)),
             (Phase::SetUp(step), error) => self.next_step(step, frame, error.is_some(), now),
             (Phase::Idle, _) => {
@@ -212,26 +212,24 @@ impl NdiProtocol {
     }
 
     /// Does the next step on the serial line; without one, the set-up begins.
-    fn next_line_step(&mut self, next: Option<Option<LineStep>>, now: Moment) {
+    fn next_line_step(&mut self, next: Option<LineStep>, now: Moment) {
         let Some(line) = self.line else { return self.begin_set_up(now) };
-        let Some(step) = next.flatten() else {
+        let Some(step) = next else {
             // Whatever the speed was, from now on it is the one that was asked for.
             self.line_change = Some(LineChange::Speed(line.speed()));
             self.phase = Phase::SetUp(SetUpStep::Initialise);
             return self.ask_at(SetUpStep::Initialise.command(), now + DRAIN);
         };
-        self.line_change = line.change_before(step);
+        self.line_change = step.change_before();
         self.phase = Phase::Line(step);
-        match line.command(step) {
-            Some(command) => self.ask_at(command, now + DRAIN),
-            None => {
-                // After a break the instrument reports its reset without a command.
-                let limit = LineStep::RESET_LIMIT;
-                self.ask_at(String::new(), now + limit);
-                if let Some(pending) = &mut self.pending {
-                    (pending.is_sent, pending.limit, pending.resends) = (true, limit, MAX_RESENDS);
-                }
-            }
+        if let Some(command) = line.command(step) {
+            return self.ask_at(command, now + DRAIN);
+        }
+        // After a break the instrument reports its reset without a command.
+        let limit = LineStep::RESET_LIMIT;
+        self.ask_at(String::new(), now + limit);
+        if let Some(pending) = &mut self.pending {
+            (pending.is_sent, pending.limit, pending.resends) = (true, limit, MAX_RESENDS);
         }
     }
 
@@ -383,17 +381,16 @@ impl NdiProtocol {
         self.unanswered = self.unanswered.saturating_add(1);
         match self.phase {
             Phase::Closed => {}
-            Phase::Line(step) => match self.line.and_then(|line| line.unanswered(step)) {
-                Some(next) => {
+            Phase::Line(step) => {
+                if let Some(next) = self.line.and_then(|line| line.unanswered(step)) {
                     self.decoder.resync();
                     self.owed = 0;
-                    self.next_line_step(Some(Some(next)), now);
-                }
-                None => {
+                    self.next_line_step(Some(next), now);
+                } else {
                     self.line_change = self.line.map(|line| LineChange::Speed(line.speed()));
                     self.lose(failure);
                 }
-            },
+            }
             Phase::SetUp(_) => self.lose(failure),
             Phase::Idle if self.unanswered >= MAX_UNANSWERED => self.lose(failure),
             Phase::Idle => {

@@ -26,6 +26,15 @@ impl LineStep {
 
     /// A command that every instrument answers in every mode.
     pub(super) const PROBE: &str = "APIREV:";
+
+    /// Change of the line before the command of the step.
+    pub(super) const fn change_before(self) -> Option<LineChange> {
+        match self {
+            Self::AtFactorySpeed => Some(LineChange::Speed(FACTORY_SPEED)),
+            Self::Reset => Some(LineChange::Break),
+            Self::AtSpeed | Self::SetSpeed => None,
+        }
+    }
 }
 
 /// A serial line with its wanted speed.
@@ -64,15 +73,6 @@ impl SerialLine {
             LineStep::Reset => None,
             // Eight data bits, no parity, one stop bit, no handshake.
             LineStep::SetSpeed => self.code().map(|code| format!("COMM:{code}0000")),
-        }
-    }
-
-    /// Change of the line before the command of a step.
-    pub(super) const fn change_before(self, step: LineStep) -> Option<LineChange> {
-        match step {
-            LineStep::AtFactorySpeed => Some(LineChange::Speed(FACTORY_SPEED)),
-            LineStep::Reset => Some(LineChange::Break),
-            LineStep::AtSpeed | LineStep::SetSpeed => None,
         }
     }
 

@@ -273,7 +273,7 @@ fn states_with_a_person_in_the_cell_can_be_measured_and_are_kept_as_a_remark() {
 fn older_controllers_are_asked_for_less_and_their_safety_mode_serves_as_well() {
     let asked = |bench: &RtdeBench| {
         let text: Vec<String> = bench.sent.iter().map(|sent| String::from_utf8_lossy(sent).into_owned()).collect();
-        text.iter().filter_map(|sent| Some(sent[sent.find("timestamp")?..].to_owned())).collect::<Vec<_>>()
+        text.iter().filter_map(|sent| Some(sent.get(sent.find("timestamp")?..)?.to_owned())).collect::<Vec<_>>()
     };
     let mut old = ready(&[Planned::always(RtdeFault::NoSafetyStatus), Planned::always(RtdeFault::Reduced)]);
     let first = "timestamp,actual_q,robot_mode,safety_status";

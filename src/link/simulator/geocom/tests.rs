@@ -119,11 +119,10 @@ const fn expected(fault: GeocomFault) -> Option<&'static str> {
         GeocomFault::StaleRepeat => "identical to the previous point",
         GeocomFault::NotANumber => "angle",
         GeocomFault::EmptyAnswer => "success but sends no values",
-        GeocomFault::CorrectionsChanged => "",
         GeocomFault::Scaled | GeocomFault::FewDecimals | GeocomFault::OldSoftware | GeocomFault::Unnumbered => {
             return None;
         }
-        GeocomFault::DisconnectMidLine | GeocomFault::Dead => "",
+        GeocomFault::CorrectionsChanged | GeocomFault::DisconnectMidLine | GeocomFault::Dead => "",
     })
 }
 

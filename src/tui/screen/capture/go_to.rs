@@ -138,7 +138,7 @@ fn heading(content: &CaptureView) -> Vec<String> {
 
 /// The warning about a move that is not known to be free.
 fn warning(cx: &ScreenCx<'_>, content: &CaptureView) -> Option<String> {
-    let mut text = match &content.move_check {
+    let warning = match &content.move_check {
         MoveCheck::Free { .. } | MoveCheck::Arrived => return None,
         MoveCheck::Blocked { from, obstruction } => {
             format!("Blocked: straight from {from}, {obstruction}. Move by hand in small steps.")
@@ -150,9 +150,9 @@ fn warning(cx: &ScreenCx<'_>, content: &CaptureView) -> Option<String> {
     if let Some(info) = cx.view.intents.iter().find(|info| offers(info))
         && let Some(hint) = home.iter().find(|hint| hint.label == info.label && hint.blocked.is_none())
     {
-        text.push_str(&format!(" '{}' goes through home.", hint.key));
+        return Some(format!("{warning} '{}' goes through home.", hint.key));
     }
-    Some(text)
+    Some(warning)
 }
 
 fn count(content: &CaptureView, is_tall: bool) -> Vec<String> {

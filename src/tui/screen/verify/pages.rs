@@ -42,8 +42,8 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
 fn sentence(verification: &VerificationSummary, verdict: &Verdict) -> String {
     let VerificationSummary { samples, independent, nominal, identified, .. } = verification;
     let which = if *independent { "were not used to identify it" } else { "were used to identify it as well" };
-    let errors = identified.errors().into_iter().zip(nominal.errors());
-    let known = errors.filter_map(|((name, after), (_, before))| Some((name, after?, before?))).next();
+    let mut errors = identified.errors().into_iter().zip(nominal.errors());
+    let known = errors.find_map(|((name, after), (_, before))| Some((name, after?, before?)));
     let Some((name, after, before)) = known else {
         return format!("Nothing can be said about the accuracy from {}.", counted(*samples, "pose"));
     };

@@ -43,7 +43,7 @@ impl Way {
         }
         let is_home = home.as_ref().is_none_or(|home| is_near(&arm, &home.configuration));
         let through_home = session.through_home == Some(row) && !is_home;
-        let candidates = candidates(row, session, &arm, before, home.filter(|_| !is_home), through_home);
+        let candidates = candidates(row, session, &arm, before, home.as_ref().filter(|_| !is_home), through_home);
         let Some(profile) = session.mounted_profile() else { return Self::default() };
         let ways: Vec<Vec<&[f64]>> = candidates
             .iter()
@@ -82,7 +82,7 @@ fn candidates(
     session: &Session,
     arm: &[f64],
     before: Vec<Waypoint>,
-    home: Option<Waypoint>,
+    home: Option<&Waypoint>,
     through_home: bool,
 ) -> Vec<Vec<Waypoint>> {
     let after_arm = match session.last_stop {
@@ -91,10 +91,10 @@ fn candidates(
         }
         Some(Stop::Passed { .. }) | None => Vec::new(),
     };
-    let is_via = |stop: &Waypoint| home.as_ref().is_none_or(|home| !is_near(&stop.configuration, &home.configuration));
+    let is_via = |stop: &Waypoint| home.is_none_or(|home| !is_near(&stop.configuration, &home.configuration));
     let vias = |stops: &[Waypoint]| stops.iter().filter(|stop| is_via(stop)).cloned().collect::<Vec<_>>();
     let (leaving, arriving) = (vias(&after_arm), vias(&before));
-    let home = home.as_slice();
+    let home = home.map(std::slice::from_ref).unwrap_or_default();
     let around =
         [home.to_vec(), [home, &arriving].concat(), [&leaving, home].concat(), [&leaving, home, &arriving].concat()];
     if through_home {
