@@ -1,7 +1,7 @@
 //! Compensation: what to command so that the real arm reaches what the nominal one would have reached.
 //!
 //! The identified arm is inverted numerically from the intended configuration, on position and orientation of a point of the tool
-//! together (see [`inverse`](crate::inverse)). Corrections are small, so two or three steps do. A joint that would pass its limit is
+//! together (see [`inverse`]). Corrections are small, so two or three steps do. A joint that would pass its limit is
 //! held there and the others continue without it. If the orientation cannot be reached with small corrections (near a singularity), only
 //! the position is reached and the result says so; if the position cannot be reached either, nothing is commanded.
 //!

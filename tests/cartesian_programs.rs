@@ -168,8 +168,7 @@ fn a_path_is_corrected_as_a_whole_or_not_at_all() {
 fn a_tool_that_is_not_in_the_program_comes_from_an_option() {
     let (cell, folder) = (Cell::new(), tempfile::tempdir().unwrap());
     let whole = module(&cell, "");
-    let program: String =
-        whole.lines().filter(|line| !line.contains("tooldata")).map(|line| format!("{line}\n")).collect();
+    let program: String = whole.split_inclusive('\n').filter(|line| !line.contains("tooldata")).collect();
     let (code, _, err) = run(folder.path(), &program, &["--points", "computed"]);
     assert!(
         code == 1 && err.contains("its tool 'gun' is not in the given files; give '--tool gun=x,y,z,rx,ry,rz'"),

@@ -157,7 +157,7 @@ fn changed_tables_and_results_of_a_session_are_named() {
     for arguments in [&["session", "export", "s", "--csv", "--out", "s"][..], &["session", "report", "s"]] {
         assert_eq!(run(folder.path(), arguments).status.code(), Some(0), "{arguments:?}");
     }
-    let show = || text(&run(folder.path(), &["session", "show", "s"]).stdout).to_owned();
+    let show = || text(&run(folder.path(), &["session", "show", "s"]).stdout);
     let identify = ["identify", "--profile", "soochow", "--measurements", "s/measurements.csv"];
     assert!(!text(&run(folder.path(), &identify).stdout).contains("has changed since"));
     for name in ["measurements.csv", "plan.csv", "report.json", "report.html"] {
@@ -436,7 +436,7 @@ fn messages_disturb_no_terminal() {
         &["resume", EVIL, "--plain"],
     ] {
         let output = run(folder.path(), arguments);
-        let said = text(&output.stdout).to_owned() + &text(&output.stderr);
+        let said = text(&output.stdout) + &text(&output.stderr);
         let bad = said.chars().find(|c| (c.is_control() && *c != '\n') || *c == '\u{202e}');
         assert_eq!(bad, None, "{arguments:?}: {said:?}");
     }

@@ -111,8 +111,7 @@ fn a_session_is_replayed_without_a_terminal_and_not_changed() {
 #[cfg(unix)]
 fn limited(folder: &Path, blocks: u64, input: &str) -> Output {
     let program = command(folder, &[]).get_program().to_owned();
-    let limited =
-        format!("ulimit -f {blocks}; exec '{}' wizard --plain --no-recording", program.to_str().expect("a path"));
+    let limited = format!("ulimit -f {blocks}; exec '{}' wizard --plain --no-recording", program.to_str().unwrap());
     let mut shell = std::process::Command::new("timeout");
     shell.args(["60", "sh", "-c", &limited]).current_dir(folder).env("TERM", "dumb").env("LANG", "C");
     let mut child = shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();

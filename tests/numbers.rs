@@ -276,7 +276,7 @@ fn a_weak_combination_is_named_with_what_it_costs_and_blocks_beyond_the_limit() 
     // Joint 5 stays near zero, so that axes 4 and 6 are nearly one, and the instrument is poor.
     let mut narrow = bench.configurations(40);
     for configuration in &mut narrow {
-        configuration[4] = 0.1 * configuration[4];
+        configuration[4] *= 0.1;
     }
     let mut known = bench.measured(&narrow, 0);
     for named in &mut known {
@@ -309,7 +309,9 @@ fn mistakes(bench: &Bench, samples: &[NamedSample]) -> Vec<Mistake> {
 
 fn altered(samples: &[NamedSample], change: impl Fn(&mut [f64])) -> Vec<NamedSample> {
     let mut samples = samples.to_vec();
-    samples.iter_mut().for_each(|named| change(&mut named.sample.at.configuration));
+    for named in &mut samples {
+        change(&mut named.sample.at.configuration);
+    }
     samples
 }
 
@@ -381,7 +383,7 @@ fn columns_and_rows_that_are_mixed_up_are_named() {
     let exchanged = columns(|q| q.swap(4, 5));
     assert_eq!(exchanged, Some(Mistake::Columns(Columns::Exchanged { joints: [4, 5] })));
     assert_eq!(columns(|q| q.rotate_right(1)), Some(Mistake::Columns(Columns::Rotated { first: 1 })));
-    assert_eq!(columns(|q| q.reverse()), Some(Mistake::Columns(Columns::Reversed)));
+    assert_eq!(columns(<[f64]>::reverse), Some(Mistake::Columns(Columns::Reversed)));
 
     let rows = |change: &dyn Fn(&mut Vec<Point3<f64>>)| {
         let mut points: Vec<Point3<f64>> = samples.iter().map(|named| named.sample.point).collect();

@@ -220,6 +220,7 @@ fn settings_of_the_controller_stay() {
 }
 
 #[test]
+#[expect(clippy::float_cmp, reason = "a number that is read as it was written")]
 fn polyscope_states_pose_tool_and_branch() {
     let text = fs::read(folder().join("field/u01_polyscope.script")).unwrap();
     let scan = found(Dialect::Urscript, "ur5e", &text, Vec::new());
@@ -383,13 +384,13 @@ impl Dice {
 
 #[test]
 fn broken_programs_never_panic_and_change_only_in_numbers() {
+    const BYTES: &[u8] = b"[]{}()<>\"'\\;:,=!#.- \t\r\n0123456789EePpAXJ/*\xfc";
     let mut programs: Vec<(Dialect, String, Vec<u8>, Vec<Companion>)> =
         all_own().into_iter().map(|own| (own.dialect, own.arm, own.text.into_bytes(), own.companions)).collect();
     for Field { file, dialect, arm, companions, .. } in FIELD {
         let text = fs::read(folder().join("field").join(file)).unwrap();
         programs.push((*dialect, (*arm).to_owned(), text, companions.iter().map(|name| companion(name)).collect()));
     }
-    const BYTES: &[u8] = b"[]{}()<>\"'\\;:,=!#.- \t\r\n0123456789EePpAXJ/*\xfc";
     let mut dice = Dice(20);
     for (dialect, arm, text, companions) in &programs {
         let profile = profile(arm);
@@ -451,7 +452,7 @@ fn described(scan: &Scan) -> String {
     };
     lines.extend(scan.left.iter().map(left));
     lines.sort_by_key(|(line, _)| *line);
-    lines.into_iter().map(|(_, text)| format!("{text}\n")).collect()
+    lines.into_iter().flat_map(|(_, text)| [text, "\n".to_owned()]).collect()
 }
 
 #[test]
