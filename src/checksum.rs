@@ -31,6 +31,20 @@ pub enum Syntax {
     Html,
 }
 
+impl Syntax {
+    const ALL: [Self; 4] = [Self::Ron, Self::Csv, Self::Json, Self::Html];
+
+    /// The line of the sum, without a line break.
+    fn line(self, sum: &str) -> String {
+        match self {
+            Self::Ron => format!("// {MARK}{sum}"),
+            Self::Csv => format!("# {MARK}{sum}"),
+            Self::Json => format!("  \"check\": \"{MARK}{sum}\","),
+            Self::Html => format!("<!-- {MARK}{sum} -->"),
+        }
+    }
+}
+
 /// What the sum of a file says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finding {
@@ -44,13 +58,7 @@ pub enum Finding {
 
 /// Adds the line of the sum to a text: after the first line, in a table after its comments.
 pub fn with_sum(text: &str, syntax: Syntax) -> String {
-    let sum = sum(text);
-    let line = match syntax {
-        Syntax::Ron => format!("// {MARK}{sum}\n"),
-        Syntax::Csv => format!("# {MARK}{sum}\n"),
-        Syntax::Json => format!("  \"check\": \"{MARK}{sum}\",\n"),
-        Syntax::Html => format!("<!-- {MARK}{sum} -->\n"),
-    };
+    let line = syntax.line(&sum(text)) + "\n";
     let before = match syntax {
         Syntax::Csv => text.split_inclusive('\n').take_while(|line| line.starts_with('#')).map(str::len).sum(),
         Syntax::Ron | Syntax::Json | Syntax::Html => text.find('\n').map_or(text.len(), |end| end + 1),
@@ -62,9 +70,9 @@ pub fn with_sum(text: &str, syntax: Syntax) -> String {
 /// Compares a text with its sum.
 pub fn check(text: &str) -> Finding {
     let Some(line) = text.lines().take(HEAD).find(|line| line.contains(MARK)) else { return Finding::Missing };
-    let stated = line.split_once(MARK).map_or("", |(_, after)| after);
-    let stated: String = stated.chars().take_while(char::is_ascii_hexdigit).collect();
-    if stated == sum(text) { Finding::Intact } else { Finding::Changed }
+    let sum = sum(text);
+    let line = line.trim_start_matches('\u{feff}').trim_end();
+    if Syntax::ALL.iter().any(|syntax| syntax.line(&sum) == line) { Finding::Intact } else { Finding::Changed }
 }
 
 /// Place of the line of the sum in a text, in bytes.

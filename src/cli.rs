@@ -53,6 +53,7 @@ Step by step:
   identify     Identify the kinematic errors of a robot from measured points
   constraints  The same from direct distances, without coordinates
   verify       Verify a calibration on other measured points
+  iso9283      Accuracy and repeatability with the definitions of ISO 9283
 
 Apply the result:
   compensate   Correct targets or programs so that the real arm reaches them

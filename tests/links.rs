@@ -61,8 +61,9 @@ fn rehearsed(wires: &str) -> Ended {
         let fields: Vec<&str> = line.split(',').collect();
         [7, 8, 9].map(|field| fields[field].parse().unwrap())
     };
-    let (mark, table) = table.split_once('\n').unwrap();
+    let mark = table.lines().next().unwrap();
     assert!(mark.starts_with("# SIMULATED: the points come from the simulated cell (seed 1)"), "{mark}");
+    let table: String = table.split_inclusive('\n').skip_while(|line| line.starts_with('#')).collect();
     assert!(table.starts_with("pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm"), "{table}");
     Ended {
         points: table.lines().skip(1).map(point).collect(),

@@ -307,10 +307,7 @@ mod tests {
         });
         for (profile, joints) in [("kuka_iiwa7", "7 joints"), ("epson_ls3_b401s", "4 joints")] {
             let problem = refused(&instrument, profile);
-            assert!(
-                problem.message.contains(joints) && problem.message.contains("RTDE controller reports 6"),
-                "{problem:?}"
-            );
+            assert!(problem.message.contains(joints) && problem.message.contains("rtde reports 6"), "{problem:?}");
         }
         // Six joints are asked about, and nobody is there.
         assert!(refused(&instrument, "soochow").message.contains("no connection"));

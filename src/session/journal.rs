@@ -137,9 +137,8 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
             Ok((line, _)) => {
                 return Err(damaged(number, format!("it has number {}", line.number)));
             }
-            Err(LineError::Text(_)) if is_interrupted_write(rest) => break,
-            // Another file has no line that could be damaged.
-            Err(LineError::Text(_)) if journal.lines.is_empty() && !bytes.starts_with(BEGIN) => break,
+            Err(LineError::Text(_)) if is_interrupted_write(text, rest) => break,
+            Err(LineError::Text(_)) if journal.lines.is_empty() && !has_a_line(bytes) => break,
             Err(LineError::Text(what)) => return Err(damaged(number, with_reading(what, text))),
             Err(error) => return Err(error.at(number)),
         }
@@ -157,15 +156,23 @@ pub fn read(bytes: &[u8]) -> Result<Journal, JournalError> {
     }
 }
 
-/// Whether `rest`, which begins with a line that cannot be read, is what a power cut leaves of the last write.
+/// Whether anything reads like a line of a journal: another file has no line that could be damaged.
+fn has_a_line(bytes: &[u8]) -> bool {
+    bytes.starts_with(BEGIN)
+        || bytes
+            .split(|byte| *byte == b'\n')
+            .any(|line| std::str::from_utf8(line).is_ok_and(|line| Parts::of(line).is_some()))
+}
+
+/// Whether `rest`, which begins with the line `first` that cannot be read, is what a power cut leaves of the last write.
 ///
 /// A file system may keep a later page of a write and lose an earlier one, which then reads as zeros. All lines of one write have the
 /// same time. A line that ends in a line break and has no zeros was complete on disk, so it has been damaged since.
-fn is_interrupted_write(rest: &[u8]) -> bool {
+fn is_interrupted_write(first: &[u8], rest: &[u8]) -> bool {
     let mut times =
         rest.split(|byte| *byte == b'\n').filter_map(|line| Some(Parts::of(std::str::from_utf8(line).ok()?)?.time));
-    let first = times.next();
-    rest.contains(&0) && times.all(|time| Some(time) == first)
+    let time = times.next();
+    first.contains(&0) && times.all(|other| Some(other) == time)
 }
 
 /// What is wrong with a line, with what can still be read of it: the operator looks for a pose, not for a line.

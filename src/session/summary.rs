@@ -451,13 +451,21 @@ const fn is_zero(count: &usize) -> bool {
 impl VerificationSummary {
     /// What intervals and the largest error mean; nothing for reports that do not count their poses.
     pub fn sample_sentence(&self) -> Option<String> {
-        (self.poses > 0).then(|| {
+        let largest = (self.poses > 0).then(|| {
             format!(
-                "Intervals (95 %) say what other sets of as many poses could have shown (bootstrap over {}). The largest error is that of these poses, a sample: about 1 of {} other poses is expected to be worse",
-                counted(self.poses, "pose"),
+                "The largest error is that of these poses, a sample: about 1 of {} other poses is expected to be worse",
                 self.poses + 1
             )
-        })
+        })?;
+        let found = &self.identified;
+        let mut statistics = [&found.position_mm, &found.distance_mm, &found.seat_mm].into_iter().flatten();
+        if statistics.any(|statistics| statistics.rms_interval.is_some()) {
+            let poses = counted(self.poses, "pose");
+            return Some(format!(
+                "Intervals (95 %) say what other sets of as many poses could have shown (bootstrap over {poses}). {largest}"
+            ));
+        }
+        Some(largest)
     }
 }
 

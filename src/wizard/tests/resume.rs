@@ -114,7 +114,7 @@ fn bytes_that_were_lost_are_said() {
     assert!(texts(&effects)[0].contains("37 bytes of an incomplete last entry dropped"));
     let (id, _) = super::bench::appended(&effects);
     wizard.update(crate::wizard::Event::Store(crate::wizard::StoreEvent::Written { id }));
-    assert!(wizard.notice().unwrap().hints[0].contains("(37 bytes) and was set aside"));
+    assert!(wizard.notice().unwrap().hints[0].contains("37 bytes were set aside"));
 }
 
 #[test]
