@@ -4,7 +4,6 @@
 //! Field names are part of the interface of scripts: units are in the names, nothing is renamed or removed within a schema
 //! version.
 
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::advice::Advice;
@@ -12,7 +11,11 @@ use super::measurements::Layout;
 use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Terms, Weighting};
 use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::Level;
-use crate::text::{counted, decimals_for, fixed, names, names_of_option, written_as_text};
+use crate::text::{counted, decimals_for, fixed, names, written_as_text};
+
+mod refit;
+
+pub use refit::Refit;
 
 /// Version of the layout of these objects.
 pub const SCHEMA: u32 = 1;
@@ -402,23 +405,6 @@ impl JointSummary {
         Some(format!("{:>5.0} ..{:>5.0} {}", first.from, last.to, self.unit))
     }
 }
-
-/// What is fitted to verification samples because the set-up changed. The comments on the values are the help of `--refit`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Refit {
-    /// Same tracker position and SMR mounting as at the identification
-    #[default]
-    None,
-    /// The tracker was moved
-    Frame,
-    /// The SMR was remounted, or is another one
-    Target,
-    /// The tracker was moved and the SMR remounted
-    #[value(name = "frame+target")]
-    FrameAndTarget,
-}
-
-names_of_option!(Refit);
 
 /// Accuracy on verification samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ mod prediction;
 mod show;
 mod way;
 
-use super::plan::{PLAN_FILE, measuring_pace, plan_request, plan_text, write_plan};
+use super::plan::{PLAN_FILE, measuring_pace, plan_not_saved, plan_request, plan_text, write_plan};
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::session::journal::{
     Correction, Decision, Entry, FindingCause, FindingText, Line, MeasuredText, from_xyz_mm, to_edge, to_xyz_mm,
@@ -43,8 +43,6 @@ pub(in crate::wizard) struct CaptureStep {
     questioned: Option<u64>,
     /// Whether a measurement is running. Only then is a failed request a refused measurement.
     measuring: bool,
-    /// Whether the plan is being written beside the journal.
-    saving_plan: bool,
     /// Fewest identification samples, if known. Neither robot nor SMR change during this step.
     fewest: Option<usize>,
     /// Prediction from the samples so far.
@@ -88,7 +86,6 @@ impl CaptureStep {
             held: None,
             questioned: None,
             measuring: false,
-            saving_plan: false,
             fewest,
             prediction: Prediction::of(session, fewest),
             expected: None,
@@ -314,9 +311,7 @@ impl CaptureStep {
             Entry::PlanExtended(_) | Entry::Plan(_) => {
                 self.prediction.restart(session);
                 self.row = self.row.filter(|row| session.is_open(*row)).or_else(|| session.open_rows().next());
-                let action = write_plan(session);
-                self.saving_plan = action.is_some();
-                return action.into_iter().collect();
+                return write_plan(session).into_iter().collect();
             }
             _ => {}
         }
@@ -580,7 +575,6 @@ impl StepMachine for CaptureStep {
 
     fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
         let was_measuring = std::mem::take(&mut self.measuring);
-        self.saving_plan = false;
         match answer {
             Answer::Measured(reading) if was_measuring => self.take(&reading, cx),
             Answer::Delivered { .. } => vec![Action::Say(
@@ -599,10 +593,8 @@ impl StepMachine for CaptureStep {
 
     fn on_failure(&mut self, problem: Problem, cx: &Cx<'_>) -> Vec<Action> {
         let was_measuring = std::mem::take(&mut self.measuring);
-        if std::mem::take(&mut self.saving_plan) {
-            // The journal has the plan: the table beside it is a convenience.
-            let notice = Notice::attention(format!("the plan is not saved as {PLAN_FILE}: {}", problem.message));
-            return vec![Action::Say(problem.hints.into_iter().fold(notice, Notice::hint))];
+        if problem.is_unwritten {
+            return vec![Action::Say(plan_not_saved(problem))];
         }
         let row = self.row.filter(|_| was_measuring).and_then(|row| cx.session.rows.get(row));
         let Some(row) = row else { return vec![Action::Say(problem.into())] };

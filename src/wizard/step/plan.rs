@@ -12,7 +12,7 @@ use crate::session::state::Session;
 use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo, PlanSettings};
-use crate::wizard::notice::Notice;
+use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::view::{Content, PlanFigures, PlanView};
 
 /// The plan step with a proposal that is not yet accepted.
@@ -75,6 +75,12 @@ pub(super) fn write_plan(session: &Session) -> Option<Action> {
     let robot = session.robot.as_ref()?;
     let files = vec![(PLAN_FILE.to_owned(), plan_csv(session, robot))];
     Some(Action::Ask(Request::Deliver { files, left_out: Vec::new() }))
+}
+
+/// What is said where the table of the plan cannot be written: the journal has the plan, the table is a convenience.
+pub(super) fn plan_not_saved(problem: Problem) -> Notice {
+    let notice = Notice::attention(format!("the plan is not saved as {PLAN_FILE}: {}", problem.message));
+    problem.hints.into_iter().fold(notice, Notice::hint)
 }
 
 /// The request for a plan with these settings.
@@ -173,6 +179,11 @@ impl StepMachine for PlanStep {
         self.proposal = Some(Proposal { plan, summary });
         let Some((first, rest)) = warnings.split_first() else { return Vec::new() };
         vec![Action::Say(Notice { hints: rest.to_vec(), ..Notice::attention(first) })]
+    }
+
+    fn on_failure(&mut self, problem: Problem, _cx: &Cx<'_>) -> Vec<Action> {
+        let notice = if problem.is_unwritten { plan_not_saved(problem) } else { problem.into() };
+        vec![Action::Say(notice)]
     }
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
