@@ -97,7 +97,7 @@ pub(super) fn run<O: Write, E: Write>(
         console.remark(&line);
     }
     let has_targets = parts.iter().any(|part| !part.scan.targets.is_empty());
-    if !has_targets {
+    if parts.iter().all(|part| part.scan.targets.is_empty() && part.scan.left.is_empty()) {
         console.remark("no motion target was found; is it this dialect?");
     }
     Ok(if report.left == 0 && has_targets { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
@@ -197,13 +197,21 @@ fn write<O: Write, E: Write>(
     if parts.len() > 1 {
         store::create_folder(out).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
     }
-    for part in parts {
-        let path: PathBuf = if parts.len() > 1 || out.is_dir() { out.join(file_name(part.path)) } else { out.clone() };
-        if is_same_file(&path, part.path) {
-            let message = format!("'{}' is the program to correct", path.display());
+    let is_folder = parts.len() > 1 || out.is_dir();
+    let place = |part: &Part<'_>| if is_folder { out.join(file_name(part.path)) } else { out.clone() };
+    let paths: Vec<PathBuf> = parts.iter().map(place).collect();
+    for (index, (path, part)) in paths.iter().zip(parts).enumerate() {
+        if is_same_file(path, part.path) {
+            let message = format!("'{}' is the program to correct; nothing is written", path.display());
             return Err(Failure::new(ExitStatus::Usage, message)
                 .hint("write to another folder: corrected targets must not be corrected a second time"));
         }
+        if paths[..index].contains(path) {
+            let message = format!("two programs would be written as '{}'; nothing is written", path.display());
+            return Err(Failure::new(ExitStatus::Usage, message).hint("correct programs of one name one by one"));
+        }
+    }
+    for (path, part) in paths.into_iter().zip(parts) {
         store::replace_bytes(&path, &part.corrected).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         report.written.push(path.display().to_string());
         if !args.json {
