@@ -13,7 +13,7 @@ const UNITS: [(f64, &str); 7] = [
     (1e3, "millimetres were read as metres; name the columns 'x_mm', 'y_mm', 'z_mm'"),
     (MILLIMETRE / INCH, "inches were read as millimetres; name the columns 'x_in', 'y_in', 'z_in'"),
     (INCH / MILLIMETRE, "millimetres were read as inches; name the columns 'x_mm', 'y_mm', 'z_mm'"),
-    (1e-3 / INCH, "metres were read as inches; name the columns 'x_m', 'y_m', 'z_m'"),
+    (INCH, "metres were read as inches; name the columns 'x_m', 'y_m', 'z_m'"),
     (0.1, "centimetres were read as millimetres; multiply the coordinates by 10"),
     (10.0, "tenths of millimetres were read as millimetres; divide the coordinates by 10"),
 ];
@@ -185,11 +185,14 @@ impl Mistake {
     }
 
     /// How common it is: the smaller the likelier among explanations that fit equally.
-    pub(super) const fn rarity(&self) -> usize {
+    pub(super) fn rarity(&self) -> usize {
         match self {
             Self::CoordinateUnit { .. } | Self::RadiansAsDegrees | Self::DegreesAsRadians => 0,
             Self::JointSigns { joints } => joints.len(),
-            Self::JointZeros { zeros } => zeros.len(),
+            // Half a turn looks like a reversed joint or two, which is commoner.
+            Self::JointZeros { zeros } => {
+                zeros.len() + 2 * zeros.iter().filter(|(_, zero)| zero.abs() > 135.0 * DEGREE).count()
+            }
             Self::Coupling { reversed, .. } => 1 + *reversed as usize,
             Self::Columns(_) | Self::RowsShifted { .. } | Self::RowsReversed => 2,
             Self::Mirrored => 9,

@@ -17,7 +17,12 @@ pub struct Places<'a> {
 impl<'a> Places<'a> {
     /// Of an arm with these joints; every configuration has a value for each.
     pub fn new(joints: &[Joint], places: impl IntoIterator<Item = &'a Place>) -> Self {
-        let tolerances = joints.iter().map(|joint| joint.joint_type.quantity().from_edge(SAME_JOINT_VALUE)).collect();
+        Self::within(SAME_JOINT_VALUE, joints, places)
+    }
+
+    /// As [`Self::new`], with another difference (deg, sliding joints mm) up to which joint values are the same.
+    pub fn within(difference: f64, joints: &[Joint], places: impl IntoIterator<Item = &'a Place>) -> Self {
+        let tolerances = joints.iter().map(|joint| joint.joint_type.quantity().from_edge(difference)).collect();
         let mut found = Self { sorted: Vec::new(), tolerances };
         let listed = places.into_iter().enumerate();
         found.sorted = listed.map(|(index, at)| (found.key(at), index, at)).collect();

@@ -23,6 +23,8 @@ use crate::units::{MICROMETRE, Quantity, to_mm};
 pub(crate) const NOT_INDEPENDENT: &str = "not_independent";
 /// Code of the note that some were, and do not count.
 const SEEN_BEFORE: &str = "seen_before";
+/// Joint values (deg, sliding joints mm) up to which a pose that is visited again is the same: joints that a controller reports scatter.
+const SAME_POSE: f64 = 0.1;
 /// Code of the warning that the identified arm is no better than the nominal one.
 const NOT_BETTER: &str = "not_better";
 /// Errors (mm) that nobody can tell apart.
@@ -187,10 +189,10 @@ impl Unseen {
     /// Of the places `tested`, where `known` were identified. The SMR that was measured there makes no difference: the error of a
     /// pose is in all of them.
     pub(crate) fn new<'a>(joints: &[Joint], known: &[Place], tested: impl IntoIterator<Item = &'a Place>) -> Self {
-        let any_target = |at: &Place| Place { target: 0, ..at.clone() };
-        let known: Vec<Place> = known.iter().map(any_target).collect();
-        let places = Places::new(joints, &known);
-        let counts: Vec<bool> = tested.into_iter().map(|at| !places.contains(&any_target(at))).collect();
+        let pose = |at: &Place| Place { configuration: within_a_turn(joints, &at.configuration), target: 0 };
+        let known: Vec<Place> = known.iter().map(pose).collect();
+        let places = Places::within(SAME_POSE, joints, &known);
+        let counts: Vec<bool> = tested.into_iter().map(|at| !places.contains(&pose(at))).collect();
         let seen = counts.iter().filter(|counts| !**counts).count();
         let samples = counted(counts.len(), "verification sample");
         if seen == 0 {
@@ -216,6 +218,17 @@ impl Unseen {
     pub(crate) fn left_out(&self) -> usize {
         self.counts.iter().filter(|counts| !**counts).count()
     }
+}
+
+/// Joint values with those of turning joints between minus and plus half a turn: full turns make no other pose.
+fn within_a_turn(joints: &[Joint], configuration: &[f64]) -> Vec<f64> {
+    let values = configuration.iter().zip(joints);
+    values
+        .map(|(value, joint)| match joint.joint_type {
+            JointType::Revolute => value - TAU * (value / TAU).round(),
+            JointType::Prismatic => *value,
+        })
+        .collect()
 }
 
 /// Names of the targets that are only `tested`, and whose position is a guess of the profile.
