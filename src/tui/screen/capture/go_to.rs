@@ -128,11 +128,12 @@ fn heading(content: &CaptureView) -> Vec<String> {
         }
     };
     parts.extend(content.kind.map(|kind| kind.name().to_owned()));
-    let most = content.joints.iter().find(|joint| joint.moves_most);
-    parts.extend(most.map(|joint| format!("{} moves most: {:.1} {}", joint.name, joint.moves, joint.unit)));
+    // Where there is no room for both, the check matters more: the last parts are left out.
     if let MoveCheck::Free { from } = &content.move_check {
         parts.push(format!("checked from {from}"));
     }
+    let most = content.joints.iter().find(|joint| joint.moves_most);
+    parts.extend(most.map(|joint| format!("{} moves most: {:.1} {}", joint.name, joint.moves, joint.unit)));
     parts
 }
 

@@ -30,14 +30,7 @@ pub(super) fn time(minutes: f64) -> String {
 }
 
 /// Draws the proposal, else the plan being measured, else a hint.
-pub(super) fn draw(
-    theme: Theme,
-    content: &PlanView,
-    folder: Option<&str>,
-    is_searching: bool,
-    area: Rect,
-    buf: &mut Buffer,
-) {
+pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: Rect, buf: &mut Buffer) {
     let mut lines = match (&content.proposal, &content.accepted) {
         (Some(figures), _) => {
             let is_narrow = area.width < COMPARED;
@@ -50,7 +43,6 @@ pub(super) fn draw(
             let mut lines = vec![(Role::Title, "This plan is being measured".to_owned())];
             lines.extend(numbers(figures, None, area.width < COMPARED));
             lines.push(named("measured", &format!("{}, {} left", content.measured, content.left)));
-            lines.extend(folder.map(|folder| program(folder, usize::from(area.width))).into_iter().flatten());
             lines
         }
         (None, None) => {
@@ -63,6 +55,13 @@ pub(super) fn draw(
     for (row, (role, line)) in (0_u16..).zip(&lines) {
         let line = shortened(&theme.glyphs.show(line), usize::from(area.width), theme.glyphs);
         paint::text(buf, area, (0, row), &line, theme.style(*role));
+    }
+}
+
+/// Draws the command that makes the robot program of the plan.
+pub(super) fn draw_program(theme: Theme, folder: &str, area: Rect, buf: &mut Buffer) {
+    for (row, (role, line)) in (0_u16..area.height).zip(program(folder, usize::from(area.width))) {
+        paint::text(buf, area, (0, row), &theme.glyphs.show(&line), theme.style(role));
     }
 }
 

@@ -41,7 +41,8 @@ impl Way {
         if is_near(&arm, target) {
             return Self::default();
         }
-        let is_home = home.as_ref().is_none_or(|home| is_near(&arm, &home.configuration));
+        // After a break nobody knows that the arm is still there.
+        let is_home = home.as_ref().is_none_or(|home| session.is_stop_certain && is_near(&arm, &home.configuration));
         let through_home = session.through_home == Some(row) && !is_home;
         let candidates = candidates(row, session, &arm, before, home.as_ref().filter(|_| !is_home), through_home);
         let Some(profile) = session.mounted_profile() else { return Self::default() };
