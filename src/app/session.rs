@@ -193,7 +193,13 @@ fn delivered_files(folder: &Path, session: &Session) -> Vec<(&'static str, Strin
     let (mut intact, mut without) = (0, 0);
     for (index, name) in session.delivered.iter().enumerate() {
         let said = |what: &str| ("file", format!("{name}: {what}"));
-        let text = match store::read(&folder.join(name)) {
+        let path = folder.join(name);
+        // A pipe or a device would be read for ever.
+        if path.symlink_metadata().is_ok_and(|metadata| !metadata.is_file()) {
+            lines.push(said("NOT readable: it is no regular file"));
+            continue;
+        }
+        let text = match store::read(&path) {
             Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
             Err(error) => {
                 lines.push(said(&format!("NOT readable: {}", causes(&error))));
