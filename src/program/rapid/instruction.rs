@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Isometry3;
 
 use super::super::findings::Way;
-use super::super::lexer::{Tokens, Value};
+use super::super::lexer::{Kind, Tokens, Value};
 use super::super::motion::Reason;
 use super::super::orientation::Orientation;
 
@@ -133,4 +133,51 @@ pub(super) fn frame(tokens: &Tokens<'_>, value: &Value) -> Result<Isometry3<f64>
         },
         _ => Err(Reason::Unreadable),
     }
+}
+
+/// The place behind a label `again:` or a placeholder `<SMT>`, which hide the instruction behind them.
+pub(super) fn behind_label(tokens: &Tokens<'_>, at: usize) -> Option<usize> {
+    if tokens.is(at, b'<') && tokens.word(at + 1).is_some() && tokens.is(at + 2, b'>') {
+        return Some(at + 3);
+    }
+    let is_label = tokens.word(at).is_some() && tokens.is(at + 1, b':') && !tokens.is(at + 2, b'=');
+    is_label.then_some(at + 2)
+}
+
+/// Whether an instruction shifts the targets of the moves that follow it.
+pub(super) fn displaces(word: &str) -> bool {
+    ["pdispon", "pdispset", "eoffson", "eoffsset"].iter().any(|name| word.eq_ignore_ascii_case(name))
+}
+
+/// Names, in lower case, of the variables that a file assigns, as a whole or in part. Searches all tokens, as an assignment
+/// may be behind the condition of an `IF` without `THEN`.
+pub(super) fn assigned(tokens: &Tokens<'_>) -> Vec<String> {
+    let assigns = (0..tokens.len()).filter(|at| tokens.is(*at, b':') && tokens.is(at + 1, b'='));
+    assigns.filter_map(|assign| assigned_name(tokens, assign)).collect()
+}
+
+/// The variable in front of `:=`, without its components and indices; none for declarations and optional arguments.
+fn assigned_name(tokens: &Tokens<'_>, assign: usize) -> Option<String> {
+    let mut at = previous(tokens, assign)?;
+    loop {
+        if tokens.is(at, b'}') {
+            let open = (0..at).rev().find(|place| tokens.is(*place, b'{'))?;
+            at = previous(tokens, open)?;
+        }
+        let name = tokens.name(at)?;
+        let before = previous(tokens, at);
+        if let Some(dot) = before.filter(|before| tokens.is(*before, b'.')) {
+            at = previous(tokens, dot)?;
+            continue;
+        }
+        let is_other = |before: usize| {
+            tokens.is(before, b'\\') || tokens.is_word(before, "tooldata") || tokens.is_word(before, "wobjdata")
+        };
+        return (!before.is_some_and(is_other)).then(|| name.to_lowercase());
+    }
+}
+
+/// The token before this place that is no line end.
+fn previous(tokens: &Tokens<'_>, at: usize) -> Option<usize> {
+    (0..at).rev().find(|place| tokens.get(*place).is_some_and(|token| token.kind != Kind::LineEnd))
 }

@@ -11,7 +11,7 @@ use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUs
 use super::super::lexer::{Kind, Rules, Tokens, Value};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
-use super::instruction::{Arguments, Instruction, frame, tool};
+use super::instruction::{Arguments, Instruction, assigned, behind_label, displaces, frame, tool};
 
 /// More routines than a file can have: their numbers differ between files.
 const ROUTINES: usize = 1 << 24;
@@ -23,6 +23,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let mut module = Module::new(source);
     for (file, tokens) in files.iter().enumerate() {
         module.each_statement(tokens, file, Module::declare);
+    }
+    for name in files.iter().flat_map(assigned) {
+        module.forget(&name);
     }
     let mut findings = Findings::default();
     for (file, tokens) in files.iter().enumerate() {
@@ -71,6 +74,10 @@ struct Module<'a> {
     scopes: usize,
     /// A program displacement moves all targets.
     is_displaced: bool,
+    /// An offset of the external axes, which may carry the arm or the workpiece.
+    has_axis_offset: bool,
+    /// Routines that set a displacement: it stays in force when they call or return to another.
+    displacing: BTreeSet<usize>,
 }
 
 /// One instruction or declaration, without the block keywords in front of it.
@@ -126,6 +133,8 @@ impl<'a> Module<'a> {
             frames: BTreeMap::new(),
             scopes: 0,
             is_displaced: false,
+            has_axis_offset: false,
+            displacing: BTreeSet::new(),
         }
     }
 
@@ -142,6 +151,10 @@ impl<'a> Module<'a> {
         self.scopes = file.saturating_mul(ROUTINES);
         while at < tokens.len() {
             at = tokens.skip_line_ends(at);
+            if let Some(behind) = behind_label(tokens, at) {
+                at = behind;
+                continue;
+            }
             let Some(word) = tokens.word(at).map(str::to_ascii_lowercase) else {
                 at += 1;
                 continue;
@@ -199,6 +212,9 @@ impl<'a> Module<'a> {
             }
             return;
         }
+        if tokens.word(range.start).is_some_and(displaces) {
+            self.displacing.insert(statement.scope);
+        }
         let Some(declaration) = Declaration::of(statement) else { return };
         let kind = declaration.kind;
         let Some(name) = tokens.name(declaration.name).map(|name| name.to_lowercase()) else { return };
@@ -215,10 +231,21 @@ impl<'a> Module<'a> {
         }
     }
 
+    /// Drops the declared value of a tool or work object that the program changes: which one holds at a move is unknown. One
+    /// that cannot be used at all keeps its reason.
+    fn forget(&mut self, name: &str) {
+        for known in [&mut self.tools, &mut self.frames] {
+            if known.get(name).is_some_and(Result::is_ok) {
+                known.remove(name);
+            }
+        }
+    }
+
     /// Notes values of positions, and motions.
     fn find(&mut self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
         if statement.is_routine {
             self.is_displaced = false;
+            self.has_axis_offset = false;
             findings.motions.push(None);
             return;
         }
@@ -233,6 +260,8 @@ impl<'a> Module<'a> {
         match word.as_str() {
             "pdispon" | "pdispset" => self.is_displaced = true,
             "pdispoff" => self.is_displaced = false,
+            "eoffson" | "eoffsset" => self.has_axis_offset = true,
+            "eoffsoff" => self.has_axis_offset = false,
             _ => {}
         }
         let assign = range.clone().find(|at| tokens.is(*at, b':') && tokens.is(at + 1, b'='));
@@ -388,7 +417,10 @@ impl<'a> Module<'a> {
         for head in arguments.heads.iter().skip(instruction.first).take(instruction.points) {
             points.push(self.point(statement, findings, head.clone(), instruction.is_joints));
         }
-        if self.is_displaced && !instruction.is_joints {
+        // The order of calls is unknown, so a displacement of another routine counts for all moves of this one.
+        let is_displaced_elsewhere = self.displacing.iter().any(|scope| *scope != statement.scope);
+        let is_displaced = self.is_displaced || self.has_axis_offset || is_displaced_elsewhere;
+        if is_displaced && !instruction.is_joints {
             points = points.into_iter().map(|point| displaced(findings, point)).collect();
         }
         let Some(point) = points.pop() else { return };
@@ -639,7 +671,11 @@ fn behind_condition(tokens: &Tokens<'_>, start: usize) -> usize {
                     .get(at - 1)
                     .is_some_and(|before| matches!(before.kind, Kind::Word | Kind::Number | Kind::Symbol(b')' | b'}')));
                 let is_argument = tokens.is(at + 1, b':') || tokens.is(at + 1, b'(');
-                if at > start + 1 && is_behind_operand && !is_argument && Instruction::named(&word).is_some() {
+                if at > start + 1
+                    && is_behind_operand
+                    && !is_argument
+                    && (Instruction::named(&word).is_some() || displaces(&word))
+                {
                     return at;
                 }
             }
