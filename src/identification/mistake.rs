@@ -193,7 +193,7 @@ impl Mistake {
             Self::JointZeros { zeros } => {
                 zeros.len() + 2 * zeros.iter().filter(|(_, zero)| zero.abs() > 135.0 * DEGREE).count()
             }
-            Self::Coupling { reversed, .. } => 1 + *reversed as usize,
+            Self::Coupling { reversed, .. } => 1 + usize::from(*reversed),
             Self::Columns(_) | Self::RowsShifted { .. } | Self::RowsReversed => 2,
             Self::Mirrored => 9,
         }

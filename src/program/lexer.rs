@@ -48,6 +48,10 @@ impl<'a> Tokens<'a> {
         let text = whole.get(..range.end).unwrap_or(whole);
         let mut tokens = Vec::new();
         let (mut at, mut line) = (range.start, line);
+        // Editors put a byte order mark in front of the text; it belongs to no word.
+        if at == 0 && text.starts_with(b"\xef\xbb\xbf") {
+            at = 3;
+        }
         while let Some(&byte) = text.get(at) {
             let start = at;
             let kind = if byte == b'\n' {

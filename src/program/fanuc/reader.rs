@@ -21,6 +21,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     if find(source.program, b"[*POSREG*]").is_some() {
         return Ok(Scan { left: registers(source.program), ..Scan::default() });
     }
+    for (_, text) in source.files() {
+        forget_assigned(text, &mut frames);
+    }
     let positions = positions(source, &mut findings, &frames);
     for line in statements(source.program) {
         motion(&line, &positions, &mut findings);
@@ -167,6 +170,7 @@ fn motion(statement: &Statement, positions: &BTreeMap<String, Position>, finding
         None
     };
     let mut used = None;
+    let mut via = None;
     let mut points: Vec<Point> = Vec::new();
     for mention in all.iter().take(count) {
         let name = Some(mention.shown.to_owned());
@@ -180,18 +184,23 @@ fn motion(statement: &Statement, positions: &BTreeMap<String, Position>, finding
             }
             None if !is_constant => Point::Left { name, reason: Reason::Computed },
             None => {
+                via = used;
                 used = positions.get(mention.number);
                 Point::Variable { key: key(mention.number), name: mention.shown.to_owned() }
             }
         });
     }
     let Some(point) = points.pop() else { return };
+    // A motion has the settings of its end. A via point with others is not tied to it and keeps those that it states.
+    let is_apart =
+        via.zip(used).is_some_and(|(via, end): (&Position, &Position)| via.tool != end.tool || via.frame != end.frame);
+    let via = points.pop().filter(|_| !is_apart);
     let identity = || Ok(Setting::Identity);
     findings.motions.push(Some(Motion {
         file: 0,
         line: statement.line,
         way,
-        via: points.pop(),
+        via,
         point,
         // Every position states its own tool and frame.
         tool: used.map_or_else(identity, |position| position.tool.clone()),
@@ -482,6 +491,28 @@ fn registers(text: &[u8]) -> Vec<LeftAlone> {
         }
     }
     left
+}
+
+/// Drops tools and frames that a program sets, such as `UFRAME[1]=PR[2]`: their values in the files may not be in force.
+fn forget_assigned(text: &[u8], frames: &mut BTreeMap<String, Isometry3<f64>>) {
+    for statement in statements(text) {
+        for kind in ["UFRAME[", "UTOOL["] {
+            for part in statement.text.split(kind).skip(1) {
+                let Some((inside, rest)) = part.split_once(']') else { continue };
+                if !rest.trim_start_matches(']').trim_start().starts_with('=') {
+                    continue;
+                }
+                let number = inside.split(':').next().unwrap_or_default().trim();
+                match number.parse::<u32>() {
+                    Ok(number) => {
+                        frames.remove(&format!("{kind}{number}]"));
+                    }
+                    // A number that is computed may be any.
+                    Err(_) => frames.retain(|name, _| !name.starts_with(kind)),
+                }
+            }
+        }
+    }
 }
 
 /// Tools and frames of a variable file: `$MNUTOOL` and `$MNUFRAME`.

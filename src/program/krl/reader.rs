@@ -1,10 +1,13 @@
 //! Reads KRL: aggregates of position types and the motion instructions that use them, in `.src` and `.dat` files.
 
+mod flow;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use nalgebra::Isometry3;
 
+use self::flow::{Block, Routine, called};
 use super::super::ProgramError;
 use super::super::configuration::Configuration;
 use super::super::findings::{Definition, Findings, Key, Motion, OtherUse, Point, Source, Way};
@@ -23,11 +26,13 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     for (file, tokens) in files.iter().enumerate() {
         each_line(tokens, file, |line| module.declare(line));
     }
+    module.follow_calls();
     let mut findings = Findings::default();
     for (file, tokens) in files.iter().enumerate() {
         module.state = State::default();
         module.set = State::default();
         module.heirs.clear();
+        module.blocks.clear();
         module.routine = findings.motions.len();
         module.sets = [false; 2];
         each_line(tokens, file, |line| module.find(line, &mut findings));
@@ -97,6 +102,8 @@ enum Frame {
     Null,
     Literal(Isometry3<f64>),
     Variable(String),
+    /// It depends on how the program runs.
+    Unknown,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,6 +147,12 @@ struct Module<'a> {
     sets: [bool; 2],
     /// Motions of routines, and whether they inherit tool and base from the caller.
     heirs: Vec<(Range<usize>, [bool; 2])>,
+    /// Routines of the given files by lower-case name.
+    routines: BTreeMap<String, Routine>,
+    /// Name of the routine whose lines are noted in `routines`.
+    declared: String,
+    /// Open branches and loops, the innermost last.
+    blocks: Vec<Block>,
 }
 
 /// A name with constant indices.
@@ -185,11 +198,15 @@ impl<'a> Module<'a> {
             routine: 0,
             sets: [false; 2],
             heirs: Vec::new(),
+            routines: BTreeMap::new(),
+            declared: String::new(),
+            blocks: Vec::new(),
         }
     }
 
     /// Notes types, frames and the data of inline forms.
     fn declare(&mut self, line: &Line<'_, 'a>) {
+        self.note_routine(line);
         let (tokens, range) = (line.tokens, line.range.clone());
         let start = behind_words(tokens, range.start, &["GLOBAL", "DECL", "CONST", "IMPORT"]);
         if tokens.is_word(start, "DEF") || tokens.is_word(start, "DEFFCT") {
@@ -226,6 +243,20 @@ impl<'a> Module<'a> {
 
     /// Notes values of positions, and motions.
     fn find(&mut self, line: &Line<'_, 'a>, findings: &mut Findings) {
+        self.statement(line, findings);
+        // A routine that sets tool or base may do so in a branch only: behind its call they are unknown.
+        for name in called(line) {
+            let [tool, base] = self.routines.get(&name).map_or([false; 2], |routine| routine.sets);
+            if tool {
+                self.set_tool(Frame::Unknown);
+            }
+            if base {
+                self.set_base(Frame::Unknown);
+            }
+        }
+    }
+
+    fn statement(&mut self, line: &Line<'_, 'a>, findings: &mut Findings) {
         let (tokens, range) = (line.tokens, line.range.clone());
         let start = behind_words(tokens, range.start, &["GLOBAL", "DECL", "CONST", "IMPORT"]);
         let Some(word) = tokens.word(start).map(str::to_ascii_uppercase) else { return };
@@ -233,8 +264,10 @@ impl<'a> Module<'a> {
             self.end_routine(findings.motions.len());
             findings.motions.push(None);
             self.state = State::default();
+            self.blocks.clear();
             return;
         }
+        self.block(&word);
         let is_call = tokens.is(start + 1, b'(') || tokens.is(start + 1, b'=') || tokens.is(start + 1, b'.');
         if let Some(instruction) = Instruction::named(&word).filter(|_| !is_call) {
             self.motion(line, findings, &instruction, start + 1);
@@ -248,6 +281,13 @@ impl<'a> Module<'a> {
         let is_declaration = start > range.start || kind != Type::Other && tokens.word(start + 1).is_some();
         let first = if is_declaration { start + 1 } else { start };
         match Variable::read(line, first) {
+            // The other components stay as they were, perhaps not as the program last set them.
+            Some(variable) if variable.name.eq_ignore_ascii_case("$TOOL") && tokens.is(variable.end, b'.') => {
+                self.set_tool(Frame::Unknown);
+            }
+            Some(variable) if variable.name.eq_ignore_ascii_case("$BASE") && tokens.is(variable.end, b'.') => {
+                self.set_base(Frame::Unknown);
+            }
             Some(variable) if tokens.is(variable.end, b'=') => self.assignment(line, findings, &variable),
             Some(variable) if tokens.is(variable.end, b'.') && line.file == 0 => {
                 let is_known = self.kind_of(&variable.key).is_some_and(Type::is_position);
@@ -299,12 +339,18 @@ impl<'a> Module<'a> {
     fn set_tool(&mut self, tool: Frame) {
         self.sets[0] = true;
         note(&mut self.set.tool, &tool);
+        if let Some(block) = self.blocks.last_mut() {
+            block.differs[0] |= block.tool.as_ref() != Some(&tool);
+        }
         self.state.tool = Some(tool);
     }
 
     fn set_base(&mut self, base: Frame) {
         self.sets[1] = true;
         note(&mut self.set.base, &base);
+        if let Some(block) = self.blocks.last_mut() {
+            block.differs[1] |= block.base.as_ref() != Some(&base);
+        }
         self.state.base = Some(base);
     }
 
@@ -389,11 +435,13 @@ impl<'a> Module<'a> {
     fn setting(&self, frame: Option<&Frame>, what: &str) -> Setting {
         let name = match frame {
             Some(Frame::Null) => return Setting::Identity,
+            // Not even a value that the program gives it elsewhere counts.
+            Some(Frame::Unknown) | None => return Setting::Named(format!("${what}")),
             Some(Frame::Number(number)) if number.trim_start_matches('0').is_empty() => return Setting::Identity,
             Some(Frame::Literal(pose)) => return Setting::Known { name: format!("${what}"), pose: *pose },
             Some(Frame::Number(number)) => format!("{what}_DATA[{number}]"),
             Some(Frame::Variable(name)) if !name.is_empty() => name.clone(),
-            Some(Frame::Variable(_)) | None => format!("${what}"),
+            Some(Frame::Variable(_)) => format!("${what}"),
         };
         match self.frames.get(&name.to_lowercase()) {
             Some(pose) => Setting::Known { name, pose: *pose },
@@ -436,6 +484,8 @@ impl<'a> Module<'a> {
         let tokens = line.tokens;
         let with = (start..line.range.end).find(|at| tokens.is_word(*at, "WITH")).unwrap_or(line.range.end);
         let before = self.state.clone();
+        // What a `WITH` part sets ends with the motion, so the block around it does not see it.
+        let blocks = std::mem::take(&mut self.blocks);
         if with < line.range.end {
             self.with(line, with + 1);
         }
@@ -446,6 +496,7 @@ impl<'a> Module<'a> {
             .take(count)
             .map(|part| self.point(line, findings, part, instruction.is_relative))
             .collect();
+        self.blocks = blocks;
         let Some(point) = points.pop() else { return };
         let is_stationary = self.state.is_stationary;
         let tool = self.setting(self.state.tool.as_ref(), "TOOL");
@@ -540,7 +591,7 @@ impl<'a> Module<'a> {
 /// Keeps a setting if it is the only one of the file.
 fn note(known: &mut Option<Frame>, new: &Frame) {
     match known {
-        Some(old) if old != new => *known = Some(Frame::Variable(String::new())),
+        Some(old) if old != new => *known = Some(Frame::Unknown),
         Some(_) => {}
         None => *known = Some(new.clone()),
     }

@@ -1,10 +1,13 @@
 //! Reads URScript: literal joint vectors and poses, and the motion functions that use them, as PolyScope and people write them.
 
-use std::collections::BTreeMap;
+mod flow;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use nalgebra::Isometry3;
 
+use self::flow::{Block, is_block, is_routine};
 use super::super::ProgramError;
 use super::super::configuration::Configuration;
 use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
@@ -21,9 +24,15 @@ const TCP: &str = "tcp";
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let files: Vec<Tokens<'_>> = source.files().map(|(_, text)| Tokens::new(text, RULES)).collect();
     let mut findings = Findings::default();
-    let mut script = Script { joints: source.robot.chain.dof(), constants: BTreeMap::new() };
+    let mut script = Script {
+        joints: source.robot.chain.dof(),
+        constants: BTreeMap::new(),
+        routines: BTreeSet::new(),
+        setters: BTreeSet::new(),
+    };
     for (file, tokens) in files.iter().enumerate() {
         script.collect(tokens, &statement_ends(tokens), file);
+        script.collect_routines(tokens, file);
     }
     for (file, tokens) in files.iter().enumerate() {
         let ends = statement_ends(tokens);
@@ -34,19 +43,16 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
             file,
             tool: None,
             tools: Vec::new(),
+            unset: Vec::new(),
             is_set_late: false,
+            is_unclear: false,
+            routine: 0,
+            has_moved: false,
+            blocks: Vec::new(),
             before: None,
         };
-        let first = findings.motions.len();
         reader.read(&mut findings);
-        // A function that sets no tool is called after the only `set_tcp` of the file.
-        if let ([tool], false) = (reader.tools.as_slice(), reader.is_set_late) {
-            for motion in findings.motions.iter_mut().skip(first).flatten() {
-                if motion.tool == Ok(Setting::Named(TCP.to_owned())) {
-                    motion.tool = Ok(tool.clone());
-                }
-            }
-        }
+        reader.complete_tools(&mut findings);
         findings.motions.push(None);
     }
     findings.resolve(source)
@@ -59,6 +65,10 @@ type Assigned = ((usize, usize), Constant);
 struct Script {
     joints: usize,
     constants: BTreeMap<String, Vec<Assigned>>,
+    /// Names of the functions and threads of all files.
+    routines: BTreeSet<String>,
+    /// File and routine of each `set_tcp`.
+    setters: BTreeSet<(usize, usize)>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +90,30 @@ impl Script {
                 self.constants.entry(name).or_default().extend(constant.map(|constant| ((file, at), constant)));
             }
         }
+    }
+
+    fn collect_routines(&mut self, tokens: &Tokens<'_>, file: usize) {
+        // The routine around each open block.
+        let mut around: Vec<usize> = Vec::new();
+        let mut routine = 0;
+        for at in 0..tokens.len() {
+            if is_routine(tokens, at) {
+                around.push(routine);
+                routine = at + 1;
+                self.routines.extend(tokens.name(at + 1));
+            } else if is_block(tokens, at) {
+                around.push(routine);
+            } else if tokens.word(at) == Some("end") {
+                routine = around.pop().unwrap_or(0);
+            } else if tokens.word(at) == Some("set_tcp") && tokens.is(at + 1, b'(') {
+                self.setters.insert((file, routine));
+            }
+        }
+    }
+
+    /// Whether a routine other than this one sets the tool.
+    fn is_set_elsewhere(&self, routine: (usize, usize)) -> bool {
+        self.setters.iter().any(|setter| *setter != routine)
     }
 
     /// The value of a variable at a place: the last assignment in front of it, or else the first.
@@ -145,11 +179,21 @@ struct Reader<'r, 'a> {
     tokens: &'r Tokens<'a>,
     ends: &'r [usize],
     file: usize,
-    tool: Option<Setting>,
+    /// Tool that the routine has set; an error if it is unknown which of several.
+    tool: Option<Result<Setting, Reason>>,
     /// All different tools of the file.
     tools: Vec<Setting>,
+    /// Motions in front of any `set_tcp` of their routine, and the routine.
+    unset: Vec<(usize, usize)>,
     /// A `set_tcp` follows a motion of its function: the tool before it is unknown.
     is_set_late: bool,
+    /// When a `set_tcp` runs is unknown: it is in a condition or loop, or in a routine that is called there or between moves.
+    is_unclear: bool,
+    /// The routine around this place: 1 + the place of its `def`; 0: none.
+    routine: usize,
+    /// The routine has moved the arm.
+    has_moved: bool,
+    blocks: Vec<Block>,
     /// Joint values of the last move that states them.
     before: Option<Vec<f64>>,
 }
@@ -159,9 +203,20 @@ impl Reader<'_, '_> {
         let (tokens, ends) = (self.tokens, self.ends);
         let mut at = 0;
         while at < tokens.len() {
-            if tokens.is_word(at, "def") || tokens.is_word(at, "thread") {
+            if is_routine(tokens, at) {
                 findings.motions.push(None);
-                at = end_of(self.ends, at);
+                self.open(at, true);
+                // A body may follow on the same line.
+                at = tokens.behind(at + 2, end_of(ends, at)).max(at + 1);
+            } else if is_block(tokens, at) {
+                self.open(at, false);
+                at += 1;
+            } else if matches!(tokens.word(at), Some("elif" | "else")) {
+                self.branch();
+                at += 1;
+            } else if tokens.word(at) == Some("end") {
+                self.close();
+                at += 1;
             } else if tokens.word(at).is_some() && tokens.is(at + 1, b'(') {
                 at = self.call(findings, at);
             } else if let Some(assignment) = Assignment::at(tokens, ends, at) {
@@ -219,6 +274,13 @@ impl Reader<'_, '_> {
             });
         }
         let inner = self.argument(value.clone());
+        if self.is_other_tool(&inner) {
+            // Moves to it would take the active tool.
+            if self.file == 0 {
+                findings.leave(line, Some(name), Reason::SeveralSettings);
+            }
+            return value.start;
+        }
         match tokens.name(inner.range.start).filter(|_| inner.range.len() == 1) {
             Some(original) if tokens.word(inner.range.start).is_some() => {
                 findings.copies.push((key, Key { scope: 0, name: original, element: String::new() }));
@@ -235,18 +297,11 @@ impl Reader<'_, '_> {
         let end = tokens.behind(at + 1, end_of(self.ends, at));
         let inside = at + 2..end.saturating_sub(1);
         if name == "set_tcp" {
-            let parts = tokens.split(inside);
-            let argument = parts.first().map(|part| self.argument(without_keyword(tokens, part.clone())));
-            let tool = argument
-                .map_or_else(|| Setting::Named(TCP.to_owned()), |argument| self.setting(argument.range, "set_tcp"));
-            if !self.tools.contains(&tool) && self.tools.len() < 2 {
-                self.tools.push(tool.clone());
-            }
-            self.is_set_late |= findings.motions.last().is_some_and(Option::is_some);
-            self.tool = Some(tool);
+            self.set_tool(inside);
             return end;
         }
         let Some(instruction) = Instruction::named(name) else {
+            self.other_call(name);
             let is_like_motion =
                 name.to_ascii_lowercase().contains("move") || name.to_ascii_lowercase().contains("servo");
             if is_like_motion && self.file == 0 {
@@ -263,49 +318,110 @@ impl Reader<'_, '_> {
         let mut points = Vec::new();
         let mut frame = Setting::Identity;
         let mut configuration = None;
+        let mut has_other_tool = false;
         for (index, keyword) in instruction.keywords.iter().enumerate() {
             let named =
                 parts.iter().find(|part| tokens.is_word(part.start, keyword) && tokens.is(part.start + 1, b'='));
             let Some(part) = named.or_else(|| parts.get(index)).or_else(|| parts.first()) else { continue };
             let argument = self.argument(without_keyword(tokens, part.clone()));
             frame = argument.frame.clone();
+            has_other_tool |= self.is_other_tool(&argument);
             configuration = argument.near.clone().map(Configuration::Near);
             points.push(self.point(findings, &argument));
         }
         let Some(point) = points.pop() else { return at + 2 };
-        let stated = match &point {
-            Point::Here(index) => findings.definitions.get(*index).and_then(|found| match &found.content {
-                Ok(literal) if matches!(literal.form, Form::Joints(_)) => Some(literal.numbers.clone()),
-                Ok(_) | Err(_) => None,
-            }),
-            Point::Variable { name, .. } => match self.script.constant(name, (self.file, at)) {
-                Some(Constant::Joints(numbers)) => Some(numbers.clone()),
-                Some(Constant::Pose(_)) | None => None,
-            },
-            Point::Left { .. } | Point::Current => None,
-        };
         let near = match &configuration {
             Some(Configuration::Near(values)) => Some(values.clone()),
+            // The variable may come from `get_inverse_kin` with its own `qnear`.
+            _ if instruction.way != Way::Linear && self.is_without_value(&point, at) => None,
             _ => self.before.clone(),
         };
-        self.before = stated.or_else(|| near.clone());
+        self.before = self.joints_after(findings, instruction.way, &point, near.as_ref(), at);
+        let tool = if has_other_tool {
+            Err(Reason::SeveralSettings)
+        } else {
+            if self.tool.is_none() {
+                self.unset.push((findings.motions.len(), self.routine));
+            }
+            self.tool.clone().unwrap_or_else(|| Ok(Setting::Named(TCP.to_owned())))
+        };
+        self.has_moved = true;
         findings.motions.push(Some(Motion {
             file: self.file,
             line: tokens.line(at),
             way: instruction.way,
             via: points.pop(),
             point,
-            tool: Ok(self.tool.clone().unwrap_or_else(|| Setting::Named(TCP.to_owned()))),
+            tool,
             frame: Ok(frame),
             configuration: near.map(Configuration::Near),
         }));
         end
     }
 
+    /// Whether a point is a variable without a single literal value.
+    fn is_without_value(&self, point: &Point, at: usize) -> bool {
+        match point {
+            Point::Variable { name, .. } => self.script.constant(name, (self.file, at)).is_none(),
+            Point::Here(_) | Point::Left { .. } | Point::Current => false,
+        }
+    }
+
+    /// Joint values whose branch the arm has after a move; `None` if its target is unknown.
+    fn joints_after(
+        &self,
+        findings: &Findings,
+        way: Way,
+        point: &Point,
+        near: Option<&Vec<f64>>,
+        at: usize,
+    ) -> Option<Vec<f64>> {
+        match point {
+            Point::Here(index) => match &findings.definitions.get(*index)?.content {
+                Ok(literal) if matches!(literal.form, Form::Joints(_)) => Some(literal.numbers.clone()),
+                Ok(_) => near.cloned(),
+                Err(_) => None,
+            },
+            Point::Variable { name, .. } => match self.script.constant(name, (self.file, at)) {
+                Some(Constant::Joints(numbers)) => Some(numbers.clone()),
+                Some(Constant::Pose(_)) => near.cloned(),
+                // A straight move to an element of a list of poses keeps the branch.
+                None if way == Way::Linear => {
+                    let is_listed = findings.definitions.iter().any(|definition| definition.key.name == *name);
+                    near.filter(|_| is_listed).cloned()
+                }
+                None => None,
+            },
+            Point::Left { .. } | Point::Current => None,
+        }
+    }
+
+    /// Whether `get_inverse_kin` states a tool that is not known to be the active one.
+    fn is_other_tool(&self, argument: &Argument) -> bool {
+        match (&argument.tool, &self.tool) {
+            (None, _) => false,
+            (Some(Setting::Known { pose: stated, .. }), Some(Ok(Setting::Known { pose, .. }))) => stated != pose,
+            (Some(_), _) => true,
+        }
+    }
+
+    /// The tool that `get_inverse_kin` states: `tcp=`, the fifth argument, or a pose in front of it.
+    fn stated_tool(&self, parts: &[Range<usize>]) -> Option<Setting> {
+        let tokens = self.tokens;
+        parts.iter().enumerate().skip(1).find_map(|(index, part)| {
+            let is_named = tokens.word(part.start).is_some() && tokens.is(part.start + 1, b'=');
+            if is_named && !tokens.is_word(part.start, "tcp") {
+                return None;
+            }
+            let tool = self.setting(self.bare(without_keyword(tokens, part.clone())), "tcp");
+            (is_named || index >= 4 || matches!(tool, Setting::Known { .. })).then_some(tool)
+        })
+    }
+
     /// Takes `get_inverse_kin(…)` and `pose_trans(…)` off a point.
     fn argument(&self, range: Range<usize>) -> Argument {
         let tokens = self.tokens;
-        let mut argument = Argument { range: self.bare(range), frame: Setting::Identity, near: None };
+        let mut argument = Argument { range: self.bare(range), frame: Setting::Identity, near: None, tool: None };
         for _ in 0..DEEPEST {
             let start = argument.range.start;
             let is_whole =
@@ -322,6 +438,7 @@ impl Reader<'_, '_> {
                 if let Some(part) = near {
                     argument.near = self.joints(without_keyword(tokens, part.clone()));
                 }
+                argument.tool = argument.tool.or_else(|| self.stated_tool(&parts));
                 let Some(first) = parts.first() else { break };
                 argument.range = self.bare(without_keyword(tokens, first.clone()));
             } else if tokens.is_word(start, "pose_trans") && argument.frame == Setting::Identity {
@@ -411,6 +528,8 @@ struct Argument {
     range: Range<usize>,
     frame: Setting,
     near: Option<Vec<f64>>,
+    /// Tool that `get_inverse_kin` states.
+    tool: Option<Setting>,
 }
 
 struct Instruction {

@@ -436,6 +436,7 @@ impl Application<'_> {
             None => Setting::Named("tool".to_owned()),
         };
         let mut frame = Setting::Identity;
+        let mut is_framed = false;
         let mut points = Vec::new();
         for part in parts.into_iter().take(count) {
             if tokens.is(part.start, b'{') {
@@ -447,7 +448,11 @@ impl Application<'_> {
             if let Some(variable) = variable {
                 let key = variable.element();
                 if let Some(father) = self.father(&key) {
+                    if is_framed && father != frame {
+                        leave(&mut points, findings);
+                    }
                     frame = father;
+                    is_framed = true;
                 }
                 points.push(Point::Variable { key, name: variable.name });
                 continue;
@@ -477,6 +482,17 @@ impl Application<'_> {
         let element = if key.element.is_empty() { "0" } else { key.element.as_str() };
         let father = self.fathers.get(&format!("{}[{element}]", key.name))?;
         Some(father.as_deref().map_or(Setting::Identity, |father| Self::chain(&self.frames, father, "world")))
+    }
+}
+
+/// Leaves the via point of a motion whose end is in another frame: a motion has one frame only.
+fn leave(points: &mut [Point], findings: &mut Findings) {
+    for point in points {
+        if let Point::Variable { key, name } = point {
+            let reason = Reason::SeveralSettings;
+            findings.other_uses.push(OtherUse { key: key.clone(), reason: reason.clone() });
+            *point = Point::Left { name: Some(name.clone()), reason };
+        }
     }
 }
 
