@@ -263,3 +263,33 @@ fn the_client_of_the_documentation_works() {
     assert!(output.status.success(), "{out}{err}");
     assert_eq!(out.split(',').count(), 6, "{out}");
 }
+
+/// A pose without a configuration is corrected in the branch of the move before, where that move is known.
+#[test]
+fn a_free_pose_after_an_unknown_move_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibration();
+    let run = |between: &str| {
+        let file = folder.path().join("part.script");
+        let q = [0.2, 0.3, -0.2, 0.4, 0.8, 0.1];
+        let profile = Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap().0;
+        let there = ForwardKinematics::new(profile.chain()).base_from_flange(&q);
+        let (p, r) = (there.translation.vector, there.rotation.scaled_axis());
+        let text = format!(
+            "def part():\n  movej([0.2,0.3,-0.2,0.4,0.8,0.1])\n{between}  movel(p[{:.9},{:.9},{:.9},{:.9},{:.9},{:.9}])\nend\n",
+            p.x, p.y, p.z, r.x, r.y, r.z
+        );
+        fs::write(&file, text).unwrap();
+        let arguments = ["compensate", "--calibration", &calibration, "--dialect", "urscript", "--points", "computed"];
+        let more = ["--partial", "--tool", "0,0,0,0,0,0", "--json", "--program", file.to_str().unwrap()];
+        let output = trupose(&[&arguments[..], &more].concat());
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout)
+            .unwrap_or_else(|_error| panic!("{}", String::from_utf8_lossy(&output.stderr)));
+        (json["corrected"].as_u64().unwrap(), json["left"].as_u64().unwrap())
+    };
+    assert_eq!(run(""), (2, 0));
+    for unknown in ["  goto_other_side()\n", "  movej(q_from_camera)\n"] {
+        let (corrected, left) = run(unknown);
+        assert!(corrected == 1 && left >= 1, "{unknown}: {corrected} corrected, {left} left");
+    }
+}

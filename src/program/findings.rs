@@ -283,9 +283,10 @@ impl Findings {
                 Way::Linear => MoveKind::Linear,
                 Way::Circular => MoveKind::Circular { via },
             };
-            path += usize::from(is_new || motion.way == Way::Joint);
-            is_new = false;
-            scan.moves.push(Move { line: motion.line, companion: motion.file.checked_sub(1), kind, target, path });
+            let is_first = std::mem::take(&mut is_new);
+            path += usize::from(is_first || motion.way == Way::Joint);
+            let companion = motion.file.checked_sub(1);
+            scan.moves.push(Move { line: motion.line, companion, kind, target, path, is_first });
         }
     }
 }

@@ -87,6 +87,8 @@ pub struct Move {
     pub target: Option<usize>,
     /// A move and the linear and circular moves that follow it share a number.
     pub path: usize,
+    /// The first of its routine: nothing is known of where the arm comes from.
+    pub is_first: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

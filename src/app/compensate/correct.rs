@@ -50,15 +50,21 @@ const LARGEST_ROUNDING: (f64, f64) = (5e-5, 1e-4);
 pub(super) fn corrected(job: &Job<'_>, resolved: &Resolved<'_>, scan: &Scan) -> Vec<Corrected> {
     let mut results: Vec<Option<Corrected>> = vec![None; scan.targets.len()];
     let mut before: Option<Vec<f64>> = None;
+    // After a move that is not known, and at the beginning of a routine, the arm may be anywhere.
     let of_move = |step: &Move| {
         let via = match step.kind {
             MoveKind::Circular { via } => via,
             MoveKind::Joint | MoveKind::Linear => None,
         };
-        via.into_iter().chain(step.target)
+        let lost = step.is_first.then_some(None);
+        lost.into_iter().chain(via.map(Some)).chain([step.target])
     };
-    for index in scan.moves.iter().flat_map(of_move).chain(0..scan.targets.len()) {
-        let Some(target) = scan.targets.get(index) else { continue };
+    let unused = std::iter::once(None).chain((0..scan.targets.len()).map(Some));
+    for index in scan.moves.iter().flat_map(of_move).chain(unused) {
+        let Some((index, target)) = index.and_then(|index| Some((index, scan.targets.get(index)?))) else {
+            before = None;
+            continue;
+        };
         let result = results[index].get_or_insert_with(|| {
             let mut report = TargetReport { line: target.line, name: target.name.clone(), ..TargetReport::default() };
             let done = match &target.goal {
@@ -123,8 +129,9 @@ fn of_pose(
         | Configuration::Krl { .. }
         | Configuration::Fanuc(_)
         | Configuration::Val3 { .. }
-        | Configuration::Inform(_)
-        | Configuration::Free => before.map(<[f64]>::to_vec),
+        | Configuration::Inform(_) => before.map(<[f64]>::to_vec),
+        // The reader has followed the moves and does not know the one before.
+        Configuration::Free => None,
     };
     let is_meant = |posture: Option<&Posture>, q: &[f64]| pose.configuration.matches(posture, q);
     let goal = PoseGoal {
