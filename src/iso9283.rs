@@ -14,7 +14,8 @@ mod label;
 
 pub use cube::{Cube, EDGES, MeasuringPlane, POSES};
 pub use figures::{
-    DistanceFigures, Estimate, FEWEST, PoseFigures, distance_figures, drift, multi_directional_variation, pose_figures,
+    DistanceFigures, Estimate, FEWEST, PoseFigures, barycentre, distance_figures, drift, multi_directional_variation,
+    pose_figures,
 };
 pub use label::{DIRECTIONS, Label, UnknownLabel};
 

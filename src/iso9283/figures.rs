@@ -59,19 +59,21 @@ pub fn pose_figures(commanded: &Point3<f64>, attained: &[Point3<f64>]) -> Option
     if attained.len() < FEWEST {
         return None;
     }
-    let barycentre = mean(attained);
-    let accuracy = |points: &[Point3<f64>]| (mean(points) - commanded).norm();
-    let components = barycentre - commanded;
+    let centre = barycentre(attained.iter().copied());
+    let accuracy = |points: &[Point3<f64>]| (barycentre(points.iter().copied()) - commanded).norm();
+    let components = centre - commanded;
     Some(PoseFigures {
         cycles: attained.len(),
         // The accuracy is a length: resamples scatter about the barycentre in all directions and make it longer on average. Its
         // interval is that of the component along the error.
         accuracy: about(accuracy(attained), attained, |points| {
-            components.try_normalize(0.0).map_or(0.0, |along| (mean(points) - commanded).dot(&along))
+            components
+                .try_normalize(0.0)
+                .map_or(0.0, |along| (barycentre(points.iter().copied()) - commanded).dot(&along))
         }),
         components,
         repeatability: about(repeatability(attained), attained, repeatability),
-        barycentre,
+        barycentre: centre,
     })
 }
 
@@ -113,9 +115,14 @@ pub fn drift(figures: &[f64]) -> Option<f64> {
     figures.iter().map(|figure| (figure - first).abs()).reduce(f64::max)
 }
 
-fn mean(points: &[Point3<f64>]) -> Point3<f64> {
-    let sum: Vector3<f64> = points.iter().map(|point| point.coords).sum();
-    Point3::from(sum / points.len() as f64)
+/// The barycentre of points (m); not a number without points.
+pub fn barycentre(points: impl IntoIterator<Item = Point3<f64>>) -> Point3<f64> {
+    let (mut sum, mut count) = (Vector3::zeros(), 0_usize);
+    for point in points {
+        sum += point.coords;
+        count += 1;
+    }
+    Point3::from(sum / count as f64)
 }
 
 fn average(values: &[f64]) -> f64 {
@@ -129,8 +136,8 @@ fn standard_deviation(values: &[f64]) -> f64 {
 }
 
 fn repeatability(points: &[Point3<f64>]) -> f64 {
-    let barycentre = mean(points);
-    let distances: Vec<f64> = points.iter().map(|point| (point - barycentre).norm()).collect();
+    let centre = barycentre(points.iter().copied());
+    let distances: Vec<f64> = points.iter().map(|point| (point - centre).norm()).collect();
     average(&distances) + 3.0 * standard_deviation(&distances)
 }
 

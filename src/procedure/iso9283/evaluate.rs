@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3};
 use super::TestError;
 use crate::geometry::register;
 use crate::iso9283::{
-    CYCLES, DIRECTIONS, DistanceFigures, Estimate, Label, POSES, PoseFigures, distance_figures, drift,
+    CYCLES, DIRECTIONS, DistanceFigures, Estimate, Label, POSES, PoseFigures, barycentre, distance_figures, drift,
     multi_directional_variation, pose_figures,
 };
 use crate::kinematics::{Arm, Place};
@@ -18,7 +18,7 @@ use crate::session::summary::Provenance;
 use crate::text::counted;
 use crate::units::to_mm;
 
-/// Cycles of a block of which the drift is told.
+/// Cycles of a block: drift is the change from one to another.
 const BLOCK: usize = 10;
 
 /// One attained point.
@@ -118,7 +118,7 @@ impl<'a> Side<'a> {
 
     /// Where this arm says that the commanded configurations are: their mean, as all are meant to be the same.
     fn commanded(&self, readings: &BTreeMap<usize, &Reading>) -> Point3<f64> {
-        mean(readings.values().map(|reading| self.arm.point_in_base(&reading.at)))
+        barycentre(readings.values().map(|reading| self.arm.point_in_base(&reading.at)))
     }
 
     fn attained(&self, reading: &Reading) -> Point3<f64> {
@@ -137,18 +137,12 @@ impl<'a> Side<'a> {
     }
 }
 
-fn mean(points: impl Iterator<Item = Point3<f64>>) -> Point3<f64> {
-    let points: Vec<_> = points.collect();
-    let sum: nalgebra::Vector3<f64> = points.iter().map(|point| point.coords).sum();
-    Point3::from(sum / points.len().max(1) as f64)
-}
-
 /// The frame that brings the barycentres nearest to the commanded points.
 fn fitted(arm: &Arm, groups: &Groups<'_>) -> Option<Isometry3<f64>> {
     let here = Side { arm, base_from_station: Isometry3::identity() };
     let of = |pose: usize| {
         let readings = groups.of(pose)?;
-        Some((1.0, mean(readings.values().map(|reading| reading.point)), here.commanded(readings)))
+        Some((1.0, barycentre(readings.values().map(|reading| reading.point)), here.commanded(readings)))
     };
     let pairs: Vec<_> = (1..=POSES).filter_map(of).collect();
     (pairs.len() >= 3).then(|| register(pairs.into_iter()))?.map(|registration| registration.to_from_from)
@@ -194,7 +188,9 @@ fn directions(groups: &Groups<'_>) -> Vec<DirectionRow> {
     let of = |pose: usize| {
         let attained = |direction| groups.0.get(&(pose, Some(direction)));
         let barycentres: Option<Vec<_>> = (1..=DIRECTIONS)
-            .map(|direction| attained(direction).map(|readings| mean(readings.values().map(|reading| reading.point))))
+            .map(|direction| {
+                attained(direction).map(|readings| barycentre(readings.values().map(|reading| reading.point)))
+            })
             .collect();
         let variation = multi_directional_variation(&barycentres?)?;
         Some(DirectionRow { pose: format!("P{pose}"), directions: DIRECTIONS, variation_mm: to_mm(variation) })
