@@ -249,7 +249,7 @@ impl Protocol for Abb {
     }
 
     fn trigger(&mut self, _now: Moment) {
-        self.outbox.fail(Failure::Refused("a robot reports joint values and takes no shots".to_owned()));
+        self.outbox.refuse_shot();
     }
 
     fn cancel(&mut self, _now: Moment) {}

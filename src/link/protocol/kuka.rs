@@ -223,7 +223,7 @@ impl Protocol for Kuka {
     }
 
     fn trigger(&mut self, _now: Moment) {
-        self.outbox.fail(Failure::Refused("a robot reports joint values and takes no shots".to_owned()));
+        self.outbox.refuse_shot();
     }
 
     fn cancel(&mut self, _now: Moment) {}

@@ -83,6 +83,11 @@ impl Outbox {
         self.push(ProtocolEvent::Failed(failure));
     }
 
+    /// Queues the refusal of a shot by a robot.
+    pub fn refuse_shot(&mut self) {
+        self.fail(Failure::Refused("a robot controller reports joint values and takes no shots".to_owned()));
+    }
+
     /// Queues the loss of the connection and discards outputs that were not sent.
     pub fn lose(&mut self, failure: Failure) {
         self.outputs.clear();

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_source_is_judged_by_four_states_and_a_gap_begins_anew() {
+    fn a_slow_source_is_judged_by_four_states_and_a_gap_starts_again() {
         let at = |time: f64| JointState { controller_time: time, ..JointState::at(vec![0.3; 6]) };
         let feed = |times: &[f64]| {
             let mut detector = RestDetector::default();

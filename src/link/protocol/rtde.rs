@@ -336,8 +336,7 @@ impl Protocol for Rtde {
     }
 
     fn trigger(&mut self, _now: Moment) {
-        let text = "a robot controller reports joint values and takes no shots".to_owned();
-        self.outbox.fail(Failure::Refused(text));
+        self.outbox.refuse_shot();
     }
 
     fn cancel(&mut self, _now: Moment) {}
