@@ -626,7 +626,7 @@ fn numbers_that_are_none_reach_neither_file() {
 }
 
 #[test]
-fn the_command_makes_the_same_report_anew() {
+fn the_command_makes_the_same_report_again() {
     let place = CALIBRATED.folder.path();
     let delivered = fs::read_to_string(place.join("sessions/s/report.json")).unwrap();
     fs::create_dir_all(place.join("again")).unwrap();

@@ -1,6 +1,6 @@
 //! Whether anything is wrong at all, by four statistics with known distributions; what it is comes later.
 //!
-//! Limits are set for one false alarm in some hundred sessions of thirty points, although every point is looked at anew with each
+//! Limits are set for one false alarm in some hundred sessions of thirty points, although every point is looked at again with each
 //! later one. Arms that are less perfect than the instrument (gravity, gear harmonics) are judged by what they show: see [`excess`].
 
 use super::fit::{Fit, Item, Nominal};

@@ -144,7 +144,7 @@ fn a_shot_that_is_asked_for_while_the_controller_is_away_is_refused_at_once() {
     assert!(matches!(&error, LinkError::Controller(Failure::Disconnected(_))), "{error:?}");
     assert!(start.elapsed() < Duration::from_millis(300), "{:?}", start.elapsed());
     bench.until(|news| matches!(news, LinkEvent::Up(name) if name.starts_with("robot: ")));
-    assert_eq!(bench.stage.shots(), before, "nothing is measured by itself");
+    assert_eq!(bench.stage.shots(), before, "nothing is measured automatically");
 }
 
 #[test]

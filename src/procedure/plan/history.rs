@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn another_search_begins_anew() {
+    fn another_search_starts_again() {
         let history = History::default();
         history.take(&sweep(0, false, 1, 0.9));
         history.take(&Progress::Unreachable { poses: 2 });

@@ -281,7 +281,7 @@ impl<'a> Module<'a> {
         local.or_else(|| self.types.get(&(0, key.name.clone()))).copied()
     }
 
-    /// Notes the value of a variable, each element of an array by itself.
+    /// Notes the value of a variable, and each element of an array separately.
     fn define(
         &self,
         statement: &Statement<'_, 'a>,

@@ -369,7 +369,7 @@ fn damage_in_the_middle_is_an_error_that_names_the_line() {
         let lost = [&text[..starts[index]], &text[starts[index + 1]..]].concat();
         let twice = [&text[..starts[index + 1]], part(index), &text[starts[index + 1]..]].concat();
         let swapped = [&text[..starts[index]], part(index + 1), part(index), &text[starts[index + 1]..]].concat();
-        // Somebody else's line, in good order by itself.
+        // A line of another journal, intact.
         let foreign = [&text[..starts[index + 1]], part(0), &text[starts[index + 1]..]].concat();
         let blank = [&text[..starts[index]], b"\n", &text[starts[index]..]].concat();
         for (what, bytes, line) in [

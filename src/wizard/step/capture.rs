@@ -287,7 +287,7 @@ impl CaptureStep {
             }
             Entry::Correction(correction) => {
                 self.prediction.restart(session);
-                // The order of the plan goes on from here, unless the sample turned out to be of another pose.
+                // The order of the plan continues from here, unless the sample turned out to be of another pose.
                 if self.row.is_none_or(|row| !session.is_open(row)) {
                     self.advance(session);
                 }

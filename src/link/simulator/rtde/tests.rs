@@ -40,7 +40,7 @@ fn unknown_names_are_not_found_and_nothing_starts() {
     assert_eq!(ask(&mut simulator, &[0, 0]), Some(Output::Close));
 }
 
-/// The recipe that the receiving client of a public library asks for unless it is told otherwise.
+/// The recipe that the receiving client of a public library asks for by default.
 const FULL_RECIPE: &str = "timestamp,target_q,target_qd,target_qdd,target_current,target_moment,actual_q,actual_qd,\
     actual_current,joint_control_output,actual_TCP_pose,actual_TCP_speed,actual_TCP_force,target_TCP_pose,\
     target_TCP_speed,actual_digital_input_bits,joint_temperatures,actual_execution_time,robot_mode,joint_mode,safety_mode,\
