@@ -27,6 +27,7 @@ pub mod station;
 pub mod summary;
 mod table;
 pub mod targets;
+mod warning;
 pub mod wire;
 
 pub use table::{Defect, TableErrors, TableProblem};

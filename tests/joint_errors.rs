@@ -169,7 +169,7 @@ fn a_range_that_was_left_out_is_named_and_not_accepted() {
             part[*joint] = (middle - 0.06 * (high - low), middle + 0.06 * (high - low));
         }
         let found = identified(&profile, measured(&arm, &part, 70, 1), measured(&arm, &part, 30, 2));
-        let warning = found.summary.warnings.iter().find(|warning| warning.code == "workspace");
+        let warning = found.summary.warnings.iter().find(|warning| warning.code.as_str() == "workspace");
         let warning = warning.unwrap_or_else(|| panic!("{:?} {:?}", found.summary.workspace, found.summary.verdict));
         assert_eq!(found.summary.verdict.status, VerdictStatus::NotAccepted);
         assert!(warning.blocks_acceptance && warning.message.contains("Joint J3 matters most"), "{}", warning.message);
@@ -189,7 +189,7 @@ fn two_joints_that_moved_say_nothing_about_the_others() {
         .collect();
     let found = identified(&profile, measured(&arm, &part, 70, 1), measured(&arm, &part, 30, 2));
     assert_eq!(found.summary.verdict.status, VerdictStatus::NotAccepted);
-    let says = |code: &str| found.summary.warnings.iter().any(|warning| warning.code == code);
+    let says = |code: &str| found.summary.warnings.iter().any(|warning| warning.code.as_str() == code);
     assert!(says("poor_data") && says("workspace"), "{:?}", found.summary.warnings);
 }
 

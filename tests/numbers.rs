@@ -103,7 +103,7 @@ impl Bench {
 }
 
 fn warning<'a>(identified: &'a Identified, code: &str) -> Option<&'a Warning> {
-    identified.summary.warnings.iter().find(|warning| warning.code == code)
+    identified.summary.warnings.iter().find(|warning| warning.code.as_str() == code)
 }
 
 /// 28 of 447 rows of one measured set were at identified poses, and blocked everything.
@@ -265,7 +265,7 @@ fn guesses_of_the_smr_with_the_same_fit_have_the_same_verdict() {
         bench.profile = Profile::parse(&text, "robot").unwrap().0;
         bench.text = text;
         let identified = bench.identify(known.clone(), fresh.clone());
-        let codes: Vec<String> = identified.summary.warnings.iter().map(|warning| warning.code.clone()).collect();
+        let codes: Vec<String> = identified.summary.warnings.iter().map(|warning| warning.code.to_string()).collect();
         let identifiable: Vec<bool> = identified.found.estimates.iter().map(|estimate| estimate.identifiable).collect();
         found.push((identified.summary.verdict.status, identified.summary.rank, codes, identifiable));
     }

@@ -17,7 +17,7 @@ use trupose::session::sha256;
 use trupose::session::state::Session;
 use trupose::session::summary::{
     CandidateSummary, Cause, JointErrorSummary, ParameterSummary, RejectedSummary, SelectionSummary, ShareSummary,
-    StatisticsSummary, VerdictStatus, Warning, WorkspaceSummary,
+    StatisticsSummary, VerdictStatus, Warning, WarningCode, WorkspaceSummary,
 };
 use trupose::store::session::read_journal;
 
@@ -309,9 +309,9 @@ fn of_many_samples_the_worst_are_listed_and_some_are_drawn() {
                 PointErrorText { identified_mm: (x + worse * x.signum(), y, z), ..*point }
             }));
         }
-        let warning = Warning::new("tested", "a remark of a row", false);
+        let warning = Warning::new(WarningCode::Other("tested".to_owned()), "a remark of a row", false);
         identified.summary.warnings = vec![warning.clone(); 700];
-        identified.summary.warnings.push(Warning::new("tested", "what blocks", true));
+        identified.summary.warnings.push(Warning::new(WarningCode::Other("tested".to_owned()), "what blocks", true));
         let rejected = [RejectedSummary {
             pose: "1".to_owned(),
             line: 1,

@@ -14,7 +14,7 @@ use crate::session::calibration::{Calibration, Integrity};
 use crate::session::export::simulation_of_table;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Layout, Measurements, Row, read_as};
-use crate::session::summary::{CHANGED_TABLE, InputFile, InputRole, Warning};
+use crate::session::summary::{InputFile, InputRole, Warning, WarningCode};
 use crate::store;
 use crate::text::counted;
 
@@ -104,7 +104,7 @@ pub(super) fn calibration<O: Write, E: Write>(
 
 /// Says of warnings about changed tables that the change was `edited` on purpose, or how to say so.
 pub(super) fn settle_changes(warnings: &mut [Warning], edited: bool) {
-    for warning in warnings.iter_mut().filter(|warning| warning.code == CHANGED_TABLE) {
+    for warning in warnings.iter_mut().filter(|warning| warning.code == WarningCode::ChangedTable) {
         let addition =
             if edited { "it was used because '--edited' was given" } else { "give '--edited' if that was on purpose" };
         warning.message = format!("{}; {addition}", warning.message);

@@ -22,7 +22,7 @@ use crate::profile::Profile;
 use crate::report;
 use crate::session::plan::{self, PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
-use crate::session::summary::{InputFile, InputRole, Warning};
+use crate::session::summary::{InputFile, InputRole, Warning, WarningCode};
 use crate::store;
 use crate::units::from_mm;
 
@@ -135,7 +135,7 @@ fn included(file: &Path, profile: &Profile) -> Result<(Vec<PlannedPose>, Vec<War
             all - included.len(),
             file.display()
         );
-        warnings.push(Warning::new("not_included", text, false));
+        warnings.push(Warning::new(WarningCode::NotIncluded, text, false));
     }
     Ok((included, warnings))
 }

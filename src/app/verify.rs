@@ -20,9 +20,7 @@ use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
 use crate::session::measurements::Row;
 use crate::session::set_up::PayloadText;
-use crate::session::summary::{
-    CHANGED_CALIBRATION, InputRole, ModelSummary, Refit, SCHEMA, SIMULATED, VerificationReport, Warning,
-};
+use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, VerificationReport, Warning, WarningCode};
 use crate::text;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
@@ -63,9 +61,9 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let mut warnings = checks::table_warnings(None, &measured.table.warnings);
     let configurations = measured_rows.iter().map(|row| (row.line, row.configuration.as_slice()));
     warnings.extend(checks::limit_warning(profile, None, configurations));
-    warnings.extend(calibration.edited().map(|said| Warning::new(CHANGED_CALIBRATION, said, false)));
+    warnings.extend(calibration.edited().map(|said| Warning::new(WarningCode::ChangedCalibration, said, false)));
     warnings.extend(carried_over(&calibration));
-    let of_calibration = calibration.warnings.iter().find(|warning| warning.code == SIMULATED);
+    let of_calibration = calibration.warnings.iter().find(|warning| warning.code == WarningCode::Simulated);
     warnings.extend(measured.simulated.as_ref().or(of_calibration).cloned());
     warnings.extend(plausible);
     let (basis, fitted) = match args.refit {
@@ -87,7 +85,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
             "{fitted} numbers of the set-up were fitted to only {}: the position errors look better than they are",
             text::counted(poses, "pose")
         );
-        warnings.push(Warning::new("few_data", message, true));
+        warnings.push(Warning::new(WarningCode::FewData, message, true));
     }
     let left_out = unseen.left_out();
     warnings.extend(unseen.warning);
@@ -174,23 +172,18 @@ fn moved_set_up(identified: &ModelSummary) -> Option<Warning> {
             text::fixed(distance, 4),
             text::fixed(position, 4)
         );
-        Warning::new("another_set_up", message, true)
+        Warning::new(WarningCode::AnotherSetUp, message, true)
     })
 }
 
 /// A warning if the identification itself was not acceptable: then a good verification is not enough.
 fn carried_over(calibration: &Calibration) -> Option<Warning> {
-    let mut codes: Vec<&str> = Vec::new();
-    for warning in calibration.warnings.iter().filter(|warning| warning.blocks_acceptance) {
-        if !codes.contains(&warning.code.as_str()) {
-            codes.push(&warning.code);
-        }
-    }
+    let codes: Vec<&str> = Warning::blocking(&calibration.warnings).into_iter().map(WarningCode::as_str).collect();
     let message = format!(
         "the calibration itself was not acceptable: {}; good figures here do not change that. Identify again from better data",
         codes.join(", ")
     );
-    (!codes.is_empty()).then(|| Warning::new("calibration_not_acceptable", message, true))
+    (!codes.is_empty()).then(|| Warning::new(WarningCode::CalibrationNotAcceptable, message, true))
 }
 
 /// The configurations and targets that the calibration was identified from.

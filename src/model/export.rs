@@ -14,7 +14,7 @@ use crate::kinematics::{Arm, ForwardKinematics, JointType, KinematicChain, Param
 use crate::profile::{Profile, Target};
 use crate::session::calibration::Calibration;
 use crate::session::joint_errors::millimetres;
-use crate::session::summary::{JointErrorSummary, SIMULATED, SelectionSummary, VerdictStatus};
+use crate::session::summary::{JointErrorSummary, SelectionSummary, VerdictStatus, WarningCode};
 use crate::units::{to_deg, to_mm};
 
 /// A format of a model. The comments on the values are the help of `--format`.
@@ -145,7 +145,7 @@ fn cautions(calibration: &Calibration) -> Vec<String> {
     let refused = (verdict.status == VerdictStatus::NotAccepted)
         .then(|| format!("this calibration was not accepted: {}", verdict.reasons.join("; ")));
     let warnings = calibration.warnings.iter();
-    let serious = warnings.filter(|warning| warning.blocks_acceptance || warning.code == SIMULATED);
+    let serious = warnings.filter(|warning| warning.blocks_acceptance || warning.code == WarningCode::Simulated);
     calibration.edited().into_iter().chain(refused).chain(serious.map(|warning| warning.message.clone())).collect()
 }
 

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use super::intervals::{Intervals, OfPoses};
-use super::result::DOES_NOT_FIT;
 use crate::identification::verification::{DirectErrors, ErrorStatistics, ModelErrors, residual_against_joints};
 use crate::identification::{Observations, Places, PointSample};
 use crate::kinematics::{Joint, Place};
@@ -12,7 +11,7 @@ use crate::report::number;
 use crate::session::advice::Advice;
 use crate::session::summary::{
     AxisSummary, Figure, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, StatisticsSummary,
-    Verdict, VerdictStatus, VerificationSummary, Warning,
+    Verdict, VerdictStatus, VerificationSummary, Warning, WarningCode,
 };
 use crate::units::to_mm;
 
@@ -188,10 +187,10 @@ pub(crate) fn verdict(
         Err(advice) => {
             let mut reasons = vec!["there are no verification samples".to_owned()];
             // Data that do not describe the robot need no verification to be refused.
-            let refuted = warnings.iter().any(|warning| warning.code == DOES_NOT_FIT);
+            let refuted = warnings.iter().any(|warning| warning.code == WarningCode::DoesNotFit);
             let status = if refuted { VerdictStatus::NotAccepted } else { VerdictStatus::NotEvaluated };
             if refuted {
-                reasons.insert(0, format!("see the warning '{DOES_NOT_FIT}'"));
+                reasons.insert(0, format!("see the warning '{}'", WarningCode::DoesNotFit));
             }
             return Verdict { advice: Some(advice), ..decided(status, reasons, Vec::new()) };
         }
@@ -210,13 +209,7 @@ pub(crate) fn verdict(
             }
         })
         .collect();
-    let mut doubts: Vec<&str> = Vec::new();
-    for warning in warnings.iter().filter(|warning| warning.blocks_acceptance) {
-        if !doubts.contains(&warning.code.as_str()) {
-            doubts.push(&warning.code);
-        }
-    }
-    reasons.extend(doubts.iter().map(|code| format!("see the warning '{code}'")));
+    reasons.extend(Warning::blocking(warnings).into_iter().map(|code| format!("see the warning '{code}'")));
     if checks.is_empty() {
         reasons.insert(0, "the profile states no acceptance limits".to_owned());
         return decided(VerdictStatus::NotEvaluated, reasons, checks);
@@ -309,7 +302,7 @@ mod tests {
         assert_eq!(status(None, &[]), VerdictStatus::NotEvaluated);
         assert_eq!(status(Some(0.3), &[]), VerdictStatus::NotAccepted);
         assert_eq!(status(Some(f64::NAN), &[]), VerdictStatus::NotAccepted);
-        let twice = [Warning::new("poor_data", "", true), Warning::new("poor_data", "", true)];
+        let twice = [Warning::new(WarningCode::PoorData, "", true), Warning::new(WarningCode::PoorData, "", true)];
         let found = verdict(&acceptance, Ok(&of(None)), &twice);
         assert_eq!(found.status, VerdictStatus::NotAccepted);
         assert_eq!(found.reasons, ["see the warning 'poor_data'", "these data cannot show: distance rms"]);

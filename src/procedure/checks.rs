@@ -15,18 +15,12 @@ use crate::profile::Profile;
 use crate::report::number;
 use crate::session::TableProblem;
 use crate::session::advice::Advice;
-use crate::session::summary::{CHANGED_TABLE, VerificationSummary, Warning};
+use crate::session::summary::{VerificationSummary, Warning, WarningCode};
 use crate::text::counted;
 use crate::units::{MICROMETRE, Quantity, to_mm};
 
-/// Code of the warning that all verification samples were also identification samples.
-pub(crate) const NOT_INDEPENDENT: &str = "not_independent";
-/// Code of the note that some were, and do not count.
-const SEEN_BEFORE: &str = "seen_before";
 /// Joint values (deg, sliding joints mm) up to which a pose that is visited again is the same: joints that a controller reports scatter.
 const SAME_POSE: f64 = 0.1;
-/// Code of the warning that the identified arm is no better than the nominal one.
-const NOT_BETTER: &str = "not_better";
 /// Errors (mm) that nobody can tell apart.
 const SAME_ERROR: f64 = 0.001;
 /// Acceptance needs at least this many verification poses.
@@ -44,7 +38,8 @@ const SHOWN: usize = 3;
 pub(crate) fn table_warnings(file: Option<&str>, problems: &[TableProblem]) -> Vec<Warning> {
     let place = file.map_or_else(String::new, |file| format!("'{file}', "));
     let warning = |problem: &TableProblem| {
-        let (code, blocks) = if problem.is_change() { (CHANGED_TABLE, true) } else { ("table", false) };
+        let (code, blocks) =
+            if problem.is_change() { (WarningCode::ChangedTable, true) } else { (WarningCode::Table, false) };
         Warning::new(code, format!("{place}{problem}"), blocks)
     };
     problems.iter().map(warning).collect()
@@ -95,7 +90,7 @@ pub(crate) fn limit_warning<'a>(
         "degrees and radians mixed up, or another robot?"
     };
     let message = format!("joint values outside the limits of the profile{place} ({cause}): {list}");
-    (!outside.is_empty()).then(|| Warning::new("joint_limits", message, false))
+    (!outside.is_empty()).then(|| Warning::new(WarningCode::JointLimits, message, false))
 }
 
 /// The result of a comparison with the nominal robot.
@@ -136,7 +131,7 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
         }
     }
     let message = format!("{gap}, and no single mistake explains it (another robot, several mistakes at once?)");
-    Ok(Compared { expected, warning: Some(Warning::new("implausible", message, true)) })
+    Ok(Compared { expected, warning: Some(Warning::new(WarningCode::Implausible, message, true)) })
 }
 
 /// Looks for the same mistakes in the verification points of a table. Very few points are left to other checks. The
@@ -173,7 +168,7 @@ pub(crate) fn far_warning<'a>(named: impl IntoIterator<Item = (&'a str, usize, &
             number(to_mm(typical), 3),
             worst.join(", ")
         );
-        Warning::new("far_verification_samples", message, false)
+        Warning::new(WarningCode::FarVerificationSamples, message, false)
     })
 }
 
@@ -202,7 +197,8 @@ impl Unseen {
             let message = format!(
                 "all {samples} are at poses that were also identified: the figures below say nothing about other poses and are no independent verification"
             );
-            let warning = Warning::new(NOT_INDEPENDENT, message, true).with_advice(Advice::SeparateVerification);
+            let warning =
+                Warning::new(WarningCode::NotIndependent, message, true).with_advice(Advice::SeparateVerification);
             return Self { counts: vec![true; seen], warning: Some(warning) };
         }
         let message = format!(
@@ -211,7 +207,7 @@ impl Unseen {
             if seen == 1 { "it is" } else { "they are" },
             counts.len() - seen
         );
-        Self { counts, warning: Some(Warning::new(SEEN_BEFORE, message, false)) }
+        Self { counts, warning: Some(Warning::new(WarningCode::SeenBefore, message, false)) }
     }
 
     /// How many samples do not count.
@@ -274,12 +270,12 @@ pub(crate) fn better_warning(verification: &VerificationSummary) -> Option<Warni
         "the identified arm is no better than the nominal one at the verification poses: {}. Keep the nominal model, and look for what has changed between the two sets (payload, temperature, a moved SMR or tracker) or for poses that the identification does not cover",
         worse.join("; ")
     );
-    Some(Warning::new(NOT_BETTER, message, true))
+    Some(Warning::new(WarningCode::NotBetter, message, true))
 }
 
 /// Whether no warning says that the verification samples depend on the identification samples.
 pub(crate) fn is_independent(warnings: &[Warning]) -> bool {
-    warnings.iter().all(|warning| warning.code != NOT_INDEPENDENT)
+    warnings.iter().all(|warning| warning.code != WarningCode::NotIndependent)
 }
 
 /// A warning about too few verification poses: `samples` show `poses`. A pose that is measured again adds nothing new.
@@ -290,7 +286,7 @@ pub(crate) fn few_warning(samples: usize, poses: usize) -> Option<Warning> {
             what = format!("{} in {what}", counted(poses, "pose"));
         }
         let message = format!("only {what}: they say little about the largest error");
-        Warning::new("few_verification_samples", message, poses < TOO_FEW_POSES)
+        Warning::new(WarningCode::FewVerificationSamples, message, poses < TOO_FEW_POSES)
     })
 }
 
@@ -309,5 +305,5 @@ fn coverage_warning(joints: &[Joint], gap: &CoverageGap) -> Warning {
             joint.name
         )
     };
-    Warning::new("coverage", message, false)
+    Warning::new(WarningCode::Coverage, message, false)
 }

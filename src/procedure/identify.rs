@@ -20,7 +20,7 @@ use crate::session::calibration::{self, Calibration, LoadsText, MountedText, Sam
 use crate::session::measurements::Layout;
 use crate::session::set_up::PayloadText;
 use crate::session::summary::{
-    IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
+    IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning, WarningCode,
 };
 use crate::units::to_mm;
 
@@ -162,7 +162,7 @@ pub fn identify(
         expected = Some(compared.expected);
     } else if observations.lengths.is_empty() && !observations.shared.is_empty() {
         let message = "shared points without any known length leave the size of the robot to the prior";
-        warnings.push(Warning::new("no_scale", message, true).with_advice(Advice::StateSocketDistance));
+        warnings.push(Warning::new(WarningCode::NoScale, message, true).with_advice(Advice::StateSocketDistance));
     }
     let settings = request.settings.solver(profile, typical_distance(&observations));
     let candidates = request.settings.candidates();

@@ -11,7 +11,7 @@ use crate::kinematics::{JointTerm, JointType, KinematicChain, ParameterId, SMOOT
 use crate::profile::Profile;
 use crate::report::number;
 use crate::session::summary::{
-    CandidateSummary, Cause, JointErrorSummary, ParameterSummary, SelectionSummary, ShareSummary, Warning,
+    CandidateSummary, Cause, JointErrorSummary, ParameterSummary, SelectionSummary, ShareSummary, Warning, WarningCode,
 };
 use crate::units::{DEGREE, MICRORADIAN, to_deg, to_mm};
 
@@ -264,5 +264,5 @@ pub(super) fn warnings(problem: &Problem<'_>, found: &Identification) -> Vec<War
             }
         }
     }
-    messages.into_iter().map(|message| Warning::new("unusual_joint", message, false)).collect()
+    messages.into_iter().map(|message| Warning::new(WarningCode::UnusualJoint, message, false)).collect()
 }

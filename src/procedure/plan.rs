@@ -22,7 +22,7 @@ use crate::profile::Profile;
 use crate::search::{available_threads, plan_in_parallel};
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::{PlanSummary, PoseSummary, TimeSummary};
-use crate::session::summary::Warning;
+use crate::session::summary::{Warning, WarningCode};
 use crate::units::{from_mm, to_mm};
 
 pub use super::cell::planning_limits as limits;
@@ -221,7 +221,7 @@ impl<'a> Planner<'a> {
         let outside: Vec<String> =
             included.filter(|row| self.is_outside(&row.configuration)).map(|row| row.pose.clone()).collect();
         let text = || format!("measured poses outside the joint limits of the profile: {}", first_of(&outside, SHOWN));
-        (!outside.is_empty()).then(|| Warning::new("joint_limits", text(), false))
+        (!outside.is_empty()).then(|| Warning::new(WarningCode::JointLimits, text(), false))
     }
 
     /// Whether a configuration is outside the mechanical limits of the arm.
@@ -236,11 +236,11 @@ impl<'a> Planner<'a> {
     fn safety_warnings(&self) -> Vec<Warning> {
         if !self.request.filters {
             let text = "collision and line-of-sight checks were skipped: the plan is for comparison only, do not run it on a robot";
-            return vec![Warning::new("not_checked", text, false)];
+            return vec![Warning::new(WarningCode::NotChecked, text, false)];
         }
         if self.profile.bodies().is_empty() {
             let text = "the profile has no bodies, so the arm was not checked against itself, and only its joints and the SMR against floor and boxes: add 'bodies', or check every move by hand";
-            return vec![Warning::new("not_checked", text, false)];
+            return vec![Warning::new(WarningCode::NotChecked, text, false)];
         }
         Vec::new()
     }
@@ -472,7 +472,7 @@ impl<'a> Planner<'a> {
             .map(|pose| format!("pose {}: {}", pose.pose, pose.problems.join(", ")))
             .collect();
         if !bad.is_empty() {
-            warnings.push(Warning::new("not_measurable", first_of(&bad, SHOWN), true));
+            warnings.push(Warning::new(WarningCode::NotMeasurable, first_of(&bad, SHOWN), true));
         }
         let blocked: Vec<String> = rows
             .windows(2)
@@ -487,7 +487,7 @@ impl<'a> Planner<'a> {
                 "moves that are not free (joint moves in the order of the file): {}",
                 first_of(&blocked, SHOWN)
             );
-            warnings.push(Warning::new("blocked_move", text, true));
+            warnings.push(Warning::new(WarningCode::BlockedMove, text, true));
         }
         summary.verification_poses = rows.iter().filter(|row| row.kind == PoseKind::Verification).count();
         warnings.append(&mut summary.warnings);

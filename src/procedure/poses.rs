@@ -7,7 +7,7 @@ use crate::kinematics::{ForwardKinematics, Joint};
 use crate::planning::{JointBox, random};
 use crate::profile::Profile;
 use crate::report::number;
-use crate::session::summary::Warning;
+use crate::session::summary::{Warning, WarningCode};
 
 /// Fewer poses are no pattern.
 const FEWEST_POSES: usize = 5;
@@ -34,11 +34,11 @@ pub(super) fn warnings(profile: &Profile, known: &[&[f64]], tested: &[&[f64]]) -
     let of_verification = moves_one_joint_at_a_time(joints, tested);
     if of_verification {
         let message = "the verification poses move one joint at a time: the figures below do not carry over to poses that move several joints, because errors of joints that multiply do not show; verify with poses that move all joints";
-        warnings.push(Warning::new("one_joint_at_a_time", message, true));
+        warnings.push(Warning::new(WarningCode::OneJointAtATime, message, true));
     }
     if moves_one_joint_at_a_time(joints, known) {
         let message = "the identification poses move one joint at a time: what joints do to each other is not measured, and other poses may be worse than predicted; add poses that move all joints";
-        warnings.push(Warning::new("one_joint_at_a_time", message, of_verification));
+        warnings.push(Warning::new(WarningCode::OneJointAtATime, message, of_verification));
     }
     if let Some(other) = rarer_configuration(profile) {
         let sets = [("identification", known), ("verification", tested)];
@@ -50,7 +50,7 @@ pub(super) fn warnings(profile: &Profile, known: &[&[f64]], tested: &[&[f64]]) -
                 names.join(" and "),
                 number(100.0 * other, 0)
             );
-            warnings.push(Warning::new("one_arm_configuration", message, false));
+            warnings.push(Warning::new(WarningCode::OneArmConfiguration, message, false));
         }
     }
     warnings

@@ -6,7 +6,7 @@ use crate::kinematics::Joint;
 use crate::profile::Level;
 use crate::report::number;
 use crate::session::advice::Advice;
-use crate::session::summary::Warning;
+use crate::session::summary::{Warning, WarningCode};
 use crate::text::counted;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
@@ -16,11 +16,6 @@ const RAN_AWAY: f64 = 5.0;
 const FAR_AWAY: f64 = 10.0;
 /// Residuals up to this many times the expected effect of the fixed constants are attributed to them.
 const FIXED_CONSTANTS: f64 = 6.0;
-/// Code of the warning that the identified arm does not describe the data.
-pub(super) const DOES_NOT_FIT: &str = "does_not_fit";
-/// Codes of warnings that make a result unusable.
-const UNUSABLE: [&str; 2] = ["implausible", NOT_CONVERGED];
-const NOT_CONVERGED: &str = "not_converged";
 /// Residuals that exceed the stated sigma by this factor get a warning.
 const SIGMA_EXCESS: f64 = 1.5;
 /// Residuals up to this many times the stated sigma always fit.
@@ -80,7 +75,7 @@ pub(crate) fn result_warnings(
             let text = weakness.describe(|joint| joints[joint].name.clone(), |joint| joints[joint].joint_type);
             // What an unclear rank leaves open costs so many millimetres, which are judged, where the workspace is known.
             let is_judged = context.is_workspace_known && matches!(weakness, Weakness::RankUnclear { .. });
-            Warning::new("poor_data", text, !is_judged)
+            Warning::new(WarningCode::PoorData, text, !is_judged)
         })
         .collect();
     let residual = found.sigma.from_residuals.unwrap_or(0.0);
@@ -90,7 +85,7 @@ pub(crate) fn result_warnings(
             "joint offsets alone leave {} mm per coordinate, as much as the other link constants are expected to cause",
             number(to_mm(residual), 3)
         );
-        warnings.push(Warning::new("offsets_only", message, false).with_advice(Advice::IdentifyGeometry));
+        warnings.push(Warning::new(WarningCode::OffsetsOnly, message, false).with_advice(Advice::IdentifyGeometry));
     } else if residual.is_nan() || context.does_not_fit(residual, found) {
         let nominal = context.nominal.map_or_else(String::new, |nominal| {
             format!(", the nominal one by {} mm", number(to_mm(per_coordinate(nominal)), 3))
@@ -103,7 +98,7 @@ pub(crate) fn result_warnings(
             "the identified robot misses the measured points by {} mm per coordinate{nominal}{stated}: the data do not describe this robot (wrong profile, wrong joint signs, several mistakes at once?)",
             number(to_mm(residual), 3)
         );
-        warnings.push(Warning::new(DOES_NOT_FIT, message, true));
+        warnings.push(Warning::new(WarningCode::DoesNotFit, message, true));
     }
     warnings.extend(run_away(found, settings));
     if let Some(stated) = found.sigma.instrument.filter(|_| found.sigma.excess() > SIGMA_EXCESS) {
@@ -113,7 +108,7 @@ pub(crate) fn result_warnings(
             number(found.sigma.excess(), 1),
             number(to_mm(stated), if stated < 10.0 * MICROMETRE { 6 } else { 4 })
         );
-        warnings.push(Warning::new("sigma_excess", message, false));
+        warnings.push(Warning::new(WarningCode::SigmaExcess, message, false));
     }
     let judged = problem.observations.places().count();
     let share = found.rejected.len() as f64 / judged.max(1) as f64;
@@ -122,18 +117,18 @@ pub(crate) fn result_warnings(
             "{} of {judged} samples were rejected: there is no consistent majority to trust; check for rows in the wrong order and for a moved instrument",
             found.rejected.len()
         );
-        warnings.push(Warning::new("many_rejected", message, true));
+        warnings.push(Warning::new(WarningCode::ManyRejected, message, true));
     }
     warnings.extend(found.unmodelled.iter().map(|unmodelled| unmodelled_warning(joints, unmodelled)));
     match found.termination {
         TerminationReason::Converged => {}
         TerminationReason::IterationLimit => {
             let message = format!("stopped after {} solver steps without having converged", found.iterations.len());
-            warnings.push(Warning::new(NOT_CONVERGED, message, true));
+            warnings.push(Warning::new(WarningCode::NotConverged, message, true));
         }
         TerminationReason::NoImprovement | TerminationReason::NonFinite => {
             warnings.push(Warning::new(
-                NOT_CONVERGED,
+                WarningCode::NotConverged,
                 "the solver could not improve the fit any further".to_owned(),
                 true,
             ));
@@ -159,7 +154,7 @@ fn unmodelled_warning(joints: &[Joint], unmodelled: &Unmodelled) -> Warning {
     let message = format!(
         "{which}: that is the arm and no bumped SMR, so the samples are kept. The model does not describe the arm there ({region}): errors of joints may explain it, a load or a cable may pull there; or narrow the planning limits to where the arm works"
     );
-    Warning::new("region_not_described", message, false)
+    Warning::new(WarningCode::RegionNotDescribed, message, false)
 }
 
 /// A warning about parameters further from nominal than on any robot of this make.
@@ -189,7 +184,7 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
     let far = of_geometry.into_iter().any(|estimate| estimate.deviation.abs() > FAR_AWAY * estimate.expected);
     Some(match settings.prior {
         Prior::None => Warning::new(
-            "ran_away",
+            WarningCode::RanAway,
             format!(
                 "parameters ran away: {list}. Without a prior, badly determined combinations take any value that lowers the residual; the robot may be worse than nominal in another part of its workspace, and a hold-out from the same series does not show it"
             ),
@@ -197,7 +192,7 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
         )
         .with_advice(Advice::UsePrior),
         Prior::Expected => Warning::new(
-            "large_deviation",
+            WarningCode::LargeDeviation,
             format!(
                 "far from nominal: {list}. Check the profile (is it this robot?), or state larger expected deviations"
             ),
@@ -210,7 +205,9 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
 pub(crate) fn is_unusable(warnings: &[Warning], found: &Identification, settings: &Settings) -> bool {
     let as_asked =
         found.termination == TerminationReason::IterationLimit && settings.iterations < Settings::default().iterations;
-    warnings
-        .iter()
-        .any(|warning| UNUSABLE.contains(&warning.code.as_str()) && !(as_asked && warning.code == NOT_CONVERGED))
+    warnings.iter().any(|warning| match warning.code {
+        WarningCode::Implausible => true,
+        WarningCode::NotConverged => !as_asked,
+        _ => false,
+    })
 }

@@ -11,12 +11,10 @@ use crate::kinematics::{Arm, Place};
 use crate::planning::{JointBox, random};
 use crate::profile::{Acceptance, Profile};
 use crate::report::number;
-use crate::session::summary::{VerificationSummary, Warning, WorkspaceSummary};
+use crate::session::summary::{VerificationSummary, Warning, WarningCode, WorkspaceSummary};
 use crate::text::{self, counted};
 use crate::units::{MICROMETRE, to_mm};
 
-/// Code of the warning that the arm is not known where it has to be accurate.
-const CODE: &str = "workspace";
 /// Configurations that the error is predicted at.
 const CONFIGURATIONS: usize = 400;
 /// Their seed: the same for every arm, so that figures can be compared.
@@ -125,7 +123,7 @@ impl<'a> Workspace<'a> {
             number(rms_mm, 2),
             number(p95_mm, 2),
         );
-        Some(Warning::new(CODE, message, true))
+        Some(Warning::new(WarningCode::Workspace, message, true))
     }
 
     /// A warning about combinations of parameters that rest on the expected deviations more than on the data. It blocks acceptance
@@ -155,7 +153,7 @@ impl<'a> Workspace<'a> {
             beyond.as_ref().map_or_else(String::new, |limit| format!(", more than {limit}")),
             self.combination(&direction)
         );
-        Some(Warning::new("poor_data", message, beyond.is_some()))
+        Some(Warning::new(WarningCode::PoorData, message, beyond.is_some()))
     }
 
     /// The parameters that have most of the say in a change of them.

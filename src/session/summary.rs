@@ -15,6 +15,7 @@ use crate::text::{counted, decimals_for, fixed, names, written_as_text};
 
 mod refit;
 
+pub use super::warning::{Warning, WarningCode};
 pub use refit::Refit;
 
 /// Version of the layout of these objects.
@@ -189,54 +190,6 @@ pub struct RejectedSummary {
     /// The same in robust standard deviations of the accepted samples.
     pub ratio: f64,
     pub reason: String,
-}
-
-/// Code of the warning that nothing was measured: the points come from a simulated cell.
-pub const SIMULATED: &str = "simulated";
-
-/// Code of the warning that a table has changed since this program wrote it.
-pub const CHANGED_TABLE: &str = "changed_table";
-/// Code of the warning that a calibration has changed since this program wrote it.
-pub const CHANGED_CALIBRATION: &str = "changed_calibration";
-
-/// A warning to read before the numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Warning {
-    /// Stable short name of the kind, such as `few_data` or `ran_away`.
-    pub code: String,
-    /// The problem and what to do about it.
-    pub message: String,
-    /// Whether it rules out the verdict "accepted".
-    pub blocks_acceptance: bool,
-    /// Advice on the remedy; taken by [`Warning::put_into_words`] before anything is shown or written.
-    #[serde(skip)]
-    pub advice: Option<Advice>,
-}
-
-impl Warning {
-    /// A warning without advice.
-    pub fn new(code: &str, message: impl Into<String>, blocks_acceptance: bool) -> Self {
-        Self { code: code.to_owned(), message: message.into(), blocks_acceptance, advice: None }
-    }
-
-    /// Adds what can be done about it.
-    #[must_use]
-    pub const fn with_advice(mut self, advice: Advice) -> Self {
-        self.advice = Some(advice);
-        self
-    }
-
-    /// Appends the advice to the message in the words of the module that shows it.
-    pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
-        if let Some(advice) = self.advice.take() {
-            self.message = format!("{}; {}", self.message, words(advice));
-        }
-    }
-
-    /// That points are simulated, as `said`.
-    pub fn simulated(said: &str) -> Self {
-        Self::new(SIMULATED, format!("SIMULATED: {said}"), false)
-    }
 }
 
 /// Statistics of a non-negative error.

@@ -14,7 +14,7 @@ use crate::session::advice::Advice;
 use crate::session::plan_summary::{
     CandidateSummary, JointGapSummary, PlanSummary, RejectionSummary, SCHEMA, TradeOffSummary, WeakParameterSummary,
 };
-use crate::session::summary::Warning;
+use crate::session::summary::{Warning, WarningCode};
 use crate::units::to_mm;
 
 impl Planner<'_> {
@@ -49,13 +49,13 @@ impl Planner<'_> {
         };
         if sigma.is_none() {
             let text = "the sigma of the instrument is not known, so there are no predictions in mm and none about weak parameters";
-            warnings.push(Warning::new("no_sigma", text, false).with_advice(Advice::StateSigma));
+            warnings.push(Warning::new(WarningCode::NoSigma, text, false).with_advice(Advice::StateSigma));
         }
         if let Some(sigma) = sigma
             && score.weak(sigma).any(|weak| weak.identifiable)
         {
             let text = "some identifiable parameters stay weakly determined (listed below); more poses or wider joint ranges help";
-            warnings.push(Warning::new("weak_parameters", text, false));
+            warnings.push(Warning::new(WarningCode::WeakParameters, text, false));
         }
         Ok(PlanSummary {
             schema: SCHEMA,

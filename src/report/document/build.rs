@@ -16,7 +16,7 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, PayloadText, TargetChoice};
 use crate::session::sha256;
 use crate::session::state::{Robot, Sample, Session};
-use crate::session::summary::{IdentificationSummary, ParameterSummary, SIMULATED};
+use crate::session::summary::{IdentificationSummary, ParameterSummary, WarningCode};
 use crate::units::to_mm;
 
 /// Points of the drawn arm closer than this (mm) are one.
@@ -24,7 +24,7 @@ const SAME_POINT: f64 = 0.001;
 
 /// Whether the points of a result are simulated according to its table.
 fn says_simulated(result: Option<&IdentificationSummary>) -> bool {
-    result.is_some_and(|result| result.warnings.iter().any(|warning| warning.code == SIMULATED))
+    result.is_some_and(|result| result.warnings.iter().any(|warning| warning.code == WarningCode::Simulated))
 }
 
 impl Document {

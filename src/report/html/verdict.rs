@@ -88,7 +88,7 @@ const fn quantity(quantity: LimitedQuantity) -> &'static str {
 
 fn warning(warning: &Warning) -> String {
     let (class, word) = if warning.blocks_acceptance { ("warn", "Warning") } else { ("note", "Note") };
-    let (message, code) = (escape(&warning.message), escape(&warning.code));
+    let (message, code) = (escape(&warning.message), escape(warning.code.as_str()));
     format!("<div class=\"{class}\"><b>{word}.</b> {message} <span class=\"soft\">[{code}]</span></div>\n")
 }
 

@@ -17,7 +17,7 @@ use crate::session::summary::{
     AxisSummary, BlindGroupSummary, CandidateSummary, Cause, IdentificationSettings, IdentificationSummary, JointBin,
     JointErrorSummary, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, ParameterSummary, Provenance, Refit,
     RejectedSummary, SelectionSummary, ShareSummary, SigmaSummary, StatisticsSummary, VerdictStatus, VerificationMode,
-    VerificationSummary, Warning, WorkspaceSummary,
+    VerificationSummary, Warning, WarningCode, WorkspaceSummary,
 };
 use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
@@ -229,7 +229,7 @@ fn verification() -> VerificationSummary {
 
 fn warning(blocks_acceptance: bool) -> Warning {
     let message = "the verification poses cover 40 % of the range of J4: nothing is said about the rest of it";
-    Warning::new("few_data", message, blocks_acceptance)
+    Warning::new(WarningCode::FewData, message, blocks_acceptance)
 }
 
 fn summary(is_good: bool) -> IdentificationSummary {

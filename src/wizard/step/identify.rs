@@ -12,7 +12,7 @@ use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::session::sha256;
 use crate::session::state::{Sample, SampleState, Session};
-use crate::session::summary::{InputFile, InputRole, VerificationMode, Warning};
+use crate::session::summary::{InputFile, InputRole, VerificationMode, Warning, WarningCode};
 use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
@@ -106,7 +106,7 @@ fn left_out(session: &Session, kind: PoseKind) -> Option<Warning> {
     let advice =
         if is_verification { "; measure them again, because a selection of poses verifies nothing" } else { "" };
     let message = format!("the operator excluded {} of the {kind} poses: {}{advice}", poses.len(), poses.join(", "));
-    Some(Warning::new("left_out", message, is_verification))
+    Some(Warning::new(WarningCode::LeftOut, message, is_verification))
 }
 
 fn result<'a>(cx: &Cx<'a>) -> Option<&'a IdentifiedText> {

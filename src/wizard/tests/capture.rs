@@ -116,7 +116,12 @@ fn the_fewest_samples_that_can_be_planned_can_be_identified_from_and_are_warned_
     bench.does(Intent::Identify);
     let result = bench.wizard.session().identified.clone().unwrap();
     assert!(result.calibration.is_some());
-    let poor = result.summary.warnings.iter().find(|warning| warning.code == "poor_data").unwrap();
+    let poor = result
+        .summary
+        .warnings
+        .iter()
+        .find(|warning| warning.code == crate::session::summary::WarningCode::PoorData)
+        .unwrap();
     assert!(poor.message.starts_with("too few data: 21 independent values for 21 combinations"), "{}", poor.message);
     assert!(poor.blocks_acceptance);
 }

@@ -8,7 +8,7 @@ use crate::session::plan_summary::{
     WeakParameterSummary,
 };
 use crate::session::set_up::Step;
-use crate::session::summary::{Provenance, Warning};
+use crate::session::summary::{Provenance, Warning, WarningCode};
 use crate::tui::screen::bench::{drawn, leaks, press, shown, themes, view};
 use crate::wizard::IntentInfo;
 use crate::wizard::view::{BusyView, PlanFigures};
@@ -33,7 +33,7 @@ fn summary() -> PlanSummary {
         schema: SCHEMA,
         provenance,
         objective: None,
-        warnings: vec![Warning::new("weak", "the tracker sees only one side of the flange", false)],
+        warnings: vec![Warning::new(WarningCode::Weak, "the tracker sees only one side of the flange", false)],
         identification_poses: 56,
         verification_poses: 20,
         parameter_count: 25,
