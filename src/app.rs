@@ -5,6 +5,7 @@ mod compensate;
 mod constraints;
 mod export;
 mod identify;
+mod identity;
 mod iso9283;
 mod link;
 mod load;

@@ -1,5 +1,6 @@
 //! Arguments of the command line.
 
+mod identity;
 mod link;
 mod payload;
 mod recording;
@@ -28,6 +29,7 @@ use crate::session::summary::Refit;
 use crate::units::{from_mm, to_mm};
 
 use link::wires;
+pub use identity::IdentityArgs;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
 pub use payload::PayloadArgs;
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
@@ -345,6 +347,9 @@ pub struct EstimationArgs {
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
+    /// What the report is about.
+    #[command(flatten)]
+    pub identity: IdentityArgs,
 }
 
 /// Arguments of `identify`.

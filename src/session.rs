@@ -8,6 +8,7 @@
 
 #![warn(clippy::wildcard_enum_match_arm)]
 
+pub mod about;
 pub mod advice;
 pub mod calibration;
 pub mod constraints;

@@ -12,7 +12,8 @@ use trupose::procedure::deliver::{data_files, files, reports};
 use trupose::profile::builtin;
 use trupose::report::identification_text;
 use trupose::session::journal::{Entry, IdentifiedText, Journal, Line, PointErrorText};
-use trupose::session::set_up::{About, PayloadText};
+use trupose::session::about::About;
+use trupose::session::set_up::PayloadText;
 use trupose::session::sha256;
 use trupose::session::state::Session;
 use trupose::session::summary::{
@@ -390,7 +391,21 @@ fn names_of_others_stay_text() {
     for name in hostile.into_iter().chain([long.as_str()]) {
         let mut session = calibrated();
         name.clone_into(&mut session.name);
-        session.about = About { serial: name.to_owned(), operator: name.to_owned(), site: name.to_owned() };
+        session.about = About {
+            serial: name.to_owned(),
+            operator: name.to_owned(),
+            site: name.to_owned(),
+            controller: name.to_owned(),
+            options: name.to_owned(),
+            speed: name.to_owned(),
+            warm_up: name.to_owned(),
+            instrument_serial: name.to_owned(),
+            certificate: name.to_owned(),
+            certificate_due: "2026-12-31".parse().ok(),
+            field_check: name.to_owned(),
+            smr: name.to_owned(),
+            weather: name.to_owned(),
+        };
         for row in &mut session.rows {
             name.clone_into(&mut row.planned.pose);
         }

@@ -20,7 +20,8 @@ use trupose::profile::{Profile, builtin};
 use trupose::session::journal::Line;
 use trupose::session::plan::{PlannedPose, PoseKind};
 use trupose::session::reading::{MeasureRequest, Reading};
-use trupose::session::set_up::{About, CoordinateUnit, InstrumentChoice, TargetChoice};
+use trupose::session::about::About;
+use trupose::session::set_up::{CoordinateUnit, InstrumentChoice, TargetChoice};
 use trupose::session::simulation::Simulation;
 use trupose::session::state::Session;
 use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
@@ -187,7 +188,7 @@ impl Cell {
             Intent::GoToPose(_) if self.chance(80) => Intent::GoToPose(self.rng.random_range(0..40).to_string()),
             Intent::GoToPose(_) => Intent::GoToPose(self.text()),
             Intent::Note(_) => Intent::Note(self.text()),
-            Intent::About(_) => Intent::About(About { serial: self.text(), operator: self.text(), site: self.text() }),
+            Intent::About(_) => Intent::About(About { serial: self.text(), operator: self.text(), smr: self.text(), ..About::default() }),
             Intent::SuggestPoses(_) => Intent::SuggestPoses([0, 1, 3, usize::MAX][self.pick(4)]),
             other => other,
         }
@@ -461,7 +462,7 @@ fn every_intent() -> Vec<Intent> {
         Note(String::new()),
         SuggestPoses(1),
         Identify,
-        About(trupose::session::set_up::About::default()),
+        About(trupose::session::about::About::default()),
         Deliver,
     ]
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::load::now;
 use super::progress::Progress;
-use super::{Console, advice, estimation_settings, load, payload_of, record, to_json};
+use super::{Console, advice, estimation_settings, identity, load, payload_of, record, to_json};
 use crate::checksum::{self, Syntax};
 use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
@@ -16,6 +16,7 @@ use crate::procedure::identify::{IdentifyRequest, NamedSample, SampleSet, identi
 use crate::profile::Profile;
 use crate::report;
 use crate::session::TableProblem;
+use crate::session::about::About;
 use crate::session::calibration::Calibration;
 use crate::session::measurements::Row;
 use crate::session::state::Session;
@@ -95,6 +96,7 @@ pub(super) fn run_request<O: Write, E: Write>(
                 "leave out '--prior none', '--weighting uniform' and '--iterations 1', or '--terms' and '--level full'",
             ));
     }
+    let about = identity::about(&args.identity, &About::default())?;
     let mut progress = Progress::new(&mut console.err);
     let mut identified = identify(request, &mut |stage| {
         progress.identifying(stage);
@@ -102,10 +104,10 @@ pub(super) fn run_request<O: Write, E: Write>(
     })?;
     identified.put_into_words(advice::words);
     if let Some(path) = recording {
-        record::identification(path, &args.profile, request, &identified)?;
+        record::identification(path, &args.profile, &about, request, &identified)?;
     }
     let session =
-        args.out.as_deref().map(|folder| record::identification_session(folder, &args.profile, request, &identified));
+        args.out.as_deref().map(|folder| record::identification_session(folder, &args.profile, &about, request, &identified));
     deliver(identified.summary, identified.calibration.as_ref(), session.transpose()?.as_ref(), args, console)
 }
 

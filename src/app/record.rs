@@ -17,6 +17,7 @@ use crate::procedure::joint_types;
 use crate::procedure::points::point_errors;
 use crate::profile::Profile;
 use crate::recording::{self, RecordingError, Written};
+use crate::session::about::About;
 use crate::session::journal::{
     Entry, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText, SCHEMA, to_edge, to_xyz_mm,
 };
@@ -100,10 +101,11 @@ pub(super) fn check_target(path: &Path) -> Result<(), Failure> {
 pub(super) fn identification(
     path: &Path,
     source: &str,
+    about: &About,
     request: &IdentifyRequest,
     identified: &Identified,
 ) -> Result<(), Failure> {
-    let lines = identification_lines(path, source, request, identified);
+    let lines = identification_lines(path, source, about, request, identified);
     recording::write(path, &lines, false).map_err(|error| failure(&error))
 }
 
@@ -111,10 +113,11 @@ pub(super) fn identification(
 pub(super) fn identification_session(
     folder: &Path,
     source: &str,
+    about: &About,
     request: &IdentifyRequest,
     identified: &Identified,
 ) -> Result<Session, Failure> {
-    session(identification_lines(folder, source, request, identified))
+    session(identification_lines(folder, source, about, request, identified))
 }
 
 fn session(lines: Vec<Line>) -> Result<Session, Failure> {
@@ -122,9 +125,18 @@ fn session(lines: Vec<Line>) -> Result<Session, Failure> {
     Session::of(&journal).map_err(|error| Failure::from_error(ExitStatus::Internal, &error))
 }
 
-fn identification_lines(path: &Path, source: &str, request: &IdentifyRequest, identified: &Identified) -> Vec<Line> {
+fn identification_lines(
+    path: &Path,
+    source: &str,
+    about: &About,
+    request: &IdentifyRequest,
+    identified: &Identified,
+) -> Vec<Line> {
     let types = joint_types(&request.profile);
     let mut lines = Lines::new(path, source, &request.profile_text);
+    if *about != About::default() {
+        lines.push(Entry::About(about.clone()));
+    }
     let named = |kind: PoseKind, samples: &[NamedSample]| -> Vec<(PoseKind, NamedSample)> {
         samples.iter().map(|sample| (kind, sample.clone())).collect()
     };

@@ -4,9 +4,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::script::session_failure;
-use super::{Console, to_json};
+use super::{Console, identity, to_json};
 use crate::checksum::{self, Finding};
-use crate::cli::SessionCommand;
+use crate::cli::{IdentityArgs, SessionCommand};
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::{deliver, models};
 use crate::report::identification_text;
@@ -27,7 +27,7 @@ pub(super) fn run<O: Write, E: Write>(
         SessionCommand::List { sessions } => list(sessions, console),
         SessionCommand::Show { folder, journal, json } => show(folder, *journal, *json, console),
         SessionCommand::Report { folder, text: true, .. } => print_report(folder, console),
-        SessionCommand::Report { folder, out, .. } => report(folder, out.as_deref(), console),
+        SessionCommand::Report { folder, out, identity, .. } => report(folder, out.as_deref(), identity, console),
         SessionCommand::Export { folder, csv, out } => export_tables(folder, *csv, out.as_deref(), console),
     }
 }
@@ -229,9 +229,11 @@ fn delivered_files(folder: &Path, session: &Session) -> Vec<(&'static str, Strin
 fn report<O: Write, E: Write>(
     folder: &Path,
     out: Option<&Path>,
+    identity: &IdentityArgs,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    let session = session(folder, console)?;
+    let mut session = session(folder, console)?;
+    session.about = identity::about(identity, &session.about)?;
     let internal = |message: String| Failure::new(ExitStatus::Internal, message);
     let mut files = deliver::data_files(&session).map_err(internal)?;
     files.extend(models::delivered(&session));

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Subcommand;
 
+use super::identity::IdentityArgs;
+
 /// Subcommands of `session`.
 #[derive(Debug, Subcommand)]
 pub enum SessionCommand {
@@ -36,6 +38,9 @@ pub enum SessionCommand {
         /// Print the report as plain text and write no file
         #[arg(long, conflicts_with = "out")]
         text: bool,
+        /// What the report is about, where the session does not say it or says it otherwise.
+        #[command(flatten)]
+        identity: IdentityArgs,
     },
     /// Write the tables of a session
     Export {

@@ -11,7 +11,7 @@ use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
 use crate::session::journal::{FindingCause, PlanText};
-use crate::session::set_up::About;
+use crate::session::about::About;
 use crate::session::state::{Note, Refused};
 use crate::session::summary::IdentificationSummary;
 

@@ -198,32 +198,3 @@ impl fmt::Display for PayloadText {
         write!(f, "{} kg, centre ({x}, {y}, {z}) mm in the flange", self.mass_kg)
     }
 }
-
-/// Details for the report that only people know. Empty: not given.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct About {
-    /// Serial number of the arm.
-    pub serial: String,
-    /// Name of the person who measured.
-    pub operator: String,
-    /// Place and conditions of the measurement.
-    pub site: String,
-}
-
-impl About {
-    /// Longest text (characters).
-    pub const LONGEST: usize = 200;
-
-    /// The same without blanks around the texts.
-    #[must_use]
-    pub fn trimmed(&self) -> Self {
-        let [serial, operator, site] = [&self.serial, &self.operator, &self.site].map(|text| text.trim().to_owned());
-        Self { serial, operator, site }
-    }
-
-    /// Whether no text is too long.
-    pub fn is_usable(&self) -> bool {
-        [&self.serial, &self.operator, &self.site].iter().all(|text| text.chars().count() <= Self::LONGEST)
-    }
-}

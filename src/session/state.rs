@@ -20,7 +20,8 @@ use super::journal::{
     from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
-use super::set_up::{About, InstrumentChoice, PayloadText, Step, TargetChoice};
+use super::about::About;
+use super::set_up::{InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::kinematics::JointType;
 use crate::profile::Profile;
 use crate::units::from_mm;

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::procedure::plan::{INTERACTIVE_CANDIDATES, PlanRequest};
-use crate::session::set_up::{About, InstrumentChoice, PayloadText, TargetChoice};
+use crate::session::about::About;
+use crate::session::set_up::{InstrumentChoice, PayloadText, TargetChoice};
 
 /// A command of the operator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,8 @@
 
 use super::entry::{Correction, Decision, Entry, MeasuredText, PlanText};
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{About, InstrumentChoice, Step, TargetChoice};
+use crate::session::about::About;
+use crate::session::set_up::{InstrumentChoice, Step, TargetChoice};
 use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictStatus};
 use crate::session::wire::LinkChoice;
 
@@ -146,9 +147,7 @@ fn result_text(summary: &IdentificationSummary, is_usable: bool) -> String {
 }
 
 fn about_text(about: &About) -> String {
-    let said = |name: &str, text: &str| (!text.is_empty()).then(|| format!("{name} {text}"));
-    let texts = [said("serial number", &about.serial), said("operator", &about.operator), said("at", &about.site)];
-    let texts: Vec<String> = texts.into_iter().flatten().collect();
+    let texts: Vec<String> = about.given().map(|(detail, text)| format!("{} {text}", detail.label())).collect();
     if texts.is_empty() { "nothing given".to_owned() } else { texts.join(", ") }
 }
 

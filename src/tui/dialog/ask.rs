@@ -4,7 +4,8 @@ use super::{Dialog, Form};
 use crate::session::filter::Filter;
 use crate::session::measurements::Layout;
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, TargetChoice};
+use crate::session::about::{About, Detail};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::wire::{LinkChoice, WireAddress};
 use crate::tui::form::{TextField, Validator};
@@ -218,32 +219,36 @@ fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
+/// What is asked for the report, each with its help.
+const ASKED: [(Detail, &str); 13] = [
+    (Detail::Serial, "Of the arm, from its type plate: the result belongs to this arm only."),
+    (Detail::Operator, "The person who measured."),
+    (Detail::Site, "Hall, cell: whatever a later reader must know."),
+    (Detail::Controller, "Type, serial number and software version."),
+    (Detail::Options, "Options such as absolute accuracy, and whether they were on while measuring."),
+    (Detail::Speed, "Speed between the poses, and the wait before each reading."),
+    (Detail::WarmUp, "How long the arm moved before the first reading."),
+    (Detail::InstrumentSerial, "From its type plate."),
+    (Detail::Certificate, "Number of the calibration certificate, and the laboratory."),
+    (Detail::CertificateDue, "The last day on which it is valid, such as 2027-03-31."),
+    (Detail::FieldCheck, "What was checked on the instrument today, and the result."),
+    (Detail::Smr, "Type, serial number and radius."),
+    (Detail::Weather, "What the instrument corrects for: temperature, pressure, humidity."),
+];
+
 /// Asks for the details of the report that only people know.
 pub fn about(about: &About) -> Dialog {
-    Dialog::Form(
-        Form::new("For the report: details that only you know. All are optional.", said)
-            .text(
-                "serial number",
-                &about.serial,
-                "Of the arm, from its type plate: the result belongs to this arm only.",
-            )
-            .text("operator", &about.operator, "The person who measured.")
-            .text(
-                "place and conditions",
-                &about.site,
-                "Hall, cell, warm-up, payload: whatever a later reader must know.",
-            ),
-    )
+    let form = Form::new("For the report: details that only you know. All are optional.", said);
+    let ask = |form: Form, (detail, help): &(Detail, &'static str)| form.text(detail.label(), &about.text(*detail), help);
+    Dialog::Form(ASKED.iter().fold(form, ask))
 }
 
 fn said(values: &[String]) -> Result<Intent, String> {
-    let [serial, operator, site] = values else { return Err("three texts are needed".to_owned()) };
-    let about = About { serial: serial.clone(), operator: operator.clone(), site: site.clone() };
-    if about.is_usable() {
-        Ok(Intent::About(about))
-    } else {
-        Err(format!("at most {} characters each", About::LONGEST))
+    let mut about = About::default();
+    for ((detail, _), text) in ASKED.iter().zip(values) {
+        about.set(*detail, text).map_err(|error| error.to_string())?;
     }
+    Ok(Intent::About(about))
 }
 
 /// Parses a number, with a decimal point or comma.
@@ -329,7 +334,19 @@ mod tests {
     fn what_the_report_is_about_may_be_empty_but_not_endless() {
         let given = About { serial: "R-17".to_owned(), ..About::default() };
         assert_eq!(said(&values(&["R-17", "", ""])), Ok(Intent::About(given)));
-        assert_eq!(said(&values(&["", "", &"x".repeat(201)])), Err("at most 200 characters each".to_owned()));
+        let long = "x".repeat(201);
+        let refused = Err("place and conditions: at most 200 characters".to_owned());
+        assert_eq!(said(&values(&["", "", &long])), refused);
+    }
+
+    #[test]
+    fn every_detail_is_asked_once() {
+        let mut details: Vec<&str> = ASKED.iter().map(|(detail, _)| detail.name()).collect();
+        let mut known = Detail::NAMES.to_vec();
+        (details.sort_unstable(), known.sort_unstable());
+        assert_eq!(details, known);
+        let widest = ASKED.iter().map(|(detail, _)| detail.label().chars().count()).max();
+        assert!(widest < Some(24), "a label runs into its field");
     }
 
     #[test]

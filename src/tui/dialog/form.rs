@@ -50,6 +50,9 @@ impl Value {
     }
 }
 
+/// Rows below the fields: a blank one, the explanation, what is wrong.
+const EXPLANATION: u16 = 4;
+
 impl Form {
     pub fn new(title: impl Into<String>, build: Build) -> Self {
         Self { title: title.into(), fields: Vec::new(), focus: 0, build, is_tried: false }
@@ -116,7 +119,10 @@ impl Form {
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         paint::text(buf, area, (0, 0), &theme.glyphs.show(&self.title), theme.style(Role::Title));
         let mut row = 2;
-        for (index, field) in self.fields.iter().enumerate() {
+        // On a low screen the fields around the focused one are shown.
+        let room = usize::from(area.height.saturating_sub(2 + EXPLANATION)).max(1);
+        let first = (self.focus + 1).saturating_sub(room);
+        for (index, field) in self.fields.iter().enumerate().skip(first).take(room) {
             let has_focus = index == self.focus;
             let role = if has_focus { Role::Title } else { Role::Dim };
             paint::text(buf, area, (0, row), field.label, theme.style(role));

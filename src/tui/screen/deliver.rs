@@ -74,17 +74,16 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         if file.starts_with('/') { file.to_owned() } else { format!("{}/{file}", folder.trim_end_matches('/')) }
     };
     if content.files.is_empty() {
-        let of = &content.about;
-        let said = |text: &str| if text.is_empty() { "-".to_owned() } else { crate::text::printable(text) };
-        page.paragraph(
-            &format!(
-                "Report for: serial number {}, operator {}, place {}",
-                said(&of.serial),
-                said(&of.operator),
-                said(&of.site)
-            ),
-            Role::Plain,
-        );
+        let given: Vec<String> = content
+            .about
+            .given()
+            .map(|(detail, text)| format!("{} {}", detail.label(), crate::text::printable(&text)))
+            .collect();
+        let given = if given.is_empty() { "nothing was said about it".to_owned() } else { given.join(", ") };
+        page.paragraph(&format!("Report for: {given}"), Role::Plain);
+        if content.about.serial.is_empty() {
+            page.paragraph("Without a serial number the verdict belongs to no arm.", Role::Warn);
+        }
         let is_writing = cx.view.busy.is_some();
         let nothing = "Nothing has been written yet. Enter writes the results to:";
         page.title(if is_writing { "The results are being written to:" } else { nothing });

@@ -10,7 +10,8 @@ use super::*;
 use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Weighting};
 use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::{Level, Profile, builtin};
-use crate::session::set_up::{About, CoordinateUnit, InstrumentChoice, TargetChoice};
+use crate::session::about::About;
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice, TargetChoice};
 use crate::session::state::Session;
 use crate::session::summary::Verdict;
 use crate::session::summary::{

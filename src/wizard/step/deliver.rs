@@ -4,7 +4,6 @@ use super::{Action, Cx, StepMachine, offer, require};
 use crate::procedure::deliver;
 use crate::procedure::models::{Models, ModelsRequest};
 use crate::session::journal::Entry;
-use crate::session::set_up::About;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::{Notice, Problem};
@@ -31,12 +30,10 @@ impl StepMachine for DeliverStep {
 
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
         if let Intent::About(about) = intent {
-            let about = about.trimmed();
-            if !about.is_usable() {
-                let what = format!("too long for the report (at most {} characters each)", About::LONGEST);
-                return vec![Action::Say(Notice::error(what))];
-            }
-            return vec![Action::Write(vec![Entry::About(about)])];
+            return vec![match about.checked() {
+                Ok(about) => Action::Write(vec![Entry::About(about)]),
+                Err(error) => Action::Say(Notice::error(error.to_string())),
+            }];
         }
         if intent != Intent::Deliver {
             return Vec::new();
