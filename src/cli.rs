@@ -28,8 +28,8 @@ use crate::session::measurements::Layout;
 use crate::session::summary::Refit;
 use crate::units::{from_mm, to_mm};
 
-use link::wires;
 pub use identity::IdentityArgs;
+use link::wires;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
 pub use payload::PayloadArgs;
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};

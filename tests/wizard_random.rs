@@ -17,10 +17,10 @@ use trupose::kinematics::ForwardKinematics;
 use trupose::procedure::identify::identify;
 use trupose::procedure::models::models;
 use trupose::profile::{Profile, builtin};
+use trupose::session::about::About;
 use trupose::session::journal::Line;
 use trupose::session::plan::{PlannedPose, PoseKind};
 use trupose::session::reading::{MeasureRequest, Reading};
-use trupose::session::about::About;
 use trupose::session::set_up::{CoordinateUnit, InstrumentChoice, TargetChoice};
 use trupose::session::simulation::Simulation;
 use trupose::session::state::Session;
@@ -188,7 +188,12 @@ impl Cell {
             Intent::GoToPose(_) if self.chance(80) => Intent::GoToPose(self.rng.random_range(0..40).to_string()),
             Intent::GoToPose(_) => Intent::GoToPose(self.text()),
             Intent::Note(_) => Intent::Note(self.text()),
-            Intent::About(_) => Intent::About(About { serial: self.text(), operator: self.text(), smr: self.text(), ..About::default() }),
+            Intent::About(_) => Intent::About(About {
+                serial: self.text(),
+                operator: self.text(),
+                smr: self.text(),
+                ..About::default()
+            }),
             Intent::SuggestPoses(_) => Intent::SuggestPoses([0, 1, 3, usize::MAX][self.pick(4)]),
             other => other,
         }

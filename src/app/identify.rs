@@ -106,8 +106,10 @@ pub(super) fn run_request<O: Write, E: Write>(
     if let Some(path) = recording {
         record::identification(path, &args.profile, &about, request, &identified)?;
     }
-    let session =
-        args.out.as_deref().map(|folder| record::identification_session(folder, &args.profile, &about, request, &identified));
+    let session = args
+        .out
+        .as_deref()
+        .map(|folder| record::identification_session(folder, &args.profile, &about, request, &identified));
     deliver(identified.summary, identified.calibration.as_ref(), session.transpose()?.as_ref(), args, console)
 }
 

@@ -31,9 +31,16 @@ fn read(path: &Path) -> Result<About, Failure> {
     let text = load::text(path)?;
     ron::from_str(&text).map_err(|error| {
         let place = error.span.start;
-        let message =
-            format!("'{}', line {}, column {}: {}", path.display(), place.line, place.col, printable(&error.code.to_string()));
-        Failure::new(ExitStatus::Usage, message)
-            .hint(format!("write for example (serial: \"20175\", certificate_due: \"2027-03-31\"); there are: {}", Detail::NAMES.join(", ")))
+        let message = format!(
+            "'{}', line {}, column {}: {}",
+            path.display(),
+            place.line,
+            place.col,
+            printable(&error.code.to_string())
+        );
+        Failure::new(ExitStatus::Usage, message).hint(format!(
+            "write for example (serial: \"20175\", certificate_due: \"2027-03-31\"); there are: {}",
+            Detail::NAMES.join(", ")
+        ))
     })
 }

@@ -10,8 +10,8 @@ mod decisions;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
-use crate::session::journal::{FindingCause, PlanText};
 use crate::session::about::About;
+use crate::session::journal::{FindingCause, PlanText};
 use crate::session::state::{Note, Refused};
 use crate::session::summary::IdentificationSummary;
 

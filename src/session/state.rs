@@ -14,13 +14,13 @@ use nalgebra::Point3;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
+use super::about::About;
 use super::calibration::{MountedText, mounted_on};
 use super::journal::{
     CirclePointText, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText,
     from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
-use super::about::About;
 use super::set_up::{InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::kinematics::JointType;
 use crate::profile::Profile;

@@ -1,8 +1,8 @@
 //! Entries in one line each, for transcripts and lists. Stable: scripts and people compare them.
 
 use super::entry::{Correction, Decision, Entry, MeasuredText, PlanText};
-use crate::session::plan::PoseKind;
 use crate::session::about::About;
+use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, Step, TargetChoice};
 use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictStatus};
 use crate::session::wire::LinkChoice;

@@ -1,10 +1,10 @@
 //! The forms of the screens: coordinates, a known target, a simulated cell, recorded measurements, and the details of the report.
 
 use super::{Dialog, Form};
+use crate::session::about::{About, Detail};
 use crate::session::filter::Filter;
 use crate::session::measurements::Layout;
 use crate::session::plan::PoseKind;
-use crate::session::about::{About, Detail};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, TargetChoice};
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::wire::{LinkChoice, WireAddress};
@@ -239,7 +239,8 @@ const ASKED: [(Detail, &str); 13] = [
 /// Asks for the details of the report that only people know.
 pub fn about(about: &About) -> Dialog {
     let form = Form::new("For the report: details that only you know. All are optional.", said);
-    let ask = |form: Form, (detail, help): &(Detail, &'static str)| form.text(detail.label(), &about.text(*detail), help);
+    let ask =
+        |form: Form, (detail, help): &(Detail, &'static str)| form.text(detail.label(), &about.text(*detail), help);
     Dialog::Form(ASKED.iter().fold(form, ask))
 }
 
