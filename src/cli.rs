@@ -413,7 +413,7 @@ pub struct ConstraintsArgs {
     /// Options of the identification.
     #[command(flatten)]
     pub estimation: EstimationArgs,
-    /// Shared points (position, socket, joints) or lengths (from_q1_deg …, to_q1_deg …, length_mm): CSV with units
+    /// Shared points (position, socket, joints), lengths (from_q1_deg …, to_q1_deg …, length_mm) or contacts (feature, shape, joints, length_mm): CSV with units
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
     /// Known distance between the two sockets of one position

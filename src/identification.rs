@@ -52,6 +52,8 @@
 pub mod circle_point;
 mod error;
 mod factor;
+mod feature;
+mod lengths;
 mod linearise;
 mod mistake;
 mod noise;
@@ -77,6 +79,7 @@ use nalgebra::{DMatrix, DVector, Point3};
 
 pub use error::IdentificationError;
 pub(crate) use factor::Factor;
+pub use feature::{Feature, Shape};
 pub use observability::{BlindGroup, Observability};
 pub(crate) use pairs::SAME_POINT;
 pub use problem::{Length, LengthEnd, Observations, PointSample, Problem, SharedPoint};
@@ -283,6 +286,7 @@ fn summarise(solve: &Solve<'_, '_>, settings: &Settings, solved: Solved) -> Iden
     let problem = solve.problem;
     let sigma = sigma(solve, settings, &at);
     let covariance = covariance(solve, &at);
+    let feature_covariances = solve.feature_covariances(&at, &in_nominal_base(problem, &observability, &covariance));
     let rejected = rejected(solve, &at);
     let observability = if rejected.is_empty() && at.arm.targets == problem.arm.targets {
         observability
@@ -319,6 +323,8 @@ fn summarise(solve: &Solve<'_, '_>, settings: &Settings, solved: Solved) -> Iden
         path,
         termination,
         base_from_station: at.points.base_from_station,
+        features: at.points.features,
+        feature_covariances,
         residuals: at.points.of_places,
     }
 }
@@ -366,6 +372,19 @@ fn covariance(solve: &Solve<'_, '_>, at: &Linearised) -> DMatrix<f64> {
     solve.basis.spread(&(&inverse * middle * &inverse))
 }
 
+/// The covariance without what only moves the base of the robot: parameters of the first link that the data cannot find.
+fn in_nominal_base(
+    problem: &Problem<'_>,
+    observability: &Observability,
+    covariance: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let moves_base = |index: usize| {
+        problem.parameters[index].id.joint() == Some(0) && !observability.is_identifiable(index)
+    };
+    let n = covariance.nrows();
+    DMatrix::from_fn(n, n, |i, j| if moves_base(i) || moves_base(j) { 0.0 } else { covariance[(i, j)] })
+}
+
 /// The samples without trust, with the likely cause.
 fn rejected(solve: &Solve<'_, '_>, at: &Linearised) -> Vec<Rejected> {
     let problem = solve.problem;
@@ -393,10 +412,7 @@ fn rejected(solve: &Solve<'_, '_>, at: &Linearised) -> Vec<Rejected> {
     };
     let scatter = solve.scatter(at, &DVector::zeros(at.x.len()));
     let typical = scatter.of_reading(&at.noise);
-    let length_residual = |index: usize| {
-        let errors = verification::DirectErrors::new(&at.arm, problem.observations);
-        errors.lengths.get(index).map_or(0.0, |error| error.abs())
-    };
+    let length_residual = |index: usize| at.rows.residuals.get(3 * places + index).map_or(0.0, |error| error.abs());
     left_out
         .iter()
         .map(|&sample| {

@@ -385,9 +385,9 @@ fn balls_in_sockets_identify_the_robot_without_an_instrument() {
         });
     }
     case.observations = observations;
-    let before = DirectErrors::new(&case.arm, &case.observations);
+    let before = DirectErrors::new(&case.arm, &[], &case.observations);
     let found = run(&case, &settings());
-    let after = DirectErrors::new(&found.arm, &case.observations);
+    let after = DirectErrors::new(&found.arm, &[], &case.observations);
     assert!(before.seat.unwrap().rms > 5.0 * MILLIMETRE, "{:?}", before.seat);
     assert!(after.seat.unwrap().max < 1.0 * MICROMETRE, "{:?}", after.seat);
     assert_eq!(found.observability.rank, Some(21));

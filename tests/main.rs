@@ -16,6 +16,7 @@ mod cartesian_programs;
 mod cell;
 mod cli;
 mod compensate;
+mod contacts;
 mod docs;
 mod estimation;
 mod example;

@@ -87,6 +87,7 @@ from_q1_deg,from_q2_deg,from_q3_deg,to_q1_deg,to_q2_deg,to_q3_deg,length_mm
         warnings.extend(match read_constraints(text, "odd.csv", &JOINTS).unwrap() {
             Constraints::SharedPoints(points) => points.warnings,
             Constraints::Lengths(lengths) => lengths.warnings,
+            Constraints::Contacts(contacts) => contacts.warnings,
         });
     }
     warnings.extend(ignored.warnings);

@@ -11,7 +11,7 @@ use crate::identification::{Length, LengthEnd, SharedPoint, Weighting};
 use crate::kinematics::Place;
 use crate::procedure::identify::{Distances, IdentifyRequest, SampleSet};
 use crate::procedure::{SampleName, checks, input_file, joint_types};
-use crate::session::constraints::{Constraints, Lengths, SharedPoints, read_constraints};
+use crate::session::constraints::{Constraints, Contacts, Lengths, NamedShape, SharedPoints, read_constraints};
 use crate::session::filter::Filter;
 use crate::session::summary::{InputRole, VerificationMode};
 use crate::store;
@@ -33,6 +33,7 @@ pub(super) fn run<O: Write, E: Write>(
     let (columns, odd) = match &table {
         Constraints::SharedPoints(shared) => (&shared.columns, &shared.warnings),
         Constraints::Lengths(lengths) => (&lengths.columns, &lengths.warnings),
+        Constraints::Contacts(contacts) => (&contacts.columns, &contacts.warnings),
     };
     let filter = load::filter(estimation.filter.as_deref(), columns)?;
     let (identification, rest) = match &table {
@@ -40,15 +41,21 @@ pub(super) fn run<O: Write, E: Write>(
             shared_points(args, shared, &Side { filter: filter.as_ref(), columns, matching: true })?,
             shared_points(args, shared, &Side { filter: filter.as_ref(), columns, matching: false })?,
         ),
-        Constraints::Lengths(_) if args.leave_one_out.is_some() || args.socket_distance_mm.is_some() => {
+        Constraints::Lengths(_) | Constraints::Contacts(_)
+            if args.leave_one_out.is_some() || args.socket_distance_mm.is_some() =>
+        {
             return Err(Failure::new(
                 ExitStatus::Usage,
-                "'--leave-one-out' and '--socket-distance-mm' belong to tables with shared points; this one holds lengths",
+                "'--leave-one-out' and '--socket-distance-mm' belong to tables with shared points; this one holds lengths or contacts",
             ));
         }
         Constraints::Lengths(table) => (
             lengths(table, &Side { filter: filter.as_ref(), columns, matching: true })?,
             lengths(table, &Side { filter: filter.as_ref(), columns, matching: false })?,
+        ),
+        Constraints::Contacts(table) => (
+            contacts(table, &Side { filter: filter.as_ref(), columns, matching: true })?,
+            contacts(table, &Side { filter: filter.as_ref(), columns, matching: false })?,
         ),
     };
     if args.verify_rest && rest.names.is_empty() {
@@ -113,6 +120,29 @@ fn lengths(table: &Lengths, side: &Side<'_>) -> Result<Distances, Failure> {
             distances.observations.lengths.push(Length { from, to, length: row.length, sigma: row.sigma });
             let name = |end: &str| SampleName { pose: end.to_owned(), line: row.line };
             distances.names.extend([name("from"), name("to")]);
+        }
+    }
+    Ok(distances)
+}
+
+/// The contacts of the rows on one side of the filter. Features keep their number on both sides.
+fn contacts(table: &Contacts, side: &Side<'_>) -> Result<Distances, Failure> {
+    let mut distances = Distances::default();
+    distances.observations.features = table.features.iter().map(|named| named.shape).collect();
+    distances.features = table.features.iter().map(|named| named.name.clone()).collect();
+    for row in &table.rows {
+        if side.has(&row.fields, row.line)? {
+            let (feature, NamedShape { name, shape }) = (row.feature, &table.features[row.feature]);
+            for component in 0..shape.components() {
+                let is_measured = component + 1 == shape.components();
+                distances.observations.lengths.push(Length {
+                    from: LengthEnd::Target(Place { configuration: row.configuration.clone(), target: 0 }),
+                    to: LengthEnd::Feature { feature, component },
+                    length: if is_measured { row.length } else { 0.0 },
+                    sigma: row.sigma,
+                });
+                distances.names.push(SampleName { pose: name.clone(), line: row.line });
+            }
         }
     }
     Ok(distances)

@@ -245,7 +245,7 @@ impl Models {
                             .hint("use '--refit frame' or '--refit frame+target'")
                     })?];
                     if refit == Refit::None {
-                        return Ok(FittedSetup { arm, base_from_station });
+                        return Ok(FittedSetup { arm, base_from_station, features: Vec::new() });
                     }
                     fit_targets(&arm, &base_from_station, samples).ok_or_else(|| {
                         Failure::new(ExitStatus::Numerical, "the position of the SMR could not be fitted")

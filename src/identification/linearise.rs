@@ -5,6 +5,8 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, SymmetricEigen, Vector3};
 
+use super::feature::Feature;
+use super::lengths::{fitted_features, length_rows, length_values, remove_features};
 use super::noise::{Groups, Noise, place_weights};
 use super::problem::{LengthEnd, Problem};
 use crate::geometry::register;
@@ -48,7 +50,7 @@ impl Evaluation {
     }
 
     /// The three rows of a place.
-    fn place(&self, index: usize) -> &[f64] {
+    pub(super) fn place(&self, index: usize) -> &[f64] {
         &self.rows[3 * self.n * index..3 * self.n * (index + 1)]
     }
 }
@@ -136,6 +138,12 @@ impl Weights {
         self.places[index]
     }
 
+    /// Inverse variance of length `index` without that of shared points (1/m²).
+    pub(super) fn of_length(&self, index: usize) -> f64 {
+        let (variance, trust) = self.lengths[index];
+        trust / variance.max(f64::MIN_POSITIVE)
+    }
+
     /// The factor by which `other` weighs every place more; `None` if it is not the same for all.
     pub(crate) fn proportion_of(&self, other: &Self) -> Option<f64> {
         let weighed = other.places.iter().zip(&self.places).filter(|(a, b)| **a > 0.0 || **b > 0.0);
@@ -183,6 +191,8 @@ pub(crate) struct PointResiduals {
     pub(crate) of_places: Vec<Vector3<f64>>,
     /// Weighted centroid of the predicted points of each station (m).
     centroids: Vec<Point3<f64>>,
+    /// Features where the predicted places have them; `None` for one that too few contacts show.
+    pub(crate) features: Vec<Option<Feature>>,
 }
 
 impl PointResiduals {
@@ -192,7 +202,7 @@ impl PointResiduals {
     }
 }
 
-/// Registers every station and takes every shared point at its weighted mean: what the distances leave open.
+/// Registers every station, takes every shared point at its weighted mean and fits every feature: what the distances leave open.
 pub(crate) fn point_residuals(problem: &Problem<'_>, points: &[Point3<f64>], weights: &Weights) -> PointResiduals {
     let samples = &problem.observations.points;
     let stations = samples.iter().map(|sample| sample.station + 1).max().unwrap_or(0);
@@ -216,11 +226,12 @@ pub(crate) fn point_residuals(problem: &Problem<'_>, points: &[Point3<f64>], wei
             of_places[index] = mean - points[index].coords;
         }
     }
-    PointResiduals { base_from_station, of_places, centroids }
+    let features = fitted_features(problem, points, weights);
+    PointResiduals { base_from_station, of_places, centroids, features }
 }
 
 /// Places of each shared point.
-fn shared_ranges(problem: &Problem<'_>) -> impl Iterator<Item = std::ops::Range<usize>> {
+pub(super) fn shared_ranges(problem: &Problem<'_>) -> impl Iterator<Item = std::ops::Range<usize>> {
     problem.observations.shared.iter().scan(problem.observations.points.len(), |start, shared| {
         let range = *start..*start + shared.at.len();
         *start = range.end;
@@ -228,7 +239,7 @@ fn shared_ranges(problem: &Problem<'_>) -> impl Iterator<Item = std::ops::Range<
     })
 }
 
-fn weighted_mean(
+pub(super) fn weighted_mean(
     weights: &Weights,
     range: std::ops::Range<usize>,
     value: impl Fn(usize) -> Vector3<f64>,
@@ -257,8 +268,8 @@ pub(crate) struct ProjectedRows {
     pub(crate) length_variances: Vec<f64>,
 }
 
-/// The position problem with the rigid motion of every station, every shared point, and the turn of the base under shared
-/// points projected out. For measured points this is exactly the distance problem weighted with the covariance of the pairs
+/// The position problem with the rigid motion of every station, every shared point, the place of every feature, and the turn of the
+/// base under shared points projected out. For measured points this is exactly the distance problem weighted with the covariance of the pairs
 /// (distances lose nothing but the frame).
 ///
 /// About the centroid the columns of a shift and of a turn are orthogonal, so the projection needs no decomposition:
@@ -271,7 +282,7 @@ pub(crate) fn project(
     weights: &Weights,
 ) -> ProjectedRows {
     let n = evaluation.n;
-    let (length_rows, length_residuals) = length_rows(problem, &evaluation, weights);
+    let (length_rows, length_residuals) = length_rows(problem, &evaluation, &residuals.features, weights);
     let Evaluation { mut rows, points, .. } = evaluation;
     let places = judged_places(problem);
     rows.truncate(3 * n * places);
@@ -309,9 +320,11 @@ impl ProjectedRows {
         let arms: Vec<Vector3<f64>> = seats.iter().map(|&index| -residuals.of_places[index]).collect();
         remove_turn(n, &mut self.rows, &seats, &arms, weights);
         let places = judged_places(problem);
-        let of_lengths = self.residuals.split_off(self.residuals.len() - problem.observations.lengths.len());
         self.residuals = residuals.of_places[..places].iter().flat_map(|residual| residual.iter().copied()).collect();
-        self.residuals.extend(of_lengths);
+        let contacts = length_values(problem, points, &residuals.features, weights);
+        self.residuals
+            .extend(problem.observations.lengths.iter().zip(&contacts).map(|(length, at)| length.length - at.value));
+        remove_features(n, &mut self.rows[3 * n * places..], problem, &contacts, weights);
         self.weigh(problem, weights);
     }
 
@@ -324,7 +337,7 @@ impl ProjectedRows {
         for (length, (variance, trust)) in problem.observations.lengths.iter().zip(&weights.lengths) {
             // A shared point is known only as the mean of its seats.
             let of_end = |end: &LengthEnd| match end {
-                LengthEnd::Target(_) => 0.0,
+                LengthEnd::Target(_) | LengthEnd::Feature { .. } => 0.0,
                 LengthEnd::SharedPoint(shared) => {
                     let information: f64 = ranges[*shared].clone().map(|index| weights.of_place(index)).sum();
                     if information > 0.0 { 1.0 / information } else { 0.0 }
@@ -394,7 +407,7 @@ fn remove_turn(n: usize, rows: &mut [f64], members: &[usize], arms: &[Vector3<f6
     }
 }
 
-fn mean_rows(n: usize, rows: &[f64], members: impl Iterator<Item = usize>, weights: &Weights) -> Vec<f64> {
+pub(super) fn mean_rows(n: usize, rows: &[f64], members: impl Iterator<Item = usize>, weights: &Weights) -> Vec<f64> {
     let mut mean = vec![0.0; 3 * n];
     let mut total = 0.0;
     for index in members {
@@ -412,7 +425,7 @@ fn mean_rows(n: usize, rows: &[f64], members: impl Iterator<Item = usize>, weigh
     mean
 }
 
-fn split_rows(rows: &[f64], n: usize) -> (&[f64], &[f64], &[f64]) {
+pub(super) fn split_rows(rows: &[f64], n: usize) -> (&[f64], &[f64], &[f64]) {
     let (x, rest) = rows.split_at(n);
     let (y, z) = rest.split_at(n);
     (x, y, z)
@@ -424,40 +437,6 @@ fn pseudo_inverse(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     let largest = eigen.eigenvalues.amax();
     let inverse = eigen.eigenvalues.map(|value| if value > 1e-13 * largest { 1.0 / value } else { 0.0 });
     eigen.eigenvectors * Matrix3::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
-}
-
-/// Rows of the measured lengths, `u · (B_to − B_from)`, equations (16) and (21) with a measured length, and their residuals (m).
-fn length_rows(problem: &Problem<'_>, evaluation: &Evaluation, weights: &Weights) -> (Vec<f64>, Vec<f64>) {
-    let n = evaluation.n;
-    let observations = problem.observations;
-    let ranges: Vec<_> = shared_ranges(problem).collect();
-    let mut next_place = judged_places(problem);
-    let (mut rows, mut residuals) = (Vec::new(), Vec::new());
-    for length in &observations.lengths {
-        let mut end = |end: &LengthEnd| match end {
-            LengthEnd::Target(_) => {
-                let index = next_place;
-                next_place += 1;
-                (evaluation.points[index].coords, evaluation.place(index).to_vec())
-            }
-            LengthEnd::SharedPoint(shared) => {
-                let range = ranges[*shared].clone();
-                let point = weighted_mean(weights, range.clone(), |index| evaluation.points[index].coords);
-                (point, mean_rows(n, &evaluation.rows, range, weights))
-            }
-        };
-        let (from, from_rows) = end(&length.from);
-        let (to, to_rows) = end(&length.to);
-        let difference = to - from;
-        let predicted = difference.norm();
-        // Two points on top of each other have no direction to differentiate along.
-        let u = if predicted > f64::EPSILON { difference / predicted } else { Vector3::zeros() };
-        let (fx, fy, fz) = split_rows(&from_rows, n);
-        let (tx, ty, tz) = split_rows(&to_rows, n);
-        rows.extend((0..n).map(|c| u.x * (tx[c] - fx[c]) + u.y * (ty[c] - fy[c]) + u.z * (tz[c] - fz[c])));
-        residuals.push(length.length - predicted);
-    }
-    (rows, residuals)
 }
 
 impl ProjectedRows {

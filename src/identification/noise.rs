@@ -194,14 +194,17 @@ impl Scatter {
             let taken: f64 = if owner < groups.stations { 6.0 } else { 3.0 };
             values += (seen - taken).max(0.0);
         }
+        let scatters = |index: usize| {
+            trust.lengths[index] > 0.0 && ends_that_move(problem, &problem.observations.lengths[index]) > 0.0
+        };
         for (index, (length, residual)) in problem.observations.lengths.iter().zip(of_lengths).enumerate() {
-            let poses = ends_that_move(problem, length);
-            if trust.lengths[index] > 0.0 && poses > 0.0 {
+            if scatters(index) {
                 let variance = noise.of_reading(length.sigma);
+                let poses = ends_that_move(problem, length);
                 residuals.push(Residual { square: residual * residual, values: 1.0, variance, poses });
-                values += 1.0;
             }
         }
+        values += problem.observations.length_values(scatters) as f64;
         let total: f64 = residuals.iter().map(|residual| residual.variance).sum();
         let reading = means.mean_reading.max(total / residuals.len().max(1) as f64);
         let is_stated = noise.stated > 0.0 || problem.observations.points.iter().any(|sample| sample.sigma.is_some());

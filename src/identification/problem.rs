@@ -2,7 +2,7 @@
 
 use nalgebra::{DVector, Point3};
 
-use super::{IdentificationError, Places, Rejected, SampleIndex};
+use super::{IdentificationError, Places, Rejected, SampleIndex, Shape};
 use crate::kinematics::{Arm, FreeParameter, Joint, ParameterId, Place};
 
 /// One measured point.
@@ -32,22 +32,39 @@ pub enum LengthEnd {
     Target(Place),
     /// The shared point with this index.
     SharedPoint(usize),
+    /// A feature of unknown place: a fixed point, a plane, a line or a circle.
+    Feature {
+        /// Its index.
+        feature: usize,
+        /// Which of the values of a contact: a line and a circle give two.
+        component: usize,
+    },
 }
 
-/// A measured length between two points of which no coordinates are known.
+/// A measured length between two points of which no coordinates are known, or a contact with a feature.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Length {
     /// From here …
     pub from: LengthEnd,
     /// … to here.
     pub to: LengthEnd,
-    /// Measured length (m).
+    /// Measured length (m); of a contact what its [`Shape`] says, zero for a component that is not measured.
     pub length: f64,
     /// Its standard deviation (m), where it is known.
     pub sigma: Option<f64>,
 }
 
-/// Everything that was observed. All three kinds enter one estimate and none of them knows the robot base.
+impl Length {
+    /// The feature that it is a contact with, and which value of the contact it is.
+    pub fn feature(&self) -> Option<(usize, usize)> {
+        [&self.from, &self.to].into_iter().find_map(|end| match end {
+            LengthEnd::Feature { feature, component } => Some((*feature, *component)),
+            LengthEnd::Target(_) | LengthEnd::SharedPoint(_) => None,
+        })
+    }
+}
+
+/// Everything that was observed. All kinds enter one estimate and none of them knows the robot base.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observations {
     /// Measured points.
@@ -56,16 +73,32 @@ pub struct Observations {
     pub shared: Vec<SharedPoint>,
     /// Measured lengths.
     pub lengths: Vec<Length>,
+    /// Features of unknown place that lengths end at.
+    pub features: Vec<Shape>,
 }
 
 impl Observations {
     /// Number of independent values in the observations: 3 per point less 6 per station, 3 per seat less 3 per shared point,
-    /// one per length.
+    /// one per length less what the place of each feature takes.
     pub fn independent_values(&self) -> usize {
         let of_station = |station: usize| self.points.iter().filter(|sample| sample.station == station).count();
         let points: usize = (0..self.stations()).map(|station| (3 * of_station(station)).saturating_sub(6)).sum();
         let shared: usize = self.shared.iter().map(|shared| 3 * shared.at.len().saturating_sub(1)).sum();
-        points + shared + self.lengths.len()
+        points + shared + self.length_values(|_| true)
+    }
+
+    /// Number of independent values in the lengths that `counts` picks: one each, less what the places of their features take.
+    pub(crate) fn length_values(&self, counts: impl Fn(usize) -> bool) -> usize {
+        let mut of_features = vec![0_usize; self.features.len()];
+        let mut values = 0;
+        for (_, length) in self.lengths.iter().enumerate().filter(|(index, _)| counts(*index)) {
+            match length.feature().and_then(|(feature, _)| of_features.get_mut(feature)) {
+                Some(count) => *count += 1,
+                None => values += 1,
+            }
+        }
+        let left = of_features.iter().zip(&self.features).map(|(count, shape)| count.saturating_sub(shape.unknowns()));
+        values + left.sum::<usize>()
     }
 
     /// Points and seats without repetitions: of every configuration and target the first per station and per shared point.
@@ -86,6 +119,7 @@ impl Observations {
             points: (0..self.stations()).flat_map(of_station).collect(),
             shared: self.shared.iter().map(once).collect(),
             lengths: self.lengths.clone(),
+            features: self.features.clone(),
         }
     }
 
@@ -120,14 +154,15 @@ impl Observations {
             .map(|shared| SharedPoint { at: shared.at.iter().filter(|_| keeps()).cloned().collect() });
         let shared = shared.collect();
         let kept = self.lengths.iter().enumerate().filter(|(index, _)| keep(SampleIndex::Length(*index)));
-        Self { points, shared, lengths: kept.map(|(_, length)| length.clone()).collect() }
+        let lengths = kept.map(|(_, length)| length.clone()).collect();
+        Self { points, shared, lengths, features: self.features.clone() }
     }
 
     /// The shared points whose index `keep` picks, with the lengths between them.
     #[must_use]
     pub fn of_shared(&self, keep: impl Fn(usize) -> bool) -> Self {
         let mut new_index = vec![None; self.shared.len()];
-        let mut picked = Self::default();
+        let mut picked = Self { features: self.features.clone(), ..Self::default() };
         for (index, shared) in self.shared.iter().enumerate() {
             if keep(index) {
                 new_index[index] = Some(picked.shared.len());
@@ -136,7 +171,7 @@ impl Observations {
         }
         let moved = |end: &LengthEnd| match end {
             LengthEnd::SharedPoint(index) => new_index.get(*index).copied().flatten().map(LengthEnd::SharedPoint),
-            LengthEnd::Target(at) => Some(LengthEnd::Target(at.clone())),
+            LengthEnd::Target(_) | LengthEnd::Feature { .. } => Some(end.clone()),
         };
         for length in &self.lengths {
             if let (Some(from), Some(to)) = (moved(&length.from), moved(&length.to)) {
@@ -150,7 +185,7 @@ impl Observations {
     pub fn places(&self) -> impl Iterator<Item = &Place> {
         let lengths = self.lengths.iter().flat_map(|length| [&length.from, &length.to]).filter_map(|end| match end {
             LengthEnd::Target(at) => Some(at),
-            LengthEnd::SharedPoint(_) => None,
+            LengthEnd::SharedPoint(_) | LengthEnd::Feature { .. } => None,
         });
         self.points
             .iter()
@@ -235,15 +270,21 @@ impl Problem<'_> {
         }
         for (index, length) in self.observations.lengths.iter().enumerate() {
             let sigma_ok = length.sigma.is_none_or(|sigma| sigma.is_finite() && sigma > 0.0);
-            if !(length.length.is_finite() && length.length > 0.0 && sigma_ok) {
+            let shape =
+                length.feature().map(|(feature, component)| (self.observations.features.get(feature), component));
+            let value_ok = length.length.is_finite()
+                && match shape {
+                    None | Some((Some(Shape::Point), _)) => length.length > 0.0,
+                    Some((Some(shape), component)) => component < shape.components(),
+                    Some((None, _)) => false,
+                };
+            let end_ok = |end: &LengthEnd| match end {
+                LengthEnd::Target(_) | LengthEnd::Feature { .. } => true,
+                LengthEnd::SharedPoint(shared) => *shared < self.observations.shared.len(),
+            };
+            let is_of_features = [&length.from, &length.to].iter().all(|end| matches!(end, LengthEnd::Feature { .. }));
+            if !(value_ok && sigma_ok && end_ok(&length.from) && end_ok(&length.to)) || is_of_features {
                 return Err(IdentificationError::Length { length: index, value: length.length });
-            }
-            for end in [&length.from, &length.to] {
-                if let LengthEnd::SharedPoint(shared) = end
-                    && *shared >= self.observations.shared.len()
-                {
-                    return Err(IdentificationError::Length { length: index, value: length.length });
-                }
             }
         }
         if self.observations.independent_values() == 0 {

@@ -1,7 +1,8 @@
 //! What an identification returns.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector3};
 
+use super::feature::Feature;
 use super::observability::Observability;
 use super::settings::{Iteration, SigmaSource, TerminationReason};
 use super::systematic::Unmodelled;
@@ -149,6 +150,10 @@ pub struct Identification {
     pub termination: TerminationReason,
     /// Pose of each instrument station in the base of the identified arm.
     pub base_from_station: Vec<Isometry3<f64>>,
+    /// Features of unknown place in the base of the identified arm; `None` for one that too few contacts show.
+    pub features: Vec<Option<Feature>>,
+    /// Covariance of the places of the features (m²), in their order.
+    pub feature_covariances: Vec<Matrix3<f64>>,
     /// Measured − predicted in the base (m) for every place, in-sample: for finding outliers, never to be shown as accuracy.
     pub residuals: Vec<Vector3<f64>>,
 }

@@ -328,6 +328,9 @@ impl<'a, 'p> Shared<'a, 'p> {
 
     /// Leave-one-pose-out score of a candidate; `None` where a pose left out cannot be predicted.
     fn score(&self, terms: &Terms) -> Option<(Scored, Start)> {
+        if self.used.is_empty() {
+            return None;
+        }
         let scales: Vec<(usize, f64)> = self
             .problem
             .parameters

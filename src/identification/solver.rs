@@ -6,9 +6,10 @@
 
 use std::ops::ControlFlow;
 
-use nalgebra::{DMatrix, DVector, Point3, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, SymmetricEigen};
 
 use super::factor::Factor;
+use super::lengths::feature_covariances;
 use super::linearise::{
     Evaluation, NormalEquations, PointResiduals, ProjectedRows, Trust, Weights, point_residuals, project,
 };
@@ -234,6 +235,11 @@ impl Solve<'_, '_> {
         let lengths = self.problem.observations.lengths.len();
         let (places, lengths) = at.rows.residuals_after(lengths, change);
         Scatter::new(self.problem, self.groups, &at.noise, self.trust, &places, &lengths)
+    }
+
+    /// Covariance of where each feature was found (m²), with that of the parameters.
+    pub(crate) fn feature_covariances(&self, at: &Linearised, covariance: &DMatrix<f64>) -> Vec<Matrix3<f64>> {
+        feature_covariances(self.problem, &at.arm, &at.points, &at.weights, covariance)
     }
 
     /// How many values the data, not the prior, determine of the parameters. `None` where the normal matrix is singular.

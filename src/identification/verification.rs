@@ -5,9 +5,10 @@
 
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 
-use super::linearise::{Weights, point_residuals};
+use super::feature::Feature;
+use super::linearise::{PointResiduals, Weights, point_residuals};
 use super::problem::{LengthEnd, Observations, PointSample, Problem};
-use super::{Estimator, IdentificationError, Places, Prior, Settings, Weighting, identify};
+use super::{Estimator, Identification, IdentificationError, Length, Places, Prior, Settings, Weighting, identify};
 use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, Joint, JointType};
 use crate::units::MILLIMETRE;
 
@@ -132,8 +133,8 @@ pub struct DirectErrors {
 }
 
 impl DirectErrors {
-    /// Errors of `arm` on shared points and lengths.
-    pub fn new(arm: &Arm, observations: &Observations) -> Self {
+    /// Errors of `arm` on shared points and lengths, with the features where they were found with it.
+    pub fn new(arm: &Arm, features: &[Option<Feature>], observations: &Observations) -> Self {
         let mut means = Vec::with_capacity(observations.shared.len());
         let (mut seats, mut of_shared) = (Vec::new(), Vec::new());
         for (index, shared) in observations.shared.iter().enumerate() {
@@ -149,12 +150,19 @@ impl DirectErrors {
         let end = |end: &LengthEnd| match end {
             LengthEnd::Target(at) => Some(arm.point_in_base(at)),
             LengthEnd::SharedPoint(index) => means.get(*index).copied(),
+            LengthEnd::Feature { .. } => None,
         };
-        let lengths: Vec<f64> = observations
-            .lengths
-            .iter()
-            .filter_map(|length| Some(length.length - (end(&length.to)? - end(&length.from)?).norm()))
-            .collect();
+        let predicted = |length: &Length| {
+            let ends = [end(&length.from), end(&length.to)];
+            match (length.feature(), ends) {
+                (Some((feature, component)), [from, to]) => {
+                    Some(features.get(feature)?.as_ref()?.predicted(&from.or(to)?, component).value)
+                }
+                (None, [from, to]) => Some((to? - from?).norm()),
+            }
+        };
+        let errors = observations.lengths.iter().filter_map(|length| Some(length.length - predicted(length)?));
+        let lengths: Vec<f64> = errors.collect();
         Self::of_values(seats, of_shared, lengths)
     }
 
@@ -305,6 +313,8 @@ pub struct FittedSetup {
     pub arm: Arm,
     /// Pose of each station in the base.
     pub base_from_station: Vec<Isometry3<f64>>,
+    /// Features of unknown place in the base.
+    pub features: Vec<Option<Feature>>,
 }
 
 /// Fits the instrument frame, and the target coordinates among `free`, of a given arm to observations. The arm is not changed.
@@ -324,7 +334,8 @@ pub fn fit_setup(
         let predicted = arm.points_in_base(observations.places());
         let weights = Weights::uniform(&problem, MILLIMETRE);
         let residuals = point_residuals(&problem, &predicted, &weights);
-        return Ok(FittedSetup { arm: arm.clone(), base_from_station: residuals.base_from_station });
+        let PointResiduals { base_from_station, features, .. } = residuals;
+        return Ok(FittedSetup { arm: arm.clone(), base_from_station, features });
     }
     // The prior keeps directions in which the data do not show the target (a wrist that never turns) at their nominal value.
     let settings = Settings {
@@ -334,7 +345,8 @@ pub fn fit_setup(
         ..Settings::default()
     };
     let fitted = identify(&problem, &settings, &mut |_| {})?;
-    Ok(FittedSetup { arm: fitted.arm, base_from_station: fitted.base_from_station })
+    let Identification { arm, base_from_station, features, .. } = fitted;
+    Ok(FittedSetup { arm, base_from_station, features })
 }
 
 /// The arm with the targets of `samples` fitted to them where the poses of the instrument are known; `None` where a station is not.
@@ -354,5 +366,5 @@ pub fn fit_targets(arm: &Arm, base_from_station: &[Isometry3<f64>], samples: &[P
             *point = Point3::from(of_target.iter().sum::<Vector3<f64>>() / of_target.len() as f64);
         }
     }
-    Some(FittedSetup { arm: fitted, base_from_station: base_from_station.to_vec() })
+    Some(FittedSetup { arm: fitted, base_from_station: base_from_station.to_vec(), features: Vec::new() })
 }

@@ -10,8 +10,8 @@ use super::workspace::Workspace;
 use super::{EstimationSettings, ProcedureError, checks, joint_errors, target_parameters};
 use crate::identification::verification::{DirectErrors, FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{
-    Identification, LengthEnd, Observations, PointSample, Problem, SampleIndex, Settings, Stage, Terms, WithTerms,
-    identify_with_terms,
+    Identification, LengthEnd, Observations, PointSample, Problem, SampleIndex, Settings, Shape, Stage, Terms,
+    WithTerms, identify_with_terms,
 };
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
@@ -20,7 +20,8 @@ use crate::session::calibration::{self, Calibration, LoadsText, MountedText, Sam
 use crate::session::measurements::Layout;
 use crate::session::set_up::PayloadText;
 use crate::session::summary::{
-    IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning, WarningCode,
+    FeatureSummary, IdentificationSummary, InputFile, Refit, VerificationMode, VerificationSummary, Warning,
+    WarningCode,
 };
 use crate::units::to_mm;
 
@@ -45,6 +46,8 @@ pub struct Distances {
     pub names: Vec<SampleName>,
     /// Position of the plate that each shared point belongs to.
     pub positions: Vec<String>,
+    /// Names of the features.
+    pub features: Vec<String>,
 }
 
 /// Samples for one purpose: measured points, direct distances, or both.
@@ -160,6 +163,9 @@ pub fn identify(
         let compared = checks::check_plausibility(&plausible, "")?;
         warnings.extend(compared.warning);
         expected = Some(compared.expected);
+    } else if !observations.features.is_empty() && !shows_size(&observations) {
+        let message = "contacts without any measured length leave the size of the robot to the prior; a ball bar, a draw wire, or planes touched over gauge blocks give it";
+        warnings.push(Warning::new(WarningCode::NoScale, message, true));
     } else if observations.lengths.is_empty() && !observations.shared.is_empty() {
         let message = "shared points without any known length leave the size of the robot to the prior";
         warnings.push(Warning::new(WarningCode::NoScale, message, true).with_advice(Advice::StateSocketDistance));
@@ -201,6 +207,7 @@ pub fn identify(
         summary.selection = joint_errors::selection(&problem, &with_terms, &nominal);
     }
     summary.joint_errors = joint_errors::summaries(profile, &problem, found);
+    summary.features = features(identification, found);
     summary.workspace = workspace.map(|workspace| workspace.summary);
     let calibration = is_usable.then(|| Calibration {
         mounted: *mounted,
@@ -216,6 +223,47 @@ fn set_warnings(set: &SampleSet, observations: &Observations, profile: &Profile)
     let names = set.names();
     let rows = names.iter().zip(observations.places()).map(|(name, place)| (name.line, place.configuration.as_slice()));
     set.warnings.iter().cloned().chain(checks::limit_warning(profile, set.file.as_deref(), rows)).collect()
+}
+
+/// The features of unknown place where they were found.
+fn features(set: &SampleSet, found: &Identification) -> Vec<FeatureSummary> {
+    let places = set.distances.features.iter().zip(&found.features).zip(&found.feature_covariances).enumerate();
+    places
+        .filter_map(|(index, ((name, feature), covariance))| {
+            let feature = feature.as_ref()?;
+            let has_axis = !matches!(feature.shape, Shape::Point | Shape::Wire | Shape::Sphere);
+            let has_size = !matches!(feature.shape, Shape::Point | Shape::Plane | Shape::Line | Shape::KnownCircle);
+            let lengths = &set.distances.observations.lengths;
+            let own = lengths.iter().filter(|length| length.feature() == Some((index, 0)));
+            Some(FeatureSummary {
+                name: name.clone(),
+                shape: feature.shape,
+                contacts: own.count(),
+                at_mm: std::array::from_fn(|axis| to_mm(feature.at[axis])),
+                sigma_mm: (!has_axis).then(|| to_mm((covariance.trace().max(0.0)).sqrt())),
+                axis: has_axis.then(|| std::array::from_fn(|axis| feature.axis[axis])),
+                size_mm: has_size.then(|| to_mm(feature.size)),
+            })
+        })
+        .collect()
+}
+
+/// Whether any measured length shows how large the robot is: one between two points, or to a feature that has a size.
+fn shows_size(observations: &Observations) -> bool {
+    let gauged = |feature: usize| {
+        let own = observations.lengths.iter().filter(|length| length.feature().is_some_and(|(own, _)| own == feature));
+        let (low, high) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), length| {
+            (low.min(length.length), high.max(length.length))
+        });
+        high > low
+    };
+    observations.lengths.iter().any(|length| match length.feature() {
+        None => true,
+        Some((feature, _)) => observations.features.get(feature).is_some_and(|shape| match shape {
+            Shape::Plane => gauged(feature),
+            shape => shape.shows_size(),
+        }),
+    })
 }
 
 /// Mean distance of the measured points from the instrument (m).
@@ -266,12 +314,17 @@ fn verify(
     let tested = unseen_observations(&all, &unseen);
     let basis = request.basis.clone();
     let errors = |arm: &FittedSetup| ModelErrors::new(&arm.arm, &arm.base_from_station, &tested.points);
-    let identified = FittedSetup { arm: found.arm.clone(), base_from_station: found.base_from_station.clone() };
+    let identified = FittedSetup {
+        arm: found.arm.clone(),
+        base_from_station: found.base_from_station.clone(),
+        features: found.features.clone(),
+    };
     let (mut summary, vectors) = if let (Some(nominal), Some(identified)) = (errors(nominal), errors(&identified)) {
         let summary = point_verification(joints, &tested.points, &nominal, &identified, basis, Refit::None);
         (summary, identified.vectors)
     } else if tested.places().next().is_some() {
-        let [nominal, identified] = [&nominal.arm, &found.arm].map(|arm| DirectErrors::new(arm, &tested));
+        let [nominal, identified] =
+            [nominal, &identified].map(|setup| DirectErrors::new(&setup.arm, &setup.features, &tested));
         (direct_verification(joints, &nominal, &identified, &tested, basis), Vec::new())
     } else {
         return Ok(Verified { verification: None, warnings });
@@ -332,7 +385,7 @@ fn leave_one_out(
     if distinct.len() < 2 {
         return Err(ProcedureError::OnePosition);
     }
-    let empty = || DirectErrors::new(problem.arm, &Observations::default());
+    let empty = || DirectErrors::new(problem.arm, &[], &Observations::default());
     let (mut nominal, mut identified, mut tested) = (empty(), empty(), Observations::default());
     for position in &distinct {
         let kept = problem.observations.of_shared(|index| positions.get(index) != Some(*position));
@@ -340,8 +393,8 @@ fn leave_one_out(
         let without = Problem { observations: &kept, ..*problem };
         let WithTerms { found, .. } = identify_with_terms(&without, settings, candidates, progress)?;
         let of_nominal = nominal_setup(&without, &found)?;
-        nominal = nominal.pooled_with(&DirectErrors::new(&of_nominal.arm, &left_out));
-        identified = identified.pooled_with(&DirectErrors::new(&found.arm, &left_out));
+        nominal = nominal.pooled_with(&DirectErrors::new(&of_nominal.arm, &of_nominal.features, &left_out));
+        identified = identified.pooled_with(&DirectErrors::new(&found.arm, &found.features, &left_out));
         tested.shared.extend(left_out.shared);
     }
     let joints = problem.arm.chain.joints();

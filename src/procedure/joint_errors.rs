@@ -63,7 +63,7 @@ pub(super) fn selection(
 /// Root mean square error of the nominal arm at the accepted samples (m).
 pub(super) fn nominal_rms(problem: &Problem<'_>, found: &Identification, nominal: &FittedSetup) -> Option<f64> {
     let Some(errors) = ModelErrors::new(&nominal.arm, &nominal.base_from_station, &problem.observations.points) else {
-        let direct = DirectErrors::new(&nominal.arm, problem.observations);
+        let direct = DirectErrors::new(&nominal.arm, &nominal.features, problem.observations);
         return direct.seat.or(direct.length).map(|statistics| statistics.rms);
     };
     let accepted = errors.vectors.iter().enumerate().filter(|(place, _)| !found.is_rejected(*place));

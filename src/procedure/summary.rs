@@ -43,6 +43,7 @@ fn rejected(found: &Identification, names: &[SampleName]) -> Vec<RejectedSummary
             let SampleName { pose, line } = match rejected.sample {
                 SampleIndex::Place(place) => name(place),
                 // Rows of a table of lengths name both ends; a known distance between sockets has no row.
+                SampleIndex::Length(length) if !found.features.is_empty() => name(length),
                 SampleIndex::Length(length) => {
                     let line = names.get(2 * length).filter(|name| name.pose == "from").map_or(0, |name| name.line);
                     SampleName { pose: format!("length {}", length + 1), line }
@@ -192,6 +193,7 @@ impl Finished<'_> {
             selection: None,
             joint_errors: Vec::new(),
             workspace: None,
+            features: Vec::new(),
         }
     }
 }

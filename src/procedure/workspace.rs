@@ -6,7 +6,7 @@ use crate::geometry::register;
 use crate::identification::plausibility::weak_combinations;
 use crate::identification::predicted::Predictor;
 use crate::identification::verification::ErrorStatistics;
-use crate::identification::{Estimate, Identification, Problem, WithTerms};
+use crate::identification::{Estimate, Identification, LengthEnd, Problem, WithTerms};
 use crate::kinematics::{Arm, Place};
 use crate::planning::{JointBox, random};
 use crate::profile::{Acceptance, Profile};
@@ -236,13 +236,23 @@ impl WorstJoint {
     }
 }
 
-/// The accepted places that define the frame: the points of the first station, or all seats of shared points.
+/// The accepted places that define the frame: the points of the first station, or all seats of shared points and contacts.
 fn frame_places<'p>(problem: &Problem<'p>, found: &Identification) -> Vec<&'p Place> {
     let observations = problem.observations;
     let points = observations.points.iter().enumerate().filter(|(_, sample)| sample.station == 0);
     let of_points: Vec<&Place> =
         points.filter(|(index, _)| !found.is_rejected(*index)).map(|(_, sample)| &sample.at).collect();
-    if of_points.is_empty() { observations.shared.iter().flat_map(|shared| &shared.at).collect() } else { of_points }
+    if !of_points.is_empty() {
+        return of_points;
+    }
+    let seats = observations.shared.iter().flat_map(|shared| &shared.at);
+    let contacts = observations.lengths.iter().filter(|length| length.feature().is_some()).flat_map(|length| {
+        [&length.from, &length.to].into_iter().filter_map(|end| match end {
+            LengthEnd::Target(at) => Some(at),
+            LengthEnd::SharedPoint(_) | LengthEnd::Feature { .. } => None,
+        })
+    });
+    seats.chain(contacts).collect()
 }
 
 /// Root mean square errors predicted at places (m): what the parameters leave open, and what a pose scatters by.

@@ -2,11 +2,11 @@
 
 use super::document::Found;
 use super::tables::{paragraph, push_line};
-use crate::identification::{Estimator, SigmaSource, TerminationReason};
+use crate::identification::{Estimator, Shape, SigmaSource, TerminationReason};
 use crate::session::joint_errors::{CurveMarks, curve_drawn, curve_scale, shares_sentence, workspace_sentence};
 use crate::session::summary::{
-    IdentificationSummary, JointErrorSummary, JointSummary, ParameterSummary, Provenance, SelectionSummary,
-    StatisticsSummary, Verdict, VerdictStatus, VerificationReport, VerificationSummary, Warning,
+    FeatureSummary, IdentificationSummary, JointErrorSummary, JointSummary, ParameterSummary, Provenance,
+    SelectionSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationReport, VerificationSummary, Warning,
 };
 use crate::text::{counted, decimals_for, fixed};
 
@@ -31,6 +31,7 @@ pub fn identification_text(summary: &IdentificationSummary) -> String {
     }
     text.push_str(&joint_error_lines(&summary.joint_errors));
     text.push_str(&parameter_table(summary.constants()));
+    text.push_str(&feature_lines(&summary.features));
     text.push_str(&blind_lines(summary));
     text.push_str(&rejected_lines(summary));
     if let Some(verification) = &summary.verification {
@@ -309,6 +310,37 @@ fn parameter_table<'a>(parameters: impl Iterator<Item = &'a ParameterSummary>) -
                 parameter.sigma.map_or_else(|| "-".to_owned(), |sigma| fixed(sigma, decimals))
             ),
         );
+    }
+    text.push('\n');
+    text
+}
+
+/// Where the features of unknown place were found.
+fn feature_lines(features: &[FeatureSummary]) -> String {
+    let mut text = String::new();
+    if features.is_empty() {
+        return text;
+    }
+    push_line(&mut text, "Found along with the arm, in its base (mm):");
+    push_line(
+        &mut text,
+        &format!("  {:<14}{:<9}{:>9}{:>10}{:>10}{:>10}{:>8}", "feature", "shape", "contacts", "x", "y", "z", "sigma"),
+    );
+    for feature in features {
+        let [x, y, z] = feature.at_mm.map(|value| fixed(value, 2));
+        let sigma = feature.sigma_mm.map_or_else(|| "-".to_owned(), |sigma| fixed(sigma, 3));
+        let shape = if feature.shape == Shape::KnownCircle { Shape::Circle } else { feature.shape };
+        let mut line =
+            format!("  {:<14}{shape:<9}{:>9}{x:>10}{y:>10}{z:>10}{sigma:>8}", feature.name, feature.contacts);
+        if let Some(axis) = feature.axis {
+            let [x, y, z] = axis.map(|value| fixed(value, 4));
+            line.push_str(&format!("  axis {x} {y} {z}"));
+        }
+        if let Some(size) = feature.size_mm {
+            let what = if feature.shape == Shape::Wire { "reads less by" } else { "radius" };
+            line.push_str(&format!("  {what} {}", fixed(size, 3)));
+        }
+        push_line(&mut text, line.trim_end());
     }
     text.push('\n');
     text

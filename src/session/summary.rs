@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::advice::Advice;
 use super::measurements::Layout;
-use crate::identification::{Estimator, Prior, SigmaSource, TerminationReason, Terms, Weighting};
+use crate::identification::{Estimator, Prior, Shape, SigmaSource, TerminationReason, Terms, Weighting};
 use crate::kinematics::{ParameterId, ParameterUnit};
 use crate::profile::Level;
 use crate::text::{counted, decimals_for, fixed, names, written_as_text};
@@ -579,6 +579,27 @@ pub struct JointErrorSummary {
     pub curve: Vec<(f64, f64, f64)>,
 }
 
+/// A feature of unknown place, found along with the arm, in the base of the identified arm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FeatureSummary {
+    pub name: String,
+    pub shape: Shape,
+    /// Contacts with it, rejected ones included.
+    pub contacts: usize,
+    /// The point, the middle of a circle, or a point of the plane or line.
+    pub at_mm: [f64; 3],
+    /// Standard deviation of the point (root of the sum of the squares of the three coordinates).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_mm: Option<f64>,
+    /// Normal of a plane or circle, direction of a line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// Radius of a circle or sphere, or what a wire reads less than its length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size_mm: Option<f64>,
+}
+
 /// Everything about an identification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentificationSummary {
@@ -624,6 +645,9 @@ pub struct IdentificationSummary {
     /// The error predicted over the workspace; none for data without points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub workspace: Option<WorkspaceSummary>,
+    /// Features of unknown place that were found along with the arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub features: Vec<FeatureSummary>,
 }
 
 impl IdentificationSummary {

@@ -146,10 +146,10 @@ pub enum Defect {
         /// What is wrong.
         reason: String,
     },
-    /// Neither of the two tables of direct distances.
+    /// None of the tables of direct distances.
     #[error(
-        "the columns are neither those of a socket table (position, socket, joints) nor those of a table of lengths \
-         (from_ joints, to_ joints, length){}",
+        "the columns are neither those of a socket table (position, socket, joints), nor those of a table of lengths \
+         (from_ joints, to_ joints, length), nor those of a table of contacts (feature, shape, joints, length){}",
         if *has_points { "; a table with x, y and z is read as measurements" } else { "" }
     )]
     NotConstraints {
@@ -220,6 +220,55 @@ pub enum Defect {
     NotPositive {
         /// Text of the cell.
         text: String,
+    },
+    /// A word that is no shape of a feature.
+    #[error("'{}' is not a shape; write {}", excerpt(text), any_of(allowed))]
+    UnknownShape {
+        /// Text of the cell.
+        text: String,
+        /// The shapes there are.
+        allowed: Vec<&'static str>,
+    },
+    /// Rows of one feature that do not agree.
+    #[error(
+        "feature '{}' is on line {first_line} with another shape, or with a length where this row has none or the reverse; \
+         give one of the two another name, or the same shape and columns",
+        excerpt(feature)
+    )]
+    OtherShape {
+        /// Name of the feature.
+        feature: String,
+        /// Line of its first row.
+        first_line: usize,
+    },
+    /// A length that is missing, or that a shape has none of.
+    #[error(
+        "a {shape} {}",
+        if *is_missing {
+            "needs the measured length in each row"
+        } else {
+            "has no measured length; leave the cell empty, or write another shape"
+        }
+    )]
+    LengthOfShape {
+        /// Name of the shape.
+        shape: &'static str,
+        /// Whether the length is missing.
+        is_missing: bool,
+    },
+    /// Warning: contacts that tell no more than where the feature is.
+    #[error(
+        "feature '{}' has {found} {}, which only show where it is; at least {needed} tell something about the robot",
+        excerpt(feature),
+        if *found == 1 { "contact" } else { "contacts" }
+    )]
+    FewContacts {
+        /// Name of the feature.
+        feature: String,
+        /// Contacts with it.
+        found: usize,
+        /// Contacts that it takes.
+        needed: usize,
     },
     #[error("'{}' is not a length; write the measured distance, which is never negative", excerpt(text))]
     NegativeLength {
