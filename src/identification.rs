@@ -373,14 +373,9 @@ fn covariance(solve: &Solve<'_, '_>, at: &Linearised) -> DMatrix<f64> {
 }
 
 /// The covariance without what only moves the base of the robot: parameters of the first link that the data cannot find.
-fn in_nominal_base(
-    problem: &Problem<'_>,
-    observability: &Observability,
-    covariance: &DMatrix<f64>,
-) -> DMatrix<f64> {
-    let moves_base = |index: usize| {
-        problem.parameters[index].id.joint() == Some(0) && !observability.is_identifiable(index)
-    };
+fn in_nominal_base(problem: &Problem<'_>, observability: &Observability, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let moves_base =
+        |index: usize| problem.parameters[index].id.joint() == Some(0) && !observability.is_identifiable(index);
     let n = covariance.nrows();
     DMatrix::from_fn(n, n, |i, j| if moves_base(i) || moves_base(j) { 0.0 } else { covariance[(i, j)] })
 }
