@@ -308,6 +308,7 @@ fn summary(is_good: bool) -> IdentificationSummary {
         selection: None,
         joint_errors: Vec::new(),
         workspace: None,
+        features: Vec::new(),
         written: Vec::new(),
     }
 }
