@@ -11,11 +11,12 @@ pub mod compensate;
 pub mod iso9283;
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use nalgebra::Point3;
 
 use crate::identification::{Estimator, Prior, Settings, TermGroup, Weighting};
@@ -98,6 +99,32 @@ pub struct Cli {
     /// Options of the terminal.
     #[command(flatten)]
     pub terminal: TerminalArgs,
+}
+
+impl Cli {
+    /// Moves options in front of a command behind it, so that `trupose --sessions DIR resume NAME` means the same as
+    /// `trupose resume NAME --sessions DIR`.
+    pub fn in_order(words: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+        let mut words: Vec<OsString> = words.into_iter().collect();
+        let command = Self::command();
+        let takes_value = |word: &str| {
+            let name = word.strip_prefix("--").filter(|name| !name.contains('='));
+            let option = command.get_arguments().find(|option| option.get_long() == name);
+            name.is_some() && option.is_some_and(|option| option.get_action().takes_values())
+        };
+        let mut at = 1;
+        while let Some(word) = words.get(at).map(|word| word.to_string_lossy().into_owned()) {
+            if !word.starts_with('-') || word == "--" {
+                break;
+            }
+            at += if takes_value(&word) { 2 } else { 1 };
+        }
+        let is_command = words.get(at).is_some_and(|word| word.to_str().is_some_and(|word| command.find_subcommand(word).is_some()));
+        if is_command {
+            words[1..=at].rotate_right(1);
+        }
+        words
+    }
 }
 
 /// Arguments of `wizard`.

@@ -12,7 +12,7 @@ use trupose::text::printable;
 
 fn main() -> ExitCode {
     let mut console = Console { out: io::stdout(), err: io::stderr() };
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(Cli::in_order(std::env::args_os())) {
         Ok(cli) => cli,
         Err(error) if error.use_stderr() => {
             // The message repeats what was typed, which must not disturb the terminal.

@@ -27,6 +27,7 @@ pub mod motion;
 mod names;
 mod orientation;
 mod rapid;
+mod remark;
 pub mod rewrite;
 mod ros;
 mod urscript;
@@ -36,6 +37,7 @@ use jiff::civil::DateTime;
 
 pub use error::ProgramError;
 pub use names::MAX_NAME;
+pub use remark::with_remark;
 
 use crate::kinematics::{JointType, KinematicChain};
 use crate::session::plan::{PlannedPose, PoseKind};
@@ -96,6 +98,7 @@ struct Language {
     write: fn(&mut Job<'_>) -> Result<Vec<ProgramFile>, ProgramError>,
     read: fn(&findings::Source<'_>) -> Result<motion::Scan, ProgramError>,
     digits: Digits,
+    remark: remark::Remark,
 }
 
 /// Decimals of corrected numbers: enough for 1 µm and 1 µrad where the controller stores them.

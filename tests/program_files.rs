@@ -86,11 +86,11 @@ const FIELD: &[Field] = &[
         &[],
         &[(2, Reason::SeveralSettings), (8, Reason::Offset), (9, Reason::Offset)],
     ),
-    field("r07_yumi.mod", Dialect::Rapid, ABB, &[], &[2], &[]),
+    field("r07_yumi.mod", Dialect::Rapid, ABB, &[], &[], &[(2, Reason::SeventhAxis)]),
     field("r07_yumi.mod", Dialect::Rapid, PANDA, &[], &[2], &[]),
     field("r08_comment_move.mod", Dialect::Rapid, ABB, &[], &[4], &[]),
     field("r09_offsetjoint.mod", Dialect::Rapid, ABB, &[], &[6], &[(3, Reason::NotMovedTo), (4, Reason::NotMovedTo)]),
-    field("r10_only_extax.mod", Dialect::Rapid, ABB, &[], &[], &[(2, Reason::Incomplete)]),
+    field("r10_only_extax.mod", Dialect::Rapid, ABB, &[], &[], &[(2, Reason::OtherGroup)]),
     field("r11_twotasks_move_var.mod", Dialect::Rapid, ABB, &[], &[2], &[]),
     field(
         "r12_noext.mod",

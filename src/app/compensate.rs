@@ -21,7 +21,7 @@ use crate::compensation::{Compensated, Compensator, Settings, Status, ToolArm};
 use crate::error::{ExitStatus, Failure};
 use crate::kinematics::{Arm, Joint};
 use crate::model::CalibratedArm;
-use crate::text::printable;
+use crate::text::{listed, printable};
 use crate::units::{from_mm, to_deg, to_mm};
 use uncertainty::Uncertainty;
 
@@ -168,15 +168,19 @@ fn reason(done: &Compensated, joints: &[Joint]) -> String {
 fn status_reason(status: &Status, joints: &[Joint]) -> String {
     let names = |held: &[usize]| {
         let names = held.iter().filter_map(|index| joints.get(*index)).map(|joint| joint.name.as_str());
-        names.collect::<Vec<_>>().join(", ")
+        listed(&names.collect::<Vec<_>>())
     };
+    let limits = |held: &[usize]| if held.len() == 1 { "its limit" } else { "their limits" };
     match status {
         Status::Reached => "it is reached".to_owned(),
         Status::PositionOnly => "near a singularity only the position is reached".to_owned(),
-        Status::AtLimit(held) => format!("{} would have to pass its limit", names(held)),
+        Status::AtLimit(held) => format!("{} would have to pass {}", names(held), limits(held)),
         Status::Singular => "near a singularity the corrections become too large".to_owned(),
         Status::OutOfReach => "it is out of reach of this arm".to_owned(),
-        Status::BeyondLimit(held) => format!("{} has a target beyond its limit", names(held)),
+        Status::BeyondLimit(held) => {
+            let have = if held.len() == 1 { "has a target" } else { "have targets" };
+            format!("{} {have} beyond {}", names(held), limits(held))
+        }
         Status::NotInConfiguration => "the arm does not reach it in the stated configuration".to_owned(),
         Status::Ambiguous => {
             "several configurations reach it, and what is stated does not tell which is meant".to_owned()

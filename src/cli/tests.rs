@@ -56,3 +56,32 @@ fn options_are_in_the_order_of_use() {
     let options: Vec<&str> = plan.get_arguments().map(|argument| argument.get_id().as_str()).take(4).collect();
     assert_eq!(options, ["profile", "poses", "verification", "out"]);
 }
+
+#[test]
+fn options_in_front_of_a_command_count_for_it() {
+    let ordered = |line: &str| -> Vec<String> {
+        let words = line.split(' ').map(std::ffi::OsString::from);
+        Cli::in_order(words).into_iter().map(|word| word.into_string().unwrap()).collect()
+    };
+    for (line, expected) in [
+        ("trupose --sessions DIR resume NAME", "trupose resume --sessions DIR NAME"),
+        ("trupose --sessions=DIR --json resume NAME", "trupose resume --sessions=DIR --json NAME"),
+        // The value of an option is no command, even with the name of one.
+        ("trupose --sessions demo", "trupose --sessions demo"),
+        ("trupose --sessions demo resume", "trupose resume --sessions demo"),
+        ("trupose resume NAME --sessions DIR", "trupose resume NAME --sessions DIR"),
+        ("trupose --help", "trupose --help"),
+        ("trupose -- resume", "trupose -- resume"),
+        ("trupose --sessions", "trupose --sessions"),
+    ] {
+        assert_eq!(ordered(line).join(" "), expected);
+    }
+    let Some(Command::Resume(args)) = Cli::parse_from(Cli::in_order(
+        ["trupose", "--sessions", "DIR", "resume", "NAME"].map(std::ffi::OsString::from),
+    ))
+    .command
+    else {
+        panic!("not the command")
+    };
+    assert_eq!(args.script_args.sessions, PathBuf::from("DIR"));
+}

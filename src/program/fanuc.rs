@@ -7,6 +7,7 @@
 mod reader;
 
 use super::names::{ascii, identifier};
+use super::remark::Remark;
 use super::{AS_ON_PENDANT, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 use crate::kinematics::JointType;
 
@@ -20,6 +21,7 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 3, length: 3, turn: 3, are_fixed: true },
+    remark: Remark { after: " ;", longest: 32, may_be_first: false, ..Remark::new("    :  !", &["/MN"]) },
 };
 
 /// Decimals of a TP position.

@@ -182,11 +182,15 @@ impl Findings {
     pub(super) fn resolve(mut self, source: &Source<'_>) -> Result<Scan, ProgramError> {
         let names = Names::new(&self.definitions, &self.copies);
         let mut uses: BTreeMap<Key, Uses> = BTreeMap::new();
-        let mut here: BTreeMap<usize, Uses> = BTreeMap::new();
+        let mut here: Vec<Option<Box<Uses>>> = vec![None; self.definitions.len()];
         for motion in self.motions.iter().flatten() {
             for point in std::iter::once(&motion.point).chain(&motion.via) {
                 match point {
-                    Point::Here(index) => here.entry(*index).or_default().add(motion),
+                    Point::Here(index) => {
+                        if let Some(uses) = here.get_mut(*index) {
+                            uses.get_or_insert_default().add(motion);
+                        }
+                    }
                     Point::Variable { key, .. } => uses.entry(names.scoped(key)).or_default().add(motion),
                     Point::Left { .. } | Point::Current => {}
                 }
@@ -211,14 +215,15 @@ impl Findings {
             let Some(definition) = self.definitions.get(index).filter(|definition| definition.file == 0) else {
                 continue;
             };
-            let mut its = here.get(&index).cloned().unwrap_or_default();
+            let mut its = here.get_mut(index).and_then(Option::take).map(|uses| *uses).unwrap_or_default();
             for key in [definition.key.clone(), definition.key.variable()] {
                 if let Some(found) = uses.get(&key).filter(|_| !key.name.is_empty()) {
                     its.merge(found);
                 }
             }
             // A use of one element says nothing about the others, but a variable that is written as a whole has all of them.
-            if definition.is_quiet && its.settings.is_none() {
+            let is_passed_on = matches!(its.other, Some(Reason::PassedTo(_)));
+            if definition.is_quiet && its.settings.is_none() && !is_passed_on {
                 continue;
             }
             match target(definition, &its, self.always.get(&index), source)? {
@@ -369,13 +374,13 @@ fn target(
     always: Option<&[Result<Setting, Reason>; 2]>,
     source: &Source<'_>,
 ) -> Result<Result<Target, Reason>, ProgramError> {
-    let literal = match &definition.content {
-        Ok(literal) => literal,
-        Err(reason) => return Ok(Err(reason.clone())),
-    };
     let [tool, frame] = match (&uses.settings, always.filter(|_| uses.other.is_none())) {
         (Some(settings), _) | (None, Some(settings)) => settings.clone(),
         (None, None) => return Ok(Err(uses.other.clone().unwrap_or(Reason::NotMovedTo))),
+    };
+    let literal = match &definition.content {
+        Ok(literal) => literal,
+        Err(reason) => return Ok(Err(reason.clone())),
     };
     let goal = match literal.form {
         Form::Joints(unit) => {

@@ -5,8 +5,10 @@
 //! [`Program::largest_rounding`](super::Program::largest_rounding).
 
 mod reader;
+mod shift;
 
 use super::names::{ascii, identifier};
+use super::remark::Remark;
 use super::{CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 use crate::text::decimal;
 use crate::units::{from_deg, to_deg};
@@ -18,6 +20,7 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 4, length: 3, turn: 4, are_fixed: true },
+    remark: Remark { longest: REMARK, may_be_first: false, ..Remark::new("'", &["NOP"]) },
 };
 
 /// Longest job name on old controllers (characters).

@@ -7,6 +7,7 @@ mod aggregate;
 mod reader;
 
 use super::names::{MAX_NAME, identifier};
+use super::remark::Remark;
 use super::{AS_ON_PENDANT, COMMENT_WIDTH, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 
 pub(super) const LANGUAGE: Language = Language {
@@ -16,6 +17,7 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 5, length: 4, turn: 5, are_fixed: false },
+    remark: Remark::new("; ", &["DEF", "DEFFCT", "DEFDAT"]),
 };
 
 const DECIMALS: usize = 5;

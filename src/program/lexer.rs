@@ -48,9 +48,8 @@ impl<'a> Tokens<'a> {
         let text = whole.get(..range.end).unwrap_or(whole);
         let mut tokens = Vec::new();
         let (mut at, mut line) = (range.start, line);
-        // Editors put a byte order mark in front of the text; it belongs to no word.
-        if at == 0 && text.starts_with(b"\xef\xbb\xbf") {
-            at = 3;
+        if at == 0 && text.starts_with(BYTE_ORDER_MARK) {
+            at = BYTE_ORDER_MARK.len();
         }
         while let Some(&byte) = text.get(at) {
             let start = at;
@@ -299,6 +298,21 @@ fn end_of_number(text: &[u8], start: usize) -> usize {
         }
     }
     at
+}
+
+/// Editors put a byte order mark in front of a text; it belongs to no line.
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Lines of a text with their number, from 1, and their place.
+pub(super) fn lines(text: &[u8]) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+    let mut start = 0;
+    text.split(|byte| *byte == b'\n').enumerate().map(move |(index, line)| {
+        let place = start..start + line.len();
+        start += line.len() + 1;
+        let is_marked = index == 0 && line.starts_with(BYTE_ORDER_MARK);
+        let mark = if is_marked { BYTE_ORDER_MARK.len() } else { 0 };
+        (index + 1, place.start + mark..place.end)
+    })
 }
 
 /// Bytes of ASCII text; empty if they are something else.

@@ -149,6 +149,8 @@ pub enum Reason {
     MovingFrame,
     /// External axes are not at zero, and may carry the arm or the workpiece.
     ExternalAxes,
+    /// An axis beside those of the arm: of a track or a positioner, or axis 7 of another arm.
+    SeventhAxis,
     /// The arm angle of a seven-axis arm.
     ArmAngle,
     /// Of another group of axes.
@@ -184,6 +186,7 @@ impl fmt::Display for Reason {
             Self::StationaryTool => "the tool is fixed in the cell",
             Self::MovingFrame => "its frame moves with a mechanical unit",
             Self::ExternalAxes => "external axes are not at zero",
+            Self::SeventhAxis => "it states a seventh axis: an external one, or that of a seven-axis arm",
             Self::ArmAngle => "the arm angle of a seven-axis arm cannot be kept",
             Self::OtherGroup => "a position of another group of axes",
             Self::Register => "a position register, whose value is outside the program",

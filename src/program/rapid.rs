@@ -7,6 +7,7 @@ mod instruction;
 mod reader;
 
 use super::names::{MAX_NAME, identifier};
+use super::remark::Remark;
 use super::{AS_ON_PENDANT, COMMENT_WIDTH, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 use crate::text::decimal;
 
@@ -17,6 +18,7 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 5, length: 4, turn: 8, are_fixed: false },
+    remark: Remark::new("  ! ", &["MODULE"]),
 };
 
 /// Decimals: RAPID's numbers have 23 bits.

@@ -8,6 +8,7 @@ mod reader;
 mod yaml;
 
 use super::names::{MAX_NAME, ascii, identifier};
+use super::remark::Remark;
 use super::{COMMENT_WIDTH, Digits, Job, LF, Language, Pause, ProgramError, ProgramFile};
 use crate::text::decimal;
 
@@ -22,6 +23,7 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 8, length: 8, turn: 8, are_fixed: false },
+    remark: Remark { never_in: b"{[", ..Remark::new("# ", &[]) },
 };
 
 const DECIMALS: usize = 8;

@@ -5,6 +5,7 @@
 mod reader;
 
 use super::names::{MAX_NAME, identifier};
+use super::remark::Remark;
 use super::{COMMENT_WIDTH, Digits, Job, LF, Language, ProgramError, ProgramFile};
 use crate::text::decimal;
 use crate::units::DEGREE;
@@ -16,6 +17,7 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 8, length: 8, turn: 8, are_fixed: false },
+    remark: Remark::new("# ", &[]),
 };
 
 const DECIMALS: usize = 8;

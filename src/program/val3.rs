@@ -6,6 +6,7 @@
 mod reader;
 
 use super::names::identifier;
+use super::remark::Remark;
 use super::{AS_ON_PENDANT, COMMENT_WIDTH, CRLF, Digits, Job, Language, ProgramError, ProgramFile};
 
 pub(super) const LANGUAGE: Language = Language {
@@ -15,6 +16,7 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 5, length: 4, turn: 5, are_fixed: false },
+    remark: Remark { after: " -->", ..Remark::new("<!-- ", &["<?xml"]) },
 };
 
 const DECIMALS: usize = 5;

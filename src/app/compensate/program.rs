@@ -12,7 +12,7 @@ use crate::cli::compensate::{CompensateArgs, Points};
 use crate::compensation::Status;
 use crate::error::{ExitStatus, Failure};
 use crate::program::motion::{Companion, Goal, Hint, ReadOptions, Reason, Scan};
-use crate::program::{Dialect, ProgramError, Robot, rewrite};
+use crate::program::{Dialect, ProgramError, Robot, rewrite, with_remark};
 use crate::store;
 use crate::text::{counted, printable};
 
@@ -20,12 +20,16 @@ use crate::text::{counted, printable};
 const TAUGHT: &str = "taught points are not corrected: they were recorded where the real arm was, so the arm returns to them as it is; corrected, \
                       it would miss them by its error";
 
+/// What a program says that was corrected with an edited calibration; it fits the 32 characters of the shortest remarks.
+const EDITED: &str = "WARNING: EDITED CALIBRATION";
+
 /// A program and what becomes of it.
 struct Part<'p> {
     path: &'p Path,
     scan: Scan,
     results: Vec<Corrected>,
     corrected: Vec<u8>,
+    is_changed: bool,
 }
 
 pub(super) fn run<O: Write, E: Write>(
@@ -67,14 +71,26 @@ pub(super) fn run<O: Write, E: Write>(
         };
         let results = correct::corrected(job, &resolved, &scan);
         let commands: Vec<_> = results.iter().map(Corrected::command).collect();
-        let corrected = rewrite::rewrite(dialect, &robot, text, &scan, &commands).map_err(unusable)?;
-        let again = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
-        correct::prove(job, &results, &scan, &again).map_err(|what| {
-            let message =
-                format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
-            Failure::new(ExitStatus::Internal, message)
-        })?;
-        parts.push(Part { path, scan, results, corrected });
+        let mut corrected = rewrite::rewrite(dialect, &robot, text, &scan, &commands).map_err(unusable)?;
+        let is_changed = corrected != *text;
+        if is_changed {
+            let again = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
+            correct::prove(job, &results, &scan, &again).map_err(|what| {
+                let message =
+                    format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
+                Failure::new(ExitStatus::Internal, message)
+            })?;
+        }
+        if is_changed && job.arm.edited.is_some() {
+            match with_remark(dialect, &corrected, EDITED) {
+                Some(text) => corrected = text,
+                None => console.remark(&format!(
+                    "note: '{}' has no place for a remark, so it does not say that the calibration was edited",
+                    path.display()
+                )),
+            }
+        }
+        parts.push(Part { path, scan, results, corrected, is_changed });
     }
     check_paths(args, &parts)?;
     let mut report = Report { edited: job.arm.edited.clone(), ..Report::default() };
@@ -213,9 +229,15 @@ fn write<O: Write, E: Write>(
     }
     for (path, part) in paths.into_iter().zip(parts) {
         store::replace_bytes(&path, &part.corrected).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
-        report.written.push(path.display().to_string());
-        if !args.json {
-            console.say_written(&path)?;
+        if part.is_changed {
+            report.written.push(path.display().to_string());
+        } else {
+            report.unchanged.push(path.display().to_string());
+        }
+        match (args.json, part.is_changed) {
+            (true, _) => {}
+            (false, true) => console.say_written(&path)?,
+            (false, false) => console.say(&format!("unchanged: {}\n", path.display()))?,
         }
     }
     Ok(())

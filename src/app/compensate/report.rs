@@ -54,6 +54,9 @@ pub(super) struct Report {
     /// Files that were written.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) written: Vec<String>,
+    /// Copies of programs in which nothing was corrected.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) unchanged: Vec<String>,
 }
 
 /// A linear or circular move between corrected targets.

@@ -50,6 +50,13 @@ pub(super) fn run<O: Write, E: Write>(
     if table.rows.iter().find(is_free).is_some() && !args.position_only {
         console.remark("note: the table has no orientations; only positions are reached, and the tool may turn");
     }
+    let has_both = |row: &TargetRow| matches!(row.goal, TargetGoal::Cartesian { near: Some(_), .. });
+    if table.rows.iter().any(has_both) {
+        console.remark(
+            "note: the table has joint values and coordinates; the coordinates are the targets, and the joint values only say which branch of \
+             the arm is meant. To compensate the joint values, leave out the coordinates",
+        );
+    }
     let mut listed = 0;
     for row in rows.iter().filter(|row| row.report.status != Status::Reached.name()) {
         listed += 1;

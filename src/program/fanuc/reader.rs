@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 use super::super::ProgramError;
 use super::super::configuration::{Configuration, FanucConfig};
 use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
-use super::super::lexer::{as_str, latin};
+use super::super::lexer::{as_str, latin, lines};
 use super::super::motion::{Form, JointUnit, LeftAlone, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
 
@@ -41,16 +41,6 @@ struct Position {
 struct Statement {
     line: usize,
     text: String,
-}
-
-/// Lines of the file with their place.
-fn lines(text: &[u8]) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
-    let mut start = 0;
-    text.split(|byte| *byte == b'\n').enumerate().map(move |(index, line)| {
-        let place = start..start + line.len();
-        start += line.len() + 1;
-        (index + 1, place)
-    })
 }
 
 /// Instructions between `/MN` and `/POS`, without remarks and without lines that are commented out.

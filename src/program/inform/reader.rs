@@ -6,10 +6,11 @@ use std::ops::Range;
 
 use nalgebra::Isometry3;
 
+use super::shift::Shifts;
 use super::super::ProgramError;
 use super::super::configuration::{Configuration, Rconf};
 use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
-use super::super::lexer::latin;
+use super::super::lexer::{self, latin};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
 
@@ -22,8 +23,8 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let mut findings = Findings::default();
     let text = source.program;
     job.has_base = lines(text).any(|(_, _, line)| line.starts_with("BC") || line.starts_with("BP"));
+    let shifts = Shifts::of(source);
     let mut part = Part::Head;
-    let mut is_shifted = false;
     for (number, place, line) in lines(text) {
         match line.as_str() {
             "//POS" => part = Part::Positions,
@@ -31,7 +32,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
             _ => match part {
                 Part::Head => {}
                 Part::Positions => job.position(number, place, &line, &mut findings),
-                Part::Instructions => job.instruction(number, &line, &mut is_shifted, &mut findings),
+                Part::Instructions => job.instruction(number, &line, shifts.holds(number), &mut findings),
             },
         }
     }
@@ -52,14 +53,12 @@ enum Part {
 }
 
 /// Lines with their number and place, without blanks around them.
-fn lines(text: &[u8]) -> impl Iterator<Item = (usize, Range<usize>, String)> + '_ {
-    let mut start = 0;
-    text.split(|byte| *byte == b'\n').enumerate().map(move |(index, line)| {
-        let begin = start;
-        start += line.len() + 1;
-        let blanks = line.len() - line.trim_ascii_start().len();
+pub(super) fn lines(text: &[u8]) -> impl Iterator<Item = (usize, Range<usize>, String)> + '_ {
+    lexer::lines(text).map(|(number, place)| {
+        let line = text.get(place.clone()).unwrap_or_default();
+        let begin = place.start + line.len() - line.trim_ascii_start().len();
         let content = line.trim_ascii();
-        (index + 1, begin + blanks..begin + blanks + content.len(), latin(content))
+        (number, begin..begin + content.len(), latin(content))
     })
 }
 
@@ -172,7 +171,7 @@ impl Job<'_> {
         [Ok(tool), Ok(frame)]
     }
 
-    fn instruction(&self, number: usize, line: &str, is_shifted: &mut bool, findings: &mut Findings) {
+    fn instruction(&self, number: usize, line: &str, is_shifted: bool, findings: &mut Findings) {
         if line.starts_with(['\'', '/', '*']) {
             return;
         }
@@ -185,10 +184,6 @@ impl Job<'_> {
             "MOVJ" => Some(Way::Joint),
             "MOVL" | "MOVS" | "EIMOVL" => Some(Way::Linear),
             "MOVC" | "EIMOVC" => Some(Way::Circular),
-            "SFTON" | "SFTOF" => {
-                *is_shifted = name == "SFTON";
-                None
-            }
             _ => None,
         };
         let variables: Vec<(&str, String)> = words.filter_map(|word| variable(word).map(|key| (word, key))).collect();
@@ -209,7 +204,7 @@ impl Job<'_> {
         };
         let [tool, frame] = self.settings.get(&key).cloned().unwrap_or([Ok(Setting::Identity), Ok(Setting::Identity)]);
         let key = Key { scope: 0, name: key, element: String::new() };
-        let point = if *is_shifted {
+        let point = if is_shifted {
             findings.other_uses.push(OtherUse { key, reason: Reason::OffsetBase });
             Point::Left { name: Some(word.to_owned()), reason: Reason::Offset }
         } else {

@@ -27,18 +27,11 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
         each_line(tokens, file, |line| module.declare(line));
     }
     module.follow_calls();
-    let mut findings = Findings::default();
-    for (file, tokens) in files.iter().enumerate() {
-        module.state = State::default();
-        module.set = State::default();
-        module.heirs.clear();
-        module.blocks.clear();
-        module.routine = findings.motions.len();
-        module.sets = [false; 2];
-        each_line(tokens, file, |line| module.find(line, &mut findings));
-        module.end_routine(findings.motions.len());
-        module.inherit(&mut findings);
-        findings.motions.push(None);
+    module.forget();
+    let mut findings = module.findings(&files);
+    if !module.loop_ends.is_empty() {
+        // The second round of a loop begins with the tool and base of the end of the first, which are known only now.
+        findings = module.findings(&files);
     }
     let hints = findings.definitions.iter().find_map(absolute_accuracy);
     let mut scan = findings.resolve(source)?;
@@ -56,6 +49,10 @@ fn absolute_accuracy(definition: &Definition) -> Option<Hint> {
         _ => None,
     }
 }
+
+/// Beginnings of the names of numbered tools and bases.
+const ANY_TOOL: &str = "tool_data[";
+const ANY_BASE: &str = "base_data[";
 
 /// A line with its words.
 struct Line<'t, 'a> {
@@ -153,6 +150,10 @@ struct Module<'a> {
     declared: String,
     /// Open branches and loops, the innermost last.
     blocks: Vec<Block>,
+    /// Tool and base at the end of each loop that sets them, by its file and first token.
+    loop_ends: BTreeMap<(usize, usize), [Option<Frame>; 2]>,
+    /// Lower-case names of frames whose value changes while the program runs.
+    changing: BTreeSet<String>,
 }
 
 /// A name with constant indices.
@@ -201,6 +202,64 @@ impl<'a> Module<'a> {
             routines: BTreeMap::new(),
             declared: String::new(),
             blocks: Vec::new(),
+            loop_ends: BTreeMap::new(),
+            changing: BTreeSet::new(),
+        }
+    }
+
+    /// Notes the values and motions of all files.
+    fn findings(&mut self, files: &[Tokens<'a>]) -> Findings {
+        let mut findings = Findings::default();
+        for (file, tokens) in files.iter().enumerate() {
+            self.state = State::default();
+            self.set = State::default();
+            self.heirs.clear();
+            self.blocks.clear();
+            self.routine = findings.motions.len();
+            self.sets = [false; 2];
+            each_line(tokens, file, |line| self.find(line, &mut findings));
+            self.end_routine(findings.motions.len());
+            self.inherit(&mut findings);
+            findings.motions.push(None);
+        }
+        findings
+    }
+
+    /// Drops the frames whose value depends on how the program runs.
+    fn forget(&mut self) {
+        let all_tools = self.changing.contains(ANY_TOOL);
+        let all_bases = self.changing.contains(ANY_BASE);
+        self.frames.retain(|name, _| {
+            let is_numbered = all_tools && name.starts_with(ANY_TOOL) || all_bases && name.starts_with(ANY_BASE);
+            !is_numbered && !self.changing.contains(name)
+        });
+    }
+
+    /// Notes a frame whose value changes: `TOOL_DATA[1].X=…`, a second value, one that is computed, or one that a routine gets.
+    fn note_change(&mut self, line: &Line<'_, 'a>, first: usize) {
+        let tokens = line.tokens;
+        let mut change = |variable: &Variable| {
+            let name = variable.name.to_lowercase();
+            let is_constant = !variable.key.element.is_empty();
+            let all = [ANY_TOOL, ANY_BASE].into_iter().find(|all| name.starts_with(all) && !is_constant);
+            self.changing.insert(all.map_or(name, str::to_owned));
+        };
+        let Some(variable) = Variable::read(line, first) else { return };
+        let assign = match tokens.get(variable.end).map(|token| token.kind) {
+            Some(Kind::Symbol(b'=')) => Some(variable.end),
+            Some(Kind::Symbol(b'.')) if tokens.is(variable.end + 2, b'=') => {
+                change(&variable);
+                None
+            }
+            _ => None,
+        };
+        if assign.is_some() && !tokens.is(variable.end + 1, b'{') {
+            change(&variable);
+        }
+        // The parameters of a routine are its caller's variables.
+        let is_harmless = ["BAS", "INV_POS"].iter().any(|word| tokens.is_word(first, word));
+        if assign.is_none() && tokens.is(first + 1, b'(') && !is_harmless {
+            line.range.clone().skip_while(|at| *at <= first).filter_map(|at| Variable::read(line, at)).for_each(|variable| change(&variable));
         }
     }
 
@@ -229,13 +288,20 @@ impl<'a> Module<'a> {
                 }
             }
         }
+        self.note_change(line, first);
         let Some(variable) = Variable::read(line, first).filter(|variable| tokens.is(variable.end, b'=')) else {
             return;
         };
         let Some(aggregate) = Aggregate::read(tokens, variable.end + 1..range.end) else { return };
         let name = variable.name.to_lowercase();
         if let Some(pose) = aggregate.frame() {
+            if self.frames.get(&name).is_some_and(|known| *known != pose) {
+                self.changing.insert(name.clone());
+            }
             self.frames.insert(name, pose);
+        } else if aggregate.has("X") || aggregate.has("Y") || aggregate.has("Z") {
+            // The other components stay as they were.
+            self.changing.insert(name);
         } else if let Some(data) = aggregate.frame_data(tokens) {
             self.frame_data.insert(name, data);
         }
@@ -267,7 +333,7 @@ impl<'a> Module<'a> {
             self.blocks.clear();
             return;
         }
-        self.block(&word);
+        self.block(line, &word);
         let is_call = tokens.is(start + 1, b'(') || tokens.is(start + 1, b'=') || tokens.is(start + 1, b'.');
         if let Some(instruction) = Instruction::named(&word).filter(|_| !is_call) {
             self.motion(line, findings, &instruction, start + 1);

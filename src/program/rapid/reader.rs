@@ -361,6 +361,28 @@ impl<'a> Module<'a> {
     fn call(&self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
         let routine = statement.tokens.name(statement.range.start);
         self.other_uses(statement, findings, statement.range.start + 1..statement.range.end, routine.as_deref());
+        if let Some(routine) = routine.filter(|_| statement.file == 0) {
+            self.written_arguments(statement, findings, &routine);
+        }
+    }
+
+    /// Names positions that are written in the call of a routine.
+    fn written_arguments(&self, statement: &Statement<'_, 'a>, findings: &mut Findings, routine: &str) {
+        let tokens = statement.tokens;
+        let mut at = statement.range.start + 1;
+        while at < statement.range.end {
+            if !tokens.is(at, b'[') {
+                at += 1;
+                continue;
+            }
+            let end = tokens.behind(at, statement.range.end);
+            let value = Value::read(tokens, at..end, b'[');
+            let is_unreadable = |content: &Result<Literal, Reason>| matches!(content, Err(Reason::Unreadable));
+            if !is_unreadable(&self.robtarget(&value)) || !is_unreadable(&self.jointtarget(&value)) {
+                findings.leave(tokens.line(at), None, Reason::PassedTo(routine.to_owned()));
+            }
+            at = end.max(at + 1);
+        }
     }
 
     fn other_uses(
@@ -384,6 +406,8 @@ impl<'a> Module<'a> {
             }
             let reason = match routine {
                 _ if is_offset => Reason::OffsetBase,
+                // It moves external axes and no arm.
+                Some(routine) if routine.eq_ignore_ascii_case("MoveExtJ") => Reason::OtherGroup,
                 Some(routine) => Reason::PassedTo(routine.to_owned()),
                 None => continue,
             };
@@ -482,6 +506,11 @@ impl<'a> Module<'a> {
         let joints = self.source.robot.chain.dof();
         if self.axes.len() != joints {
             return Err(Reason::JointCount { found: 6, joints });
+        }
+        // The joints of a seven-axis arm are no target of a six-axis one.
+        let has_seventh = external.first().is_some_and(|axis| axis.value < UNUSED && axis.value != 0.0);
+        if joints == 6 && has_seventh && !self.source.options.ignores_external_axes {
+            return Err(Reason::SeventhAxis);
         }
         let chosen: Vec<_> = self.axes.iter().filter_map(|axis| all.get(*axis)).collect();
         if chosen.iter().any(|number| number.value >= UNUSED) {

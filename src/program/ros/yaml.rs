@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use super::super::lexer::BYTE_ORDER_MARK;
+
 /// A value of a document.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Node {
@@ -46,7 +48,8 @@ impl Node {
 
 /// All documents of a file.
 pub(super) fn documents(text: &[u8]) -> Vec<Node> {
-    let mut reader = Reader { text, at: 0, line: 1, line_start: 0 };
+    let start = if text.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
+    let mut reader = Reader { text, at: start, line: 1, line_start: start };
     let mut documents = Vec::new();
     loop {
         reader.skip();

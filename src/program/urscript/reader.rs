@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use nalgebra::Isometry3;
 
-use self::flow::{Block, is_block, is_routine};
+use self::flow::{Block, is_block, is_of_controller, is_routine};
 use super::super::ProgramError;
 use super::super::configuration::Configuration;
 use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
@@ -302,15 +302,8 @@ impl Reader<'_, '_> {
         }
         let Some(instruction) = Instruction::named(name) else {
             self.other_call(name);
-            let is_like_motion =
-                name.to_ascii_lowercase().contains("move") || name.to_ascii_lowercase().contains("servo");
-            if is_like_motion && self.file == 0 {
-                for part in tokens.split(inside) {
-                    if literal(tokens, part.clone(), self.script.joints).is_some() {
-                        findings.leave(tokens.line(part.start), None, Reason::PassedTo(name.to_owned()));
-                    }
-                }
-                return end;
+            if !is_of_controller(name) {
+                self.arguments(findings, name, inside);
             }
             return at + 2;
         };
@@ -357,6 +350,22 @@ impl Reader<'_, '_> {
             configuration: near.map(Configuration::Near),
         }));
         end
+    }
+
+    /// Names positions that are handed to a routine whose use of them is unknown.
+    fn arguments(&self, findings: &mut Findings, routine: &str, inside: Range<usize>) {
+        let tokens = self.tokens;
+        for part in tokens.split(inside) {
+            let part = self.bare(without_keyword(tokens, part));
+            if literal(tokens, part.clone(), self.script.joints).is_some() {
+                if self.file == 0 {
+                    findings.leave(tokens.line(part.start), None, Reason::PassedTo(routine.to_owned()));
+                }
+            } else if let Some(name) = tokens.name(part.start).filter(|_| part.len() == 1) {
+                let key = Key { scope: 0, name, element: String::new() };
+                findings.other_uses.push(OtherUse { key, reason: Reason::PassedTo(routine.to_owned()) });
+            }
+        }
     }
 
     /// Whether a point is a variable without a single literal value.

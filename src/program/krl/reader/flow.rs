@@ -6,6 +6,8 @@ use super::{Frame, Line, Module, behind_words};
 
 /// A branch or loop, with tool and base as they were in front of it.
 pub(super) struct Block {
+    /// File and first token of a loop; `None`: a branch.
+    start: Option<(usize, usize)>,
     pub(super) tool: Option<Frame>,
     pub(super) base: Option<Frame>,
     /// Whether it sets tool and base to something else.
@@ -21,11 +23,14 @@ pub(super) struct Routine {
 
 impl<'a> Module<'a> {
     /// Follows the words that begin, divide and end branches and loops.
-    pub(super) fn block(&mut self, word: &str) {
+    pub(super) fn block(&mut self, line: &Line<'_, 'a>, word: &str) {
         match word {
             "IF" | "SWITCH" | "FOR" | "WHILE" | "LOOP" | "REPEAT" => {
+                let is_loop = !matches!(word, "IF" | "SWITCH");
+                let start = is_loop.then_some((line.file, line.range.start));
+                self.enter_loop(start);
                 let (tool, base) = (self.state.tool.clone(), self.state.base.clone());
-                self.blocks.push(Block { tool, base, differs: [false; 2] });
+                self.blocks.push(Block { start, tool, base, differs: [false; 2] });
             }
             // The next branch begins as the one before it did.
             "ELSE" | "CASE" | "DEFAULT" => {
@@ -35,7 +40,11 @@ impl<'a> Module<'a> {
                 }
             }
             "ENDIF" | "ENDSWITCH" | "ENDFOR" | "ENDWHILE" | "ENDLOOP" | "UNTIL" => {
-                let [tool, base] = self.blocks.pop().map_or([false; 2], |block| block.differs);
+                let Some(block) = self.blocks.pop() else { return };
+                let [tool, base] = block.differs;
+                if let Some(start) = block.start.filter(|_| tool || base) {
+                    self.loop_ends.insert(start, [self.state.tool.clone(), self.state.base.clone()]);
+                }
                 // Also the block around this one may now end with something else.
                 if tool {
                     self.set_tool(Frame::Unknown);
@@ -45,6 +54,17 @@ impl<'a> Module<'a> {
                 }
             }
             _ => {}
+        }
+    }
+
+    /// A loop that ends with another tool or base than it begins with: which one holds at its beginning is unknown.
+    fn enter_loop(&mut self, start: Option<(usize, usize)>) {
+        let Some([tool, base]) = start.and_then(|start| self.loop_ends.get(&start)).cloned() else { return };
+        if tool != self.state.tool {
+            self.set_tool(Frame::Unknown);
+        }
+        if base != self.state.base {
+            self.set_base(Frame::Unknown);
         }
     }
 

@@ -21,6 +21,31 @@ const HARMLESS: [&str; 56] = [
     "socket_open",
 ];
 
+/// Functions of the controller whose poses and lists are no targets: forces, speeds, limits and settings.
+const WITHOUT_TARGETS: [&str; 16] = [
+    "force_mode",
+    "speedj",
+    "speedl",
+    "end_force_mode",
+    "force_mode_set_damping",
+    "force_mode_set_gain_scaling",
+    "get_inverse_kin_has_solution",
+    "set_joint_limits",
+    "direct_torque",
+    "get_jacobian",
+    "position_deviation_warning",
+    "set_tcp",
+    "set_conveyor_tick_count",
+    "track_conveyor_circular",
+    "wrench_trans",
+    "print",
+];
+
+/// Whether the controller has a function of this name that moves to no position.
+pub(super) fn is_of_controller(name: &str) -> bool {
+    HARMLESS.contains(&name) || WITHOUT_TARGETS.contains(&name) || matches!(name, "if" | "while" | "elif" | "def" | "thread")
+}
+
 /// Whether a function or thread begins here.
 pub(super) fn is_routine(tokens: &Tokens<'_>, at: usize) -> bool {
     matches!(tokens.word(at), Some("def" | "sec" | "thread"))
