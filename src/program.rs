@@ -21,6 +21,7 @@ mod error;
 mod fanuc;
 mod findings;
 mod inform;
+pub mod insert;
 mod krl;
 mod lexer;
 pub mod motion;

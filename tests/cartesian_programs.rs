@@ -8,10 +8,11 @@ use serde_json::Value;
 use trupose::inverse::InverseKinematics;
 use trupose::kinematics::ForwardKinematics;
 use trupose::profile::{Profile, builtin};
+use trupose::program::Dialect;
 use trupose::session::calibration::Calibration;
 use trupose::units::{MICROMETRE, from_mm, to_mm};
 
-use crate::support::{root, text, trupose};
+use crate::support::{invented, root, text, trupose};
 
 const CALIBRATION: &str = "sessions/example/calibration.ron";
 
@@ -204,4 +205,145 @@ fn the_result_is_reported_and_drawn() {
     let (code, _, err) =
         run(folder.path(), &module(&cell, ""), &["--points", "computed", "--largest-uncertainty-mm", "0.001"]);
     assert!(code == 1 && err.contains("above the limit of 0.00 mm"), "{err}");
+}
+
+/// Two targets far apart, and a third one behind an offset.
+fn long_path(dialect: Dialect, poses: &[Isometry3<f64>], confs: &[String]) -> String {
+    let numbers = |values: &[f64], decimals: usize| {
+        values.iter().map(|value| format!("{value:.decimals$}")).collect::<Vec<_>>()
+    };
+    let mm = |pose: &Isometry3<f64>| numbers(pose.translation.vector.map(to_mm).as_slice(), 4);
+    match dialect {
+        Dialect::Rapid => {
+            let target = |index: usize| {
+                format!("[{},{},[9E9,9E9,9E9,9E9,9E9,9E9]]", pose_of(&poses[index]), confs[index])
+            };
+            format!(
+                "MODULE M\r\n  CONST robtarget pB:={};\r\n  PROC main()\r\n    MoveJ {},v100,fine,tool0;\r\n    MoveL pB,v100,fine,tool0\\WObj:=wobj0; ! there\r\n    \
+                 IF diA=1 MoveL {},v100,fine,tool0;\r\n    MoveL pB,v100,fine,tool0;\r\n  ENDPROC\r\nENDMODULE\r\n",
+                target(1),
+                target(0),
+                target(0)
+            )
+        }
+        Dialect::Krl => {
+            let target = |pose: &Isometry3<f64>| {
+                let (c, b, a) = pose.rotation.euler_angles();
+                let turn = numbers(&[a, b, c].map(f64::to_degrees), 5);
+                let values = [mm(pose), turn].concat();
+                let named = ["X", "Y", "Z", "A", "B", "C"].iter().zip(values).map(|(name, value)| format!("{name} {value}"));
+                format!("{{{}}}", named.collect::<Vec<_>>().join(","))
+            };
+            format!(
+                "DEF x()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {{A1 10,A2 -70,A3 100,A4 5,A5 50,A6 20}}\nLIN {}\nLIN {}\n;comment\nTRIGGER WHEN \
+                 DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE\nLIN {}\nEND\n",
+                target(&poses[0]),
+                target(&poses[1]),
+                target(&poses[0])
+            )
+        }
+        _ => {
+            let target = |pose: &Isometry3<f64>| {
+                let (p, r) = (pose.translation.vector, pose.rotation.scaled_axis());
+                format!("p[{}]", numbers(&[p.x, p.y, p.z, r.x, r.y, r.z], 8).join(", "))
+            };
+            format!(
+                "def x():\n  set_tcp(p[0,0,0,0,0,0])\n  movej([0.08,-1.57,1.57,-1.57,-1.57,0.17])\n  movel({}, a=1.2)\n  $ 3 \"W\"\n  movel({}, a=1.2, v=0.1)\n  \
+                 sleep(1)\n  movel({}, a=1.2)\nend\n",
+                target(&poses[0]),
+                target(&poses[1]),
+                target(&poses[0])
+            )
+        }
+    }
+}
+
+#[test]
+fn points_are_inserted_only_where_the_arm_surely_comes_from_the_target_before() {
+    let folder = tempfile::tempdir().unwrap();
+    for (dialect, arm, base) in [
+        (Dialect::Rapid, "abb_irb120", [10.0, 20.0, 10.0, 5.0, 60.0, 20.0]),
+        (Dialect::Krl, "kuka_kr6_r900", [10.0, -70.0, 100.0, 5.0, 50.0, 20.0]),
+        (Dialect::Urscript, "ur5e", [5.0, -90.0, 90.0, -90.0, -90.0, 10.0]),
+    ] {
+        let profile = Profile::parse(builtin(arm).unwrap(), arm).unwrap().0;
+        let forward = ForwardKinematics::new(profile.chain());
+        let ends = [base, [base[0] + 25.0, base[1] + 5.0, base[2] - 8.0, base[3] + 3.0, base[4] + 6.0, base[5] + 10.0]];
+        let poses = ends.map(|q| forward.base_from_flange(&q.map(f64::to_radians)));
+        let confs = ends.map(|q| {
+            let quarter = |joint: usize| (q[joint] / 90.0).floor();
+            format!("[{},{},{},0]", quarter(0), quarter(3), quarter(5))
+        });
+        let (calibration, file) = (folder.path().join(arm), folder.path().join("program"));
+        fs::write(&calibration, invented::calibration(arm).to_text().unwrap()).unwrap();
+        let program = long_path(dialect, &poses, &confs);
+        fs::write(&file, &program).unwrap();
+        let name = dialect.to_string();
+        let compensate = |more: &[&str]| {
+            let fixed = ["compensate", "--points", "computed", "--dialect", &name];
+            let files = ["--calibration", calibration.to_str().unwrap(), "--program", file.to_str().unwrap()];
+            let output = trupose(&[&fixed[..], &files, more].concat());
+            assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+            (text(&output.stdout), text(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" "))
+        };
+        let (plain, _) = compensate(&[]);
+        let (json, _) = compensate(&["--json"]);
+        let report: Value = serde_json::from_str(&json).unwrap();
+        let worst = report["paths"].as_array().unwrap().iter().map(|path| path["corrected_mm"].as_f64().unwrap()).fold(0.0, f64::max);
+        // Not even a tenth of the deviation is left.
+        let limit = format!("{}", 0.1 * worst);
+        let (divided, said) = compensate(&["--insert", &limit]);
+        let (json, _) = compensate(&["--insert", &limit, "--json"]);
+        let report: Value = serde_json::from_str(&json).unwrap();
+        let paths = report["paths"].as_array().unwrap();
+        let inserted: u64 = paths.iter().filter_map(|path| path["inserted"].as_u64()).sum();
+        println!("{arm}: {worst:.4} mm, {inserted} points: {said}");
+        assert!(inserted >= 3, "{json}");
+        assert!(said.contains("would need more points and cannot get them"), "{said}");
+        let moved: Vec<&Value> = paths.iter().filter(|path| path["inserted"].is_u64()).collect();
+        assert!(moved.iter().all(|path| path["corrected_mm"].as_f64().unwrap() <= 0.1 * worst), "{json}");
+        // Only lines were added, and they are moves that do not stop.
+        let mut rest = plain.lines().peekable();
+        let added: Vec<&str> = divided.lines().filter(|line| rest.next_if_eq(line).is_none()).collect();
+        assert!(rest.next().is_none(), "{divided}");
+        assert_eq!(u64::try_from(added.len()).unwrap(), inserted, "{divided}");
+        let mark = match dialect {
+            Dialect::Rapid => "v100,z1,tool0\\WObj:=wobj0;",
+            Dialect::Krl => "} C_DIS",
+            _ => ", r=0.001)",
+        };
+        assert!(added.iter().all(|line| line.ends_with(mark)), "{added:#?}");
+        assert_eq!(divided.contains("\r\n"), program.contains("\r\n"));
+    }
+    let refused = trupose(&[
+        "compensate", "--calibration", CALIBRATION, "--program", "x.ls", "--dialect", "fanuc", "--points", "computed", "--insert", "0.1",
+    ]);
+    assert!(refused.status.code() == Some(2) && text(&refused.stderr).contains("cannot be inserted"));
+}
+
+#[test]
+fn a_program_says_that_its_calibration_was_edited_and_a_copy_that_nothing_changed() {
+    let (cell, folder) = (Cell::new(), tempfile::tempdir().unwrap());
+    let edited = fs::read_to_string(root().join(CALIBRATION)).unwrap().replacen("expected: ", "expected: 1", 1);
+    let (calibration, file) = (folder.path().join("edited.ron"), folder.path().join("part.mod"));
+    fs::write(&calibration, edited).unwrap();
+    fs::write(&file, module(&cell, "")).unwrap();
+    let (calibration, file) = (calibration.to_str().unwrap(), file.to_str().unwrap());
+    let arguments =
+        ["compensate", "--calibration", calibration, "--dialect", "rapid", "--program", file, "--points", "computed", "--edited"];
+    let output = trupose(&arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).starts_with("MODULE Part\n  ! WARNING: EDITED CALIBRATION\n"), "{}", text(&output.stdout));
+    let output = trupose(&[&arguments[..], &["--json"]].concat());
+    assert!(text(&output.stdout).contains("\"edited\": \"this calibration was changed"), "{}", text(&output.stdout));
+    // Nothing is corrected, so nothing is said.
+    let (nothing, out) = (folder.path().join("nothing.mod"), folder.path().join("out.mod"));
+    fs::write(&nothing, "MODULE M\nENDMODULE\n").unwrap();
+    let output = trupose(&[
+        "compensate", "--calibration", calibration, "--dialect", "rapid", "--program", nothing.to_str().unwrap(), "--points", "computed",
+        "--edited", "--out", out.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stdout).starts_with("unchanged: "), "{}", text(&output.stdout));
+    assert_eq!(fs::read(out).unwrap(), fs::read(nothing).unwrap());
 }

@@ -338,6 +338,30 @@ fn several_reversed_joints_are_named_before_a_mirrored_frame() {
     assert_eq!(mistakes(&bench, &reversed).first(), Some(&Mistake::JointSigns { joints: vec![1, 4] }));
 }
 
+/// A rigid registration sees that the points are mirrored, and not why.
+#[test]
+fn exchanged_coordinates_are_named_before_a_mirrored_frame() {
+    let mut bench = Bench::builtin("kuka_kr6_r900", 13);
+    let samples = bench.random(40);
+    for (one, other) in [(0, 1), (1, 2), (0, 2)] {
+        let mut exchanged = samples.clone();
+        exchanged.iter_mut().for_each(|named| named.sample.point.coords.swap_rows(one, other));
+        let found = mistakes(&bench, &exchanged);
+        let place = |mistake: &Mistake| found.iter().position(|found| found == mistake);
+        assert!(place(&Mistake::Coordinates) < place(&Mistake::Mirrored) && found.contains(&Mistake::Coordinates), "{found:?}");
+    }
+    assert!(bench.try_identify(samples.clone(), Vec::new()).is_ok());
+    // J3 to J6 in the first columns, and zeros behind them.
+    let shifted = altered(&samples, |q| {
+        q.rotate_left(2);
+        q[4..].fill(0.0);
+    });
+    let identified = bench.try_identify(shifted, Vec::new()).unwrap();
+    let said = warning(&identified, "implausible").unwrap();
+    let hint = "the columns of A5 and A6 hold only zeros: are the columns shifted, so that the first one holds A3?";
+    assert!(said.message.contains(hint) && said.blocks_acceptance, "{said:?}");
+}
+
 #[test]
 fn two_joints_with_another_zero_are_named() {
     let mut bench = Bench::builtin("kuka_kr6_r900", 12);

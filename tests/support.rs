@@ -8,6 +8,7 @@ use std::thread;
 
 pub(crate) mod derivatives;
 pub(crate) mod faulty_session;
+pub(crate) mod invented;
 pub(crate) mod paper_case;
 pub(crate) mod place;
 pub(crate) mod point_cloud;

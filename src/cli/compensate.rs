@@ -47,6 +47,9 @@ pub struct CompensateArgs {
     /// Write the program even if corrected and uncorrected moves belong to one path
     #[arg(long, requires = "program")]
     pub partial: bool,
+    /// Put points into linear moves until their path deviates by no more than this (RAPID, KRL and URScript)
+    #[arg(long, value_name = "MM", requires = "program", value_parser = positive)]
+    pub insert: Option<f64>,
     /// External axes carry neither the arm nor the workpiece: correct targets that state their positions
     #[arg(long, requires = "program")]
     pub ignore_external_axes: bool,

@@ -90,6 +90,8 @@ pub enum Mistake {
     },
     /// The points are in reverse order.
     RowsReversed,
+    /// Two coordinates of the points are exchanged, or one has the wrong sign. A rigid registration cannot tell which.
+    Coordinates,
     /// The measured frame is left-handed.
     Mirrored,
 }
@@ -177,6 +179,10 @@ impl Mistake {
                 "the points fit in reverse order: joints and points were listed in opposite orders; reverse one of them"
                     .to_owned()
             }
+            Self::Coordinates => {
+                "two columns of coordinates are exchanged (x and y, y and z, or x and z), or one has the wrong sign: the points fit when one axis is reversed; compare the coordinates of one point with the display of the instrument, and correct the header or the column"
+                    .to_owned()
+            }
             Self::Mirrored => {
                 "the points fit only when mirrored: the instrument's frame is left-handed; reverse one of its axes. Trackers are hardly ever left-handed: rule out the signs of the joints and exchanged columns of coordinates first"
                     .to_owned()
@@ -195,6 +201,8 @@ impl Mistake {
             }
             Self::Coupling { reversed, .. } => 1 + usize::from(*reversed),
             Self::Columns(_) | Self::RowsShifted { .. } | Self::RowsReversed => 2,
+            // Three joints at once is what an arm looks like that is symmetric about a plane.
+            Self::Coordinates => 4,
             Self::Mirrored => 9,
         }
     }
@@ -248,6 +256,7 @@ pub(super) fn simple(arm: &Arm, points: &[PointSample], ratio: f64) -> Vec<Trial
     trials.push((Mistake::RadiansAsDegrees, scaled(1.0 / DEGREE)));
     trials.push((Mistake::DegreesAsRadians, scaled(DEGREE)));
     let mirrored = alter(points, |sample| sample.point = Point3::new(-sample.point.x, sample.point.y, sample.point.z));
+    trials.push((Mistake::Coordinates, mirrored.clone()));
     trials.push((Mistake::Mirrored, mirrored));
     for joint in 0..joints.len() {
         trials.push(signs(points, vec![joint]));

@@ -16,7 +16,7 @@ use crate::report::number;
 use crate::session::TableProblem;
 use crate::session::advice::Advice;
 use crate::session::summary::{VerificationSummary, Warning, WarningCode};
-use crate::text::counted;
+use crate::text::{counted, listed};
 use crate::units::{MICROMETRE, Quantity, to_mm};
 
 /// Joint values (deg, sliding joints mm) up to which a pose that is visited again is the same: joints that a controller reports scatter.
@@ -130,8 +130,25 @@ pub(crate) fn check_plausibility(problem: &Problem<'_>, what: &str) -> Result<Co
             return Err(ProcedureError::Mistaken { gap, mistake });
         }
     }
-    let message = format!("{gap}, and no single mistake explains it (another robot, several mistakes at once?)");
+    let hint = zero_columns(problem).map_or_else(String::new, |hint| format!("; {hint}"));
+    let message = format!("{gap}, and no single mistake explains it (another robot, several mistakes at once?){hint}");
     Ok(Compared { expected, warning: Some(Warning::new(WarningCode::Implausible, message, true)) })
+}
+
+/// That the last joints are zero in all rows: with the first joints lost no fit can show that the columns are shifted.
+fn zero_columns(problem: &Problem<'_>) -> Option<String> {
+    let joints = problem.arm.chain.joints();
+    let samples = &problem.observations.points;
+    let is_zero = |joint: usize| samples.iter().all(|sample| sample.at.configuration.get(joint) == Some(&0.0));
+    let zeros = (0..joints.len()).rev().take_while(|joint| is_zero(*joint)).count();
+    let names: Vec<&str> = joints.iter().skip(joints.len() - zeros).map(|joint| joint.name.as_str()).collect();
+    let first = joints.get(zeros).filter(|_| zeros > 0)?;
+    let (columns, hold) = if zeros == 1 { ("column", "holds") } else { ("columns", "hold") };
+    Some(format!(
+        "the {columns} of {} {hold} only zeros: are the columns shifted, so that the first one holds {}?",
+        listed(&names),
+        first.name
+    ))
 }
 
 /// Looks for the same mistakes in the verification points of a table. Very few points are left to other checks. The

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::configuration::Configuration;
+use super::insert::Spot;
 use super::motion::{
     Form, Goal, LeftAlone, Move, MoveKind, PoseTarget, ReadOptions, Reason, Scan, Setting, Slot, Target,
 };
@@ -95,6 +96,8 @@ pub(super) struct Motion {
     pub(super) frame: Result<Setting, Reason>,
     /// Branch, where the instruction states it and not the position.
     pub(super) configuration: Option<Configuration>,
+    /// Where further points can be put in front of it.
+    pub(super) spot: Option<Spot>,
 }
 
 /// Path of a motion.
@@ -291,7 +294,7 @@ impl Findings {
             let is_first = std::mem::take(&mut is_new);
             path += usize::from(is_first || motion.way == Way::Joint);
             let companion = motion.file.checked_sub(1);
-            scan.moves.push(Move { line: motion.line, companion, kind, target, path, is_first });
+            scan.moves.push(Move { line: motion.line, companion, kind, target, path, is_first, spot: motion.spot });
         }
     }
 }

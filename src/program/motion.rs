@@ -6,6 +6,7 @@ use std::ops::Range;
 use nalgebra::Isometry3;
 
 use super::configuration::Configuration;
+use super::insert::Spot;
 use super::orientation::Orientation;
 use crate::text::counted;
 
@@ -89,6 +90,7 @@ pub struct Move {
     pub path: usize,
     /// The first of its routine: nothing is known of where the arm comes from.
     pub is_first: bool,
+    pub(super) spot: Option<Spot>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::report::PathReport;
-use crate::compensation::Compensator;
+use crate::compensation::{Compensator, PoseGoal};
+use crate::inverse::Posture;
 use crate::units::{MILLIMETRE, to_mm};
 
 /// Distance between samples of a path (m), and their least and largest number.
@@ -102,5 +103,99 @@ pub(super) fn deviation(
             near[index] = q;
         }
     }
-    Some(PathReport { line, corrected_mm: to_mm(largest[0]), uncorrected_mm: to_mm(largest[1]) })
+    Some(PathReport { line, corrected_mm: to_mm(largest[0]), uncorrected_mm: to_mm(largest[1]), inserted: 0 })
+}
+
+/// A point inside a linear move.
+#[derive(Clone, Debug)]
+pub(super) struct Inside {
+    /// What to command there.
+    pub(super) base_from_tool: Isometry3<f64>,
+    /// Configurations of the nominal arm at the point and at its command.
+    meant: Vec<f64>,
+    pub(super) commanded: Vec<f64>,
+}
+
+/// Shortest piece of a move that is divided (m).
+const SHORTEST: f64 = 4.0 * MILLIMETRE;
+/// Most pieces of a move.
+const MOST_PIECES: u32 = 64;
+
+/// A linear move in pieces that deviate by no more than `limit` (m): the points between them, and the report. `None` if there is no such
+/// division.
+pub(super) fn divided(
+    line: usize,
+    compensator: &Compensator<'_>,
+    flange_from_tool: &Isometry3<f64>,
+    [meant, commanded]: [&Ends; 2],
+    start: &[f64],
+    limit: f64,
+) -> Option<(Vec<Inside>, PathReport)> {
+    let course = Course::new(meant);
+    let mut pieces: u32 = 2;
+    while pieces <= MOST_PIECES && course.length() >= SHORTEST * f64::from(pieces) {
+        let points = inside(compensator, flange_from_tool, meant, start, pieces)?;
+        let report = of_pieces(line, compensator, flange_from_tool, [meant, commanded], start, &points)?;
+        if report.corrected_mm <= to_mm(limit) {
+            return Some((points, report));
+        }
+        pieces *= 2;
+    }
+    None
+}
+
+/// The points that divide a move, each corrected in the branch of its start.
+fn inside(
+    compensator: &Compensator<'_>,
+    flange_from_tool: &Isometry3<f64>,
+    meant: &Ends,
+    start: &[f64],
+    pieces: u32,
+) -> Option<Vec<Inside>> {
+    let course = Course::new(meant);
+    let posture = compensator.inverse().posture(start);
+    let is_meant = |other: Option<&Posture>, _: &[f64]| other == posture.as_ref();
+    let mut near = start.to_vec();
+    (1..pieces)
+        .map(|piece| {
+            let goal = PoseGoal {
+                base_from_tool: meant.pose(&course, f64::from(piece) / f64::from(pieces)),
+                flange_from_tool: *flange_from_tool,
+                is_meant: &is_meant,
+                near: Some(&near),
+            };
+            let done = compensator.solve_pose(&goal).ok()?;
+            near.clone_from(&done.meant);
+            Some(Inside { base_from_tool: done.base_from_tool, meant: done.meant, commanded: done.command })
+        })
+        .collect()
+}
+
+/// The largest deviation of all pieces.
+fn of_pieces(
+    line: usize,
+    compensator: &Compensator<'_>,
+    flange_from_tool: &Isometry3<f64>,
+    [meant, commanded]: [&Ends; 2],
+    start: &[f64],
+    points: &[Inside],
+) -> Option<PathReport> {
+    let course = Course::new(meant);
+    let pieces = points.len() + 1;
+    let mut all = PathReport { line, corrected_mm: 0.0, uncorrected_mm: 0.0, inserted: points.len() };
+    for piece in 0..pieces {
+        let at = |piece: usize| meant.pose(&course, piece as f64 / pieces as f64);
+        let part = Ends { from: at(piece), via: None, to: at(piece + 1) };
+        let before = piece.checked_sub(1).and_then(|before| points.get(before));
+        let new = Ends {
+            from: before.map_or(commanded.from, |point| point.base_from_tool),
+            via: None,
+            to: points.get(piece).map_or(commanded.to, |point| point.base_from_tool),
+        };
+        let start = before.map_or(start, |point| point.meant.as_slice());
+        let report = deviation(line, compensator, flange_from_tool, [&part, &new], start)?;
+        all.corrected_mm = all.corrected_mm.max(report.corrected_mm);
+        all.uncorrected_mm = all.uncorrected_mm.max(report.uncorrected_mm);
+    }
+    Some(all)
 }

@@ -2,13 +2,14 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::between::{Ends, deviation};
+use super::between::{Ends, deviation, divided};
 use super::report::{Moved, PathReport, TargetReport};
 use super::settings::Settings;
 use super::{Job, reason, status_reason};
 use crate::compensation::{self, PoseGoal, Status};
 use crate::inverse::Posture;
 use crate::program::configuration::Configuration;
+use crate::program::insert::{InsertedPoint, Insertion, has_spot};
 use crate::program::motion::{Command, Goal, Move, MoveKind, PoseTarget, Scan, Target};
 use crate::units::{MICROMETRE, MICRORADIAN, to_mm};
 
@@ -222,12 +223,18 @@ pub(super) fn half_corrected(scan: &Scan, results: &[Corrected]) -> Vec<usize> {
     scan.moves.iter().filter(is_torn).map(|step| step.line).collect()
 }
 
-/// How far the paths of linear and circular moves deviate between corrected targets.
-pub(super) fn between(job: &Job<'_>, scan: &Scan, results: &[Corrected]) -> Vec<PathReport> {
+/// How far the paths of linear and circular moves deviate between corrected targets, and the points that keep linear ones within `limit`
+/// (m). The second list has the lines of moves that deviate by more and cannot be divided.
+pub(super) fn between(
+    job: &Job<'_>,
+    scan: &Scan,
+    results: &[Corrected],
+    limit: Option<f64>,
+) -> (Vec<PathReport>, Vec<Insertion>, Vec<usize>) {
     let done =
         |index: Option<usize>| index.and_then(|index| results.get(index)).and_then(|result| result.done.as_ref());
-    let mut reports = Vec::new();
-    for pair in scan.moves.windows(2) {
+    let (mut reports, mut insertions, mut whole) = (Vec::new(), Vec::new(), Vec::new());
+    for (index, pair) in scan.moves.windows(2).enumerate() {
         let [before, step] = pair else { continue };
         let via = match step.kind {
             MoveKind::Joint => continue,
@@ -252,9 +259,63 @@ pub(super) fn between(job: &Job<'_>, scan: &Scan, results: &[Corrected]) -> Vec<
             via: via.map(|via| at(&via.commanded_pose(job))),
             to: to.commanded_pose(job),
         };
-        reports.extend(deviation(step.line, &job.compensator, &tool, [&meant, &commanded], &from.meant));
+        let ends = [&meant, &commanded];
+        let Some(report) = deviation(step.line, &job.compensator, &tool, ends, &from.meant) else { continue };
+        let Some(limit) = limit.filter(|limit| report.corrected_mm > to_mm(*limit)) else {
+            reports.push(report);
+            continue;
+        };
+        let is_linear = step.kind == MoveKind::Linear && has_spot(scan, index + 1);
+        let divided = is_linear
+            .then(|| divided(step.line, &job.compensator, &tool, ends, &from.meant, limit))
+            .flatten();
+        match divided {
+            Some((points, report)) => {
+                let frame_from_base = to.base_from_frame.inverse();
+                let points = points.into_iter().map(|point| InsertedPoint {
+                    frame_from_tool: frame_from_base * point.base_from_tool,
+                    posture: job.compensator.inverse().posture(&point.commanded),
+                    joints: point.commanded,
+                });
+                insertions.push(Insertion { step: index + 1, points: points.collect() });
+                reports.push(report);
+            }
+            None => {
+                whole.push(step.line);
+                reports.push(report);
+            }
+        }
     }
-    reports
+    (reports, insertions, whole)
+}
+
+/// Compares a program with inserted points with the one before and with these points.
+///
+/// # Errors
+/// In words, what is not as it has to be.
+pub(super) fn prove_inserted(before: &Scan, insertions: &[Insertion], written: &Scan) -> Result<(), String> {
+    let mut inserted = insertions.iter().flat_map(|insertion| &insertion.points).peekable();
+    let mut old = before.targets.iter().peekable();
+    for new in &written.targets {
+        if old.next_if(|old| is_same_place(&old.goal, &new.goal)).is_some() {
+            continue;
+        }
+        let is_next = |point: &&InsertedPoint| match &new.goal {
+            Goal::Joints(_) => false,
+            Goal::Pose(pose) => {
+                let off = pose.frame_from_tool.translation.vector - point.frame_from_tool.translation.vector;
+                let turned = pose.frame_from_tool.rotation.angle_to(&point.frame_from_tool.rotation);
+                off.norm() <= LARGEST_ROUNDING.0 && turned <= LARGEST_ROUNDING.1
+            }
+        };
+        if inserted.next_if(is_next).is_none() {
+            return Err(format!("line {}: an inserted point is not where it has to be", new.line));
+        }
+    }
+    match (old.next(), inserted.next()) {
+        (None, None) => Ok(()),
+        (Some(_), _) | (_, Some(_)) => Err("a target is missing".to_owned()),
+    }
 }
 
 /// Whether two targets are at one place. A configuration that comes from the move before changes when that move is corrected.

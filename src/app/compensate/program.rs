@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 
 use super::super::{Console, to_json};
 use super::correct::{self, Corrected, Resolved};
-use super::report::Report;
+use super::report::{PathReport, Report};
 use super::settings::Settings;
 use super::{Job, SHOWN, is_same_file, picture};
 use crate::cli::compensate::{CompensateArgs, Points};
 use crate::compensation::Status;
 use crate::error::{ExitStatus, Failure};
 use crate::program::motion::{Companion, Goal, Hint, ReadOptions, Reason, Scan};
-use crate::program::{Dialect, ProgramError, Robot, rewrite, with_remark};
+use crate::program::{Dialect, ProgramError, Robot, insert, rewrite, with_remark};
 use crate::store;
 use crate::text::{counted, printable};
+use crate::units::from_mm;
 
 /// Why points that were taught are not corrected.
 const TAUGHT: &str = "taught points are not corrected: they were recorded where the real arm was, so the arm returns to them as it is; corrected, \
@@ -30,6 +31,9 @@ struct Part<'p> {
     results: Vec<Corrected>,
     corrected: Vec<u8>,
     is_changed: bool,
+    paths: Vec<PathReport>,
+    /// Lines of moves that deviate by more than they may, and have no place for further points.
+    undivided: Vec<usize>,
 }
 
 pub(super) fn run<O: Write, E: Write>(
@@ -38,6 +42,10 @@ pub(super) fn run<O: Write, E: Write>(
     dialect: Dialect,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
+    if args.insert.is_some() && !insert::can_insert(dialect) {
+        return Err(Failure::new(ExitStatus::Usage, format!("points cannot be inserted into {dialect} programs"))
+            .hint("'--insert' is for RAPID, KRL and URScript; without it the path between the targets is only judged"));
+    }
     let profile = &job.arm.profile;
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
     let pulses: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
@@ -73,13 +81,20 @@ pub(super) fn run<O: Write, E: Write>(
         let commands: Vec<_> = results.iter().map(Corrected::command).collect();
         let mut corrected = rewrite::rewrite(dialect, &robot, text, &scan, &commands).map_err(unusable)?;
         let is_changed = corrected != *text;
+        let unproven = |what: String| {
+            let message =
+                format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
+            Failure::new(ExitStatus::Internal, message)
+        };
+        let (paths, insertions, undivided) = correct::between(job, &scan, &results, args.insert.map(from_mm));
         if is_changed {
             let again = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
-            correct::prove(job, &results, &scan, &again).map_err(|what| {
-                let message =
-                    format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
-                Failure::new(ExitStatus::Internal, message)
-            })?;
+            correct::prove(job, &results, &scan, &again).map_err(unproven)?;
+            if !insertions.is_empty() {
+                corrected = insert::insert(dialect, &corrected, &again, &insertions);
+                let last = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
+                correct::prove_inserted(&again, &insertions, &last).map_err(unproven)?;
+            }
         }
         if is_changed && job.arm.edited.is_some() {
             match with_remark(dialect, &corrected, EDITED) {
@@ -90,12 +105,12 @@ pub(super) fn run<O: Write, E: Write>(
                 )),
             }
         }
-        parts.push(Part { path, scan, results, corrected, is_changed });
+        parts.push(Part { path, scan, results, corrected, is_changed, paths, undivided });
     }
     check_paths(args, &parts)?;
     let mut report = Report { edited: job.arm.edited.clone(), ..Report::default() };
     for part in &parts {
-        add(job, part, &mut report);
+        add(part, &mut report);
     }
     write(args, &parts, &mut report, console)?;
     if let Some(path) = &args.record {
@@ -181,7 +196,7 @@ fn is_missed(reason: &Reason) -> bool {
     !matches!(reason, Reason::InFile(_) | Reason::SystemVariable | Reason::NotMovedTo | Reason::OtherGroup)
 }
 
-fn add(job: &Job<'_>, part: &Part<'_>, report: &mut Report) {
+fn add(part: &Part<'_>, report: &mut Report) {
     let corrected = part.results.iter().filter(|result| result.is_done()).count();
     report.corrected += corrected;
     let missed = part.scan.left.iter().filter(|left| is_missed(&left.reason)).count();
@@ -194,7 +209,7 @@ fn add(job: &Job<'_>, part: &Part<'_>, report: &mut Report) {
         reason: Some(left.reason.to_string()),
         ..super::report::TargetReport::default()
     }));
-    report.paths.extend(correct::between(job, &part.scan, &part.results));
+    report.paths.extend(part.paths.iter().cloned());
 }
 
 fn write<O: Write, E: Write>(
@@ -268,6 +283,17 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>],
     }
     if notes.len() > SHOWN {
         console.remark(&format!("and {} more lines", notes.len() - SHOWN));
+    }
+    if let Some(first) = part.undivided.first() {
+        console.remark(&format!(
+            "{} would need more points and cannot get them, first line {first}: points are put only into plain linear moves directly behind another \
+             move",
+            counted(part.undivided.len(), "move")
+        ));
+    }
+    let external = |reason: &Reason| matches!(reason, Reason::ExternalAxes | Reason::SeventhAxis);
+    if left.iter().any(|left| external(&left.reason)) {
+        console.remark("external axes that carry neither the arm nor the workpiece do not matter: '--ignore-external-axes'");
     }
     let (joints, mut largest) = (job.joints(), vec![0.0; job.joints().len()]);
     for result in &part.results {

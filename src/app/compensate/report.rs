@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use serde::Serialize;
 
-use crate::text::decimal;
+use crate::text::{counted, decimal};
 use crate::units::{to_deg, to_mm};
 
 /// A target and its correction.
@@ -66,6 +66,14 @@ pub(super) struct PathReport {
     /// Largest distance of the tool from where the nominal arm would have had it, with the targets corrected and without.
     pub(super) corrected_mm: f64,
     pub(super) uncorrected_mm: f64,
+    /// Points that were put into it.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub(super) inserted: usize,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+const fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl Report {
@@ -90,6 +98,11 @@ impl Report {
                 "the arm is known within +-{} mm at these targets (predicted, rms)",
                 decimal(largest, 3)
             ));
+        }
+        let inserted: usize = self.paths.iter().map(|path| path.inserted).sum();
+        if inserted > 0 {
+            let moves = self.paths.iter().filter(|path| path.inserted > 0).count();
+            lines.push(format!("{} inserted into {}", counted(inserted, "point"), counted(moves, "linear move")));
         }
         if let Some(worst) = self.paths.iter().max_by(|a, b| a.corrected_mm.total_cmp(&b.corrected_mm)) {
             lines.push(format!(

@@ -196,6 +196,7 @@ fn motion(statement: &Statement, positions: &BTreeMap<String, Position>, finding
         tool: used.map_or_else(identity, |position| position.tool.clone()),
         frame: used.map_or_else(identity, |position| position.frame.clone()),
         configuration: None,
+        spot: None,
     }));
 }
 

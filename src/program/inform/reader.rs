@@ -219,6 +219,7 @@ impl Job<'_> {
             tool,
             frame,
             configuration: None,
+            spot: None,
         }));
     }
 }

@@ -11,6 +11,7 @@ use self::flow::{Block, Routine, called};
 use super::super::ProgramError;
 use super::super::configuration::Configuration;
 use super::super::findings::{Definition, Findings, Key, Motion, OtherUse, Point, Source, Way};
+use super::super::insert::Spot;
 use super::super::lexer::{Kind, Rules, Tokens};
 use super::super::motion::{Form, Hint, Reason, Scan, Setting};
 use super::aggregate::{Aggregate, FrameData};
@@ -154,6 +155,8 @@ struct Module<'a> {
     loop_ends: BTreeMap<(usize, usize), [Option<Frame>; 2]>,
     /// Lower-case names of frames whose value changes while the program runs.
     changing: BTreeSet<String>,
+    /// File and end of the line of the last motion.
+    behind_motion: Option<(usize, usize)>,
 }
 
 /// A name with constant indices.
@@ -204,6 +207,7 @@ impl<'a> Module<'a> {
             blocks: Vec::new(),
             loop_ends: BTreeMap::new(),
             changing: BTreeSet::new(),
+            behind_motion: None,
         }
     }
 
@@ -575,8 +579,28 @@ impl<'a> Module<'a> {
             tool: if is_stationary { Err(Reason::StationaryTool) } else { Ok(tool) },
             frame: Ok(self.setting(self.state.base.as_ref(), "BASE")),
             configuration: None,
+            spot: self.spot(line, with, start),
         }));
+        self.behind_motion = Some((line.file, line.range.end));
         self.state = before;
+    }
+
+    /// A plain `LIN` in the line behind another motion.
+    fn spot(&self, line: &Line<'_, 'a>, end: usize, start: usize) -> Option<Spot> {
+        let tokens = line.tokens;
+        let (file, behind) = self.behind_motion?;
+        let is_line_end = |at: usize| tokens.get(at).is_some_and(|token| token.kind == Kind::LineEnd);
+        let is_next = file == line.file && (behind..line.range.start).all(is_line_end);
+        let is_plain = tokens.is_word(line.range.start, "LIN") && start == line.range.start + 1 && end == line.range.end;
+        if !is_plain || !is_next || line.file != 0 {
+            return None;
+        }
+        let point_end = if tokens.is(start, b'{') { tokens.behind(start, end) } else { Variable::read(line, start)?.end };
+        let instruction = tokens.bytes(line.range.clone());
+        let spot = Spot::alone(tokens.text, instruction.clone(), tokens.bytes(start..point_end))?;
+        let is_exact = point_end == end;
+        let changes = if is_exact { vec![(instruction.end..instruction.end, " C_DIS")] } else { Vec::new() };
+        Some(Spot { changes, ..spot })
     }
 
     /// Tool and base in the `WITH` part of a spline motion, such as `$TOOL=STOOL2(FP3)`.

@@ -8,6 +8,7 @@ use nalgebra::Isometry3;
 use super::super::ProgramError;
 use super::super::configuration::Configuration;
 use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source};
+use super::super::insert::Spot;
 use super::super::lexer::{Kind, Rules, Tokens, Value};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
@@ -78,6 +79,8 @@ struct Module<'a> {
     has_axis_offset: bool,
     /// Routines that set a displacement: it stays in force when they call or return to another.
     displacing: BTreeSet<usize>,
+    /// File and end of the last motion instruction, if nothing but moves can follow it directly.
+    behind_motion: Option<(usize, usize)>,
 }
 
 /// One instruction or declaration, without the block keywords in front of it.
@@ -89,6 +92,8 @@ struct Statement<'t, 'a> {
     range: Range<usize>,
     /// The header of a routine, with its parameters.
     is_routine: bool,
+    /// The instruction of an `IF` without `THEN`.
+    is_conditional: bool,
 }
 
 impl Statement<'_, '_> {
@@ -135,6 +140,7 @@ impl<'a> Module<'a> {
             is_displaced: false,
             has_axis_offset: false,
             displacing: BTreeSet::new(),
+            behind_motion: None,
         }
     }
 
@@ -147,6 +153,7 @@ impl<'a> Module<'a> {
     ) {
         let mut at = 0;
         let mut scope = 0;
+        let mut is_behind_if = false;
         // Routines have the same numbers in both passes.
         self.scopes = file.saturating_mul(ROUTINES);
         while at < tokens.len() {
@@ -159,6 +166,7 @@ impl<'a> Module<'a> {
                 at += 1;
                 continue;
             };
+            let is_conditional = std::mem::take(&mut is_behind_if);
             match word.as_str() {
                 "module" | "test" => at = end_of_line(tokens, at),
                 "record" => {
@@ -173,10 +181,13 @@ impl<'a> Module<'a> {
                     let end = if tokens.is(end, b'(') { tokens.behind(end, tokens.len()) } else { end };
                     self.scopes += 1;
                     scope = self.scopes;
-                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: true });
+                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: true, is_conditional });
                     at = end;
                 }
-                "if" | "elseif" | "while" | "for" => at = behind_condition(tokens, at),
+                "if" | "elseif" | "while" | "for" => {
+                    at = behind_condition(tokens, at);
+                    is_behind_if = !tokens.is_word(at - 1, "THEN") && !tokens.is_word(at - 1, "DO");
+                }
                 "case" => {
                     let colon = (at..tokens.len()).find(|place| tokens.is(*place, b':') || line_ends(tokens, *place));
                     at = colon.unwrap_or(tokens.len()) + 1;
@@ -189,7 +200,7 @@ impl<'a> Module<'a> {
                 }
                 _ => {
                     let end = (at..tokens.len()).find(|place| tokens.is(*place, b';')).unwrap_or(tokens.len());
-                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: false });
+                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: false, is_conditional });
                     at = end + 1;
                 }
             }
@@ -267,7 +278,10 @@ impl<'a> Module<'a> {
         let assign = range.clone().find(|at| tokens.is(*at, b':') && tokens.is(at + 1, b'='));
         let has_arguments = !tokens.is(range.start + 1, b':') && !tokens.is(range.start + 1, b'(');
         match (Instruction::named(&word).filter(|_| has_arguments), assign) {
-            (Some(instruction), _) => self.motion(statement, findings, &instruction),
+            (Some(instruction), _) => {
+                self.motion(statement, findings, &instruction);
+                self.behind_motion = (!statement.is_conditional).then_some((statement.file, range.end));
+            }
             // The first `:=` of a call belongs to an optional argument.
             (None, Some(assign)) if !range.clone().take_while(|at| *at < assign).any(|at| tokens.is(at, b'\\')) => {
                 self.assignment(statement, findings, assign);
@@ -457,7 +471,26 @@ impl<'a> Module<'a> {
             tool,
             frame,
             configuration: None,
+            spot: self.spot(statement, &arguments),
         }));
+    }
+
+    /// A plain `MoveL` directly behind another motion: its copies get the smallest usual zone, so that the arm does not stop.
+    fn spot(&self, statement: &Statement<'_, 'a>, arguments: &Arguments) -> Option<Spot> {
+        let (tokens, range) = (statement.tokens, statement.range.clone());
+        let (file, behind) = self.behind_motion?;
+        let is_next = file == statement.file && (behind + 1..range.start).all(|at| line_ends(tokens, at));
+        let options = range.clone().filter(|at| tokens.is(*at, b'\\'));
+        let is_plain = tokens.is_word(range.start, "MoveL")
+            && options.into_iter().all(|at| tokens.is_word(at + 1, "WObj"))
+            && tokens.is(range.end, b';');
+        let [point, _speed, zone, _tool] = arguments.heads.as_slice() else { return None };
+        if !is_plain || !is_next || statement.is_conditional || statement.file != 0 {
+            return None;
+        }
+        let instruction = tokens.bytes(range.start..range.end + 1);
+        let spot = Spot::alone(tokens.text, instruction, tokens.bytes(point.clone()))?;
+        Some(Spot { changes: vec![(tokens.bytes(zone.clone()), "z1")], ..spot })
     }
 
     fn point(

@@ -142,6 +142,7 @@ impl Trajectories<'_> {
             tool: Ok(Setting::Identity),
             frame: Ok(Setting::Identity),
             configuration: None,
+            spot: None,
         }));
     }
 

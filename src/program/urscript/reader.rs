@@ -11,6 +11,7 @@ use self::flow::{Block, is_block, is_of_controller, is_routine};
 use super::super::ProgramError;
 use super::super::configuration::Configuration;
 use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
+use super::super::insert::Spot;
 use super::super::lexer::{Kind, Number, Rules, Tokens, Value};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
@@ -50,6 +51,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
             has_moved: false,
             blocks: Vec::new(),
             before: None,
+            behind_motion: None,
         };
         reader.read(&mut findings);
         reader.complete_tools(&mut findings);
@@ -196,6 +198,8 @@ struct Reader<'r, 'a> {
     blocks: Vec<Block>,
     /// Joint values of the last move that states them.
     before: Option<Vec<f64>>,
+    /// Place behind the last motion.
+    behind_motion: Option<usize>,
 }
 
 impl Reader<'_, '_> {
@@ -348,8 +352,41 @@ impl Reader<'_, '_> {
             tool,
             frame: Ok(frame),
             configuration: near.map(Configuration::Near),
+            spot: if name == "movel" { self.spot(at, end, &parts) } else { None },
         }));
+        self.behind_motion = Some(end);
         end
+    }
+
+    /// A `movel` in the line behind another motion: its copies are passed with a small radius.
+    fn spot(&self, at: usize, end: usize, parts: &[Range<usize>]) -> Option<Spot> {
+        let tokens = self.tokens;
+        let is_line_end = |at: usize| tokens.get(at).is_some_and(|token| token.kind == Kind::LineEnd);
+        let mut between = self.behind_motion?;
+        while between < at {
+            // PolyScope marks its nodes with lines that begin with a dollar sign.
+            let is_mark = tokens.is(between, b'$');
+            while is_mark && between < at && !is_line_end(between) {
+                between += 1;
+            }
+            if !is_line_end(between) {
+                return None;
+            }
+            between += 1;
+        }
+        let named = |part: &Range<usize>| tokens.word(part.start).filter(|_| tokens.is(part.start + 1, b'='));
+        let positional = parts.iter().filter(|part| named(part).is_none()).count();
+        let has = |name: &str| parts.iter().any(|part| named(part) == Some(name));
+        let point = parts.iter().find(|part| named(part) == Some("pose")).or_else(|| parts.first())?;
+        let argument = self.argument(without_keyword(tokens, point.clone()));
+        if self.file != 0 || positional > 3 || has("t") || argument.near.is_some() || !is_line_end(end) {
+            return None;
+        }
+        let instruction = tokens.bytes(at..end);
+        let close = instruction.end - 1;
+        let spot = Spot::alone(tokens.text, instruction, tokens.bytes(argument.range))?;
+        let changes = if has("r") { Vec::new() } else { vec![(close..close, ", r=0.001")] };
+        Some(Spot { changes, ..spot })
     }
 
     /// Names positions that are handed to a routine whose use of them is unknown.

@@ -474,6 +474,7 @@ impl Application<'_> {
             tool: Ok(tool),
             frame: Ok(frame),
             configuration: None,
+            spot: None,
         }));
     }
 
