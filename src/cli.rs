@@ -119,7 +119,8 @@ impl Cli {
             }
             at += if takes_value(&word) { 2 } else { 1 };
         }
-        let is_command = words.get(at).is_some_and(|word| word.to_str().is_some_and(|word| command.find_subcommand(word).is_some()));
+        let is_command =
+            words.get(at).is_some_and(|word| word.to_str().is_some_and(|word| command.find_subcommand(word).is_some()));
         if is_command {
             words[1..=at].rotate_right(1);
         }

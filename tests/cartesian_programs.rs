@@ -209,15 +209,13 @@ fn the_result_is_reported_and_drawn() {
 
 /// Two targets far apart, and a third one behind an offset.
 fn long_path(dialect: Dialect, poses: &[Isometry3<f64>], confs: &[String]) -> String {
-    let numbers = |values: &[f64], decimals: usize| {
-        values.iter().map(|value| format!("{value:.decimals$}")).collect::<Vec<_>>()
-    };
+    let numbers =
+        |values: &[f64], decimals: usize| values.iter().map(|value| format!("{value:.decimals$}")).collect::<Vec<_>>();
     let mm = |pose: &Isometry3<f64>| numbers(pose.translation.vector.map(to_mm).as_slice(), 4);
     match dialect {
         Dialect::Rapid => {
-            let target = |index: usize| {
-                format!("[{},{},[9E9,9E9,9E9,9E9,9E9,9E9]]", pose_of(&poses[index]), confs[index])
-            };
+            let target =
+                |index: usize| format!("[{},{},[9E9,9E9,9E9,9E9,9E9,9E9]]", pose_of(&poses[index]), confs[index]);
             format!(
                 "MODULE M\r\n  CONST robtarget pB:={};\r\n  PROC main()\r\n    MoveJ {},v100,fine,tool0;\r\n    MoveL pB,v100,fine,tool0\\WObj:=wobj0; ! there\r\n    \
                  IF diA=1 MoveL {},v100,fine,tool0;\r\n    MoveL pB,v100,fine,tool0;\r\n  ENDPROC\r\nENDMODULE\r\n",
@@ -231,7 +229,8 @@ fn long_path(dialect: Dialect, poses: &[Isometry3<f64>], confs: &[String]) -> St
                 let (c, b, a) = pose.rotation.euler_angles();
                 let turn = numbers(&[a, b, c].map(f64::to_degrees), 5);
                 let values = [mm(pose), turn].concat();
-                let named = ["X", "Y", "Z", "A", "B", "C"].iter().zip(values).map(|(name, value)| format!("{name} {value}"));
+                let named =
+                    ["X", "Y", "Z", "A", "B", "C"].iter().zip(values).map(|(name, value)| format!("{name} {value}"));
                 format!("{{{}}}", named.collect::<Vec<_>>().join(","))
             };
             format!(
@@ -289,7 +288,12 @@ fn points_are_inserted_only_where_the_arm_surely_comes_from_the_target_before() 
         let (plain, _) = compensate(&[]);
         let (json, _) = compensate(&["--json"]);
         let report: Value = serde_json::from_str(&json).unwrap();
-        let worst = report["paths"].as_array().unwrap().iter().map(|path| path["corrected_mm"].as_f64().unwrap()).fold(0.0, f64::max);
+        let worst = report["paths"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|path| path["corrected_mm"].as_f64().unwrap())
+            .fold(0.0, f64::max);
         // Not even a tenth of the deviation is left.
         let limit = format!("{}", 0.1 * worst);
         let (divided, said) = compensate(&["--insert", &limit]);
@@ -316,7 +320,17 @@ fn points_are_inserted_only_where_the_arm_surely_comes_from_the_target_before() 
         assert_eq!(divided.contains("\r\n"), program.contains("\r\n"));
     }
     let refused = trupose(&[
-        "compensate", "--calibration", CALIBRATION, "--program", "x.ls", "--dialect", "fanuc", "--points", "computed", "--insert", "0.1",
+        "compensate",
+        "--calibration",
+        CALIBRATION,
+        "--program",
+        "x.ls",
+        "--dialect",
+        "fanuc",
+        "--points",
+        "computed",
+        "--insert",
+        "0.1",
     ]);
     assert!(refused.status.code() == Some(2) && text(&refused.stderr).contains("cannot be inserted"));
 }
@@ -329,19 +343,43 @@ fn a_program_says_that_its_calibration_was_edited_and_a_copy_that_nothing_change
     fs::write(&calibration, edited).unwrap();
     fs::write(&file, module(&cell, "")).unwrap();
     let (calibration, file) = (calibration.to_str().unwrap(), file.to_str().unwrap());
-    let arguments =
-        ["compensate", "--calibration", calibration, "--dialect", "rapid", "--program", file, "--points", "computed", "--edited"];
+    let arguments = [
+        "compensate",
+        "--calibration",
+        calibration,
+        "--dialect",
+        "rapid",
+        "--program",
+        file,
+        "--points",
+        "computed",
+        "--edited",
+    ];
     let output = trupose(&arguments);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).starts_with("MODULE Part\n  ! WARNING: EDITED CALIBRATION\n"), "{}", text(&output.stdout));
+    assert!(
+        text(&output.stdout).starts_with("MODULE Part\n  ! WARNING: EDITED CALIBRATION\n"),
+        "{}",
+        text(&output.stdout)
+    );
     let output = trupose(&[&arguments[..], &["--json"]].concat());
     assert!(text(&output.stdout).contains("\"edited\": \"this calibration was changed"), "{}", text(&output.stdout));
     // Nothing is corrected, so nothing is said.
     let (nothing, out) = (folder.path().join("nothing.mod"), folder.path().join("out.mod"));
     fs::write(&nothing, "MODULE M\nENDMODULE\n").unwrap();
     let output = trupose(&[
-        "compensate", "--calibration", calibration, "--dialect", "rapid", "--program", nothing.to_str().unwrap(), "--points", "computed",
-        "--edited", "--out", out.to_str().unwrap(),
+        "compensate",
+        "--calibration",
+        calibration,
+        "--dialect",
+        "rapid",
+        "--program",
+        nothing.to_str().unwrap(),
+        "--points",
+        "computed",
+        "--edited",
+        "--out",
+        out.to_str().unwrap(),
     ]);
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stdout).starts_with("unchanged: "), "{}", text(&output.stdout));

@@ -8,8 +8,8 @@ use crate::support::trupose;
 use nalgebra::{DVector, Isometry3, Point3, Translation3};
 use trupose::compensation::{Compensator, Goal, Settings, Status, ToolArm};
 use trupose::geometry::register;
-use trupose::inverse::{InverseKinematics, Posture};
 use trupose::identification::identify;
+use trupose::inverse::{InverseKinematics, Posture};
 use trupose::kinematics::{Arm, ForwardKinematics, KinematicChain, ParameterUnit, Place};
 use trupose::link::SimulatedCell;
 use trupose::model::CalibratedArm;
@@ -598,13 +598,8 @@ fn calibrated_in_the_cell(folder: &Path, robot: &str, simulation: &Simulation) -
          CaptureAll(Fail), Do(Next), Do(Identify), Do(Next), Do(Next), Do(Deliver)])"
     );
     fs::write(path("loop.script.ron"), script).unwrap();
-    let output = trupose(&[
-        "--script",
-        &path("loop.script.ron"),
-        "--sessions",
-        folder.to_str().unwrap(),
-        "--no-recording",
-    ]);
+    let output =
+        trupose(&["--script", &path("loop.script.ron"), "--sessions", folder.to_str().unwrap(), "--no-recording"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     path("loop/calibration.ron")
 }

@@ -348,7 +348,10 @@ fn exchanged_coordinates_are_named_before_a_mirrored_frame() {
         exchanged.iter_mut().for_each(|named| named.sample.point.coords.swap_rows(one, other));
         let found = mistakes(&bench, &exchanged);
         let place = |mistake: &Mistake| found.iter().position(|found| found == mistake);
-        assert!(place(&Mistake::Coordinates) < place(&Mistake::Mirrored) && found.contains(&Mistake::Coordinates), "{found:?}");
+        assert!(
+            place(&Mistake::Coordinates) < place(&Mistake::Mirrored) && found.contains(&Mistake::Coordinates),
+            "{found:?}"
+        );
     }
     assert!(bench.try_identify(samples.clone(), Vec::new()).is_ok());
     // J3 to J6 in the first columns, and zeros behind them.

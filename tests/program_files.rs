@@ -353,9 +353,10 @@ fn of_typical_programs_more_than_95_percent_of_the_targets_are_corrected() {
             let report = corrected(program, &calibration);
             let number = |name: &str| usize::try_from(report[name].as_u64().unwrap()).unwrap();
             (count, done, left) = (count + 1, done + number("corrected"), left + number("left"));
-            let unnamed = report["targets"].as_array().unwrap().iter().find(|target| {
-                target["status"] != "reached" && target["reason"].as_str().is_none_or(str::is_empty)
-            });
+            let unnamed =
+                report["targets"].as_array().unwrap().iter().find(|target| {
+                    target["status"] != "reached" && target["reason"].as_str().is_none_or(str::is_empty)
+                });
             assert!(unnamed.is_none(), "{}: {unnamed:?}", program.title);
             if number("corrected") != program.targets || number("left") != program.left {
                 println!("{dialect} {}: {} corrected, {} left", program.title, number("corrected"), number("left"));

@@ -125,7 +125,8 @@ fn literal(dialect: Dialect, program: &[u8], target: &Target, point: &InsertedPo
         }
         Dialect::Krl => {
             let numbers = numbers(Orientation::Zyx, &[]);
-            let named = ["X", "Y", "Z", "A", "B", "C"].iter().zip(&numbers).map(|(name, value)| format!("{name} {value}"));
+            let named =
+                ["X", "Y", "Z", "A", "B", "C"].iter().zip(&numbers).map(|(name, value)| format!("{name} {value}"));
             Some(format!("{{{}}}", named.collect::<Vec<_>>().join(",")))
         }
         Dialect::Urscript => Some(format!("p[{}]", numbers(Orientation::Vector, &[]).join(", "))),
@@ -149,6 +150,7 @@ fn confdata(point: &InsertedPoint) -> Option<String> {
     let posture = point.posture.as_ref()?;
     let quarter = |index: usize| Some((point.joints.get(index)? / FRAC_PI_2).floor() as i32);
     let bit = |is: bool, value: i32| if is { value } else { 0 };
-    let form = bit(posture.wrist_is_behind, 4) + bit(posture.wrist_is_behind_lower_arm, 2) + bit(posture.wrist_is_negative, 1);
+    let form =
+        bit(posture.wrist_is_behind, 4) + bit(posture.wrist_is_behind_lower_arm, 2) + bit(posture.wrist_is_negative, 1);
     Some(format!("[{},{},{},{form}]", quarter(0)?, quarter(3)?, quarter(5)?))
 }

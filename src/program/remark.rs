@@ -40,7 +40,8 @@ pub fn with_remark(dialect: Dialect, program: &[u8], text: &str) -> Option<Vec<u
         let word = words.next().unwrap_or_default();
         remark.behind.iter().any(|wanted| word.eq_ignore_ascii_case(wanted))
     };
-    let place = lines(program).map(|(_, place)| place).find(|place| is_place(program.get(place.clone()).unwrap_or_default()));
+    let place =
+        lines(program).map(|(_, place)| place).find(|place| is_place(program.get(place.clone()).unwrap_or_default()));
     let at = match place {
         Some(line) => (line.end + 1).min(program.len()),
         None if remark.may_be_first => start,

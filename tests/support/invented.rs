@@ -5,8 +5,8 @@ use std::fs;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use trupose::profile::{Level, Profile, builtin};
-use trupose::session::sha256;
 use trupose::session::calibration::Calibration;
+use trupose::session::sha256;
 use trupose::session::summary::ParameterSummary;
 use trupose::units::to_mm;
 

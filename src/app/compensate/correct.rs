@@ -266,9 +266,8 @@ pub(super) fn between(
             continue;
         };
         let is_linear = step.kind == MoveKind::Linear && has_spot(scan, index + 1);
-        let divided = is_linear
-            .then(|| divided(step.line, &job.compensator, &tool, ends, &from.meant, limit))
-            .flatten();
+        let divided =
+            is_linear.then(|| divided(step.line, &job.compensator, &tool, ends, &from.meant, limit)).flatten();
         match divided {
             Some((points, report)) => {
                 let frame_from_base = to.base_from_frame.inverse();

@@ -44,7 +44,9 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     if args.insert.is_some() && !insert::can_insert(dialect) {
         return Err(Failure::new(ExitStatus::Usage, format!("points cannot be inserted into {dialect} programs"))
-            .hint("'--insert' is for RAPID, KRL and URScript; without it the path between the targets is only judged"));
+            .hint(
+                "'--insert' is for RAPID, KRL and URScript; without it the path between the targets is only judged",
+            ));
     }
     let profile = &job.arm.profile;
     let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
@@ -293,7 +295,9 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>],
     }
     let external = |reason: &Reason| matches!(reason, Reason::ExternalAxes | Reason::SeventhAxis);
     if left.iter().any(|left| external(&left.reason)) {
-        console.remark("external axes that carry neither the arm nor the workpiece do not matter: '--ignore-external-axes'");
+        console.remark(
+            "external axes that carry neither the arm nor the workpiece do not matter: '--ignore-external-axes'",
+        );
     }
     let (joints, mut largest) = (job.joints(), vec![0.0; job.joints().len()]);
     for result in &part.results {

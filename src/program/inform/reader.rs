@@ -6,13 +6,13 @@ use std::ops::Range;
 
 use nalgebra::Isometry3;
 
-use super::shift::Shifts;
 use super::super::ProgramError;
 use super::super::configuration::{Configuration, Rconf};
 use super::super::findings::{Definition, Findings, Key, Literal, Motion, OtherUse, Point, Source, Way};
 use super::super::lexer::{self, latin};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
+use super::shift::Shifts;
 
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let mut frames = BTreeMap::new();

@@ -263,7 +263,11 @@ impl<'a> Module<'a> {
         // The parameters of a routine are its caller's variables.
         let is_harmless = ["BAS", "INV_POS"].iter().any(|word| tokens.is_word(first, word));
         if assign.is_none() && tokens.is(first + 1, b'(') && !is_harmless {
-            line.range.clone().skip_while(|at| *at <= first).filter_map(|at| Variable::read(line, at)).for_each(|variable| change(&variable));
+            line.range
+                .clone()
+                .skip_while(|at| *at <= first)
+                .filter_map(|at| Variable::read(line, at))
+                .for_each(|variable| change(&variable));
         }
     }
 
@@ -591,11 +595,13 @@ impl<'a> Module<'a> {
         let (file, behind) = self.behind_motion?;
         let is_line_end = |at: usize| tokens.get(at).is_some_and(|token| token.kind == Kind::LineEnd);
         let is_next = file == line.file && (behind..line.range.start).all(is_line_end);
-        let is_plain = tokens.is_word(line.range.start, "LIN") && start == line.range.start + 1 && end == line.range.end;
+        let is_plain =
+            tokens.is_word(line.range.start, "LIN") && start == line.range.start + 1 && end == line.range.end;
         if !is_plain || !is_next || line.file != 0 {
             return None;
         }
-        let point_end = if tokens.is(start, b'{') { tokens.behind(start, end) } else { Variable::read(line, start)?.end };
+        let point_end =
+            if tokens.is(start, b'{') { tokens.behind(start, end) } else { Variable::read(line, start)?.end };
         let instruction = tokens.bytes(line.range.clone());
         let spot = Spot::alone(tokens.text, instruction.clone(), tokens.bytes(start..point_end))?;
         let is_exact = point_end == end;

@@ -43,7 +43,9 @@ const WITHOUT_TARGETS: [&str; 16] = [
 
 /// Whether the controller has a function of this name that moves to no position.
 pub(super) fn is_of_controller(name: &str) -> bool {
-    HARMLESS.contains(&name) || WITHOUT_TARGETS.contains(&name) || matches!(name, "if" | "while" | "elif" | "def" | "thread")
+    HARMLESS.contains(&name)
+        || WITHOUT_TARGETS.contains(&name)
+        || matches!(name, "if" | "while" | "elif" | "def" | "thread")
 }
 
 /// Whether a function or thread begins here.
