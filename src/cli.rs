@@ -3,6 +3,7 @@
 mod identity;
 mod link;
 mod payload;
+mod profile;
 mod recording;
 mod session;
 mod terminal;
@@ -33,6 +34,8 @@ pub use identity::IdentityArgs;
 use link::wires;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
 pub use payload::PayloadArgs;
+use profile::NEW_EXAMPLES;
+pub use profile::NewProfileArgs;
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
 pub use session::SessionCommand;
 pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
@@ -319,16 +322,9 @@ pub enum ProfileCommand {
         /// Path of the profile file, or name of a shipped profile
         file: PathBuf,
     },
-    /// Write a profile to start from: the text of another one, to be edited
-    #[command(after_help = "Example:\n  trupose profile new --from abb_irb120 --out my-robot.ron")]
-    New {
-        /// Profile to copy: the name of a shipped one ('trupose profile list'), or a file
-        #[arg(long, value_name = "NAME|FILE")]
-        from: String,
-        /// New file [default: print the text]
-        #[arg(long, value_name = "FILE")]
-        out: Option<PathBuf>,
-    },
+    /// Write a profile for an arm that is not in the list: from another one, from a data sheet, or measured
+    #[command(after_help = NEW_EXAMPLES)]
+    New(Box<NewProfileArgs>),
     /// Make a profile from the serial chain of a URDF
     ImportUrdf(compensate::ImportUrdfArgs),
 }

@@ -9,6 +9,7 @@
 mod builtin;
 mod cell;
 mod check;
+pub mod datasheet;
 mod decode;
 mod diagnostic;
 mod expected;
@@ -110,6 +111,16 @@ pub struct Target {
 }
 
 impl Target {
+    /// An SMR whose place nobody has stated.
+    pub fn beside_the_flange(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            position_in_flange: Point3::origin(),
+            uncertainty: FREE_TARGET_UNCERTAINTY,
+            axis_in_flange: Vector3::z_axis(),
+        }
+    }
+
     /// Whether the position is identified together with the arm.
     pub fn is_free(&self) -> bool {
         self.uncertainty > 0.0
@@ -280,6 +291,14 @@ impl Profile {
         if let Some(place) = changed.targets.get_mut(index) {
             *place = target;
         }
+        changed
+    }
+
+    /// The robot with a tracker at another place (m, in the base).
+    #[must_use]
+    pub fn with_tracker_at(&self, position_in_base: Point3<f64>) -> Self {
+        let mut changed = self.clone();
+        changed.tracker.position_in_base = position_in_base;
         changed
     }
 

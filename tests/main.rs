@@ -56,6 +56,7 @@ mod sessions;
 #[cfg(target_os = "linux")]
 mod terminal;
 mod triage;
+mod whole_arm;
 mod wizard_random;
 mod worked_example;
 

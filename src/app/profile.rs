@@ -1,5 +1,7 @@
 //! `trupose profile list | show | new | check`.
 
+mod new;
+
 use std::io::Write;
 use std::path::Path;
 
@@ -7,7 +9,6 @@ use super::{Console, load};
 use crate::cli::ProfileCommand;
 use crate::error::{ExitStatus, Failure};
 use crate::profile::{Profile, builtin, builtin_names, check_text, list_text, show_text};
-use crate::store;
 
 pub(super) fn run<O: Write, E: Write>(
     command: &ProfileCommand,
@@ -31,21 +32,7 @@ pub(super) fn run<O: Write, E: Write>(
             console.print(&show_text(&loaded.profile))?;
             Ok(ExitStatus::Accepted)
         }
-        ProfileCommand::New { from, out } => {
-            let text = text(Path::new(from))?;
-            let Some(out) = out else {
-                console.print(&text)?;
-                return Ok(ExitStatus::Accepted);
-            };
-            if out.exists() {
-                let message = format!("'{}' exists already", out.display());
-                return Err(Failure::new(ExitStatus::Usage, message).hint("give '--out' another name"));
-            }
-            store::replace(out, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
-            let file = out.display();
-            console.remark(&format!("written to '{file}': edit it, then check it with 'trupose profile check {file}'"));
-            Ok(ExitStatus::Accepted)
-        }
+        ProfileCommand::New(args) => new::run(args, console),
         ProfileCommand::Check { file } => {
             let name = file.display().to_string();
             let text = text(file)?;

@@ -17,10 +17,12 @@
 
 mod adjustment;
 mod circle;
+mod whole_arm;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use thiserror::Error;
 
+pub use whole_arm::{JointMotion, MeasuredArm, MeasuredConstant, Template, WholeArmError, measure_arm};
 pub use circle::{CircleFit, CircleResidual, CircleUncertainty, SHORTEST_ARC, SMALLEST_RADIUS, fit_circle};
 
 use crate::kinematics::{ForwardKinematics, FreeParameter, JointType, KinematicChain};
@@ -330,25 +332,30 @@ fn measured_circle(
 ) -> Result<CircleFit, CirclePointError> {
     let mut fit = fit_circle(series.points, sigma)
         .map_err(|error| CirclePointError::Circle { joint: name_of(chain, series.joint), error })?;
-    // Angles about the normal follow the pendant values or their negatives: the sum of unit phasors says which.
-    let reference = series.points.first().map_or_else(Vector3::x, |point| point - fit.centre);
-    let across = fit.normal.cross(&reference);
-    let (mut same, mut opposite) = ((0.0, 0.0), (0.0, 0.0));
-    for (point, q) in series.points.iter().zip(series.configurations) {
-        let from_centre = point - fit.centre;
-        let seen = from_centre.dot(&across).atan2(from_centre.dot(&reference));
-        let pendant = q.get(series.joint).copied().unwrap_or_default();
-        let add = |sum: &mut (f64, f64), angle: f64| *sum = (sum.0 + angle.cos(), sum.1 + angle.sin());
-        add(&mut same, seen - pendant);
-        add(&mut opposite, seen + pendant);
-    }
-    if opposite.0.hypot(opposite.1) > same.0.hypot(same.1) {
+    let values: Vec<f64> = series.configurations.iter().filter_map(|q| q.get(series.joint)).copied().collect();
+    if !turns_with(&fit, series.points, &values) {
         fit.normal = -fit.normal;
         for residual in &mut fit.residuals {
             residual.out_of_plane = -residual.out_of_plane;
         }
     }
     Ok(fit)
+}
+
+/// Whether points go round the normal of their circle in the sense in which the joint values grow.
+fn turns_with(fit: &CircleFit, points: &[Point3<f64>], values: &[f64]) -> bool {
+    // Angles about the normal follow the joint values or their negatives: the sum of unit phasors says which.
+    let reference = points.first().map_or_else(Vector3::x, |point| point - fit.centre);
+    let across = fit.normal.cross(&reference);
+    let (mut same, mut opposite) = ((0.0, 0.0), (0.0, 0.0));
+    for (point, value) in points.iter().zip(values) {
+        let from_centre = point - fit.centre;
+        let seen = from_centre.dot(&across).atan2(from_centre.dot(&reference));
+        let add = |sum: &mut (f64, f64), angle: f64| *sum = (sum.0 + angle.cos(), sum.1 + angle.sin());
+        add(&mut same, seen - value);
+        add(&mut opposite, seen + value);
+    }
+    opposite.0.hypot(opposite.1) <= same.0.hypot(same.1)
 }
 
 /// The motion that brings two lines onto two others: both directions, and the middle of their common perpendicular.

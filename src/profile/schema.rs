@@ -257,12 +257,7 @@ fn targets(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<Vec<Target>>
             "no target is given: one SMR is assumed within 50 mm of the flange origin",
             "add 'targets: [(name: \"smr\", position_mm: (0.0, 0.0, 50.0))]' with the position as mounted".to_owned(),
         );
-        return Some(vec![Target {
-            name: "smr".to_owned(),
-            position_in_flange: Point3::origin(),
-            uncertainty: FREE_TARGET_UNCERTAINTY,
-            axis_in_flange: Vector3::z_axis(),
-        }]);
+        return Some(vec![Target::beside_the_flange("smr")]);
     }
     let mut targets: Vec<Option<Target>> = Vec::new();
     for item in items {

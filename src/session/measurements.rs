@@ -134,6 +134,25 @@ pub fn read_as(
         Err(TableErrors::new(file, problems, headers))
     }
 }
+
+/// The kinds of the joints `q1`, `q2`, … that the first line of a table names; `None` without such columns.
+pub fn types_in_header(content: impl AsRef<[u8]>) -> Option<Vec<JointType>> {
+    let text = String::from_utf8_lossy(content.as_ref());
+    let header = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    let names: Vec<String> = header
+        .trim_start_matches('\u{feff}')
+        .split([',', ';', '\t'])
+        .map(|name| name.trim().trim_matches('"').to_lowercase())
+        .collect();
+    let kind = |number: usize| {
+        let start = format!("q{number}_");
+        let unit = names.iter().find_map(|name| name.strip_prefix(&start))?;
+        Some(if matches!(unit, "deg" | "rad") { JointType::Revolute } else { JointType::Prismatic })
+    };
+    let types: Vec<JointType> = (1..=names.len()).map_while(kind).collect();
+    (!types.is_empty()).then_some(types)
+}
+
 /// The line of column names that a table for this robot can have: `pose,target,q1_deg,…,x_mm,y_mm,z_mm`.
 pub fn header(joints: &[JointType]) -> String {
     let mut names = vec!["pose".to_owned(), "target".to_owned()];
