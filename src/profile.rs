@@ -8,6 +8,7 @@
 
 mod builtin;
 mod cell;
+pub mod cell_text;
 mod check;
 pub mod datasheet;
 mod decode;
@@ -24,6 +25,7 @@ use clap::ValueEnum;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 pub use builtin::{builtin, builtin_names};
+pub use cell_text::CellText;
 pub use cell::{Capsule, Instrument, KeepOut, Tracker};
 pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
 pub use expected::{ExpectedDeviation, ExpectedDeviations};

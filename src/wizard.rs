@@ -21,6 +21,7 @@
 #![warn(clippy::wildcard_enum_match_arm)]
 
 pub mod advice;
+mod cell;
 mod effect;
 pub mod intent;
 mod live;
@@ -85,6 +86,7 @@ pub struct Wizard {
     live: Live,
     /// Sessions that can be continued instead of starting one.
     sessions: Vec<SessionCard>,
+    cells: cell::KnownCells,
     /// Folder of the session to continue after the end.
     resumes: Option<String>,
     ended: Option<String>,
@@ -133,6 +135,7 @@ impl Wizard {
             notice: None,
             live: Live::default(),
             sessions: Vec::new(),
+            cells: cell::KnownCells::default(),
             resumes: None,
             ended: None,
             unsaved: Vec::new(),
@@ -226,6 +229,10 @@ impl Wizard {
                 self.sessions = sessions;
                 Vec::new()
             }
+            Event::Cell(cell) => {
+                self.cells.earlier = cell;
+                Vec::new()
+            }
             Event::Remark(notice) => {
                 self.notice = Some(notice);
                 Vec::new()
@@ -287,7 +294,8 @@ impl Wizard {
             let blocked = busy.cancelled.then(|| "already being cancelled".to_owned());
             intents.push(IntentInfo::new(Intent::Cancel, format!("cancel {}", busy.what)).unless(blocked));
         }
-        for mut info in self.phase.intents(&self.cx()) {
+        let cell = self.cells.offer(self.phase.step(), &self.session);
+        for mut info in self.phase.intents(&self.cx()).into_iter().chain(cell) {
             if let Some(busy) = &busy
                 && !matches!(info.intent, Intent::Note(_))
             {
@@ -372,6 +380,11 @@ impl Wizard {
             let cause = format!("continuing the session in {folder}");
             self.resumes = Some(folder);
             return self.end(cause);
+        }
+        if let Intent::DescribeCell(cell) = intent {
+            let actions = self.cells.state(cell, &self.session);
+            self.actions.extend(actions);
+            return self.run();
         }
         if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo) {
             self.live.hold_until_moved();

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::support::PROGRAM;
 use crate::support::place::Place;
-use crate::support::pty::{CTRL_U, CTRL_Z, ENTER, PATIENCE, Terminal, processor_seconds};
+use crate::support::pty::{CTRL_U, CTRL_Z, ENTER, PATIENCE, Shown, Terminal, processor_seconds};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use trupose::session::journal::Entry;
@@ -396,4 +396,116 @@ fn garbage_does_not_make_it_fail() {
         Ok(())
     });
     outcome.unwrap();
+}
+
+/// Keys of a technician, counted.
+struct Technician {
+    terminal: Terminal,
+    keys: usize,
+}
+
+impl Technician {
+    fn press(&mut self, keys: &str) {
+        self.keys += keys.chars().count();
+        self.terminal.send(keys);
+    }
+
+    /// Fills the fields of a form; `None` leaves one as it is.
+    fn fill(&mut self, values: &[Option<&str>]) {
+        for (index, value) in values.iter().enumerate() {
+            if index > 0 {
+                self.press("\t");
+            }
+            if let Some(value) = value {
+                self.press(&format!("{CTRL_U}{value}"));
+            }
+        }
+        self.press(ENTER);
+    }
+
+    fn presses_until(&mut self, keys: &str, what: &str, condition: impl FnMut(&Shown) -> bool) {
+        self.keys += keys.chars().count();
+        self.terminal.send_until(keys, what, condition);
+    }
+}
+
+/// An arm that is not in the list, from its data sheet to a corrected program: with an exchanged pose, a bad reading and a beam that
+/// breaks, answered as the screen proposes.
+#[test]
+fn a_technician_without_a_profile_calibrates_by_keys() {
+    let place = Place::new();
+    let terminal = Terminal::start(place.0.path(), &["wizard"], SIZE);
+    terminal.wait_for_step(1);
+    let mut technician = Technician { terminal, keys: 0 };
+
+    // The data sheet; a mistyped dimension is seen at the flange and corrected.
+    technician.press("d");
+    technician.terminal.wait_for_text("from the drawing in its data sheet");
+    let limits = Some("165, -110..110, -110..70, 160, 120, 180");
+    let lengths = [Some("290"), Some("0"), Some("720"), Some("70"), Some("302"), Some("72"), Some("0")];
+    technician.fill(&[&[Some("Maker 6/0.6"), None], &lengths[..], &[limits]].concat());
+    technician.terminal.wait_for_text("(374.0, 0.0, 1080.0) mm");
+    technician.press("d");
+    technician.terminal.wait_for_text("from the drawing in its data sheet");
+    technician.fill(&[None, None, None, None, Some("270")]);
+    technician.terminal.wait_for_text("(374.0, 0.0, 630.0) mm");
+    technician.press(ENTER);
+    technician.terminal.wait_for_step(2);
+
+    // The cell: accuracy from the list, place of the tracker, limits of the verdict.
+    technician.press("j");
+    technician.terminal.wait_for_text("This cell.");
+    technician.press("\u{1b}[C");
+    technician.press("\t\t\t");
+    technician.fill(&[None, Some("2500 0 700"), None, None, Some("0.3"), Some("0.8")]);
+    technician.terminal.wait_for_text("Leica AT9xx");
+    technician.press("\u{1b}[B\u{1b}[B\u{1b}[B\u{1b}[B");
+    technician.press(ENTER);
+    technician.terminal.wait_for_text("hidden errors of the arm");
+    technician.fill(&[Some("5"), None, None, None, Some("swapped-rows@6, outlier@12:4mm, beam-break@15")]);
+    technician.terminal.wait_for("the instrument", |shown| shown.has("simulated cell") && shown.has("answers"));
+    technician.presses_until("n", "step 3", |shown| shown.step() == Some(3));
+    technician.press("p");
+    technician.presses_until("n", "step 4", |shown| shown.step() == Some(4));
+    technician.press(&format!("{CTRL_U}30\t8\t300"));
+    technician.press("p");
+    technician.presses_until("a", "step 5", |shown| shown.step() == Some(5));
+
+    // Enter always does the next sensible thing; what is in question is corrected, or measured again.
+    for _ in 0..200 {
+        if technician.terminal.look(|shown| shown.step() == Some(6)) {
+            break;
+        }
+        let before = technician.terminal.look(|shown| shown.text());
+        let has_remedy = technician.terminal.look(|shown| shown.has("c ") && shown.has("correct"));
+        technician.press(if has_remedy { "c" } else { ENTER });
+        technician.terminal.comes(Duration::from_secs(3), |shown| shown.text() != before && shown.has("· saved ·"));
+    }
+    technician.terminal.wait_for_step(6);
+    technician.presses_until(ENTER, "step 7", |shown| shown.step() == Some(7));
+    technician.terminal.wait_for("a verdict", |shown| shown.has("ACCEPTED") || shown.has("accepted"));
+    technician.presses_until(ENTER, "step 8", |shown| shown.step() == Some(8));
+    technician.press(ENTER);
+    let folder = fs::read_dir(place.0.path().join("sessions")).unwrap().map(|entry| entry.unwrap().path());
+    let folder = folder.filter(|path| path.is_dir()).next().unwrap();
+    technician.terminal.wait_for("the files", |_| folder.join("calibration.ron").exists());
+    technician.terminal.wait_for("what was done is saved", |shown| shown.has("Written") && shown.has("· saved ·"));
+    technician.press("q");
+    technician.press("y");
+    assert_eq!(technician.terminal.end(PATIENCE, 0.0).0, 0);
+    let session = Session::of(&read_journal(&folder).unwrap()).unwrap();
+    let counted = session.counted().count();
+    eprintln!("{} keys, {} bytes for {counted} samples", technician.keys, technician.terminal.written());
+    assert!(counted >= 38 && session.closed, "{counted}");
+    assert!(place.path("sessions/cell.ron").exists());
+
+    // To a corrected program.
+    let program = "MODULE part\n  PROC main()\n    MoveAbsJ [[10,20,-20,30,40,50],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  ENDPROC\nENDMODULE\n";
+    fs::write(place.path("part.mod"), program).unwrap();
+    let calibration = folder.join("calibration.ron");
+    let arguments = ["compensate", "--calibration", calibration.to_str().unwrap(), "--program", "part.mod", "--dialect", "rapid", "--out", "corrected.mod"];
+    let output = place.run(&arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let corrected = fs::read_to_string(place.path("corrected.mod")).unwrap();
+    assert!(corrected.contains("MoveAbsJ [[") && !corrected.contains("[[10,20,-20"), "{corrected}");
 }

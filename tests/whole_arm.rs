@@ -1,6 +1,10 @@
 //! The link constants of a whole arm from circles, measured on the simulated cell.
 
+use std::fs;
+use std::path::Path;
+
 use nalgebra::Point3;
+use crate::support::trupose_in;
 use trupose::identification::circle_point::{MeasuredArm, Template, measure_arm};
 use trupose::kinematics::{ForwardKinematics, JointType, LinkParameter, ParameterId};
 use trupose::link::{Link as _, SimulatedCell};
@@ -192,4 +196,104 @@ fn rows_that_do_not_move_one_joint_at_a_time_are_refused() {
         error(&|_, points| points[20..30].iter_mut().for_each(|point| *point = Point3::origin())),
     ];
     insta::assert_snapshot!(messages.join("\n"));
+}
+
+/// The rows of a case as a table.
+fn table(case: &Case) -> String {
+    let types: Vec<JointType> = case.template.chain.joints().iter().map(|joint| joint.joint_type).collect();
+    let mut text = String::new();
+    for (index, kind) in types.iter().enumerate() {
+        text += &format!("q{}_{},", index + 1, if *kind == JointType::Revolute { "deg" } else { "mm" });
+    }
+    text += "x_mm,y_mm,z_mm\n";
+    for (row, point) in case.rows.iter().zip(&case.measured) {
+        let joints = row.iter().zip(&types).map(|(value, kind)| kind.quantity().to_edge(*value));
+        let values: Vec<String> =
+            joints.chain(point.coords.iter().map(|value| value * 1e3)).map(|value| format!("{value:.6}")).collect();
+        text += &(values.join(",") + "\n");
+    }
+    text
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output = trupose_in(folder, arguments);
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn a_profile_is_made_from_circles_and_can_be_planned_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = case("abb_irb120", 4);
+    fs::write(folder.path().join("circles.csv"), table(&case)).unwrap();
+    // Of an arm of which nothing is known but its limits.
+    let limits = "165, -110..110, -110..70, 160, 120, 180";
+    let new = ["profile", "new", "--circles", "circles.csv", "--name", "Unknown 1", "--limits", limits, "--out", "new.ron"];
+    let (code, _, said) = run(folder.path(), &new);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("beta2") && !said.contains("nominal"), "{said}");
+    let text = fs::read_to_string(folder.path().join("new.ron")).unwrap();
+    let (profile, _) = Profile::parse(&text, "new.ron").unwrap_or_else(|errors| panic!("{errors}"));
+    let truth = &case.truth.truth().arm;
+    let made = ForwardKinematics::new(profile.chain());
+    let real = ForwardKinematics::new(&truth.chain);
+    let target = profile.targets()[0].position_in_flange;
+    let place = |q: &[f64]| (made.point_in_base(q, &target), real.point_in_base(q, &truth.targets[0]));
+    let (a, b) = (place(&[0.3, -0.5, 0.2, 0.8, -0.6, 1.0]), place(&[-0.7, 0.4, -0.3, -0.9, 0.8, -1.2]));
+    let difference = ((a.0 - b.0).norm() - (a.1 - b.1).norm()).abs();
+    assert!(difference < from_mm(0.5), "{difference}");
+    // The tracker stands where it stands, up to a turn about the first axis and a shift along it.
+    let horizontal = |point: Point3<f64>| point.x.hypot(point.y);
+    let stands = Point3::from(case.truth.truth().base_from_tracker.translation.vector);
+    let off = horizontal(profile.tracker().position_in_base) - horizontal(stands);
+    assert!(off.abs() < 0.01, "{off}");
+    let plan = ["plan", "--profile", "new.ron", "--poses", "20", "--verification", "0", "--candidates", "200", "--out", "plan.csv"];
+    let (code, _, said) = run(folder.path(), &plan);
+    assert_eq!(code, 0, "{said}");
+
+    // Compared with the data sheet.
+    let new = ["profile", "new", "--circles", "circles.csv", "--compare", "abb_irb120", "--sigma-mm", "0.01", "--out", "better.ron"];
+    let (code, _, said) = run(folder.path(), &new);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("nominal") && said.contains("difference") && !said.contains("WARNING"), "{said}");
+    let (code, _, said) = run(folder.path(), &["profile", "check", "better.ron"]);
+    assert_eq!(code, 0, "{said}");
+    let new = ["profile", "new", "--circles", "circles.csv", "--compare", "abb_irb1600_6_145"];
+    let (_, _, said) = run(folder.path(), &new);
+    assert!(said.contains("WARNING") && said.contains("marked !"), "{said}");
+}
+
+#[test]
+fn tables_of_circles_that_cannot_be_used_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), "x_mm,y_mm,z_mm\n1,2,3\n").unwrap();
+    let (code, _, said) = run(folder.path(), &["profile", "new", "--circles", "a.csv"]);
+    assert!(code == 2 && said.contains("no columns q1_deg"), "{said}");
+    let case = case("ur10e", 1);
+    let half: Vec<String> = table(&case).lines().take(31).map(str::to_owned).collect();
+    fs::write(folder.path().join("b.csv"), half.join("\n")).unwrap();
+    let (code, _, said) = run(folder.path(), &["profile", "new", "--circles", "b.csv"]);
+    assert!(code == 4 && said.contains("joint J4 is not moved in any series"), "{said}");
+}
+
+#[test]
+fn a_profile_is_made_from_seven_dimensions() {
+    let folder = tempfile::tempdir().unwrap();
+    let limits = "165, -110..110, -110..70, 160, 120, 400";
+    let sheet = ["profile", "new", "--data-sheet", "abb", "--name", "My ABB", "--base", "290", "--shoulder", "0", "--upper-arm", "270"];
+    let rest = ["--elbow", "70", "--forearm", "302", "--flange", "72", "--limits", limits];
+    let with = |more: &[&'static str]| [&sheet[..], &rest[..], more].concat();
+    let (code, out, said) = run(folder.path(), &with(&["--pendant", "374,0,630", "--out", "my.ron"]));
+    assert_eq!((code, out.as_str()), (0, ""), "{said}");
+    assert!(said.contains("at all zeros the flange is at x 374.0, y 0.0, z 630.0 mm"), "{said}");
+    assert!(said.contains("the pendant shows the same"), "{said}");
+    let (code, out, _) = run(folder.path(), &["profile", "check", "my.ron"]);
+    assert!(code == 0 && out.contains("can be used"), "{out}");
+    // What the pendant shows tells which dimension or which maker was meant.
+    let (code, _, said) = run(folder.path(), &with(&["--pendant", "644,0,360"]));
+    assert!(code == 2 && said.contains("the zero position of kuka"), "{said}");
+    let (code, _, said) = run(folder.path(), &[&sheet[..], &["--elbow", "70"]].concat());
+    assert!(code == 2 && said.contains("missing: forearm (mm)"), "{said}");
+    let (code, _, said) = run(folder.path(), &["profile", "new"]);
+    assert!(code == 2 && said.contains("--data-sheet"), "{said}");
 }

@@ -125,7 +125,7 @@ impl Dimension {
 }
 
 /// What a data sheet says. Lengths in mm, angles in degrees.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Datasheet {
     /// Name of the arm.
@@ -135,6 +135,13 @@ pub struct Datasheet {
     pub dimensions_mm: [f64; 7],
     /// Lowest and highest pendant value of each joint (degree).
     pub limits_deg: Limits,
+}
+
+/// Half a turn to each side.
+impl Default for Limits {
+    fn default() -> Self {
+        Self([(-180.0, 180.0); JOINTS])
+    }
 }
 
 /// Limits of six joints (degree), written `165, -110..110, …`: a single number is meant to both sides.

@@ -6,7 +6,10 @@ use std::thread;
 use std::time::SystemTime;
 
 use super::events::Events;
+use super::store_thread::CELL;
+use crate::profile::CellText;
 use crate::session::state::Session;
+use crate::store;
 use crate::store::session::{folders, read_journal};
 use crate::wizard::Event;
 use crate::wizard::view::SessionCard;
@@ -39,9 +42,18 @@ pub fn unfinished(root: &Path) -> Vec<SessionCard> {
     by_age(root).into_iter().take(READ).filter_map(read).take(SHOWN).collect()
 }
 
+/// The cell of the last session. A file that cannot be read is no cell.
+fn earlier_cell(root: &Path) -> Option<CellText> {
+    let bytes = store::read(&root.join(CELL)).ok()?;
+    ron::from_str(&String::from_utf8(bytes).ok()?).ok()
+}
+
 /// Looks for unfinished sessions beside the first screen, which does not wait for them.
 pub(super) fn look(root: PathBuf, events: Events) {
     let search = move || {
+        if let Some(cell) = earlier_cell(&root) {
+            events.send(Event::Cell(cell));
+        }
         let found = unfinished(&root);
         if !found.is_empty() {
             events.send(Event::Sessions(found));

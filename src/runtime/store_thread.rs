@@ -7,11 +7,14 @@ use std::thread::{self, JoinHandle};
 
 use super::events::Events;
 use crate::checksum;
-use crate::session::journal::Line;
+use crate::session::journal::{Entry, Line};
+use crate::store;
 use crate::store::session::{SessionError, SessionFolder};
 use crate::text::causes;
 use crate::wizard::{Answer, Event, Problem, RequestId, StoreEvent};
 
+/// File with the cell of the last session, beside the folders of the sessions.
+pub(super) const CELL: &str = "cell.ron";
 /// Capacity of the channel of commands; the wizard never has more than one request running.
 const COMMAND_CAPACITY: usize = 4;
 
@@ -74,6 +77,9 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
             }),
             Command::Append { id, lines } => {
                 let written = held.as_mut().map(|folder| folder.append(&lines));
+                if matches!(written, Some(Ok(()))) {
+                    keep_cell(root, &lines);
+                }
                 Event::Store(match written {
                     Some(Ok(())) => StoreEvent::Written { id },
                     Some(Err(error)) => StoreEvent::Failed { id, message: causes(&SessionError::from(error)) },
@@ -86,6 +92,17 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
         };
         if !events.send(event) {
             break;
+        }
+    }
+}
+
+/// Keeps the cell for the next session. Without the file it has to be typed again, which is no reason to stop.
+fn keep_cell(root: &Path, lines: &[Line]) {
+    for line in lines {
+        if let Entry::Cell(cell) = &line.entry
+            && let Ok(text) = ron::ser::to_string_pretty(cell, ron::ser::PrettyConfig::default())
+        {
+            drop(store::replace(&root.join(CELL), &(text + "\n")));
         }
     }
 }

@@ -23,7 +23,7 @@ use super::journal::{
 use super::plan::{PlannedPose, PoseKind};
 use super::set_up::{InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::kinematics::JointType;
-use crate::profile::Profile;
+use crate::profile::{CellText, Profile};
 use crate::units::from_mm;
 pub use correction::Corrected;
 use correction::is_factor;
@@ -53,6 +53,10 @@ pub struct Session {
     pub target: Option<TargetChoice>,
     /// What the flange carries, if not what the profile says.
     pub payload: Option<PayloadText>,
+    /// What was stated about the cell, if anything.
+    pub cell: CellText,
+    /// When the acceptance limits were set, if not by the profile.
+    pub limits_set: Option<LimitsSet>,
     /// Points of the circle-point analysis.
     pub circle_points: Vec<CirclePointText>,
     /// All rows of all plans, in the order of the programs.
@@ -85,6 +89,8 @@ pub struct Session {
     /// Current step of the wizard.
     pub step: Step,
     pub identified: Option<Box<IdentifiedText>>,
+    /// Whether there ever was a result.
+    has_result: bool,
     pub delivered: Vec<String>,
     /// Their check sums, in the same order; none where an earlier version wrote them.
     pub delivered_sums: Vec<String>,
@@ -107,6 +113,14 @@ pub struct Robot {
     /// The parsed profile.
     pub profile: Profile,
     pub joint_types: Vec<JointType>,
+}
+
+/// When acceptance limits were set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LimitsSet {
+    pub time: Timestamp,
+    /// Whether a result had been seen before.
+    pub after_result: bool,
 }
 
 /// A row of a plan.
@@ -270,6 +284,7 @@ impl Session {
             }
             Entry::Target(target) => self.target = Some(*target),
             Entry::Payload(payload) => self.payload = Some(*payload),
+            Entry::Cell(cell) => self.state_cell(cell, line)?,
             Entry::CirclePoint(point) => {
                 self.measurements = self.measurements.max(point.number);
                 self.pass("the last circle point", &point.joints);
@@ -327,6 +342,7 @@ impl Session {
             }
             Entry::Identified(result) => {
                 self.identified = Some(result.clone());
+                self.has_result = true;
                 // Files of an earlier result are not those of this one.
                 self.delivered.clear();
                 self.left_out.clear();
@@ -352,10 +368,28 @@ impl Session {
         self.robot = Some(robot);
         self.target = None;
         self.payload = None;
+        self.cell = CellText::default();
+        self.limits_set = None;
         self.rows.clear();
         self.shown = None;
         self.last_stop = None;
         self.plan = None;
+    }
+
+    /// Puts a cell into the profile. A result from before does not know it.
+    fn state_cell(&mut self, cell: &CellText, line: &Line) -> Result<(), FoldError> {
+        let misfit = |what: String| FoldError::Misfit { line: line.number, what };
+        let known = self.robot.as_ref().ok_or_else(|| misfit("a cell without a robot".to_owned()))?;
+        let text = cell.applied(&known.text).map_err(misfit)?;
+        let changed = robot(line.number, &known.source, &super::sha256(text.as_bytes()), &text)?;
+        if changed.profile.acceptance() != known.profile.acceptance() {
+            self.limits_set = Some(LimitsSet { time: line.time, after_result: self.has_result });
+        }
+        self.robot = Some(changed);
+        self.cell = cell.clone();
+        self.identified = None;
+        self.delivered.clear();
+        Ok(())
     }
 
     /// Moves the arm to a stop; `None` if its joint values do not fit the robot.

@@ -1,13 +1,16 @@
 //! Dialogs: they ask for the value of an intent, or for a confirmation. Drawn over the content of a screen.
 
 pub mod ask;
+mod cell;
 mod form;
+mod plain;
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 pub use form::{Build, Form};
+pub use plain::Answered;
 
 use super::form::{ChoiceList, FieldOutcome, NumberField, TextField};
 use super::keymap::{Key, KeyHint};
@@ -19,6 +22,8 @@ use crate::text::wrapped;
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Danger, Intent, IntentInfo};
 
+/// Label, text, how it is understood or a problem of two lines.
+const LINES_OF_COORDINATES: u16 = 5;
 /// Largest number of poses that can be added at once.
 const MOST_POSES: f64 = 200.0;
 
@@ -71,6 +76,8 @@ impl Dialog {
             Intent::TypeReading(_) => Some(ask::coordinates(view, "")),
             Intent::StatePayload(payload) => Some(ask::payload(payload)),
             Intent::About(about) => Some(ask::about(about)),
+            Intent::DescribeCell(cell) => Some(cell::cell(cell)),
+            Intent::DescribeRobot(sheet) => Some(cell::data_sheet(sheet)),
             Intent::Note(_) => text(&note_label(view), "", Intent::Note),
             Intent::GoToPose(_) => choose_pose(view),
             Intent::SuggestPoses(count) => {
@@ -80,6 +87,14 @@ impl Dialog {
                 Some(Self::Number { field, intent })
             }
             intent => confirm(intent, info, view),
+        }
+    }
+
+    /// Rows that a dialog takes above its screen, if that stays in view: what is typed is compared with it.
+    pub fn rows_above(&self) -> Option<u16> {
+        match self {
+            Self::Text { field, .. } if field.is_checked() => Some(LINES_OF_COORDINATES),
+            Self::Text { .. } | Self::Confirm { .. } | Self::Number { .. } | Self::Choice { .. } | Self::Form(_) => None,
         }
     }
 

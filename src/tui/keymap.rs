@@ -106,7 +106,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 pub const BELL: Key = Key::ctrl('b');
 
 /// The table. Of several bindings with the same key, the first one whose intent is possible applies.
-const BINDINGS: [Binding; 44] = [
+const BINDINGS: [Binding; 46] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Target::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Target::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -118,7 +118,9 @@ const BINDINGS: [Binding; 44] = [
     offer('r', 3, |intent| matches!(intent, Intent::Retry)),
     offer('c', 3, |intent| matches!(intent, Intent::ChooseProfile(_))),
     offer('e', 6, |intent| matches!(intent, Intent::NameSession(_))),
+    offer('d', 4, |intent| matches!(intent, Intent::DescribeRobot(_))),
     offer('c', 3, |intent| matches!(intent, Intent::ChooseInstrument(_))),
+    offer('j', 4, |intent| matches!(intent, Intent::DescribeCell(_))),
     offer('p', 3, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Profile))),
     offer('f', 4, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Free { .. }))),
     offer('k', 4, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Known { .. }))),

@@ -1,13 +1,16 @@
 //! The wizard in plain lines, for terminals that cannot move their cursor, for screen readers and for pipes.
 //!
-//! The view is printed, then a line is read: a number from the list, followed by a value if one is needed, or an intent as in
-//! scripts. The next line is read only when no work is running, so that lines can come from a file.
+//! The view is printed, then a line is read: the number of what can be done. What needs a value is asked for in the words of the
+//! screens, or the value follows the number. An intent as in scripts is understood too. The next line is read only when no work is
+//! running, so that lines can come from a file.
 
 use std::io::{self, BufRead as _, BufReader, Read, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::thread;
 
+use super::dialog::{Answered, Dialog};
 use super::glyphs::Glyphs;
+use super::screen::instrument::{way, ways};
 use super::values;
 use super::{AtEnd, Exit, IDLE, LAST_ENTRY};
 use crate::runtime::{Engine, Events, signals};
@@ -33,6 +36,8 @@ enum Command {
     Show { all: bool },
     /// Send an intent.
     Intent(Intent),
+    /// Do what is on offer, and ask for what it needs.
+    Offer(Box<IntentInfo>),
     /// The line is invalid for this reason.
     Invalid(String),
 }
@@ -50,7 +55,7 @@ pub fn run(
 ) -> io::Result<Exit> {
     let received = signals::watch(engine.sender())?;
     let lines = start(input, engine.sender())?;
-    let mut driver = Driver { engine: &mut engine, out, glyphs };
+    let mut driver = Driver { engine: &mut engine, out, glyphs, asking: None };
     if driver.run(&lines).is_err() {
         engine.shut_down("the output cannot be written");
     }
@@ -82,6 +87,75 @@ struct Driver<'a, W> {
     engine: &'a mut Engine,
     out: &'a mut W,
     glyphs: Glyphs,
+    /// What the next line answers, if it is no command.
+    asking: Option<Asking>,
+}
+
+/// A question that is open.
+enum Asking {
+    /// Which of the ways to measure.
+    Ways,
+    /// A question of a dialog, by its number.
+    Dialog(Box<Dialog>, usize),
+}
+
+impl Asking {
+    fn question(&self) -> Vec<String> {
+        match self {
+            Self::Ways => {
+                let ways = ways().iter().zip(1..).map(|((way, about), number): (_, usize)| format!("{number:5}  {way}: {about}"));
+                ways.chain(["number".to_owned()]).collect()
+            }
+            Self::Dialog(dialog, number) => dialog.question(*number).unwrap_or_default(),
+        }
+    }
+}
+
+/// How an answer has ended.
+enum Outcome {
+    /// Another question is open, after a remark on the last answer.
+    Asks(Asking, Option<String>),
+    Does(Intent),
+    Cancelled,
+}
+
+/// Takes a line as the answer to an open question.
+fn answered(asking: Asking, line: &str, view: &ViewModel) -> Outcome {
+    if line == "cancel" {
+        return Outcome::Cancelled;
+    }
+    match asking {
+        Asking::Ways => match line.parse::<usize>().ok().and_then(|number| number.checked_sub(1)) {
+            Some(at) if at < ways().len() => match way(at, view) {
+                Ok(intent) => Outcome::Does(intent),
+                Err(dialog) => Outcome::Asks(Asking::Dialog(dialog, 0), None),
+            },
+            _ => Outcome::Asks(Asking::Ways, Some(format!("'{line}' is no number of the list"))),
+        },
+        Asking::Dialog(mut dialog, number) => {
+            if let Err(problem) = dialog.answer(number, line) {
+                return Outcome::Asks(Asking::Dialog(dialog, number), Some(problem));
+            }
+            if dialog.question(number + 1).is_some() {
+                return Outcome::Asks(Asking::Dialog(dialog, number + 1), None);
+            }
+            match dialog.answered() {
+                Answered::Intent(intent) => Outcome::Does(intent),
+                Answered::Cancelled => Outcome::Cancelled,
+                Answered::Wrong(problem) => Outcome::Asks(Asking::Dialog(dialog, 0), Some(problem)),
+            }
+        }
+    }
+}
+
+/// What an offer asks for before it is done.
+fn asks(offer: &IntentInfo, view: &ViewModel) -> Option<Asking> {
+    let dialog = |dialog| Some(Asking::Dialog(Box::new(dialog), 0));
+    match &offer.intent {
+        Intent::ChooseInstrument(_) => Some(Asking::Ways),
+        Intent::MakePlan(settings) => dialog(Dialog::plan(*settings)),
+        _ => Dialog::before(offer, view).and_then(dialog),
+    }
 }
 
 impl<W: Write> Driver<'_, W> {
@@ -113,16 +187,52 @@ impl<W: Write> Driver<'_, W> {
 
     fn on_line(&mut self, line: &str) -> io::Result<()> {
         let view = self.engine.wizard().view();
-        match command(line, &view.intents) {
+        let understood = command(line, &view.intents);
+        if let Some(asking) = self.asking.take() {
+            // An intent as in scripts is never an answer.
+            return match understood {
+                Command::Intent(intent) if line.contains('(') => self.intend(intent),
+                _ => self.take(answered(asking, line.trim(), &view)),
+            };
+        }
+        match understood {
             Command::Show { all } => self.show(&view, all),
             Command::Invalid(reason) => self.say(&reason),
-            Command::Intent(intent) => {
-                self.engine.intend(intent);
-                self.settle()?;
-                if self.engine.has_exited() {
-                    return Ok(());
+            Command::Intent(intent) => self.intend(intent),
+            Command::Offer(offer) => match asks(&offer, &view) {
+                Some(asking) => self.take(Outcome::Asks(asking, None)),
+                None => self.intend(offer.intent),
+            },
+        }
+    }
+
+    fn intend(&mut self, intent: Intent) -> io::Result<()> {
+        self.engine.intend(intent);
+        self.settle()?;
+        if self.engine.has_exited() {
+            return Ok(());
+        }
+        self.show(&self.engine.wizard().view(), false)
+    }
+
+    /// Carries out what an answer leads to.
+    fn take(&mut self, outcome: Outcome) -> io::Result<()> {
+        match outcome {
+            Outcome::Does(intent) => self.intend(intent),
+            Outcome::Cancelled => self.show(&self.engine.wizard().view(), false),
+            Outcome::Asks(asking, remark) => {
+                if let Some(remark) = remark {
+                    self.say(&format!("not yet: {remark}"))?;
                 }
-                self.show(&self.engine.wizard().view(), false)
+                let question = asking.question();
+                let (last, before) = question.split_last().map_or(("", &[][..]), |(last, before)| (last.as_str(), before));
+                for line in before {
+                    self.say(line)?;
+                }
+                write!(self.out, "{}: ", self.glyphs.show(last))?;
+                self.out.flush()?;
+                self.asking = Some(asking);
+                Ok(())
             }
         }
     }
@@ -179,8 +289,9 @@ fn page(view: &ViewModel, has_all: bool) -> Vec<String> {
     lines.push("You can type:".to_owned());
     lines.extend(offers(&view.intents).zip(1..).map(|(offer, number): (&IntentInfo, usize)| {
         let mark = if offer.is_default { "   <- next" } else { "" };
-        format!("{number:3}  {}: {}{mark}", offer.label, ron(&offer.intent))
+        format!("{number:3}  {}{mark}", offer.label)
     }));
+    lines.push("Type a number. An empty line shows this again, 'all' without cutting, 'cancel' leaves a question.".to_owned());
     lines
 }
 
@@ -201,10 +312,6 @@ fn offers(intents: &[IntentInfo]) -> impl Iterator<Item = &IntentInfo> {
     intents.iter().filter(|offer| offer.is_enabled())
 }
 
-fn ron(intent: &Intent) -> String {
-    ron::to_string(intent).unwrap_or_else(|_| intent.name().to_owned())
-}
-
 fn command(line: &str, intents: &[IntentInfo]) -> Command {
     let line = line.trim();
     match line {
@@ -217,28 +324,22 @@ fn command(line: &str, intents: &[IntentInfo]) -> Command {
         let Some(offer) = number.checked_sub(1).and_then(|index| offers(intents).nth(index)) else {
             return Command::Invalid(format!("there is no {number} in the list; an empty line shows the list again"));
         };
+        if value.trim().is_empty() {
+            return Command::Offer(Box::new(offer.clone()));
+        }
         return match with_value(&offer.intent, value.trim()) {
             Some(intent) => Command::Intent(intent),
-            None => Command::Invalid(format!(
-                "'{value}' is not a value for {}; write the intent as in the list",
-                offer.intent.name()
-            )),
+            None => Command::Invalid(format!("'{}' takes no value here: type its number alone", offer.label)),
         };
     }
     match ron::from_str(line) {
         Ok(intent) => Command::Intent(intent),
-        Err(error) => Command::Invalid(format!(
-            "neither a number from the list nor an intent such as ChooseProfile(\"soochow\"): {}",
-            error.code
-        )),
+        Err(_) => Command::Invalid(format!("'{line}' is no number of the list; an empty line shows the list again")),
     }
 }
 
-/// The intent with the value typed after its number, or as offered if there is none.
+/// The intent with the value typed after its number.
 fn with_value(intent: &Intent, value: &str) -> Option<Intent> {
-    if value.is_empty() {
-        return Some(intent.clone());
-    }
     let text = value.to_owned();
     Some(match intent {
         Intent::ChooseProfile(_) => Intent::ChooseProfile(text),
@@ -265,7 +366,7 @@ mod tests {
         ];
         let parsed = |line: &str| command(line, &offers);
         assert_eq!(parsed(" 1 my plan.csv\n"), Command::Intent(Intent::LoadPlan("my plan.csv".to_owned())));
-        assert_eq!(parsed("2"), Command::Intent(Intent::AcceptPlan));
+        assert_eq!(parsed("2"), Command::Offer(Box::new(offers[2].clone())));
         assert_eq!(parsed("Next"), Command::Intent(Intent::Next));
         assert_eq!(parsed("Note(\"warm\")"), Command::Intent(Intent::Note("warm".to_owned())));
         assert_eq!(parsed("\r\n"), Command::Show { all: false });

@@ -7,7 +7,7 @@
 mod capture;
 mod deliver;
 mod identify;
-mod instrument;
+pub(super) mod instrument;
 mod menu;
 mod page;
 mod plan;

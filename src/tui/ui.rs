@@ -10,13 +10,16 @@ use super::keymap::{self, Action, Key, KeyHint, LocalAction};
 use super::preview::{Camera, Scene};
 use super::screen::{self, PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use super::theme::Theme;
-use super::{frame, help};
+use super::{frame, help, paint};
 use crate::profile::{Profile, builtin};
 use crate::session::set_up::Step;
 use crate::session::state::Session;
 use crate::units::{DEGREE, MILLIMETRE};
 use crate::wizard::Intent;
 use crate::wizard::view::{Content, TargetView, ViewModel};
+
+/// Rows of a screen below a dialog that are worth showing.
+const FEWEST_BELOW: u16 = 8;
 
 /// A command to the driver.
 #[derive(Clone, Debug, PartialEq)]
@@ -275,7 +278,14 @@ impl Ui {
         let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
         let Some(content) = frame::draw(view, &self.key_hints(&cx, area), self.theme, area, buf) else { return };
         match (&self.dialog, self.help) {
-            (Some(dialog), _) => dialog.draw(self.theme, content, buf),
+            (Some(dialog), _) => {
+                let above = dialog.rows_above().filter(|above| content.height > above + FEWEST_BELOW);
+                let rows = above.unwrap_or(content.height);
+                dialog.draw(self.theme, paint::band(content, 0, rows), buf);
+                if above.is_some() {
+                    self.screen.draw(&cx, paint::band(content, rows, content.height), buf);
+                }
+            }
             (None, Some(scroll)) => {
                 help::draw(&self.page_key_hints(&cx, area), scroll, self.theme, content, buf);
             }
@@ -289,6 +299,9 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
     match &view.content {
         Content::Profile(content) => {
             let chosen = content.chosen.as_ref()?;
+            if let Some(profile) = &chosen.profile {
+                return Some(Scene::at_rest(profile));
+            }
             match builtin(&chosen.name).and_then(|text| Profile::parse(text, &chosen.name).ok()) {
                 Some((profile, _)) => Some(Scene::at_rest(&profile)),
                 None => Scene::of_session(session, None),

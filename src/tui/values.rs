@@ -22,9 +22,12 @@ fn collect(depth: usize, value: &Value, has_all: bool, lines: &mut Vec<String>) 
     let Value::Object(fields) = value else { return };
     let indent = "  ".repeat(depth);
     for (name, value) in fields {
-        let name = name.replace('_', " ");
+        let name = name.trim_start_matches("is_").replace('_', " ");
         match value {
-            Value::Null => {}
+            // What is not so, or not there, needs no line.
+            Value::Null | Value::Bool(false) => {}
+            Value::Number(number) if number.as_u64() == Some(0) => {}
+            Value::Bool(true) => lines.push(format!("{indent}{name}")),
             Value::Array(values) if values.is_empty() => {}
             Value::Array(values) if values.len() <= SHORT_LIST && !values.iter().any(is_nested) => {
                 lines.push(format!("{indent}{name}: {}", inline(value)));

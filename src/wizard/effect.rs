@@ -10,7 +10,7 @@ use crate::procedure;
 use crate::procedure::identify::{Identified, IdentifyRequest};
 use crate::procedure::models::{Models, ModelsRequest};
 use crate::procedure::plan::PlanRequest;
-use crate::profile::Profile;
+use crate::profile::{CellText, Profile};
 use crate::session::journal::Line;
 use crate::session::plan::PlannedPose;
 use crate::session::plan_summary::PlanSummary;
@@ -42,6 +42,8 @@ pub enum Event {
     Live(LiveReading),
     /// Sessions that can be continued, the latest first.
     Sessions(Vec<SessionCard>),
+    /// The cell of an earlier session.
+    Cell(CellText),
     /// A message that does not concern the calibration itself, such as a recording that stopped.
     Remark(Notice),
     /// The program has to end.

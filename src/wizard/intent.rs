@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::procedure::plan::{INTERACTIVE_CANDIDATES, PlanRequest};
+use crate::profile::CellText;
+use crate::profile::datasheet::Datasheet;
 use crate::session::about::About;
 use crate::session::set_up::{InstrumentChoice, PayloadText, TargetChoice};
 
@@ -22,6 +24,8 @@ pub enum Intent {
 
     /// Choose a robot by the name of a bundled profile or the path of a file.
     ChooseProfile(String),
+    /// Describe a robot that is not in the list, by its data sheet.
+    DescribeRobot(Box<Datasheet>),
     NameSession(String),
     /// Continue another session, by its folder.
     ResumeSession(String),
@@ -30,6 +34,8 @@ pub enum Intent {
     ChooseTarget(TargetChoice),
     /// State what the flange carries besides the SMR.
     StatePayload(PayloadText),
+    /// State instrument, tracker, limits, boxes and acceptance of this cell.
+    DescribeCell(CellText),
     /// Locate the SMR by circle-point analysis.
     StartCircles,
     /// Use the result of the circle-point analysis.
@@ -93,11 +99,13 @@ impl Intent {
             Self::Dismiss => "Dismiss",
             Self::Retry => "Retry",
             Self::ChooseProfile(_) => "ChooseProfile",
+            Self::DescribeRobot(_) => "DescribeRobot",
             Self::NameSession(_) => "NameSession",
             Self::ResumeSession(_) => "ResumeSession",
             Self::ChooseInstrument(_) => "ChooseInstrument",
             Self::ChooseTarget(_) => "ChooseTarget",
             Self::StatePayload(_) => "StatePayload",
+            Self::DescribeCell(_) => "DescribeCell",
             Self::StartCircles => "StartCircles",
             Self::UseCircles => "UseCircles",
             Self::DiscardCircles => "DiscardCircles",

@@ -3,6 +3,7 @@
 mod automatic;
 mod bench;
 mod capture;
+mod cell;
 mod gates;
 mod journal_first;
 mod resume;

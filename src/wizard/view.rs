@@ -195,8 +195,13 @@ pub struct ProfileCard {
     pub instrument: Option<String>,
     /// Nominal position of the SMR in the flange frame.
     pub target_mm: Option<[f64; 3]>,
+    /// Where the flange is at all zeros, as the pendant shows it.
+    pub flange_at_zero_mm: [f64; 3],
     /// Oddities found when the profile was read.
     pub warnings: Vec<String>,
+    /// The robot itself, to be drawn.
+    #[serde(skip)]
+    pub profile: Option<Box<Profile>>,
 }
 
 impl ProfileCard {
@@ -212,7 +217,9 @@ impl ProfileCard {
                 let point = target.position_in_flange;
                 [to_mm(point.x), to_mm(point.y), to_mm(point.z)]
             }),
+            flange_at_zero_mm: profile.flange_at_zero(),
             warnings,
+            profile: Some(Box::new(profile.clone())),
         }
     }
 }
@@ -230,6 +237,8 @@ pub struct InstrumentView {
     pub recorded_poses: usize,
     /// Uncertainty of the instrument as the profile states it.
     pub stated_sigma: Option<String>,
+    /// The cell in words: instrument, tracker, acceptance, limits and boxes.
+    pub cell: Option<String>,
 }
 
 /// The view of the target step.

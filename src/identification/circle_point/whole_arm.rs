@@ -12,16 +12,19 @@
 //! The standard deviations come from the scatter of the points, by the derivatives of every constant with respect to every
 //! measured coordinate.
 
+mod series;
+
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use thiserror::Error;
 
-use super::{CircleError, STILL, fit_circle, turns_with};
+use series::{Series, reference, series};
+
+use super::{CircleError, fit_circle, turns_with};
 use crate::kinematics::{
     Convention, ForwardKinematics, Joint, JointType, KinematicChain, KinematicsError, Link, LinkParameter, ParameterId,
 };
-use crate::text::listed;
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE, to_mm};
 
 /// Neighbouring axes nearer to parallel than this get a β (rad): 1°, far above any assembly error.
@@ -300,85 +303,6 @@ pub fn measure_arm(
 /// Kinematic joint variables of a configuration.
 fn variables(chain: &KinematicChain, q: &[f64]) -> Vec<f64> {
     chain.joints().iter().enumerate().map(|(index, joint)| joint.variable(index, q)).collect()
-}
-
-/// The rows in which one joint moves.
-#[derive(Clone, Copy, Debug)]
-struct Series {
-    joint: usize,
-    /// First row and the one after the last.
-    rows: (usize, usize),
-}
-
-impl Series {
-    fn of<'a, T>(&self, all: &'a [T]) -> &'a [T] {
-        all.get(self.rows.0..self.rows.1).unwrap_or_default()
-    }
-}
-
-/// Whether a joint has moved between two configurations.
-fn has_moved(joint_type: JointType, from: f64, to: f64) -> bool {
-    let tolerance = match joint_type {
-        JointType::Revolute => STILL.0,
-        JointType::Prismatic => STILL.1,
-    };
-    (from - to).abs() > tolerance
-}
-
-/// Joints that differ between two rows.
-fn moved(template: &Template, from: &[f64], to: &[f64]) -> Vec<usize> {
-    let pairs = from.iter().zip(to).enumerate();
-    pairs.filter(|(joint, (a, b))| has_moved(template.joint_type(*joint), **a, **b)).map(|(joint, _)| joint).collect()
-}
-
-/// Splits the rows into series, one per joint, from the base to the flange.
-fn series(template: &Template, variables: &[Vec<f64>]) -> Result<Vec<Series>, WholeArmError> {
-    let mut found: Vec<Series> = Vec::new();
-    let mut start = 0;
-    while start < variables.len() {
-        let mut joint = None;
-        let mut end = start + 1;
-        while let (Some(first), Some(row)) = (variables.get(start), variables.get(end)) {
-            match (moved(template, first, row).as_slice(), joint) {
-                ([], _) => {}
-                ([one], None) => joint = Some(*one),
-                ([one], Some(same)) if *one == same => {}
-                (several, None) => {
-                    let names: Vec<String> = several.iter().map(|joint| template.name(*joint)).collect();
-                    return Err(WholeArmError::Together { row: end + 1, joints: listed(&names) });
-                }
-                (_, Some(_)) => break,
-            }
-            end += 1;
-        }
-        let joint = joint.ok_or(WholeArmError::NothingMoves { row: start + 1 })?;
-        if let Some(other) = found.iter().find(|other| other.joint == joint) {
-            let (first, second) = (other.rows.0 + 1, start + 1);
-            return Err(WholeArmError::Twice { joint: template.name(joint), first, second });
-        }
-        found.push(Series { joint, rows: (start, end) });
-        start = end;
-    }
-    found.sort_by_key(|series| series.joint);
-    match (0..template.chain.dof()).find(|joint| found.iter().all(|series| series.joint != *joint)) {
-        Some(joint) => Err(WholeArmError::Missing { joint: template.name(joint) }),
-        None => Ok(found),
-    }
-}
-
-/// The common value of each joint while those after it move. The last one needs none.
-fn reference(template: &Template, variables: &[Vec<f64>], series: &[Series]) -> Result<Vec<f64>, WholeArmError> {
-    let first_row = |series: &Series| series.of(variables).first().cloned().unwrap_or_default();
-    let Some(last) = series.last() else { return Ok(Vec::new()) };
-    let reference = first_row(last);
-    for one in series {
-        let own = first_row(one);
-        if let Some(moved) = moved(template, &reference, &own).into_iter().find(|joint| *joint < one.joint) {
-            let (moved, series) = (template.name(moved), template.name(one.joint));
-            return Err(WholeArmError::NotReturned { moved, series, last: template.name(last.joint) });
-        }
-    }
-    Ok(reference)
 }
 
 /// A line with a sense.

@@ -20,6 +20,7 @@ impl Entry {
             Self::Connected { identity } => format!("connected: {identity}"),
             Self::Target(target) => format!("SMR: {}", target_text(target)),
             Self::Payload(payload) => format!("payload: {payload}"),
+            Self::Cell(cell) => format!("cell: {cell}"),
             Self::CirclePoint(point) => {
                 format!("measurement {}: joint {} turned, at {}", point.number, point.joint + 1, xyz(point.xyz_mm))
             }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::identification::triage::Cause;
 use crate::kinematics::JointType;
 use crate::planning::Figures;
+use crate::profile::CellText;
 use crate::session::about::About;
 use crate::session::calibration::Calibration;
 use crate::session::plan::{PlannedPose, PoseKind};
@@ -46,6 +47,8 @@ pub enum Entry {
     Target(TargetChoice),
     /// What the flange carries besides the SMR.
     Payload(PayloadText),
+    /// What the operator states about the cell; it replaces what the profile says.
+    Cell(CellText),
     /// A point of the circle-point analysis.
     CirclePoint(CirclePointText),
     /// The points of the circle-point analysis are to be measured again.

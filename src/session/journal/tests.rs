@@ -10,7 +10,8 @@ use crate::kinematics::Place;
 use crate::planning::Figures;
 use crate::procedure::EstimationSettings;
 use crate::procedure::identify::{IdentifyRequest, NamedSample, identify};
-use crate::profile::{Profile, builtin};
+use crate::profile::cell_text::InstrumentText;
+use crate::profile::{CellText, Profile, builtin};
 use crate::session::about::About;
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
@@ -277,6 +278,10 @@ fn all_entries() -> Vec<Entry> {
     entries.push(Entry::About(About { serial: TRICKY.to_owned(), ..About::default() }));
     entries.extend(instruments.map(Entry::Instrument));
     entries.extend(targets.map(Entry::Target));
+    let limits = [(TRICKY.to_owned(), (-1e-9, 170.5))];
+    let instrument = InstrumentText { name: TRICKY.to_owned(), sigma_um: 7.5, sigma_um_per_m: 0.0 };
+    let cell = CellText { instrument: Some(instrument), planning_limits: limits.into(), ..CellText::default() };
+    entries.push(Entry::Cell(cell));
     entries.push(Entry::Payload(PayloadText { mass_kg: 2.5, centre_mm: (0.1, -20.0, 1e-9) }));
     entries.extend(corrections.map(Entry::Correction));
     let decisions = [Decision::Keep, Decision::LeaveOut, Decision::Undo];
@@ -312,6 +317,7 @@ fn variant(entry: &Entry) -> usize {
         Entry::Payload(_) => 22,
         Entry::Passed { .. } => 23,
         Entry::ThroughHome(_) => 24,
+        Entry::Cell(_) => 25,
     }
 }
 
@@ -319,7 +325,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 25);
+    assert_eq!(variants.len(), 26);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

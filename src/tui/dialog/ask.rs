@@ -9,6 +9,7 @@ use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, Reco
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::wire::{LinkChoice, WireAddress};
 use crate::tui::form::{TextField, Validator};
+use crate::units::to_mm;
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Intent, reading};
 
@@ -39,11 +40,19 @@ pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
 /// The validator of coordinates in a unit.
 fn validator(unit: CoordinateUnit) -> Validator {
     match unit {
-        CoordinateUnit::Millimetre => |text| reading::check(text, CoordinateUnit::Millimetre),
-        CoordinateUnit::Metre => |text| reading::check(text, CoordinateUnit::Metre),
-        CoordinateUnit::Inch => |text| reading::check(text, CoordinateUnit::Inch),
-        CoordinateUnit::Micrometre => |text| reading::check(text, CoordinateUnit::Micrometre),
+        CoordinateUnit::Millimetre => |text| understood(text, CoordinateUnit::Millimetre),
+        CoordinateUnit::Metre => |text| understood(text, CoordinateUnit::Metre),
+        CoordinateUnit::Inch => |text| understood(text, CoordinateUnit::Inch),
+        CoordinateUnit::Micrometre => |text| understood(text, CoordinateUnit::Micrometre),
     }
+}
+
+/// The coordinates as they are understood.
+fn understood(text: &str, unit: CoordinateUnit) -> Result<String, String> {
+    reading::check(text, unit)?;
+    let point = reading::parse(text, unit)?;
+    let [x, y, z] = [point.x, point.y, point.z].map(to_mm);
+    Ok(format!("x {x:.3}  y {y:.3}  z {z:.3} mm"))
 }
 
 /// Asks for known coordinates of the SMR.
@@ -253,7 +262,7 @@ fn said(values: &[String]) -> Result<Intent, String> {
 }
 
 /// Parses a number, with a decimal point or comma.
-fn number(name: &str, text: &str) -> Result<f64, String> {
+pub(super) fn number(name: &str, text: &str) -> Result<f64, String> {
     let value = text.replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite());
     value.ok_or_else(|| format!("{name}: '{text}' is not a number"))
 }

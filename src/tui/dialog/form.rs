@@ -4,7 +4,8 @@ use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use crate::text::wrapped;
+use super::plain::{replace, with_value};
+use crate::text::{alternatives, wrapped};
 use crate::tui::form::{FieldOutcome, TextField};
 use crate::tui::keymap::Key;
 use crate::tui::paint;
@@ -87,6 +88,35 @@ impl Form {
         (self.build)(&values)
     }
 
+    /// The question of a field, for plain lines.
+    pub(super) fn question(&self, number: usize) -> Option<Vec<String>> {
+        let field = self.fields.get(number)?;
+        let title = (number == 0).then(|| self.title.clone());
+        let about = [format!("  {}", field.about)];
+        let asked = match &field.value {
+            Value::Text(text) => with_value(field.label, &text.text()),
+            Value::Pick { options, at } => {
+                format!("{}: {} [{}]", field.label, alternatives(options), options.get(*at).unwrap_or(&""))
+            }
+        };
+        Some(title.into_iter().chain(about).chain([asked]).collect())
+    }
+
+    /// Answers the question of a field, for plain lines.
+    pub(super) fn answer(&mut self, number: usize, line: &str) -> Result<(), String> {
+        match self.fields.get_mut(number).map(|field| &mut field.value) {
+            Some(Value::Text(field)) => replace(field, line),
+            Some(Value::Pick { options, at }) if !line.is_empty() => {
+                *at = options
+                    .iter()
+                    .position(|option| option.eq_ignore_ascii_case(line))
+                    .ok_or_else(|| format!("'{line}' is not one of {}", alternatives(options)))?;
+            }
+            Some(Value::Pick { .. }) | None => {}
+        }
+        Ok(())
+    }
+
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let count = self.fields.len().max(1);
         match key.code {
@@ -134,6 +164,14 @@ impl Form {
                     paint::text(buf, place, (2, 0), &theme.glyphs.show(&text.text()), theme.style(Role::Plain));
                 }
                 Value::Pick { options, at } => {
+                    let width: usize = options.iter().map(|option| option.chars().count() + 3).sum();
+                    if width + 1 > usize::from(place.width) {
+                        let shown = format!("[{}]  {} of {}", options.get(*at).unwrap_or(&""), at + 1, options.len());
+                        let role = if has_focus { Role::Focus } else { Role::Plain };
+                        paint::text(buf, place, (2, 0), &theme.glyphs.show(&shown), theme.style(role));
+                        row += 1;
+                        continue;
+                    }
                     let mut column = 2;
                     for (number, option) in options.iter().enumerate() {
                         let is_chosen = number == *at;

@@ -45,6 +45,35 @@ impl ChoiceList {
         matching.get(self.selected).or_else(|| matching.last()).copied()
     }
 
+    /// The numbered choices as a question, for plain lines.
+    pub fn question(&self) -> Vec<String> {
+        let choices = self.choices.iter().zip(1..).map(|(choice, number): (_, usize)| format!("{number:5}  {choice}"));
+        let last = format!("number [{}]", self.selected + 1);
+        [self.label.clone()].into_iter().chain(choices).chain([last]).collect()
+    }
+
+    /// Chooses by a number or by the beginning of a choice, for plain lines.
+    ///
+    /// # Errors
+    /// No choice, or several, are meant.
+    pub fn answer(&mut self, line: &str) -> Result<(), String> {
+        if line.is_empty() {
+            return Ok(());
+        }
+        let by_number = line.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let by_name = || {
+            let exact = self.choices.iter().position(|choice| choice == line);
+            let mut beginning = self.choices.iter().enumerate().filter(|(_, choice)| choice.starts_with(line));
+            exact.or_else(|| match (beginning.next(), beginning.next()) {
+                (Some((index, _)), None) => Some(index),
+                _ => None,
+            })
+        };
+        let chosen = by_number.filter(|index| *index < self.choices.len()).or_else(by_name);
+        self.selected = chosen.ok_or_else(|| format!("'{line}' is none of the choices: answer with a number"))?;
+        Ok(())
+    }
+
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let last = self.matching().len().saturating_sub(1);
         let now = self.selected.min(last);

@@ -47,6 +47,21 @@ impl NumberField {
         }
     }
 
+    pub fn label(&self) -> &str {
+        self.field.label()
+    }
+
+    /// The number as it is written.
+    pub fn text(&self) -> String {
+        self.field.text()
+    }
+
+    /// Replaces the number.
+    pub fn set(&mut self, text: &str) {
+        self.field.clear();
+        self.field.paste(text);
+    }
+
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         match self.field.on_key(key) {
             FieldOutcome::Submitted if self.value().is_err() => FieldOutcome::Changed,

@@ -13,8 +13,8 @@ use crate::tui::theme::{Role, Theme};
 /// Longest text, in characters; a paste beyond it is cut.
 const LONGEST: usize = 4096;
 
-/// Checks a text; the error says what is wrong.
-pub type Validator = fn(&str) -> Result<(), String>;
+/// Reads a text: how it is understood, or what is wrong with it.
+pub type Validator = fn(&str) -> Result<String, String>;
 
 /// A single line of text with a cursor.
 #[derive(Clone, Debug)]
@@ -73,6 +73,16 @@ impl TextField {
     /// What is wrong with the text, if anything.
     pub fn problem(&self) -> Option<String> {
         self.check.and_then(|check| check(self.text().trim()).err())
+    }
+
+    /// How the text is understood, if it is read while it is typed.
+    pub fn understood(&self) -> Option<String> {
+        self.check.and_then(|check| check(self.text().trim()).ok())
+    }
+
+    /// Whether the text is read while it is typed.
+    pub const fn is_checked(&self) -> bool {
+        self.check.is_some()
     }
 
     /// Inserts pasted text. Line breaks and tabs become blanks, other control characters are removed.
@@ -145,6 +155,9 @@ impl TextField {
                 paint::text(buf, area, (0, row), line, theme.style(Role::Warn));
             }
         }
+        if let Some(understood) = self.understood().filter(|_| !self.characters.is_empty()) {
+            paint::text(buf, area, (2, 2), &theme.glyphs.show(&understood), theme.style(Role::Ok));
+        }
     }
 
     /// Draws the text alone. The cursor is always in view.
@@ -216,11 +229,12 @@ mod tests {
 
     #[test]
     fn a_wrong_text_is_not_accepted() {
-        let check: Validator = |text| if text.is_empty() { Err("write something".to_owned()) } else { Ok(()) };
+        let check: Validator = |text| if text.is_empty() { Err("write something".to_owned()) } else { Ok(text.to_uppercase()) };
         let mut field = TextField::new("note", "").checked(check);
         assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Changed);
         assert_eq!(field.problem().as_deref(), Some("write something"));
         typed(&mut field, &[KeyCode::Char('x')]);
+        assert_eq!(field.understood().as_deref(), Some("X"));
         assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Submitted);
         assert_eq!(field.on_key(Key::plain_code(KeyCode::Esc)), FieldOutcome::Cancelled);
     }

@@ -9,12 +9,12 @@ use super::page::{Page, Parts, Scroll, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::text::counted;
-use crate::tui::dialog::ask;
+use crate::tui::dialog::{Dialog, ask};
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::theme::Role;
 use crate::tui::values;
 use crate::wizard::Intent;
-use crate::wizard::view::{Content, InstrumentView};
+use crate::wizard::view::{Content, InstrumentView, ViewModel};
 
 /// Columns of the text beside the picture.
 const TEXT: u16 = 62;
@@ -55,17 +55,9 @@ impl InstrumentScreen {
     }
 
     fn choose(&mut self, cx: &ScreenCx<'_>) -> ScreenOutcome {
-        let at = self.menu.at.take().unwrap_or(0);
-        match UNITS.get(at) {
-            Some(unit) => ScreenOutcome::Intent(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
-            None if at == UNITS.len() => {
-                ScreenOutcome::Open(Box::new(ask::linked(content(cx).and_then(|content| content.link.as_ref()))))
-            }
-            None if at == UNITS.len() + 1 => {
-                let is_paper = cx.view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper"));
-                ScreenOutcome::Open(Box::new(ask::simulated(is_paper)))
-            }
-            None => ScreenOutcome::Open(Box::new(ask::recorded())),
+        match way(self.menu.at.take().unwrap_or(0), cx.view) {
+            Ok(intent) => ScreenOutcome::Intent(intent),
+            Err(dialog) => ScreenOutcome::Open(dialog),
         }
     }
 
@@ -86,10 +78,35 @@ impl InstrumentScreen {
     }
 }
 
+/// The ways to measure, with their explanations.
+pub(in crate::tui) const fn ways() -> &'static [(&'static str, &'static str)] {
+    &WAYS
+}
+
+/// The intent of a way to measure, or the dialog that it needs first.
+pub(in crate::tui) fn way(at: usize, view: &ViewModel) -> Result<Intent, Box<Dialog>> {
+    let link = match &view.content {
+        Content::Instrument(content) => content.link.as_ref(),
+        _ => None,
+    };
+    match UNITS.get(at) {
+        Some(unit) => Ok(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
+        None if at == UNITS.len() => Err(Box::new(ask::linked(link))),
+        None if at == UNITS.len() + 1 => {
+            let is_paper = view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper"));
+            Err(Box::new(ask::simulated(is_paper)))
+        }
+        None => Err(Box::new(ask::recorded())),
+    }
+}
+
 /// The chosen instrument, its identity and its uncertainty.
 fn state(content: &InstrumentView, cx: &ScreenCx<'_>, page: &mut Page) {
     let robot = "none stated; sigma is estimated from the residuals";
     page.pair("profile", content.stated_sigma.as_deref().unwrap_or(robot));
+    if let Some(cell) = &content.cell {
+        page.pair("cell", &format!("{cell} (j: change)"));
+    }
     let Some(choice) = &content.choice else {
         page.pair("chosen", "nothing yet: what measures the SMR?");
         return;

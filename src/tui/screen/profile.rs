@@ -283,7 +283,7 @@ fn introduction(cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
     page.gap();
     page.paragraph("Move to your robot and press Enter to see it. Enter again uses it.", Role::Plain);
     page.gap();
-    page.paragraph("Is your robot not in the list? 'file...' loads a profile that you have written: 'trupose profile new --from NAME --out FILE' writes one to start from.", Role::Dim);
+    page.paragraph("Is your robot not in the list? d makes it from the dimensions of its data sheet, f loads a profile from a file. 'trupose profile new' also copies one, or measures the arm.", Role::Dim);
     page.gap();
     page.paragraph(
         "To rehearse without hardware, choose soochow, the arm of the method paper, and then the simulated cell.",
@@ -306,6 +306,8 @@ fn card_page(card: &ProfileCard, content: &ProfileView, cx: &ScreenCx<'_>, colum
     if let Some([x, y, z]) = card.target_mm {
         page.pair("SMR", &format!("({x:.3}, {y:.3}, {z:.3}) mm in the flange"));
     }
+    let [x, y, z] = card.flange_at_zero_mm;
+    page.pair("at all zeros", &format!("flange ({x:.1}, {y:.1}, {z:.1}) mm: as on the pendant?"));
     page.pair("source", &card.source);
     if content.is_fixed {
         page.gap();

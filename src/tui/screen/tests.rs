@@ -65,6 +65,8 @@ fn profile(has_card: bool) -> ViewModel {
             free_parameters: 25,
             instrument: Some("Leica AT901-B".to_owned()),
             target_mm: Some([-1.473, 26.384, 71.991]),
+            flange_at_zero_mm: [1065.0, 0.0, 1424.0],
+            profile: None,
             warnings: vec!["no bodies for link 3: \u{1b}[31m".to_owned()],
         });
         content.session = "soochow-20260105-0800".to_owned();
@@ -80,6 +82,7 @@ fn instrument(choice: Option<&str>, identity: Option<&str>) -> ViewModel {
         identity: identity.map(str::to_owned),
         recorded_poses: 0,
         stated_sigma: Some("Leica AT901-B: 0.015 mm + 6 um/m (one sigma)".to_owned()),
+        cell: None,
     });
     let proposal = InstrumentChoice::Manual { unit: CoordinateUnit::Millimetre };
     let wait = identity.is_none().then(|| "the instrument does not answer yet".to_owned());

@@ -30,6 +30,8 @@ fn crowded() -> ViewModel {
             free_parameters: 25,
             instrument: None,
             target_mm: Some([-1.473, 26.384, 71.991]),
+            flange_at_zero_mm: [1065.0, 0.0, 1424.0],
+            profile: None,
             warnings: Vec::new(),
         });
         view.header.robot = Some(profile.title().to_owned());

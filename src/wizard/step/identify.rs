@@ -91,7 +91,11 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
 /// What a reader of the result must know about how the samples were measured.
 fn remarks(session: &Session) -> Vec<Warning> {
     let simulated = session.simulation().map(|said| Warning::simulated(&said));
-    simulated.into_iter().chain(left_out(session, PoseKind::Identification)).collect()
+    let limits = session.limits_set.filter(|set| set.after_result).map(|set| {
+        let message = format!("the acceptance limits were set at {}, after a result had been seen", set.time);
+        Warning::new("limits_set_late", message, false)
+    });
+    simulated.into_iter().chain(left_out(session, PoseKind::Identification)).chain(limits).collect()
 }
 
 /// A warning about samples of a kind that the operator excluded and did not measure again.
@@ -128,6 +132,24 @@ fn has_solution(cx: &Cx<'_>) -> Condition {
     require(is_usable, "no usable solution found; check the warnings, then go back and remeasure the affected poses")
 }
 
+/// Writes a result that has arrived.
+fn take_result(answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
+    let Answer::Identified(mut identified) = answer else { return Vec::new() };
+    identified.put_into_words(advice::words);
+    let blocking = identified.summary.warnings.iter().find(|warning| warning.blocks_acceptance);
+    let notice = blocking.map(|warning| Notice::attention(warning.message.clone()));
+    let of = |kind| samples(cx.session, kind);
+    let points = point_errors(&identified, &of(PoseKind::Identification), &of(PoseKind::Verification));
+    let text = IdentifiedText {
+        points,
+        samples: cx.session.basis(),
+        summary: identified.summary,
+        calibration: identified.calibration,
+    };
+    let write = Action::Write(vec![Entry::Identified(Box::new(text))]);
+    std::iter::once(write).chain(notice.map(Action::Say)).collect()
+}
+
 impl StepMachine for IdentifyStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let has_enough = super::capture::has_enough(cx.session, self.fewest);
@@ -149,21 +171,7 @@ impl StepMachine for IdentifyStep {
     }
 
     fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
-        let Answer::Identified(identified) = answer else { return Vec::new() };
-        let mut identified = identified;
-        identified.put_into_words(advice::words);
-        let blocking = identified.summary.warnings.iter().find(|warning| warning.blocks_acceptance);
-        let notice = blocking.map(|warning| Notice::attention(warning.message.clone()));
-        let of = |kind| samples(cx.session, kind);
-        let points = point_errors(&identified, &of(PoseKind::Identification), &of(PoseKind::Verification));
-        let text = IdentifiedText {
-            points,
-            samples: cx.session.basis(),
-            summary: identified.summary,
-            calibration: identified.calibration,
-        };
-        let write = Action::Write(vec![Entry::Identified(Box::new(text))]);
-        std::iter::once(write).chain(notice.map(Action::Say)).collect()
+        take_result(answer, cx)
     }
 
     fn content(&self, cx: &Cx<'_>) -> Content {
@@ -191,6 +199,16 @@ impl StepMachine for VerifyStep {
             Intent::Next => vec![Action::go(Step::Deliver)],
             _ => Vec::new(),
         }
+    }
+
+    fn on_answer(&mut self, answer: Answer, cx: &Cx<'_>) -> Vec<Action> {
+        take_result(answer, cx)
+    }
+
+    fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
+        // The verdict is that of the limits now.
+        let is_cell = matches!(entry, Entry::Cell(_));
+        if is_cell { request(cx).map(Action::Ask).into_iter().collect() } else { Vec::new() }
     }
 
     fn content(&self, cx: &Cx<'_>) -> Content {

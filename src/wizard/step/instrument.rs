@@ -1,6 +1,7 @@
 //! Step Instrument: what measures.
 
 use super::{Action, Cx, StepMachine};
+use crate::profile::{CellText, Profile};
 use crate::session::journal::{Entry, instrument_text};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
 use crate::session::wire::LinkChoice;
@@ -16,6 +17,10 @@ pub(in crate::wizard) struct InstrumentStep;
 fn connect(cx: &Cx<'_>) -> Vec<Action> {
     let (Some(instrument), Some(robot)) = (&cx.session.instrument, cx.robot()) else { return Vec::new() };
     vec![Action::Ask(Request::Connect { instrument: instrument.clone(), profile: Box::new(robot.profile.clone()) })]
+}
+
+fn joint_names(profile: &Profile) -> Vec<&str> {
+    profile.chain().joints().iter().map(|joint| joint.name.as_str()).collect()
 }
 
 /// The link that the profile describes.
@@ -59,7 +64,12 @@ impl StepMachine for InstrumentStep {
     }
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
-        if matches!(entry, Entry::Instrument(_)) { connect(cx) } else { Vec::new() }
+        match entry {
+            Entry::Instrument(_) => connect(cx),
+            // A simulated instrument stands and scatters as the cell says.
+            Entry::Cell(_) if !cx.session.has_measurements() => connect(cx),
+            _ => Vec::new(),
+        }
     }
 
     fn content(&self, cx: &Cx<'_>) -> Content {
@@ -69,6 +79,7 @@ impl StepMachine for InstrumentStep {
             choice: cx.session.instrument.as_ref().map(instrument_text),
             identity: cx.connection.map(|connection| connection.identity.clone()),
             recorded_poses: cx.connection.map_or(0, |connection| connection.recorded.len()),
+            cell: profile.map(|profile| cx.session.cell.or(&CellText::of(profile), &joint_names(profile)).to_string()),
             stated_sigma: profile
                 .and_then(|profile| profile.instrument())
                 .map(|instrument| format!("{}: {}", instrument.name, instrument.sigma_text())),

@@ -1,6 +1,7 @@
 //! Step Profile: which robot.
 
 use super::{Action, Cx, StepMachine};
+use crate::profile::datasheet::Datasheet;
 use crate::profile::{Profile, builtin_names};
 use crate::session::journal::Entry;
 use crate::session::set_up::Step;
@@ -16,6 +17,8 @@ use crate::wizard::view::{Content, ProfileCard, ProfileView, SessionCard, Sessio
 pub(in crate::wizard) struct ProfileStep {
     chosen: Option<Box<LoadedProfile>>,
     name: Option<String>,
+    /// The last data sheet, to be corrected.
+    sheet: Datasheet,
 }
 
 #[derive(Clone, Debug)]
@@ -68,7 +71,8 @@ impl StepMachine for ProfileStep {
         });
         let mut intents = vec![
             IntentInfo::new(Intent::Next, "use this robot").unless(none).default_action(),
-            IntentInfo::new(Intent::ChooseProfile(first), "choose a robot").unless(fixed),
+            IntentInfo::new(Intent::ChooseProfile(first), "choose a robot").unless(fixed.clone()),
+            IntentInfo::new(Intent::DescribeRobot(Box::new(self.sheet.clone())), "robot from a data sheet").unless(fixed),
             IntentInfo::new(Intent::NameSession(proposal), "name the session").unless(named),
         ];
         intents.extend(sessions);
@@ -78,6 +82,18 @@ impl StepMachine for ProfileStep {
     fn on_intent(&mut self, intent: Intent, cx: &Cx<'_>) -> Vec<Action> {
         match intent {
             Intent::ChooseProfile(source) => vec![Action::Ask(Request::LoadProfile { source })],
+            Intent::DescribeRobot(sheet) => {
+                self.sheet = *sheet;
+                match self.sheet.profile() {
+                    Ok((text, profile)) => {
+                        let warnings = profile.gaps().into_iter().map(|gap| gap.message).collect();
+                        let source = "data sheet".to_owned();
+                        self.chosen = Some(Box::new(LoadedProfile { source, text, profile, warnings }));
+                        Vec::new()
+                    }
+                    Err(error) => vec![Action::Say(Notice::error(format!("no robot from this data sheet: {error}")))],
+                }
+            }
             Intent::NameSession(name) => {
                 let usable = !name.is_empty()
                     && name.len() <= 64

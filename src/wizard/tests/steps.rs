@@ -15,7 +15,7 @@ fn text(name: &str) -> String {
 #[test]
 fn profile_begins_with_nothing_chosen() {
     let mut bench = Bench::new();
-    assert_eq!(offers(&bench.wizard), ["Next -- choose a robot first", "ChooseProfile", "NameSession", "Quit"]);
+    assert_eq!(offers(&bench.wizard), ["Next -- choose a robot first", "ChooseProfile", "DescribeRobot", "NameSession", "Quit"]);
     let view = bench.wizard.view();
     assert_eq!((view.header.step, view.header.number, view.header.steps), (Step::Profile, 1, 8));
     assert_eq!((view.header.folder, view.header.session, view.header.saved_entries), (None, None, 0));
@@ -86,6 +86,7 @@ fn instrument_connects_as_soon_as_it_is_chosen() {
             "ChooseInstrument",
             "Retry -- there is nothing to reconnect",
             "Back",
+            "DescribeCell",
             "Quit"
         ]
     );
@@ -188,6 +189,7 @@ fn plan_is_proposed_then_accepted() {
             "PlanFromRecording -- the instrument does not play back recorded measurements",
             "Next -- accept a plan first",
             "Back",
+            "DescribeCell",
             "Quit"
         ]
     );
@@ -273,7 +275,7 @@ fn identify_verify_and_deliver_end_in_files() {
     let verification = view.verification.unwrap();
     let mean = |model: &crate::session::summary::ModelSummary| model.position_mm.unwrap().mean;
     assert!(mean(&verification.identified) < 0.2 * mean(&verification.nominal));
-    assert_eq!(offers(&bench.wizard), ["Next*", "Back", "Quit"]);
+    assert_eq!(offers(&bench.wizard), ["Next*", "Back", "DescribeCell", "Quit"]);
     bench.does(Intent::Next);
     assert_eq!(offers(&bench.wizard), ["Deliver*", "About", "Back", "Quit"]);
     let effects = bench.intend(Intent::Deliver);
