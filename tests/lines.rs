@@ -130,7 +130,7 @@ fn a_journal_that_cannot_grow_stops_the_lines_and_is_never_called_saved() {
         let output = limited(place.path(), blocks, &demo());
         let (said, errors) = (text(&output.stdout), text(&output.stderr).replace("\n  ", " "));
         assert_eq!(output.status.code(), Some(5), "{errors}\n{said}");
-        for part in ["STOP: could not save", "NOT SAVED", "Retry", "Quit"] {
+        for part in ["STOP: could not save", "NOT SAVED", "  retry", "  quit"] {
             assert!(said.contains(part), "{part}:\n{said}");
         }
         assert!(errors.contains("NOT saved: "), "{errors}");

@@ -21,6 +21,8 @@ const GONE: Duration = Duration::from_secs(1);
 const CLOSING: f64 = 0.3;
 const SIZE: (u16, u16) = (80, 24);
 const POSES: usize = 18;
+/// A search for poses on a busy machine.
+const PLANNING: Duration = Duration::from_secs(240);
 
 /// Steps of a script that end in each step of the wizard.
 const SCRIPT: [&str; 7] = [
@@ -467,8 +469,11 @@ fn a_technician_without_a_profile_calibrates_by_keys() {
     technician.presses_until("n", "step 3", |shown| shown.step() == Some(3));
     technician.press("p");
     technician.presses_until("n", "step 4", |shown| shown.step() == Some(4));
-    technician.press(&format!("{CTRL_U}30\t8\t300"));
+    technician.press("26\u{1b}[B6\u{1b}[B120");
     technician.press("p");
+    technician.terminal.wait_for_text("cancel choosing poses");
+    let is_chosen = |shown: &Shown| !shown.has("cancel choosing poses");
+    assert!(technician.terminal.comes(PLANNING, is_chosen), "{}", technician.terminal.text());
     technician.presses_until("a", "step 5", |shown| shown.step() == Some(5));
 
     // Enter always does the next sensible thing; what is in question is corrected, or measured again.
@@ -496,7 +501,7 @@ fn a_technician_without_a_profile_calibrates_by_keys() {
     let session = Session::of(&read_journal(&folder).unwrap()).unwrap();
     let counted = session.counted().count();
     eprintln!("{} keys, {} bytes for {counted} samples", technician.keys, technician.terminal.written());
-    assert!(counted >= 38 && session.closed, "{counted}");
+    assert!(counted >= 32 && session.closed, "{counted}");
     assert!(place.path("sessions/cell.ron").exists());
 
     // To a corrected program.

@@ -35,8 +35,8 @@ pub struct NewProfileArgs {
     #[arg(long, value_name = "RANGES", allow_hyphen_values = true)]
     pub limits: Option<String>,
     /// What the pendant shows for the flange at all zeros, to be compared with the data sheet
-    #[arg(long, value_name = "X,Y,Z", requires = "data_sheet", value_delimiter = ',', num_args = 3, allow_hyphen_values = true)]
-    pub pendant: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z", requires = "data_sheet", value_parser = place, allow_hyphen_values = true)]
+    pub pendant: Option<Place>,
     /// Profile to compare the measured constants with; everything that is not measured is taken from it
     #[arg(long, value_name = "NAME|FILE", requires = "circles")]
     pub compare: Option<String>,
@@ -49,6 +49,16 @@ pub struct NewProfileArgs {
     /// New file [default: print the text]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+}
+
+/// A place that the pendant shows (mm).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place(pub [f64; 3]);
+
+fn place(text: &str) -> Result<Place, String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|number| number.trim().parse().ok()).collect();
+    let place = <[f64; 3]>::try_from(numbers).ok().filter(|place| place.iter().all(|value| value.is_finite()));
+    place.map(Place).ok_or_else(|| format!("'{text}' is no place: write three numbers such as 374,0,630"))
 }
 
 /// Dimensions of a data sheet (mm).

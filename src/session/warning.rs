@@ -67,6 +67,8 @@ codes! {
     LargeDeviation => "large_deviation",
     /// Points that the operator excluded.
     LeftOut => "left_out",
+    /// Acceptance limits that were set when a result had been seen.
+    LimitsSetLate => "limits_set_late",
     /// So many points were rejected that nothing consistent is left.
     ManyRejected => "many_rejected",
     /// Nothing states a length.

@@ -27,6 +27,7 @@ fn collect(depth: usize, value: &Value, has_all: bool, lines: &mut Vec<String>) 
             // What is not so, or not there, needs no line.
             Value::Null | Value::Bool(false) => {}
             Value::Number(number) if number.as_u64() == Some(0) => {}
+            Value::String(text) if text.is_empty() => {}
             Value::Bool(true) => lines.push(format!("{indent}{name}")),
             Value::Array(values) if values.is_empty() => {}
             Value::Array(values) if values.len() <= SHORT_LIST && !values.iter().any(is_nested) => {

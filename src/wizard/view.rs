@@ -523,6 +523,23 @@ pub struct RowView {
     pub kind: PoseKind,
     /// State of the row.
     pub state: RowState,
+    /// The sample that counts, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured: Option<MeasuredRow>,
+    /// Whether there is a note about the pose.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub has_note: bool,
+}
+
+/// What is known about the sample of a row.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MeasuredRow {
+    /// Distance from where the identified arm has it, once it is identified from the samples that count now.
+    pub fit_mm: Option<f64>,
+    pub scatter_mm: Option<f64>,
+    pub shots: u32,
+    /// Time of day (UTC), `09:15`.
+    pub time: String,
 }
 
 /// The view of the identify step.

@@ -83,7 +83,7 @@ fn data_sheet<O: Write, E: Write>(
     console.remark(&format!("at all zeros the flange is at x {x:.1}, y {y:.1}, z {z:.1} mm"));
     match &args.pendant {
         None => console.remark("is that what the pendant shows, without a tool? '--pendant X,Y,Z' compares them and says what could be wrong"),
-        Some(pendant) => compare(&sheet, pendant, console)?,
+        Some(pendant) => compare(&sheet, pendant.0, console)?,
     }
     Ok(text)
 }
@@ -91,11 +91,9 @@ fn data_sheet<O: Write, E: Write>(
 /// Compares the flange at all zeros with the pendant.
 fn compare<O: Write, E: Write>(
     sheet: &Datasheet,
-    pendant: &[f64],
+    pendant: [f64; 3],
     console: &mut Console<O, E>,
 ) -> Result<(), Failure> {
-    let pendant = <[f64; 3]>::try_from(pendant)
-        .map_err(|_| Failure::new(ExitStatus::Usage, "'--pendant' needs three numbers: X,Y,Z in mm"))?;
     match sheet.compared(pendant).map_err(|error| usage(&error))? {
         Agreement::Agrees => {
             console.remark("the pendant shows the same: dimensions and zero position are right");

@@ -20,7 +20,7 @@ pub(super) fn cell(known: &CellText) -> Dialog {
     let tracker = known.tracker_mm.map_or_else(String::new, |(x, y, z)| format!("{x} {y} {z}"));
     let acceptance = known.acceptance.unwrap_or_default();
     Dialog::Form(
-        Form::new("This cell. Everything is filled in from the last session or the profile; change what is not so", stated)
+        Form::new("This cell. Filled in from the last session or the profile", stated)
             .pick("instrument", PICKS, 0, "Left/Right. From the list: half of what the maker allows as the largest error of a point. as below: the two fields that follow, such as those of its certificate.")
             .text("name of it", instrument.map_or("", |one| &one.name), "Maker, type and serial number. Empty: nothing is known about its accuracy.")
             .text("sigma (um)", &text(instrument.map(|one| one.sigma_um)), "Standard deviation of a coordinate, the part that does not depend on the distance.")

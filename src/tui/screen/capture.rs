@@ -68,6 +68,8 @@ pub(super) struct CaptureScreen {
     tab: Tab,
     /// Focused row of the list; `None`: the pose shown.
     cursor: Option<usize>,
+    /// Whether the list begins with the worst fit instead of the first pose.
+    by_fit: bool,
     /// Scroll position of the notes.
     scroll: usize,
 }
@@ -92,7 +94,9 @@ fn reading_dialog(cx: &ScreenCx<'_>, begun: &str) -> ScreenOutcome {
 impl CaptureScreen {
     /// The focused row of the list.
     fn selected(&self, content: &CaptureView) -> usize {
-        let shown = || content.rows.iter().position(|row| Some(row.row) == content.row).unwrap_or(0);
+        let order = poses::order(content, self.by_fit);
+        let is_shown = |index: &usize| content.rows.get(*index).is_some_and(|row| Some(row.row) == content.row);
+        let shown = || order.iter().position(is_shown).unwrap_or(0);
         self.cursor.unwrap_or_else(shown).min(content.rows.len().saturating_sub(1))
     }
 
@@ -107,10 +111,17 @@ impl CaptureScreen {
             KeyCode::Home => 0,
             KeyCode::End => last,
             KeyCode::Enter => {
-                let Some(row) = content.rows.get(selected) else { return ScreenOutcome::Ignored };
+                let order = poses::order(content, self.by_fit);
+                let row = order.get(selected).and_then(|index| content.rows.get(*index));
+                let Some(row) = row else { return ScreenOutcome::Ignored };
                 self.tab = Tab::GoTo;
                 self.cursor = None;
                 return ScreenOutcome::Intent(Intent::GoToPose(row.pose.clone()));
+            }
+            KeyCode::Char('o') => {
+                self.by_fit = !self.by_fit;
+                self.cursor = Some(0);
+                return ScreenOutcome::Changed;
             }
             _ => return ScreenOutcome::Ignored,
         };
@@ -140,6 +151,7 @@ impl Screen for CaptureScreen {
             Tab::Poses => {
                 items.push(KeyHint::new("Enter", "go to this pose", 0));
                 items.push(KeyHint::new("Up/Down", "choose", 1));
+                items.push(KeyHint::new("o", if self.by_fit { "plan order" } else { "worst fit first" }, 2));
             }
             Tab::Notes => items.push(KeyHint::new("Up/Down", "scroll", 7)),
             Tab::GoTo | Tab::Prediction | Tab::Live | Tab::Picture => {}
@@ -191,7 +203,10 @@ impl Screen for CaptureScreen {
         let body = paint::band(main, 1, main.height);
         match self.tab {
             Tab::GoTo => go_to::draw(cx, content, body, buf),
-            Tab::Poses => poses::draw(cx.theme, content, self.selected(content), body, buf),
+            Tab::Poses => {
+                let order = poses::order(content, self.by_fit);
+                poses::draw(cx.theme, content, (&order, self.selected(content)), body, buf);
+            }
             Tab::Prediction => prediction::draw(cx.theme, content, body, buf),
             Tab::Live => live::draw(cx, content, body, buf),
             Tab::Notes => notes::draw(cx.theme, content, self.scroll, body, buf),

@@ -93,7 +93,7 @@ fn remarks(session: &Session) -> Vec<Warning> {
     let simulated = session.simulation().map(|said| Warning::simulated(&said));
     let limits = session.limits_set.filter(|set| set.after_result).map(|set| {
         let message = format!("the acceptance limits were set at {}, after a result had been seen", set.time);
-        Warning::new("limits_set_late", message, false)
+        Warning::new(WarningCode::LimitsSetLate, message, false)
     });
     simulated.into_iter().chain(left_out(session, PoseKind::Identification)).chain(limits).collect()
 }

@@ -5,6 +5,7 @@ use crate::profile::CellText;
 use crate::profile::cell_text::{AcceptanceText, InstrumentText, limits_from_text};
 use crate::session::journal::Entry;
 use crate::session::set_up::Step;
+use crate::session::summary::WarningCode;
 use crate::wizard::view::Content;
 use crate::wizard::{Event, Intent, Request};
 
@@ -82,7 +83,7 @@ fn limits_set_after_the_result_are_evaluated_at_once_and_said() {
     let effects = bench.written(id, lines);
     assert_eq!(texts(&effects), ["start identifying"]);
     let (_, Request::Identify(request)) = started(&effects) else { panic!() };
-    assert!(request.identification.warnings.iter().any(|warning| warning.code == "limits_set_late"));
+    assert!(request.identification.warnings.iter().any(|warning| warning.code == WarningCode::LimitsSetLate));
     bench.settle(effects);
     let session = bench.wizard.session();
     assert!(session.limits_set.unwrap().after_result && session.is_current());

@@ -6,19 +6,68 @@ use ratatui::layout::Rect;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
 use crate::tui::widget::{Column, Table};
-use crate::wizard::view::{CaptureView, RowState};
+use crate::wizard::view::{CaptureView, RowState, RowView};
 
-const COLUMNS: [Column<'static>; 3] = [Column::text("pose", 10), Column::text("for", 15), Column::text("state", 14)];
+const COLUMNS: [Column<'static>; 8] = [
+    Column::text("pose", 6),
+    Column::text("for", 14),
+    Column::text("state", 13),
+    Column::number("fit mm", 7),
+    Column::text("", BAR),
+    Column::number("scatter", 7),
+    Column::number("shots", 5),
+    Column::text("time", 7),
+];
+/// Columns of the bar for the largest misfit.
+const BAR: u16 = 6;
+
+/// Positions of the rows in the order shown: that of the plan, or the worst fit first.
+pub(super) fn order(content: &CaptureView, by_fit: bool) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..content.rows.len()).collect();
+    if by_fit {
+        let fit = |index: &usize| content.rows.get(*index).and_then(fit_mm).unwrap_or(-1.0);
+        order.sort_by(|one, other| fit(other).total_cmp(&fit(one)));
+    }
+    order
+}
+
+fn fit_mm(row: &RowView) -> Option<f64> {
+    row.measured.as_ref()?.fit_mm
+}
+
+/// The cells of a row about its sample.
+fn sample_cells(row: &RowView, worst: f64, theme: Theme) -> Vec<String> {
+    let Some(measured) = &row.measured else { return Vec::new() };
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.3}"));
+    let part = measured.fit_mm.map_or(0.0, |fit| fit / worst.max(f64::MIN_POSITIVE));
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the columns of the bar")]
+    let length = (part * f64::from(BAR)).round().clamp(0.0, f64::from(BAR)) as usize;
+    let note = if row.has_note { " *" } else { "" };
+    vec![
+        number(measured.fit_mm),
+        theme.glyphs.bar_done().repeat(length),
+        number(measured.scatter_mm),
+        measured.shots.to_string(),
+        format!("{}{note}", measured.time),
+    ]
+}
 
 /// Draws the list with the focus on row `selected`.
-pub(super) fn draw(theme: Theme, content: &CaptureView, selected: usize, area: Rect, buf: &mut Buffer) {
+pub(super) fn draw(
+    theme: Theme,
+    content: &CaptureView,
+    (order, selected): (&[usize], usize),
+    area: Rect,
+    buf: &mut Buffer,
+) {
     if content.rows.is_empty() {
         paint::text(buf, area, (0, 1), "The plan has no poses: go back to the plan step.", theme.style(Role::Hint));
         return;
     }
-    let rows: Vec<(Role, Vec<String>)> = content
-        .rows
+    let worst = content.rows.iter().filter_map(fit_mm).fold(0.0, f64::max);
+    let rows: Vec<(Role, Vec<String>)> = order
         .iter()
+        .filter_map(|index| content.rows.get(*index))
         .map(|row| {
             let is_shown = Some(row.row) == content.row;
             let is_asked = content.finding.as_ref().is_some_and(|finding| finding.pose == row.pose)
@@ -31,7 +80,8 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, selected: usize, area: R
                 RowState::Skipped => (Role::Dim, "skipped".to_owned()),
                 RowState::LeftOut => (Role::Warn, "excluded".to_owned()),
             };
-            (role, vec![row.pose.clone(), row.kind.name().to_owned(), word])
+            let cells = [row.pose.clone(), row.kind.name().to_owned(), word];
+            (role, cells.into_iter().chain(sample_cells(row, worst, theme)).collect())
         })
         .collect();
     Table { columns: &COLUMNS, rows: &rows, selected: Some(selected), first: 0 }.draw(theme, area, buf);

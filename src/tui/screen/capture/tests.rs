@@ -7,7 +7,8 @@ use crate::session::set_up::Step;
 use crate::tui::dialog::DialogOutcome;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
-    DriftView, FindingView, JointShown, LivePoint, LiveView, MoveCheck, PairView, PredictionView, RowState, RowView,
+    DriftView, FindingView, JointShown, LivePoint, LiveView, MeasuredRow, MoveCheck, PairView, PredictionView, RowState,
+    RowView,
     SampleView,
 };
 use crate::wizard::{IntentInfo, Notice};
@@ -35,6 +36,13 @@ fn rows() -> Vec<RowView> {
             1..=14 => RowState::Measured,
             _ => RowState::Open,
         },
+        measured: (row < 15 && row != 5 && row != 7).then(|| MeasuredRow {
+            fit_mm: (row < 10).then_some(0.01 * ((row * 7) % 10) as f64),
+            scatter_mm: Some(0.004),
+            shots: 3,
+            time: format!("09:{row:02}"),
+        }),
+        has_note: row == 3,
     };
     (1..=40).map(row).collect()
 }

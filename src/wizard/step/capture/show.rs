@@ -7,7 +7,7 @@ use crate::session::state::{Sample, SampleState, Session};
 use crate::units::to_mm;
 use crate::wizard::step::Cx;
 use crate::wizard::view::{
-    CaptureView, DriftView, FindingView, JointShown, PairView, PredictionView, RowState, RowView, SampleView,
+    CaptureView, DriftView, FindingView, JointShown, MeasuredRow, PairView, PredictionView, RowState, RowView, SampleView,
 };
 
 /// The view of a capture step.
@@ -101,7 +101,24 @@ fn row_view(session: &Session, index: usize) -> Option<RowView> {
         None if !row.active => return None,
         None => RowState::Open,
     };
-    Some(RowView { row: index, pose: row.planned.pose.clone(), kind: row.planned.kind, state })
+    let pose = row.planned.pose.clone();
+    let has_note = session.notes.iter().any(|note| note.pose.as_ref() == Some(&pose));
+    let measured = sample.map(|sample| MeasuredRow {
+        fit_mm: fit_mm(session, sample),
+        scatter_mm: sample.noted.scatter_mm,
+        shots: sample.noted.shots,
+        // `2026-03-01T09:15:02Z`
+        time: sample.time.to_string().get(11..16).unwrap_or_default().to_owned(),
+    });
+    Some(RowView { row: index, pose, kind: row.planned.kind, state, measured, has_note })
+}
+
+/// How far a sample is from where the identified arm has it (mm), if the result is of the samples that count now.
+fn fit_mm(session: &Session, sample: &Sample) -> Option<f64> {
+    let result = session.identified.as_ref().filter(|_| session.is_current())?;
+    let at = result.samples.iter().position(|number| *number == sample.noted.number)?;
+    let (x, y, z) = result.points.get(at)?.identified_mm;
+    Some(x.hypot(y).hypot(z))
 }
 
 fn sample_view(session: &Session, sample: &Sample) -> SampleView {
