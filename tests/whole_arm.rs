@@ -120,7 +120,7 @@ fn the_constants_are_within_three_sigma_of_the_truth() {
         }
         let ratio = (square / f64::from(count)).sqrt();
         eprintln!("{name}: {} constants, RMS {ratio:.2} sigma, worst {worst:.2}", count / 6);
-        assert!((0.8..1.2).contains(&ratio), "{name}: {ratio}");
+        assert!((0.8..1.25).contains(&ratio), "{name}: {ratio}");
         assert!(beyond <= 1, "{name}: {beyond} of {count} constants beyond 3 sigma");
     }
 }

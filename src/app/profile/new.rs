@@ -9,7 +9,7 @@ use super::super::{Console, load};
 use crate::cli::NewProfileArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::circle_point::{MeasuredArm, Template, measure_arm};
-use crate::kinematics::{JointType, ParameterId};
+use crate::kinematics::{JointType, LinkParameter, ParameterId};
 use crate::model::{Arm, Heading, complete, geometry_only};
 use crate::procedure::joint_types;
 use crate::profile::datasheet::{Agreement, Datasheet, Dimension, Limits, Maker};
@@ -17,10 +17,11 @@ use crate::profile::{JointRange, Masses, Profile, Target};
 use crate::session::measurements::{Layout, read_as, types_in_header};
 use crate::store;
 use crate::text::{alternatives, counted};
-use crate::units::{MILLIMETRE, from_mm, to_deg, to_mm};
+use crate::units::{MILLIMETRE, Quantity, from_mm, to_deg, to_mm};
 
-/// Differences from the data sheet beyond these are no assembly errors (mm), (degree).
+/// Differences from the data sheet beyond these are no assembly errors (mm), (degree); zeros of joints are set less exactly.
 const ASTONISHING: (f64, f64) = (5.0, 0.5);
+const ASTONISHING_ZERO_DEG: f64 = 2.0;
 
 pub(super) fn run<O: Write, E: Write>(
     args: &NewProfileArgs,
@@ -246,7 +247,11 @@ fn report<O: Write, E: Write>(arm: &MeasuredArm, is_compared: bool, console: &mu
         let edge = |value: f64| quantity.to_edge(value);
         let nominal = constant.nominal.map_or_else(String::new, |nominal| {
             let difference = edge(constant.value - nominal);
-            let limit = if quantity.unit() == "mm" { ASTONISHING.0 } else { ASTONISHING.1 };
+            let limit = match (quantity, parameter) {
+                (Quantity::Length, _) => ASTONISHING.0,
+                (Quantity::Angle, LinkParameter::Theta) => ASTONISHING_ZERO_DEG,
+                (Quantity::Angle, _) => ASTONISHING.1,
+            };
             let mark = if difference.abs() > limit { " !" } else { "" };
             astonishing += usize::from(difference.abs() > limit);
             format!("{:>14.3}{difference:>12.3}{mark}", edge(nominal))
@@ -269,7 +274,7 @@ fn report<O: Write, E: Write>(arm: &MeasuredArm, is_compared: bool, console: &mu
     ));
     if astonishing > 0 {
         console.remark(&format!(
-            "WARNING: {} marked ! by more than {} mm or {} deg: another arm, a wrong profile, or joint values that are not the pendant's",
+            "WARNING: {} marked ! (beyond {} mm, {} deg, or {ASTONISHING_ZERO_DEG} deg of a joint's zero): another arm, a wrong profile, or joint values that are not the pendant's",
             counted(astonishing, "difference"),
             ASTONISHING.0,
             ASTONISHING.1

@@ -9,17 +9,17 @@ use crate::tui::widget::{Column, Table};
 use crate::wizard::view::{CaptureView, RowState, RowView};
 
 const COLUMNS: [Column<'static>; 8] = [
-    Column::text("pose", 6),
+    Column::text("pose", 5),
     Column::text("for", 14),
     Column::text("state", 13),
-    Column::number("fit mm", 7),
+    Column::number("fit mm", 6),
     Column::text("", BAR),
     Column::number("scatter", 7),
     Column::number("shots", 5),
     Column::text("time", 7),
 ];
 /// Columns of the bar for the largest misfit.
-const BAR: u16 = 6;
+const BAR: u16 = 5;
 
 /// Positions of the rows in the order shown: that of the plan, or the worst fit first.
 pub(super) fn order(content: &CaptureView, by_fit: bool) -> Vec<usize> {
