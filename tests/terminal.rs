@@ -481,7 +481,7 @@ fn a_technician_without_a_profile_calibrates_by_keys() {
         if technician.terminal.look(|shown| shown.step() == Some(6)) {
             break;
         }
-        let before = technician.terminal.look(|shown| shown.text());
+        let before = technician.terminal.look(Shown::text);
         let has_remedy = technician.terminal.look(|shown| shown.has("c ") && shown.has("correct"));
         technician.press(if has_remedy { "c" } else { ENTER });
         technician.terminal.comes(Duration::from_secs(3), |shown| shown.text() != before && shown.has("· saved ·"));
@@ -491,8 +491,8 @@ fn a_technician_without_a_profile_calibrates_by_keys() {
     technician.terminal.wait_for("a verdict", |shown| shown.has("ACCEPTED") || shown.has("accepted"));
     technician.presses_until(ENTER, "step 8", |shown| shown.step() == Some(8));
     technician.press(ENTER);
-    let folder = fs::read_dir(place.0.path().join("sessions")).unwrap().map(|entry| entry.unwrap().path());
-    let folder = folder.filter(|path| path.is_dir()).next().unwrap();
+    let mut inside = fs::read_dir(place.0.path().join("sessions")).unwrap().map(|entry| entry.unwrap().path());
+    let folder = inside.find(|path| path.is_dir()).unwrap();
     technician.terminal.wait_for("the files", |_| folder.join("calibration.ron").exists());
     technician.terminal.wait_for("what was done is saved", |shown| shown.has("Written") && shown.has("· saved ·"));
     technician.press("q");

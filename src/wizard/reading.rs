@@ -84,6 +84,34 @@ pub fn check(text: &str, unit: CoordinateUnit) -> Result<(), String> {
     gate(&point, None).map_or(Ok(()), Err)
 }
 
+/// Parses one point, or one per line. A line may begin with the name of its point, and a line of titles is passed over.
+///
+/// # Errors
+/// What is wrong, and in which line.
+pub fn parse_all(text: &str, unit: CoordinateUnit) -> Result<Vec<Point3<f64>>, String> {
+    let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let one = parse(text, unit);
+    if one.is_ok() || lines.len() < 2 {
+        return one.map(|point| vec![point]);
+    }
+    let mut points = Vec::new();
+    for (line, number) in lines.iter().zip(1..) {
+        let named = || {
+            let (name, rest) = line.split_once([' ', '\t', ',', ';'])?;
+            name.contains(char::is_alphabetic).then(|| parse(rest.trim_start_matches([' ', ',', ';']), unit).ok()).flatten()
+        };
+        match parse(line, unit) {
+            Ok(point) => points.push(point),
+            Err(problem) => match named() {
+                Some(point) => points.push(point),
+                None if number == 1 && !line.contains(|c: char| c.is_ascii_digit()) => {}
+                None => return Err(format!("line {number}: {problem}")),
+            },
+        }
+    }
+    if points.is_empty() { Err("there is no point in these lines".to_owned()) } else { Ok(points) }
+}
+
 /// Advice on numbers that can be read in several ways.
 const SEPARATE: &str = "separate the numbers by blanks or ';'";
 const NO_THOUSANDS: &str = "leave out the thousands separator";
@@ -301,5 +329,19 @@ mod tests {
         ] {
             assert!(gate(&point, previous).unwrap().contains(part));
         }
+    }
+
+    #[test]
+    fn lines_are_points_with_or_without_names() {
+        let mm = CoordinateUnit::Millimetre;
+        let all = |text: &str| parse_all(text, mm).map(|points| points.len());
+        assert_eq!(all("1 2 3"), Ok(1));
+        assert_eq!(all("1000\n2000\n3000"), Ok(1), "one coordinate per line");
+        assert_eq!(all("1000 2 3\n\n4000 5 6\r\n7000 8 9\n"), Ok(3));
+        assert_eq!(all("Name;X;Y;Z\nP1;1000,5;2;3\nP2;4000;5;6"), Ok(2));
+        let point = parse_all("SMR_1, 1000.5, -2, 3\nSMR_2, 4, 5, 6000", mm).unwrap()[0];
+        assert!((point.x - 1.0005).abs() < 1e-12 && (point.y + 0.002).abs() < 1e-12);
+        assert!(parse_all("1000 2 3\n4000 5\n7000 8 9", mm).unwrap_err().starts_with("line 2: "));
+        assert!(parse_all("a b\nc d", mm).is_err());
     }
 }

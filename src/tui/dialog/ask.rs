@@ -9,7 +9,7 @@ use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, Reco
 use crate::session::simulation::{Fault, Simulation, Truth};
 use crate::session::wire::{LinkChoice, WireAddress};
 use crate::tui::form::{TextField, Validator};
-use crate::units::to_mm;
+use crate::units::{from_mm, to_mm};
 use crate::wizard::view::{Content, ViewModel};
 use crate::wizard::{Intent, reading};
 
@@ -34,7 +34,25 @@ pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
     };
     let unit = CoordinateUnit::ALL.into_iter().find(|one| Some(one.sign()) == unit).unwrap_or_default();
     let label = format!("Coordinates x y z of the SMR{place} ({})", unit.sign());
-    Dialog::Text { field: TextField::new(label, begun).checked(validator(unit)), intent: Intent::TypeReading }
+    let field = if begun.is_empty() {
+        // The last text, selected: typing replaces it, moving the cursor corrects it.
+        TextField::new(label, &questioned(view, unit)).proposed()
+    } else {
+        TextField::new(label, begun)
+    };
+    Dialog::Text { field: field.checked(validator(unit)), intent: Intent::TypeReading }
+}
+
+/// The coordinates of the point in question, in the unit that is typed.
+fn questioned(view: &ViewModel, unit: CoordinateUnit) -> String {
+    let Content::Capture(content) = &view.content else { return String::new() };
+    match (&content.finding, &content.last) {
+        (Some(finding), Some(last)) if finding.measurement == last.measurement => {
+            let [x, y, z] = last.xyz_mm.map(|value| from_mm(value) / unit.size());
+            format!("{x:.6} {y:.6} {z:.6}")
+        }
+        _ => String::new(),
+    }
 }
 
 /// The validator of coordinates in a unit.

@@ -17,17 +17,21 @@ mod poses;
 mod prediction;
 
 use crossterm::event::KeyCode;
+use nalgebra::Point3;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::page::picture_if_any;
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
-use crate::tui::dialog::ask;
+use crate::session::set_up::CoordinateUnit;
+use crate::text::counted;
+use crate::tui::dialog::{Dialog, ask};
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::widget::{TabView, draw_tabs};
-use crate::wizard::Intent;
-use crate::wizard::view::{CaptureView, Content, ViewModel};
+use crate::units::to_mm;
+use crate::wizard::view::{CaptureView, Content, RowState, RowView, ViewModel};
+use crate::wizard::{Intent, reading};
 
 /// Content columns from which the picture is beside the views (a terminal of 100).
 const WIDE: u16 = 98;
@@ -37,6 +41,8 @@ const VIEWS: [u16; 2] = [72, 46];
 const AROUND_JOINTS: u16 = 7;
 /// Columns between view and picture.
 const GAP: u16 = 2;
+/// Most pasted points that are listed.
+const POINTS_SHOWN: usize = 12;
 /// Rows that PgUp and PgDn scroll.
 const PAGE: usize = 8;
 
@@ -89,6 +95,29 @@ fn takes_typing(view: &ViewModel) -> bool {
 /// Opens the dialog for coordinates, starting with the text typed or pasted so far.
 fn reading_dialog(cx: &ScreenCx<'_>, begun: &str) -> ScreenOutcome {
     ScreenOutcome::Open(Box::new(ask::coordinates(cx.view, begun)))
+}
+
+/// Asks whether the points of several lines belong to the poses to come; `None` if there is only one, or they cannot be read.
+fn points_dialog(content: &CaptureView, text: &str) -> Option<ScreenOutcome> {
+    let unit = CoordinateUnit::ALL.into_iter().find(|one| Some(one.sign()) == content.typed_unit.as_deref())?;
+    let points = reading::parse_all(text, unit).ok().filter(|points| points.len() > 1)?;
+    let is_next = |row: &&RowView| row.state == RowState::Open && content.row.is_none_or(|shown| row.row >= shown);
+    let poses: Vec<&str> = content.rows.iter().filter(is_next).map(|row| row.pose.as_str()).collect();
+    let line = |(index, point): (usize, &Point3<f64>)| {
+        let pose = poses.get(index).map_or("no pose is left", |pose| *pose);
+        let [x, y, z] = [point.x, point.y, point.z].map(to_mm);
+        format!("{pose:>5}  x {x:.3}  y {y:.3}  z {z:.3} mm")
+    };
+    let mut lines = vec![format!(
+        "Take {} for the poses that follow? Each is checked; a question stops them.",
+        counted(points.len(), "point")
+    )];
+    lines.extend(points.iter().enumerate().take(POINTS_SHOWN).map(line));
+    if points.len() > POINTS_SHOWN {
+        lines.push(format!("and {} more", points.len() - POINTS_SHOWN));
+    }
+    let intent = Intent::TypeReading(text.to_owned());
+    Some(ScreenOutcome::Open(Box::new(Dialog::Confirm { intent, lines, is_yes: true })))
 }
 
 impl CaptureScreen {
@@ -186,7 +215,9 @@ impl Screen for CaptureScreen {
 
     fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome {
         match content(cx.view) {
-            Some(_) if takes_typing(cx.view) => reading_dialog(cx, text.trim()),
+            Some(content) if takes_typing(cx.view) => {
+                points_dialog(content, text).unwrap_or_else(|| reading_dialog(cx, text.trim()))
+            }
             _ => ScreenOutcome::Ignored,
         }
     }

@@ -1,6 +1,7 @@
 //! Step Capture: pose by pose, every point checked against all earlier ones.
 
 mod checks;
+mod pasted;
 mod prediction;
 mod show;
 mod way;
@@ -49,6 +50,8 @@ pub(in crate::wizard) struct CaptureStep {
     prediction: Prediction,
     /// Number of the measurement that is being written and that the prediction already includes.
     expected: Option<u64>,
+    /// Points that were pasted and wait for their poses.
+    pasted: pasted::Pasted,
 }
 
 /// A reading that counts only if the operator accepts it.
@@ -89,6 +92,7 @@ impl CaptureStep {
             fewest,
             prediction: Prediction::of(session, fewest),
             expected: None,
+            pasted: pasted::Pasted::new(),
         };
         step.question_last_doubt(session);
         step.find_way(session);
@@ -503,14 +507,7 @@ impl StepMachine for CaptureStep {
                 self.held = None;
                 self.row.map_or_else(Vec::new, |row| self.measure(cx, row))
             }
-            Intent::TypeReading(text) => match reading::parse(&text, Self::manual_unit(cx).unwrap_or_default()) {
-                Ok(point) => {
-                    // Typing a reading remeasures the questioned sample.
-                    self.show_questioned(session);
-                    self.take(&reading::typed(point), cx)
-                }
-                Err(message) => vec![Action::Say(Notice::error(message))],
-            },
+            Intent::TypeReading(text) => self.paste(&text, cx),
             Intent::AcceptReading => {
                 let Some(HeldReading { mut noted, reason }) = self.held.take() else { return Vec::new() };
                 let number = session.measurements + 1;
@@ -603,8 +600,9 @@ impl StepMachine for CaptureStep {
     }
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
-        let actions = self.follow(entry, cx.session);
+        let mut actions = self.follow(entry, cx.session);
         self.find_way(cx.session);
+        actions.extend(self.continue_pasted(entry, cx));
         actions
     }
 

@@ -1,10 +1,10 @@
 //! Measuring: pose by pose, in any order, with second thoughts.
 
-use super::bench::{Bench, IDENTIFICATION, MEASURED, VERIFICATION, blocked, offers, started, texts};
+use super::bench::{Bench, IDENTIFICATION, MANUAL, MEASURED, VERIFICATION, blocked, offers, seen_at, started, texts};
 use crate::session::journal::Entry;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
-use crate::session::state::SampleState;
+use crate::session::state::{Row, SampleState};
 use crate::wizard::view::RowState;
 use crate::wizard::{Intent, Request};
 
@@ -14,6 +14,35 @@ fn go_to(pose: &str) -> Intent {
 
 fn states(bench: &Bench) -> Vec<RowState> {
     bench.capture().rows.iter().map(|row| row.state).collect()
+}
+
+/// Points of rows of the plan as they are pasted.
+fn pasted(bench: &Bench, rows: std::ops::Range<usize>) -> String {
+    let rows = bench.wizard.session().rows.iter().filter(|row| row.planned.kind.is_measured()).skip(rows.start).take(rows.len());
+    let line = |row: &Row| {
+        let point = seen_at(&row.planned.configuration) * 1e3;
+        format!("P, {:.6}, {:.6}, {:.6}\n", point.x, point.y, point.z)
+    };
+    rows.map(line).collect()
+}
+
+#[test]
+fn pasted_points_are_taken_one_by_one_until_one_is_in_question() {
+    let mut bench = Bench::with(&MANUAL, Step::Capture);
+    let text = pasted(&bench, 0..5);
+    bench.does(Intent::TypeReading(text));
+    assert_eq!(bench.wizard.session().samples.len(), 5);
+    assert_eq!(bench.capture().finding, None);
+    // The third of four is wrong: the question comes before the fourth is taken.
+    let text = pasted(&bench, 5..9);
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    lines[2] = "P 1000 2000 3000".to_owned();
+    bench.does(Intent::TypeReading(lines.join("\n")));
+    assert_eq!(bench.wizard.session().samples.len(), 8);
+    assert!(bench.capture().finding.is_some());
+    bench.does(Intent::LeaveOut);
+    assert_eq!(bench.wizard.session().samples.len(), 9, "the fourth follows when the question is answered");
+    assert_eq!(bench.capture().finding, None);
 }
 
 #[test]
