@@ -508,7 +508,17 @@ fn a_technician_without_a_profile_calibrates_by_keys() {
     let program = "MODULE part\n  PROC main()\n    MoveAbsJ [[10,20,-20,30,40,50],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  ENDPROC\nENDMODULE\n";
     fs::write(place.path("part.mod"), program).unwrap();
     let calibration = folder.join("calibration.ron");
-    let arguments = ["compensate", "--calibration", calibration.to_str().unwrap(), "--program", "part.mod", "--dialect", "rapid", "--out", "corrected.mod"];
+    let arguments = [
+        "compensate",
+        "--calibration",
+        calibration.to_str().unwrap(),
+        "--program",
+        "part.mod",
+        "--dialect",
+        "rapid",
+        "--out",
+        "corrected.mod",
+    ];
     let output = place.run(&arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let corrected = fs::read_to_string(place.path("corrected.mod")).unwrap();

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use nalgebra::Point3;
 use crate::support::trupose_in;
+use nalgebra::Point3;
 use trupose::identification::circle_point::{MeasuredArm, Template, measure_arm};
 use trupose::kinematics::{ForwardKinematics, JointType, LinkParameter, ParameterId};
 use trupose::link::{Link as _, SimulatedCell};
@@ -62,8 +62,7 @@ struct Case {
 
 fn case(name: &str, seed: u64) -> Case {
     let profile = profile(name);
-    let simulation =
-        Simulation { seed, truth: Truth::Drawn, noise_mm: Some(NOISE_MM), ..Simulation::default() };
+    let simulation = Simulation { seed, truth: Truth::Drawn, noise_mm: Some(NOISE_MM), ..Simulation::default() };
     let mut cell = SimulatedCell::new(&profile, &simulation).unwrap();
     let rows = configurations(&profile);
     let mut measured = Vec::new();
@@ -140,7 +139,12 @@ fn without_noise_the_measured_arm_is_the_true_one() {
                 && !case.template.beta_joints.contains(&joint)
                 && case.template.chain.joints()[joint].joint_type == JointType::Revolute;
             let truth = arm.value(constant.id).unwrap();
-            assert!(!is_free || (truth - constant.value).abs() < 1e-7, "{name} {}: {truth} {}", constant.id, constant.value);
+            assert!(
+                !is_free || (truth - constant.value).abs() < 1e-7,
+                "{name} {}: {truth} {}",
+                constant.id,
+                constant.value
+            );
         }
         // Anywhere else the arm is the true one as well.
         let kinematics = [ForwardKinematics::new(&found.chain), ForwardKinematics::new(&arm.chain)];
@@ -228,7 +232,8 @@ fn a_profile_is_made_from_circles_and_can_be_planned_with() {
     fs::write(folder.path().join("circles.csv"), table(&case)).unwrap();
     // Of an arm of which nothing is known but its limits.
     let limits = "165, -110..110, -110..70, 160, 120, 180";
-    let new = ["profile", "new", "--circles", "circles.csv", "--name", "Unknown 1", "--limits", limits, "--out", "new.ron"];
+    let new =
+        ["profile", "new", "--circles", "circles.csv", "--name", "Unknown 1", "--limits", limits, "--out", "new.ron"];
     let (code, _, said) = run(folder.path(), &new);
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("beta2") && !said.contains("nominal"), "{said}");
@@ -247,12 +252,35 @@ fn a_profile_is_made_from_circles_and_can_be_planned_with() {
     let stands = Point3::from(case.truth.truth().base_from_tracker.translation.vector);
     let off = horizontal(profile.tracker().position_in_base) - horizontal(stands);
     assert!(off.abs() < 0.01, "{off}");
-    let plan = ["plan", "--profile", "new.ron", "--poses", "20", "--verification", "0", "--candidates", "200", "--out", "plan.csv"];
+    let plan = [
+        "plan",
+        "--profile",
+        "new.ron",
+        "--poses",
+        "20",
+        "--verification",
+        "0",
+        "--candidates",
+        "200",
+        "--out",
+        "plan.csv",
+    ];
     let (code, _, said) = run(folder.path(), &plan);
     assert_eq!(code, 0, "{said}");
 
     // Compared with the data sheet.
-    let new = ["profile", "new", "--circles", "circles.csv", "--compare", "abb_irb120", "--sigma-mm", "0.01", "--out", "better.ron"];
+    let new = [
+        "profile",
+        "new",
+        "--circles",
+        "circles.csv",
+        "--compare",
+        "abb_irb120",
+        "--sigma-mm",
+        "0.01",
+        "--out",
+        "better.ron",
+    ];
     let (code, _, said) = run(folder.path(), &new);
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("nominal") && said.contains("difference") && !said.contains("WARNING"), "{said}");
@@ -280,7 +308,20 @@ fn tables_of_circles_that_cannot_be_used_are_refused() {
 fn a_profile_is_made_from_seven_dimensions() {
     let folder = tempfile::tempdir().unwrap();
     let limits = "165, -110..110, -110..70, 160, 120, 400";
-    let sheet = ["profile", "new", "--data-sheet", "abb", "--name", "My ABB", "--base", "290", "--shoulder", "0", "--upper-arm", "270"];
+    let sheet = [
+        "profile",
+        "new",
+        "--data-sheet",
+        "abb",
+        "--name",
+        "My ABB",
+        "--base",
+        "290",
+        "--shoulder",
+        "0",
+        "--upper-arm",
+        "270",
+    ];
     let rest = ["--elbow", "70", "--forearm", "302", "--flange", "72", "--limits", limits];
     let with = |more: &[&'static str]| [&sheet[..], &rest[..], more].concat();
     let (code, out, said) = run(folder.path(), &with(&["--pendant", "374,0,630", "--out", "my.ron"]));

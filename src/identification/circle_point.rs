@@ -22,8 +22,8 @@ mod whole_arm;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use thiserror::Error;
 
-pub use whole_arm::{JointMotion, MeasuredArm, MeasuredConstant, Template, WholeArmError, measure_arm};
 pub use circle::{CircleFit, CircleResidual, CircleUncertainty, SHORTEST_ARC, SMALLEST_RADIUS, fit_circle};
+pub use whole_arm::{JointMotion, MeasuredArm, MeasuredConstant, Template, WholeArmError, measure_arm};
 
 use crate::kinematics::{ForwardKinematics, FreeParameter, JointType, KinematicChain};
 use crate::units::{DEGREE, MICROMETRE, to_deg, to_mm};

@@ -237,7 +237,8 @@ fn joint<'a>(tree: &'a Ast, name: &str) -> Result<&'a Ast, String> {
         Some(Node::List(joints)) => joints.as_slice(),
         _ => &[],
     };
-    let named = |joint: &&Ast| matches!(field(joint, "name").map(|name| &name.node), Some(Node::Text(own)) if own == name);
+    let named =
+        |joint: &&Ast| matches!(field(joint, "name").map(|name| &name.node), Some(Node::Text(own)) if own == name);
     joints.iter().find(named).ok_or_else(|| {
         let names: Vec<&str> = joints
             .iter()
@@ -284,7 +285,9 @@ pub fn limits_as_text(limits: &BTreeMap<String, (f64, f64)>) -> String {
 /// # Errors
 /// What is wrong, in words.
 pub fn boxes_from_text(text: &str) -> Result<Vec<BoxText>, String> {
-    let wrong = |part: &str| format!("'{}' is no box: write a name and two corners, such as table 300 -500 0 900 500 400", printable(part));
+    let wrong = |part: &str| {
+        format!("'{}' is no box: write a name and two corners, such as table 300 -500 0 900 500 400", printable(part))
+    };
     let parts = text.split(';').map(str::trim).filter(|part| !part.is_empty());
     let one = |part: &str| {
         let words: Vec<&str> = part.split([' ', ',']).filter(|word| !word.is_empty()).collect();

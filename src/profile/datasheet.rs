@@ -116,7 +116,9 @@ impl Dimension {
             Self::Base => "mounting face to axis 2, upwards",
             Self::Shoulder => "axis 1 to axis 2, forwards",
             Self::UpperArm => "axis 2 to axis 3",
-            Self::Elbow => "axis 3 to axis 4, across the forearm: above axis 3 while the forearm points forwards is positive",
+            Self::Elbow => {
+                "axis 3 to axis 4, across the forearm: above axis 3 while the forearm points forwards is positive"
+            }
             Self::Forearm => "axis 3 to the middle of the wrist, along the forearm",
             Self::Flange => "middle of the wrist to the face of the flange",
             Self::Side => "axis 1 to the forearm, sideways; 0 for most arms",
@@ -283,7 +285,10 @@ impl Datasheet {
         );
         if self.maker.counts_from_axis_2() {
             let height = self.dimension(Dimension::Base);
-            _ = writeln!(text, "    // The controller counts z from axis 2.\n    controller_world: (xyz_mm: (0.0, 0.0, {height:?})),");
+            _ = writeln!(
+                text,
+                "    // The controller counts z from axis 2.\n    controller_world: (xyz_mm: (0.0, 0.0, {height:?})),"
+            );
         }
         text.push_str("    joints: [\n");
         let letter = self.maker.letter();
@@ -360,7 +365,8 @@ impl Datasheet {
             let moved = self.with(dimension, value + 1.0).flange_at_zero()?;
             let per_mm: Vec<f64> = moved.iter().zip(here).map(|(moved, here)| moved - here).collect();
             let square: f64 = per_mm.iter().map(|part| part * part).sum();
-            let along: f64 = per_mm.iter().zip(pendant_mm).zip(here).map(|((part, there), here)| part * (there - here)).sum();
+            let along: f64 =
+                per_mm.iter().zip(pendant_mm).zip(here).map(|((part, there), here)| part * (there - here)).sum();
             if square < 1e-9 {
                 continue;
             }
@@ -485,9 +491,17 @@ mod tests {
         };
         assert!(causes([374.3, 0.0, 629.8]).is_empty());
         assert_eq!(causes([644.0, 0.0, 360.0]), ["the zero position of kuka"]);
-        assert!(causes([374.0, 0.0, 340.0]).contains(&"a pendant that counts z from the other place: mounting face or axis 2".to_owned()));
-        assert_eq!(causes([412.0, 0.0, 630.0]), ["a shoulder offset of 38 mm", "a forearm of 340 mm", "a flange of 110 mm"]);
-        assert!(matches!(abb.compared([1.0, 2.0, 3.0]).unwrap(), Agreement::Differs { causes, .. } if causes.is_empty()));
+        assert!(
+            causes([374.0, 0.0, 340.0])
+                .contains(&"a pendant that counts z from the other place: mounting face or axis 2".to_owned())
+        );
+        assert_eq!(
+            causes([412.0, 0.0, 630.0]),
+            ["a shoulder offset of 38 mm", "a forearm of 340 mm", "a flange of 110 mm"]
+        );
+        assert!(
+            matches!(abb.compared([1.0, 2.0, 3.0]).unwrap(), Agreement::Differs { causes, .. } if causes.is_empty())
+        );
     }
 
     #[test]

@@ -94,7 +94,9 @@ impl Dialog {
     pub fn rows_above(&self) -> Option<u16> {
         match self {
             Self::Text { field, .. } if field.is_checked() => Some(LINES_OF_COORDINATES),
-            Self::Text { .. } | Self::Confirm { .. } | Self::Number { .. } | Self::Choice { .. } | Self::Form(_) => None,
+            Self::Text { .. } | Self::Confirm { .. } | Self::Number { .. } | Self::Choice { .. } | Self::Form(_) => {
+                None
+            }
         }
     }
 

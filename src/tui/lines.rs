@@ -103,7 +103,10 @@ impl Asking {
     fn question(&self) -> Vec<String> {
         match self {
             Self::Ways => {
-                let ways = ways().iter().zip(1..).map(|((way, about), number): (_, usize)| format!("{number:5}  {way}: {about}"));
+                let ways = ways()
+                    .iter()
+                    .zip(1..)
+                    .map(|((way, about), number): (_, usize)| format!("{number:5}  {way}: {about}"));
                 ways.chain(["number".to_owned()]).collect()
             }
             Self::Dialog(dialog, number) => dialog.question(*number).unwrap_or_default(),
@@ -225,7 +228,8 @@ impl<W: Write> Driver<'_, W> {
                     self.say(&format!("not yet: {remark}"))?;
                 }
                 let question = asking.question();
-                let (last, before) = question.split_last().map_or(("", &[][..]), |(last, before)| (last.as_str(), before));
+                let (last, before) =
+                    question.split_last().map_or(("", &[][..]), |(last, before)| (last.as_str(), before));
                 for line in before {
                     self.say(line)?;
                 }
@@ -291,7 +295,9 @@ fn page(view: &ViewModel, has_all: bool) -> Vec<String> {
         let mark = if offer.is_default { "   <- next" } else { "" };
         format!("{number:3}  {}{mark}", offer.label)
     }));
-    lines.push("Type a number. An empty line shows this again, 'all' without cutting, 'cancel' leaves a question.".to_owned());
+    lines.push(
+        "Type a number. An empty line shows this again, 'all' without cutting, 'cancel' leaves a question.".to_owned(),
+    );
     lines
 }
 

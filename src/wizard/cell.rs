@@ -52,7 +52,8 @@ impl KnownCells {
             Err(reason) => {
                 self.tried = Some(cell);
                 vec![Action::Say(
-                    Notice::error(format!("this cell cannot be used: {reason}")).hint("what was typed is kept for correction"),
+                    Notice::error(format!("this cell cannot be used: {reason}"))
+                        .hint("what was typed is kept for correction"),
                 )]
             }
         }

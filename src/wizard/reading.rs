@@ -98,7 +98,9 @@ pub fn parse_all(text: &str, unit: CoordinateUnit) -> Result<Vec<Point3<f64>>, S
     for (line, number) in lines.iter().zip(1..) {
         let named = || {
             let (name, rest) = line.split_once([' ', '\t', ',', ';'])?;
-            name.contains(char::is_alphabetic).then(|| parse(rest.trim_start_matches([' ', ',', ';']), unit).ok()).flatten()
+            name.contains(char::is_alphabetic)
+                .then(|| parse(rest.trim_start_matches([' ', ',', ';']), unit).ok())
+                .flatten()
         };
         match parse(line, unit) {
             Ok(point) => points.push(point),

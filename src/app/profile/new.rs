@@ -70,7 +70,9 @@ fn data_sheet<O: Write, E: Write>(
     let read = |text: &str| text.parse::<Limits>().map_err(|error| error.to_string());
     let limits_deg = match &args.limits {
         Some(text) => read(text).map_err(|error| Failure::new(ExitStatus::Usage, error))?,
-        None => asked("limits of the six joints (deg), such as 165, -110..110, -110..70, 160, 120, 400", console, read)?,
+        None => {
+            asked("limits of the six joints (deg), such as 165, -110..110, -110..70, 160, 120, 400", console, read)?
+        }
     };
     let name = match &args.name {
         Some(name) => name.clone(),
@@ -191,8 +193,7 @@ fn first_profile(arm: &MeasuredArm, types: &[JointType], args: &NewProfileArgs) 
     }
     let name = args.name.as_deref().unwrap_or("measured");
     let heading = Heading { comments: &[], name, title: name, source: "measured" };
-    let part =
-        Arm { chain: &arm.chain, ranges: &ranges, beta_joints: &arm.beta_joints, masses: &Masses::Unknown };
+    let part = Arm { chain: &arm.chain, ranges: &ranges, beta_joints: &arm.beta_joints, masses: &Masses::Unknown };
     Ok(load::parse_profile(geometry_only(&heading, &part), "the measured profile")?.profile)
 }
 
@@ -209,8 +210,10 @@ fn written(profile: &Profile, arm: &MeasuredArm, name: Option<&str>, file: &str)
     let placed = profile.with_tracker_at(tracker).with_target(0, target);
     let targets = placed.targets().to_vec();
     let comments = [
-        "Link constants from circles: each joint was moved in turn, and the axes of the circles give the constants.".to_owned(),
-        "Not measured: d and theta of the first link, all constants of the last one, and d between parallel axes.".to_owned(),
+        "Link constants from circles: each joint was moved in turn, and the axes of the circles give the constants."
+            .to_owned(),
+        "Not measured: d and theta of the first link, all constants of the last one, and d between parallel axes."
+            .to_owned(),
     ];
     let heading = Heading {
         comments: &comments,

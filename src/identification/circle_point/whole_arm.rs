@@ -444,7 +444,8 @@ impl Setting<'_> {
             let total = between(&in_frame, choice, nominal.theta + turned, nominal.d + slid);
             if is_sliding && choice.keeps_theta {
                 let foot = in_frame.at_height(total.d);
-                let wanted = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), total.theta) * Vector3::x() * nominal.a;
+                let wanted =
+                    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), total.theta) * Vector3::x() * nominal.a;
                 missed.push((index, frame * Vector3::new(foot.x - wanted.x, foot.y - wanted.y, 0.0)));
             }
             if index == 0 {
@@ -482,8 +483,8 @@ impl Setting<'_> {
         for (index, choice) in choices.iter().enumerate() {
             // The place of an axis along which the arm slides is arbitrary.
             let slides = self.template.joint_type(index) == JointType::Prismatic;
-            let is_arbitrary = (index + 1..self.joints())
-                .all(|later| self.template.joint_type(later) == JointType::Prismatic);
+            let is_arbitrary =
+                (index + 1..self.joints()).all(|later| self.template.joint_type(later) == JointType::Prismatic);
             let mut add = |parameter, is_shown: bool| {
                 if is_shown {
                     shown.push((index, parameter));
@@ -524,7 +525,8 @@ impl Setting<'_> {
                 }
                 let changed = self.solve(&axes, &points, choices)?;
                 let by_constant = shown.iter().map(|(link, parameter)| {
-                    let value = |solution: &Solution| solution.links.get(*link).map_or(0.0, |link| link.value(*parameter));
+                    let value =
+                        |solution: &Solution| solution.links.get(*link).map_or(0.0, |link| link.value(*parameter));
                     value(&changed) - value(at)
                 });
                 let by_point = (0..3).map(|axis| changed.point_in_flange[axis] - at.point_in_flange[axis]);

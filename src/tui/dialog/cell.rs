@@ -90,7 +90,11 @@ pub(super) fn data_sheet(known: &Datasheet) -> Dialog {
         form = form.text(dimension.label(), &shown, dimension.about());
     }
     let limits = if known.name.is_empty() { String::new() } else { known.limits_deg.to_string() };
-    Dialog::Form(form.text("limits (deg)", &limits, "Of the six joints: 165 is -165 to 165, so: 165, -110..110, -110..70, 160, 120, 400"))
+    Dialog::Form(form.text(
+        "limits (deg)",
+        &limits,
+        "Of the six joints: 165 is -165 to 165, so: 165, -110..110, -110..70, 160, 120, 400",
+    ))
 }
 
 fn sheet(values: &[String]) -> Result<Intent, String> {

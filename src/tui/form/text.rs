@@ -229,7 +229,8 @@ mod tests {
 
     #[test]
     fn a_wrong_text_is_not_accepted() {
-        let check: Validator = |text| if text.is_empty() { Err("write something".to_owned()) } else { Ok(text.to_uppercase()) };
+        let check: Validator =
+            |text| if text.is_empty() { Err("write something".to_owned()) } else { Ok(text.to_uppercase()) };
         let mut field = TextField::new("note", "").checked(check);
         assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Changed);
         assert_eq!(field.problem().as_deref(), Some("write something"));

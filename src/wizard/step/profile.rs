@@ -72,7 +72,8 @@ impl StepMachine for ProfileStep {
         let mut intents = vec![
             IntentInfo::new(Intent::Next, "use this robot").unless(none).default_action(),
             IntentInfo::new(Intent::ChooseProfile(first), "choose a robot").unless(fixed.clone()),
-            IntentInfo::new(Intent::DescribeRobot(Box::new(self.sheet.clone())), "robot from a data sheet").unless(fixed),
+            IntentInfo::new(Intent::DescribeRobot(Box::new(self.sheet.clone())), "robot from a data sheet")
+                .unless(fixed),
             IntentInfo::new(Intent::NameSession(proposal), "name the session").unless(named),
         ];
         intents.extend(sessions);

@@ -18,7 +18,14 @@ fn states(bench: &Bench) -> Vec<RowState> {
 
 /// Points of rows of the plan as they are pasted.
 fn pasted(bench: &Bench, rows: std::ops::Range<usize>) -> String {
-    let rows = bench.wizard.session().rows.iter().filter(|row| row.planned.kind.is_measured()).skip(rows.start).take(rows.len());
+    let rows = bench
+        .wizard
+        .session()
+        .rows
+        .iter()
+        .filter(|row| row.planned.kind.is_measured())
+        .skip(rows.start)
+        .take(rows.len());
     let line = |row: &Row| {
         let point = seen_at(&row.planned.configuration) * 1e3;
         format!("P, {:.6}, {:.6}, {:.6}\n", point.x, point.y, point.z)

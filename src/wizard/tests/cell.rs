@@ -88,7 +88,11 @@ fn limits_set_after_the_result_are_evaluated_at_once_and_said() {
     let session = bench.wizard.session();
     assert!(session.limits_set.unwrap().after_result && session.is_current());
     assert_eq!(session.samples, samples);
-    assert_eq!(session.robot.as_ref().unwrap().profile.tracker().position_in_base, place, "the tracker stood where it stood");
+    assert_eq!(
+        session.robot.as_ref().unwrap().profile.tracker().position_in_base,
+        place,
+        "the tracker stood where it stood"
+    );
     let Content::Verify(view) = bench.wizard.view().content else { panic!() };
     let verdict = format!("{:?}", view.verdict.unwrap());
     assert!(verdict.contains("0.0001"), "{verdict}");

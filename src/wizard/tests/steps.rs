@@ -15,7 +15,10 @@ fn text(name: &str) -> String {
 #[test]
 fn profile_begins_with_nothing_chosen() {
     let mut bench = Bench::new();
-    assert_eq!(offers(&bench.wizard), ["Next -- choose a robot first", "ChooseProfile", "DescribeRobot", "NameSession", "Quit"]);
+    assert_eq!(
+        offers(&bench.wizard),
+        ["Next -- choose a robot first", "ChooseProfile", "DescribeRobot", "NameSession", "Quit"]
+    );
     let view = bench.wizard.view();
     assert_eq!((view.header.step, view.header.number, view.header.steps), (Step::Profile, 1, 8));
     assert_eq!((view.header.folder, view.header.session, view.header.saved_entries), (None, None, 0));

@@ -14,8 +14,7 @@ pub(super) fn motion(
     variables: &[Vec<f64>],
     points: &[Point3<f64>],
 ) -> Result<(Axis, JointMotion), WholeArmError> {
-    let values: Vec<f64> =
-        series.of(variables).iter().filter_map(|row| row.get(series.joint)).copied().collect();
+    let values: Vec<f64> = series.of(variables).iter().filter_map(|row| row.get(series.joint)).copied().collect();
     let points = series.of(points);
     match template.joint_type(series.joint) {
         JointType::Revolute => circle(template, series.joint, &values, points),
@@ -29,8 +28,7 @@ fn circle(
     values: &[f64],
     points: &[Point3<f64>],
 ) -> Result<(Axis, JointMotion), WholeArmError> {
-    let fit =
-        fit_circle(points, None).map_err(|error| WholeArmError::Circle { joint: template.name(joint), error })?;
+    let fit = fit_circle(points, None).map_err(|error| WholeArmError::Circle { joint: template.name(joint), error })?;
     let normal = fit.normal.into_inner() * if turns_with(&fit, points, values) { 1.0 } else { -1.0 };
     let motion = JointMotion {
         joint,

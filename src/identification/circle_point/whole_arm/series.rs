@@ -71,7 +71,11 @@ pub(super) fn series(template: &Template, variables: &[Vec<f64>]) -> Result<Vec<
 }
 
 /// The common value of each joint while those after it move. The last one needs none.
-pub(super) fn reference(template: &Template, variables: &[Vec<f64>], series: &[Series]) -> Result<Vec<f64>, WholeArmError> {
+pub(super) fn reference(
+    template: &Template,
+    variables: &[Vec<f64>],
+    series: &[Series],
+) -> Result<Vec<f64>, WholeArmError> {
     let first_row = |series: &Series| series.of(variables).first().cloned().unwrap_or_default();
     let Some(last) = series.last() else { return Ok(Vec::new()) };
     let reference = first_row(last);

@@ -7,9 +7,8 @@ use crate::session::set_up::Step;
 use crate::tui::dialog::DialogOutcome;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
-    DriftView, FindingView, JointShown, LivePoint, LiveView, MeasuredRow, MoveCheck, PairView, PredictionView, RowState,
-    RowView,
-    SampleView,
+    DriftView, FindingView, JointShown, LivePoint, LiveView, MeasuredRow, MoveCheck, PairView, PredictionView,
+    RowState, RowView, SampleView,
 };
 use crate::wizard::{IntentInfo, Notice};
 

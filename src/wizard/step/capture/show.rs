@@ -7,7 +7,8 @@ use crate::session::state::{Sample, SampleState, Session};
 use crate::units::to_mm;
 use crate::wizard::step::Cx;
 use crate::wizard::view::{
-    CaptureView, DriftView, FindingView, JointShown, MeasuredRow, PairView, PredictionView, RowState, RowView, SampleView,
+    CaptureView, DriftView, FindingView, JointShown, MeasuredRow, PairView, PredictionView, RowState, RowView,
+    SampleView,
 };
 
 /// The view of a capture step.
