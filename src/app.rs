@@ -6,6 +6,7 @@ mod constraints;
 mod export;
 mod identify;
 mod identity;
+mod import;
 mod iso9283;
 mod link;
 mod load;
@@ -107,6 +108,7 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         }
         Command::Replay(args) => replay::run(&args, console),
         Command::Session(command) => session::run(&command, console),
+        Command::Import(args) => import::run(&args, console),
         Command::Identify(args) => identify::run(&args, console),
         Command::Verify(args) => verify::run(&args, console),
         Command::Constraints(args) => constraints::run(&args, console),

@@ -1,6 +1,7 @@
 //! Arguments of the command line.
 
 mod identity;
+mod import;
 mod link;
 mod payload;
 mod profile;
@@ -26,12 +27,12 @@ use crate::planning::{BoxInBase, Objective};
 use crate::procedure::plan::PlanRequest;
 use crate::profile::{ExpectedDeviation, Level};
 use crate::program::{Dialect, MAX_SPEED};
-use crate::session::measurements::Layout;
 use crate::session::summary::Refit;
 use crate::units::{from_mm, to_mm};
 
 pub use identity::IdentityArgs;
 use link::wires;
+pub use import::ImportArgs;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
 pub use payload::PayloadArgs;
 use profile::NEW_EXAMPLES;
@@ -56,6 +57,7 @@ Step by step:
   profile      List, show, write or check robot profiles
   plan         Plan which poses to measure, and in which order
   program      Write a robot program that visits the poses of a plan
+  import       Read measured points from tables of other programs
   identify     Identify the kinematic errors of a robot from measured points
   constraints  The same from direct distances, without coordinates
   verify       Verify a calibration on other measured points
@@ -231,6 +233,11 @@ pub struct ReplayArgs {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Read measured points from tables of other programs, and show what was understood
+    #[command(
+        after_help = "Examples:\n  trupose import points.txt --profile ur10e --out points.csv\n  trupose import points.txt --profile ur10e --columns 'q1_deg=A1, …, x_mm=X, …' --save-layout faro --out points.csv\n  trupose import --joints joints.txt --points points.txt --units deg,mm --profile ur10e --out points.csv"
+    )]
+    Import(ImportArgs),
     /// Identify the kinematic errors of a robot from measured points
     #[command(after_help = "Example:\n  trupose identify --profile ur10e --measurements points.csv --out results")]
     Identify(IdentifyArgs),
@@ -327,6 +334,11 @@ pub enum ProfileCommand {
     New(Box<NewProfileArgs>),
     /// Make a profile from the serial chain of a URDF
     ImportUrdf(compensate::ImportUrdfArgs),
+    /// Make a profile from the factory calibration of a Universal Robots arm
+    #[command(
+        after_help = "Example:\n  trupose profile import-ur calibration.conf --model ur10e --out my-ur10e.ron"
+    )]
+    ImportUr(compensate::ImportUrArgs),
 }
 
 /// Options of the identification, shared by all commands that identify.
@@ -388,9 +400,9 @@ pub struct IdentifyArgs {
     /// Measured points: CSV with units in the column names
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
-    /// Layout of the tables
-    #[arg(long, value_parser = one_of::<Layout>(Layout::NAMES), ignore_case = true, default_value_t)]
-    pub layout: Layout,
+    /// Layout of the tables: 'named', 'robodk', 'delmia', or one that 'import' saved
+    #[arg(long, value_name = "NAME", default_value = "named")]
+    pub layout: String,
     /// Verify on the points of another file measured in the same set-up
     #[arg(long, value_name = "CSV", conflicts_with = "verify_rest")]
     pub verify: Option<PathBuf>,
@@ -414,9 +426,9 @@ pub struct VerifyArgs {
     /// Measured points: CSV with units in the column names
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
-    /// Layout of the table
-    #[arg(long, value_parser = one_of::<Layout>(Layout::NAMES), ignore_case = true, default_value_t)]
-    pub layout: Layout,
+    /// Layout of the table: 'named', 'robodk', 'delmia', or one that 'import' saved
+    #[arg(long, value_name = "NAME", default_value = "named")]
+    pub layout: String,
     /// Rows to verify on, such as 'pose < 20'
     #[arg(long = "use", value_name = "CONDITION")]
     pub filter: Option<String>,

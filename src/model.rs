@@ -5,21 +5,25 @@
 
 mod corrections;
 mod export;
+mod factory;
 mod import;
 mod profile_text;
 pub mod proof;
 mod tables;
 mod transforms;
 mod urdf;
+mod urdf_text;
 mod urdf_write;
 
 use thiserror::Error;
 
 pub use export::{CalibratedArm, Export, ExportOptions, Format, GivenUrdf, export};
-pub use import::{ImportedArm, import};
+pub use factory::{FactoryArm, read_factory};
+pub use import::{Coupling, ImportedArm, import, import_coupled};
 pub use profile_text::{Arm, Heading, complete, geometry_only};
 pub use transforms::{from_roll_pitch_yaw, link_values, roll_pitch_yaw};
 pub use urdf::{Urdf, UrdfChain, UrdfError, UrdfJoint, UrdfJointType};
+pub use urdf_text::decode_xml;
 pub use urdf_write::fresh as urdf_text;
 
 use crate::kinematics::KinematicsError;

@@ -30,6 +30,7 @@ mod table;
 pub mod targets;
 mod warning;
 pub mod wire;
+pub mod workbook;
 
 pub use table::{Defect, TableErrors, TableProblem};
 

@@ -9,6 +9,8 @@ use std::f64::consts::PI;
 pub const MILLIMETRE: f64 = 1e-3;
 /// One micrometre (m).
 pub const MICROMETRE: f64 = 1e-6;
+/// One centimetre (m).
+pub const CENTIMETRE: f64 = 1e-2;
 /// One inch (m), exact (ISO 31-1).
 pub const INCH: f64 = 25.4e-3;
 /// One degree (rad).

@@ -9,6 +9,7 @@
 )]
 
 mod support;
+mod table_import;
 
 mod architecture;
 mod cartesian;

@@ -9,10 +9,10 @@ use rand_chacha::ChaCha8Rng;
 use trupose::kinematics::{Arm as KinematicArm, Convention, ForwardKinematics, KinematicChain, ParameterId};
 use trupose::model::proof::{self, configurations, prove};
 use trupose::model::{
-    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, complete, export,
-    geometry_only, import, link_values, urdf_text,
+    Arm, CalibratedArm, Coupling, ExportOptions, Format, GivenUrdf, Heading, ImportedArm, ModelError, Urdf, complete,
+    export, geometry_only, import, import_coupled, link_values, read_factory, urdf_text,
 };
-use trupose::profile::{Level, Profile, builtin, builtin_names};
+use trupose::profile::{Level, Masses, Profile, builtin, builtin_names};
 use trupose::session::summary::JointErrorSummary;
 use trupose::units::{MICRORADIAN, to_deg, to_mm};
 
@@ -207,15 +207,21 @@ fn what_is_no_serial_chain_is_refused_with_its_place() {
     for (text, expected) in [
         ("<robot><link", "line 1, column"),
         ("<sdf/>", "line 1: <sdf>: a URDF begins with <robot>"),
-        ("<robot><link name='a'/>\n<link name='a'/></robot>", "line 2: link 'a': the link of line 1 has the same name"),
-        ("<robot name='r'><link/></robot>", "line 1: <link>: has no attribute 'name'"),
+        (
+            &joint("").replace("<link name='b'/>", "<link name='b'/>\n<link name='b'/>"),
+            "line 2: link 'b': the link of line 1 has the same name",
+        ),
         (
             "<robot xmlns:xacro='http://www.ros.org/wiki/xacro'>\n<xacro:arm/></robot>",
             "line 2: <xacro:arm>: this is xacro, not URDF; expand it first",
         ),
         (
-            "<robot>\n<joint name='j' type='fixed'><parent link='x'/><child link='b'/></joint></robot>",
-            "line 2: <parent> of joint 'j': there is no link 'x'",
+            &joint("").replace("parent link='a'", "parent link='x'"),
+            "links 'a' and 'b' are not connected; line 3: <parent> of joint 'j': there is no link 'x'",
+        ),
+        (
+            &joint("\n<origin rpy='0 1 ${pi/2}'/>"),
+            "line 4: <origin> of joint 'j': attribute 'rpy' has '${pi/2}', which is not a number; it is xacro: expand it first",
         ),
         (
             &joint("\n<origin xyz='0 1'/>"),
@@ -226,10 +232,9 @@ fn what_is_no_serial_chain_is_refused_with_its_place() {
             "line 4: <origin> of joint 'j': attribute 'rpy' has 'x', which is not a number",
         ),
         (&joint("<axis xyz='0 0 0'/>"), "line 2: <axis> of joint 'j': it has no direction"),
-        (&joint("\n<limit lower='1' upper='-1'/>"), "line 4: <limit> of joint 'j': lower 1 is above upper -1"),
         (&joint("\n<origin/>\n<origin/>"), "line 5: <origin> of joint 'j': the joint has two of them"),
     ] {
-        let message = Urdf::parse(text).unwrap_err().to_string();
+        let message = refusal(text, "a", "b");
         assert!(message.starts_with(expected), "{message}\nexpected {expected}");
     }
     let floating = joint("").replace("revolute", "floating");
@@ -240,8 +245,198 @@ fn what_is_no_serial_chain_is_refused_with_its_place() {
     assert!(Urdf::parse(ring).unwrap().chain("a", "b").unwrap_err().to_string().contains("part of a ring"));
     let two = "<robot><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>\n\
         <joint name='k' type='fixed'><parent link='a'/><child link='b'/></joint></robot>";
-    let message = Urdf::parse(two).unwrap_err().to_string();
+    let message = refusal(two, "a", "b");
     assert!(message.starts_with("line 2: joint 'k': link 'b' already hangs on joint 'j' (line 1)"), "{message}");
+}
+
+/// Why there is no chain between two links.
+fn refusal(text: &str, base: &str, tip: &str) -> String {
+    match Urdf::parse(text) {
+        Ok(urdf) => urdf.chain(base, tip).unwrap_err().to_string(),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// What has no effect on the chain is no reason to refuse it.
+#[test]
+fn defects_elsewhere_do_not_matter() {
+    let arm = |inside: &str, outside: &str| {
+        format!(
+            "<robot name='r'><link name='a'/><link name='b'/><link name='c'/>{outside}\
+            <joint name='j' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0.1 0.2 0.3' rpy='0.4 0.5 0.6'/><axis xyz='0 1 0'/>{inside}</joint>\
+            <joint name='end' type='fixed'><parent link='b'/><child link='c'/><origin xyz='0 0 1'/><axis xyz='0 0 0'/><limit lower='3' upper='1'/></joint></robot>"
+        )
+    };
+    let pose = |text: &str| {
+        let urdf = Urdf::parse(text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let chain = urdf.chain("a", "c").unwrap_or_else(|error| panic!("{error}\n{text}"));
+        (chain.base_from_tip(&[0.7]), import(&chain, Convention::Standard).unwrap().notes)
+    };
+    let limit = "<limit lower='-1' upper='1'/>";
+    let (expected, notes) = pose(&arm(limit, ""));
+    assert!(notes.is_empty(), "{notes:?}");
+    let joint = |inside: &str| format!("<link name='g'/><joint name='f' type='prismatic'><parent link='c'/><child link='g'/>{inside}</joint>");
+    for text in [
+        arm(limit, &joint("<axis xyz='0 0 0'/>")),
+        arm(limit, &joint("<axis xyz='0 0 x'/>")),
+        arm(limit, &joint("<limit lower='2' upper='1'/>")),
+        arm(limit, &joint("<origin xyz='1 2'/>")),
+        arm(limit, &joint("<origin/><origin/>")),
+        arm(limit, &joint("").replace("name='f'", "name='j'")),
+        arm(limit, &joint("").replace("link='c'", "link='nowhere'")),
+        arm(limit, &joint("").replace("type='prismatic'", "")),
+        arm(limit, "<link/><joint/><link name='g'/><link name='g'/>"),
+        arm(limit, "<link name='g'><inertial/></link>"),
+        format!("\n\n<?xml version='1.0'?>\n{}", arm(limit, "")),
+        format!("<?xml version='1.0'?><!DOCTYPE robot [<!ENTITY h '0.3'>]>{}", arm(limit, "").replace("0.2 0.3'", "0.2 &h;'")),
+    ] {
+        let (found, notes) = pose(&text);
+        assert!(differs(&found, &expected) < 1e-15 && notes.is_empty(), "{notes:?}\n{text}");
+    }
+    // Limits are not geometry either: without usable ones the joint has none.
+    for (inside, note) in [
+        ("<limit lower='-inf' upper='inf' velocity='inf'/>", "has no usable <limit>"),
+        ("<limit lower='1' upper='-1'/>", "lower 1 is above upper -1, taken as no limits"),
+        ("<limit lower='${low}' upper='1'/>", "lower '${low}' is not a number and is left out; it is xacro: expand it first"),
+    ] {
+        let (found, notes) = pose(&arm(inside, ""));
+        assert!(differs(&found, &expected) < 1e-15 && notes.iter().any(|said| said.contains(note)), "{notes:?}");
+    }
+    // A mass of the arm that cannot be read: the geometry without masses.
+    let heavy = arm(limit, "").replace("<link name='b'/>", "<link name='b'><inertial><mass value='x'/></inertial></link>");
+    let (found, notes) = pose(&heavy);
+    assert!(differs(&found, &expected) < 1e-15 && notes[0].starts_with("no masses are taken: line 1: <mass> of link 'b'"), "{notes:?}");
+}
+
+#[test]
+fn rounded_angles_are_pointed_out() {
+    let said = |angle: &str| {
+        let text = format!(
+            "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='revolute'><parent link='a'/><child link='b'/>\
+            <origin rpy='{angle} 0 0'/><limit lower='-1' upper='1'/></joint></robot>"
+        );
+        let urdf = Urdf::parse(&text).unwrap();
+        import(&urdf.chain("a", "b").unwrap(), Convention::Standard).unwrap().notes
+    };
+    for (angle, meant) in [("1.57", "89.9544 deg; if 90 deg is meant, write 1.5707963267948966"), ("3.141", "if 180 deg"), ("-0.785", "if -45 deg")] {
+        let notes = said(angle);
+        assert!(notes.len() == 1 && notes[0].contains(meant), "{notes:?}");
+    }
+    for angle in ["1.5707963", "1.5708", "0", "0.3", "1.5", "1.56"] {
+        assert_eq!(said(angle), Vec::<String>::new(), "{angle}");
+    }
+}
+
+/// A FANUC through a URDF, whose joints turn one link against the one before, counts like the pendant again.
+#[test]
+fn a_coupling_makes_pendant_values_of_joint_values() {
+    let profile = profile("fanuc_lrmate200id");
+    let chain = profile.chain();
+    let coupled: Vec<(usize, &trupose::kinematics::Joint)> =
+        chain.joints().iter().enumerate().filter(|(_, joint)| joint.coupling.iter().any(|factor| *factor != 0.0)).collect();
+    let [(index, joint)] = coupled.as_slice() else { panic!("one coupled joint") };
+    let other = joint.coupling.iter().position(|factor| *factor != 0.0).unwrap();
+    let text = urdf_text("fanuc", &[], chain, profile.joints()).unwrap();
+    let urdf = Urdf::parse(&text).unwrap();
+    let way = urdf.chain("base", "flange").unwrap();
+    // In a URDF both joints turn with the signs of the pendant.
+    let sign = if joint.coupling[other] > 0.0 { "" } else { "-" };
+    let option = format!("{}={sign}{}", joint.name, chain.joints()[other].name);
+    let arm = import_coupled(&way, Convention::Standard, &[option.parse().unwrap()]).unwrap();
+    assert!(arm.notes.iter().any(|note| note.contains(&format!("'{}' counts with another", chain.joints()[*index].name))));
+    let read = through_text(&arm);
+    let (ours, theirs) = (ForwardKinematics::new(&read), ForwardKinematics::new(chain));
+    for q in configurations(chain, &limits(&profile), 200) {
+        assert!(differs(&ours.base_from_flange(&q), &theirs.base_from_flange(&q)) < 1e-8);
+    }
+    let uncoupled = ForwardKinematics::new(&import(&way, Convention::Standard).unwrap().chain).base_from_flange(&[0.3; 6]);
+    assert!(differs(&uncoupled, &theirs.base_from_flange(&[0.3; 6])) > 0.05);
+    assert!("J3".parse::<Coupling>().is_err() && "J3=J3".parse::<Coupling>().is_err());
+    let unknown = import_coupled(&way, Convention::Standard, &["J3=J9".parse().unwrap()]).unwrap_err().to_string();
+    assert!(unknown.contains("there is no joint"), "{unknown}");
+}
+
+/// A rail and seven joints.
+#[test]
+fn a_rail_with_seven_joints_is_one_arm() {
+    let panda = profile("franka_panda");
+    let inner = urdf_text("panda", &[], panda.chain(), panda.joints()).unwrap();
+    let text = inner.replace(
+        "<link name=\"base\"/>",
+        "<link name=\"base\"/><link name=\"floor\"/><joint name=\"rail\" type=\"prismatic\"><parent link=\"floor\"/><child link=\"base\"/><origin xyz=\"0 0.5 0.2\" rpy=\"0 0 1.2\"/><axis xyz=\"1 0 0\"/><limit lower=\"-2\" upper=\"3\"/></joint>",
+    );
+    let urdf = Urdf::parse(&text).unwrap();
+    let way = urdf.chain("floor", "flange").unwrap();
+    for convention in BOTH {
+        let arm = import(&way, convention).unwrap();
+        let read = through_text(&arm);
+        assert_eq!(read.dof(), 8);
+        let fk = ForwardKinematics::new(&read);
+        for q in configurations(&read, &[Some((-2.0, 3.0))], 200) {
+            assert!(differs(&fk.base_from_flange(&q), &way.base_from_tip(&q)) < 1e-9);
+        }
+    }
+}
+
+/// The deviations of a controller of Universal Robots: the same arm as their plain constants, with sane ones.
+#[test]
+fn a_factory_calibration_is_the_nominal_arm() {
+    let profile = profile("ur5");
+    let theta = [1e-6, 0.178, 6.2, -0.09_f64, 6e-6, -5e-7];
+    let (a, alpha) = ([-2e-4, 3e-4, -1e-4, 1e-4, -2e-4, 0.0], [1e-3, 3.5e-4, -4e-4, 4e-4, -2e-3, 0.0]);
+    // Three nearly parallel axes: large d that nearly cancel.
+    let d = [9e-5, 12.062, 17.671, -29.733, -3e-5, 2e-4];
+    let list = |values: &[f64; 6]| values.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(", ");
+    let conf = |d: &[f64; 6], theta: &[f64; 6]| {
+        format!(
+            "[mounting]\ndelta_theta = [ {}]\ndelta_a = [{}]\ndelta_d = [ {}]\ndelta_alpha = [{}]\ncalibration_status = 2 # Linearised\n",
+            list(theta), list(&a), list(d), list(&alpha)
+        )
+    };
+    let plain = |d: &[f64; 6], theta: &[f64; 6]| {
+        let joints = profile.chain().joints().iter().enumerate().map(|(index, joint)| trupose::kinematics::Joint {
+            link: trupose::kinematics::Link {
+                theta: joint.link.theta + theta[index],
+                a: joint.link.a + a[index],
+                d: joint.link.d + d[index],
+                alpha: joint.link.alpha + alpha[index],
+                ..joint.link
+            },
+            ..joint.clone()
+        });
+        KinematicChain::new(Convention::Standard, *profile.chain().base(), joints.collect(), *profile.chain().flange()).unwrap()
+    };
+    // Large angles make another arm, which is refused; with the nominal ones it is this arm.
+    let refused = read_factory(&conf(&d, &theta), &profile).unwrap_err().to_string();
+    assert!(refused.contains("is that of another model"), "{refused}");
+    let (theta, d) = ([1e-6, 2e-4, -3e-4, 1e-4, 6e-6, -5e-7], [9e-5, 1.2062, 1.7671, -2.9733, -3e-5, 2e-4]);
+    let alpha_free = read_factory(&conf(&d, &theta), &profile).unwrap();
+    let meant = ForwardKinematics::new(&plain(&d, &theta)).base_from_flange(&[0.3, -1.0, 1.2, -0.4, 0.9, 2.0]);
+    let found = ForwardKinematics::new(&through_text(&alpha_free.arm)).base_from_flange(&[0.3, -1.0, 1.2, -0.4, 0.9, 2.0]);
+    assert!(differs(&found, &meant) < 1e-8);
+    assert!(alpha_free.arm.chain.joints().iter().all(|joint| joint.link.d.abs() < 0.2), "{}", table(&alpha_free.arm.chain));
+    assert_eq!(alpha_free.arm.beta_joints, profile.beta_joints());
+    assert!(alpha_free.moved > 1e-4 && alpha_free.moved < 0.05);
+
+    // Out again in the kinematics file of the ROS description, and in from it.
+    let mut arm = calibrated(&profile);
+    arm.geometry.chain = alpha_free.arm.chain.clone();
+    arm.identified = arm.geometry.clone();
+    let yaml = export(&arm, Format::UrKinematics, &ExportOptions { with_tool_offset: true, ..ExportOptions::default() }).unwrap().text;
+    let back = read_factory(&yaml, &profile).unwrap().arm.chain;
+    let (one, other) = (ForwardKinematics::new(&back), ForwardKinematics::new(&alpha_free.arm.chain));
+    for q in configurations(&back, &limits(&profile), 100) {
+        assert!(differs(&one.base_from_flange(&q), &other.base_from_flange(&q)) < 1e-8);
+    }
+    for (text, expected) in [
+        ("hello".to_owned(), "neither a 'calibration.conf'"),
+        (conf(&d, &theta).replace("delta_d", "delta_e"), "'delta_d' is missing"),
+        (conf(&d, &theta).replacen(", ", " ", 1), "'delta_theta' has something that is not a number"),
+        (yaml.replacen("    yaw", "    jaw", 1), "a link or a number is missing"),
+    ] {
+        let refused = read_factory(&text, &profile).unwrap_err().to_string();
+        assert!(refused.contains(expected), "{refused}");
+    }
 }
 
 #[test]
@@ -298,16 +493,22 @@ fn masses_of_a_urdf_arrive_at_the_same_places() {
             assert!(((frames[joint + 1] * found.centre).coords - place).norm() < 1e-9, "{convention:?} {joint}");
         }
     }
+    // The base does not move: its mass says nothing. That of a moving link is left out with the reason.
     for (wrong, message) in [
-        ("<inertial><mass value='-9'/>", "line 2: <mass> of link 'base': -9 kg is below zero"),
+        ("<inertial><mass value='-4'/>", "line 3: <mass> of link 'upper': -4 kg is below zero"),
         (
             "<inertial><mass value='x'/>",
-            "line 2: <mass> of link 'base': attribute 'value' has 'x', which is not a number",
+            "line 3: <mass> of link 'upper': attribute 'value' has 'x', which is not a number",
         ),
-        ("<inertial>", "line 2: <inertial> of link 'base': has no <mass>"),
+        ("<inertial>", "line 3: <inertial> of link 'upper': has no <mass>"),
     ] {
-        let error = Urdf::parse(&text.replacen("<inertial><mass value='9'/>", wrong, 1)).unwrap_err().to_string();
-        assert_eq!(error, message);
+        let given = "<inertial><origin xyz='0 0.1 0.2' rpy='1 2 3'/><mass value='4'/>";
+        let urdf = Urdf::parse(&text.replacen(given, wrong, 1)).unwrap();
+        let arm = import(&urdf.chain("base", "flange").unwrap(), Convention::Standard).unwrap();
+        assert_eq!(arm.masses, Masses::Unknown);
+        assert!(arm.notes.contains(&format!("no masses are taken: {message}")), "{:?}", arm.notes);
+        let base = Urdf::parse(&text.replacen("<inertial><mass value='9'/>", wrong, 1)).unwrap();
+        assert_ne!(import(&base.chain("base", "flange").unwrap(), Convention::Standard).unwrap().masses, Masses::Unknown);
     }
     // A corrected profile keeps what gravity acts on.
     let given = builtin("ur5").unwrap().replacen("    targets: [", "    payload: (mass_kg: 2.0, centre_mm: (0.0, 1.0, 60.0)),\n    gravity_in_base: (0.0, 0.6, -0.8),\n    targets: [", 1);

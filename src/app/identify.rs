@@ -31,13 +31,14 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         console.remark(&diagnostic.to_string());
     }
     args.record.record.as_deref().map_or(Ok(()), record::check_target)?;
-    let identification = load::measurements(&args.measurements, args.layout, profile, InputRole::Identification)?;
+    let named = (profile, estimation.profile.as_str());
+    let identification = load::measurements(&args.measurements, &args.layout, named, InputRole::Identification)?;
     let filter = load::filter(estimation.filter.as_deref(), &identification.table.columns)?;
     let (rows, rest) = load::split(&identification.table, filter.as_ref())?;
     let verification = args
         .verify
         .as_ref()
-        .map(|path| load::measurements(path, args.layout, profile, InputRole::Verification))
+        .map(|path| load::measurements(path, &args.layout, named, InputRole::Verification))
         .transpose()?;
     let (verification_rows, basis, verification_mode) = match &verification {
         Some(loaded) => {
@@ -52,6 +53,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
             .hint("'--use' must leave some rows out"));
     }
 
+    let layout = identification.table.layout;
     // With two files, warnings about rows name the file.
     let file = verification.as_ref().map(|_| identification.input.file.as_str());
     let mut set = sample_set(&rows, profile, file, &identification.table.warnings)?;
@@ -77,7 +79,7 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         verification: verification_set,
         basis,
         verification_mode,
-        layout: Some(args.layout),
+        layout: Some(layout),
         socket_distance_mm: None,
     };
     run_request(&request, estimation, args.record.record.as_deref(), console)

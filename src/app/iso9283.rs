@@ -12,7 +12,6 @@ use crate::procedure::iso9283::{Reading, TestError, TestPlanRequest, TestRequest
 use crate::procedure::{input_file, joint_types, provenance};
 use crate::report;
 use crate::session::calibration::Calibration;
-use crate::session::measurements::Layout;
 use crate::session::plan;
 use crate::session::summary::InputRole;
 use crate::store;
@@ -101,7 +100,8 @@ fn figures<O: Write, E: Write>(args: &EvaluateArgs, console: &mut Console<O, E>)
         }
         (None, None) => return Err(Failure::new(ExitStatus::Usage, "give '--profile' or '--calibration'")),
     };
-    let measured = load::measurements(&args.measurements, Layout::default(), &loaded.profile, InputRole::Verification)?;
+    let named = (&loaded.profile, args.profile.as_deref().unwrap_or_default());
+    let measured = load::measurements(&args.measurements, "named", named, InputRole::Verification)?;
     for warning in &measured.table.warnings {
         console.remark(&format!("note: {warning}"));
     }

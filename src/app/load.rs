@@ -1,7 +1,7 @@
 //! Reading the files that commands name.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Console;
 use crate::checksum::{self, Finding};
@@ -13,7 +13,8 @@ use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
 use crate::session::calibration::{Calibration, Integrity};
 use crate::session::export::simulation_of_table;
 use crate::session::filter::Filter;
-use crate::session::measurements::{Layout, Measurements, Row, read_as};
+use crate::session::measurements::{Expected, Layout, Measurements, Reading, Row, SavedLayout, read_for};
+use crate::session::{TableErrors, TableProblem, workbook};
 use crate::session::summary::{InputFile, InputRole, Warning, WarningCode};
 use crate::store;
 use crate::text::counted;
@@ -121,17 +122,53 @@ pub(super) struct LoadedTable {
     pub(super) simulated: Option<Warning>,
 }
 
-/// A measurement table for the robot of a profile.
+/// A layout of tables by its name: one that the program knows, or one that `import` saved beside the profile or here.
+pub(super) fn layout(name: &str, profile: &str) -> Result<(Layout, Reading), Failure> {
+    let known = match name.parse::<Layout>() {
+        Ok(layout) => return Ok((layout, Reading::default())),
+        Err(unknown) => unknown,
+    };
+    let file = SavedLayout::file_name(name);
+    let profile = Path::new(profile);
+    let beside = profile.parent().filter(|_| profile.is_file()).map(|folder| folder.join(&file));
+    let candidates = [beside, Some(PathBuf::from(&file)), Some(PathBuf::from(name))];
+    let Some(path) = candidates.into_iter().flatten().find(|path| path.is_file()) else {
+        return Err(Failure::from_error(ExitStatus::Usage, &known)
+            .hint(format!("'trupose import --save-layout {name}' would save one as '{file}' beside the profile")));
+    };
+    let reading = SavedLayout::parse(&text(&path)?).map_err(|reason| {
+        Failure::new(ExitStatus::Usage, format!("'{}' is no layout of tables: {reason}", path.display()))
+    })?;
+    Ok((Layout::Named, reading))
+}
+
+/// A measurement table for the robot of a profile, whose name or path is `profile_name`.
 pub(super) fn measurements(
     path: &Path,
-    layout: Layout,
-    profile: &Profile,
+    layout: &str,
+    (profile, profile_name): (&Profile, &str),
     role: InputRole,
 ) -> Result<LoadedTable, Failure> {
+    let (layout, reading) = self::layout(layout, profile_name)?;
     let bytes = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
     let file = path.display().to_string();
-    let table = read_as(layout, &bytes, &file, &joint_types(profile))
-        .map_err(|errors| Failure::new(ExitStatus::Usage, errors.to_string()))?;
+    let refused = |errors: &TableErrors| {
+        let failure = Failure::new(ExitStatus::Usage, errors.to_string());
+        let is_of_columns = errors.problems.iter().any(TableProblem::is_of_columns);
+        match errors.understood.as_ref().and_then(|understood| understood.proposal.as_deref()) {
+            Some(proposal) => failure.hint(format!(
+                "if this is what the columns mean, units included: 'trupose import {file} --profile {profile_name} --columns '{proposal}' --save-layout NAME --out points.csv'"
+            )),
+            None if is_of_columns => failure.hint(format!("'trupose import {file} --profile {profile_name}' shows what is understood")),
+            None => failure,
+        }
+    };
+    let sheet = workbook::is_workbook(&bytes).then(|| workbook::sheet_text(&bytes, &file, None)).transpose();
+    let sheet = sheet.map_err(|errors| refused(&errors))?;
+    let content = sheet.as_deref().map_or(bytes.as_slice(), str::as_bytes);
+    let joints = joint_types(profile);
+    let table = read_for(&Expected::of(profile, &joints), layout, &reading, content, &file)
+        .map_err(|errors| refused(&errors))?;
     let simulated = simulation_of_table(&bytes).map(|said| Warning::simulated(&said));
     Ok(LoadedTable { table, input: input_file(role, file, &bytes), simulated })
 }

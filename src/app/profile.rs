@@ -16,6 +16,7 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     match command {
         ProfileCommand::ImportUrdf(args) => super::export::import_urdf(args, console),
+        ProfileCommand::ImportUr(args) => super::export::import_ur(args, console),
         ProfileCommand::List => {
             let profiles: Vec<Profile> = builtin_names()
                 .filter_map(|name| Profile::parse(builtin(name)?, name).ok())

@@ -34,7 +34,7 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let load::LoadedCalibration { calibration, text, profile } =
         load::calibration(&args.calibration, args.edited, console)?;
     let profile = &calibration.mounted_on(&profile);
-    let measured = load::measurements(&args.measurements, args.layout, profile, InputRole::Verification)?;
+    let measured = load::measurements(&args.measurements, &args.layout, (profile, &file), InputRole::Verification)?;
     let filter = load::filter(args.filter.as_deref(), &measured.table.columns)?;
     let (measured_rows, _) = load::split(&measured.table, filter.as_ref())?;
     let all = load::samples(&measured_rows, profile)?;

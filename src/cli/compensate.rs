@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::{PayloadArgs, one_of};
 use crate::kinematics::Convention;
-use crate::model::Format;
+use crate::model::{Coupling, Format};
 use crate::program::Dialect;
 use crate::text::printable;
 use crate::units::{from_deg, from_mm};
@@ -169,6 +169,22 @@ pub struct ImportUrdfArgs {
     /// Order of the link constants
     #[arg(long, value_enum, default_value_t)]
     pub convention: Convention,
+    /// A joint that the pendant counts together with another (FANUC J3, parallel linkages), such as 'joint_3=joint_2' or 'joint_3=-joint_2'; may be repeated
+    #[arg(long = "coupling", value_name = "JOINT=JOINT")]
+    pub couplings: Vec<Coupling>,
+    /// File for the profile [default: print it]
+    #[arg(long, value_name = "RON")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `profile import-ur`.
+#[derive(Args, Debug)]
+pub struct ImportUrArgs {
+    /// 'calibration.conf' of the controller, or the kinematics file of the ROS description
+    pub file: PathBuf,
+    /// Profile of the model, such as 'ur10e'
+    #[arg(long, value_name = "NAME|FILE")]
+    pub model: String,
     /// File for the profile [default: print it]
     #[arg(long, value_name = "RON")]
     pub out: Option<PathBuf>,

@@ -8,7 +8,7 @@
 use super::{Link, LinkError};
 use crate::kinematics::JointType;
 use crate::profile::Profile;
-use crate::session::measurements::{Layout, Measurements, Row, read_as};
+use crate::session::measurements::{Expected, Layout, Measurements, Reading as TableReading, Row, read_for};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::text::printable;
 use crate::units::{DEGREE, MICROMETRE};
@@ -48,7 +48,8 @@ impl Replay {
     /// [`LinkError::SetUp`] with all defects of the table, or as in [`Self::of_table`].
     pub fn new(profile: &Profile, bytes: &[u8], file: &str, layout: Layout) -> Result<Self, LinkError> {
         let joints: Vec<JointType> = profile.chain().joints().iter().map(|joint| joint.joint_type).collect();
-        let table = read_as(layout, bytes, file, &joints).map_err(|errors| LinkError::SetUp(errors.to_string()))?;
+        let expected = Expected::of(profile, &joints);
+        let table = read_for(&expected, layout, &TableReading::default(), bytes, file).map_err(|errors| LinkError::SetUp(errors.to_string()))?;
         Self::of_table(profile, &table, file)
     }
 

@@ -12,11 +12,13 @@
 //! A sliding axis has a direction and no place: it is put where `a` vanishes, or on a following parallel axis that turns.
 //! Of the two directions of x the one with |θ| ≤ 90° is taken, so `a` may be negative, as makers write it.
 
+use std::str::FromStr;
+
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::ModelError;
 use super::proof::{self, Agreement, prove};
-use super::transforms::{between_axes, from_axes, screw_z};
+use super::transforms::{between_axes, from_axes, is_coupled, link_values, screw_z};
 use super::urdf::{UrdfChain, UrdfJointType};
 use crate::kinematics::{Convention, ForwardKinematics, Joint, JointType, KinematicChain, Link, LinkMass};
 use crate::profile::{JointRange, Masses, PARALLEL_TOLERANCE};
@@ -45,6 +47,54 @@ pub struct ImportedArm {
     pub agreement: Agreement,
 }
 
+/// A joint whose pendant value counts together with that of another: `joint_3=joint_2`, or `joint_3=-joint_2`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coupling {
+    /// Name of the joint.
+    pub joint: String,
+    /// Name of the joint that also turns its link.
+    pub with: String,
+    /// By how much.
+    pub factor: f64,
+}
+
+impl FromStr for Coupling {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("'{}' is no coupling; write for example 'joint_3=joint_2', or 'joint_3=-joint_2'", printable(text));
+        let (joint, with) = text.split_once('=').ok_or_else(wrong)?;
+        let (factor, with) = match with.trim().strip_prefix('-') {
+            Some(with) => (-1.0, with),
+            None => (1.0, with.trim()),
+        };
+        let (joint, with) = (joint.trim(), with.trim());
+        if joint.is_empty() || with.is_empty() || joint == with {
+            return Err(wrong());
+        }
+        Ok(Self { joint: joint.to_owned(), with: with.to_owned(), factor })
+    }
+}
+
+impl Coupling {
+    fn apply(&self, joints: &mut [Joint]) -> Result<(), ModelError> {
+        let place = |name: &str| {
+            let known = || joints.iter().map(|joint| printable(&joint.name)).collect::<Vec<_>>().join(", ");
+            let message = || format!("there is no joint '{}' in the chain; joints: {}", printable(name), known());
+            joints.iter().position(|joint| joint.name == name).ok_or_else(|| ModelError::Unsuitable(message()))
+        };
+        let (own, other) = (place(&self.joint)?, place(&self.with)?);
+        let count = joints.len();
+        if let Some(joint) = joints.get_mut(own) {
+            joint.coupling.resize(count, 0.0);
+            if let Some(coefficient) = joint.coupling.get_mut(other) {
+                *coefficient = self.factor;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// An axis at rest, in the base of the chain.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
@@ -58,6 +108,18 @@ struct Axis {
 /// # Errors
 /// The result does not agree with the URDF to 1 nm and 1 nrad.
 pub fn import(urdf: &UrdfChain<'_>, convention: Convention) -> Result<ImportedArm, ModelError> {
+    import_coupled(urdf, convention, &[])
+}
+
+/// As [`import`], for an arm whose pendant counts some joints together with others: FANUC, and arms with a parallel linkage.
+///
+/// # Errors
+/// As [`import`], and a coupling of joints that the chain does not have.
+pub fn import_coupled(
+    urdf: &UrdfChain<'_>,
+    convention: Convention,
+    couplings: &[Coupling],
+) -> Result<ImportedArm, ModelError> {
     let (axes, base_from_tip) = axes_at_rest(urdf);
     let walked = walk(&axes, &base_from_tip);
     let moving: Vec<_> = urdf.moving().collect();
@@ -82,9 +144,12 @@ pub fn import(urdf: &UrdfChain<'_>, convention: Convention) -> Result<ImportedAr
             coupling: Vec::new(),
         });
     }
+    for coupling in couplings {
+        coupling.apply(&mut joints)?;
+    }
     let chain = KinematicChain::new(convention, walked.base, joints, walked.flange)?;
     let limits: Vec<_> = moving.iter().map(|(joint, _)| joint.limits).collect();
-    let agreement = prove(&chain, &limits, proof::IMPORT, |q| urdf.base_from_tip(q))?;
+    let agreement = prove(&chain, &limits, proof::IMPORT, |q| urdf.base_from_tip(&link_values(&chain, q)))?;
     let ranges = moving
         .iter()
         .map(|(joint, joint_type)| JointRange {
@@ -109,12 +174,19 @@ pub fn import(urdf: &UrdfChain<'_>, convention: Convention) -> Result<ImportedAr
             printable(link)
         )
     });
-    Ok(ImportedArm { notes: notes.chain(tools).collect(), chain, ranges, beta_joints, masses, agreement })
+    let mut notes: Vec<String> = notes.chain(tools).collect();
+    notes.extend(urdf.joints.iter().flat_map(|joint| joint.notes.iter().cloned()));
+    notes.extend(urdf.mass_defect.map(|defect| format!("no masses are taken: {defect}")));
+    let coupled = chain.joints().iter().filter(|joint| is_coupled(joint));
+    notes.extend(coupled.map(|joint| {
+        format!("joint '{}' counts with another: its limits are those of the URDF; check them", printable(&joint.name))
+    }));
+    Ok(ImportedArm { notes, chain, ranges, beta_joints, masses, agreement })
 }
 
 /// The masses of the links, in the frames at the ends of the links of `chain`.
 fn masses(urdf: &UrdfChain<'_>, chain: &KinematicChain) -> Masses {
-    if urdf.masses.iter().all(|link| link.mass <= 0.0) {
+    if urdf.mass_defect.is_some() || urdf.masses.iter().all(|link| link.mass <= 0.0) {
         return Masses::Unknown;
     }
     let ends = ForwardKinematics::new(chain).base_from_links(&vec![0.0; chain.dof()]);
@@ -136,10 +208,9 @@ fn masses(urdf: &UrdfChain<'_>, chain: &KinematicChain) -> Masses {
 fn axes_at_rest(urdf: &UrdfChain<'_>) -> (Vec<Axis>, Isometry3<f64>) {
     let mut pose = urdf.base_from_top;
     let mut axes = Vec::new();
-    let mut moving = urdf.moving().peekable();
     for joint in &urdf.joints {
         pose *= joint.origin;
-        if let Some((_, joint_type)) = moving.next_if(|(next, _)| next.name == joint.name) {
+        if let UrdfJointType::Moving(joint_type) = joint.joint_type {
             let direction = Unit::new_normalize(pose.rotation * joint.axis.into_inner());
             axes.push(Axis { joint_type, point: Point3::from(pose.translation.vector), direction });
         }

@@ -1,18 +1,29 @@
 //! Reading URDF: the joints of a robot description, and the serial chain between two of its links.
 //!
+//! What has no effect on the chain is no reason to refuse a file: defects are kept with the joint or link that they belong to, and
+//! matter only once it is part of a chain.
+//!
 //! Only `<joint>` elements directly under `<robot>` are joints: transmissions, `ros2_control` and simulators have elements of
 //! the same name that mean something else. Metres and radians, as in the format.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_4;
 use std::ops::Range;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
+use super::urdf_text::{beside_xacro, parseable};
 use super::transforms::{from_roll_pitch_yaw, motion};
 use crate::kinematics::{JointType, LinkMass};
 use crate::text::printable;
+use crate::units::to_deg;
+
+/// Most decimals of an angle that a person rounded.
+const MOST_DECIMALS: usize = 5;
+/// Rounding (rad) of which nothing is said: 10 µm at 1 m.
+const NOT_WORTH_A_WORD: f64 = 1e-5;
 
 /// A defect of a URDF.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -72,6 +83,10 @@ pub struct UrdfJoint {
     pub max_speed: Option<f64>,
     /// Joint that this one follows.
     pub mimic: Option<String>,
+    /// Why it cannot be part of a chain.
+    pub defect: Option<UrdfError>,
+    /// Oddities, one sentence each.
+    pub notes: Vec<String>,
     /// Line in the file, from 1.
     pub line: u32,
     /// Byte range of its `<origin>` element, or the position where one can be inserted.
@@ -89,6 +104,12 @@ pub struct Urdf {
     pub joints: Vec<UrdfJoint>,
     /// Masses of the links that have an `<inertial>`, with the centre in the frame of the link (m).
     pub masses: BTreeMap<String, LinkMass>,
+    /// Masses that cannot be read, by link.
+    pub mass_defects: BTreeMap<String, UrdfError>,
+    /// Links with the name of another.
+    pub repeated_links: BTreeMap<String, UrdfError>,
+    /// Joints that connect nothing, because a name is missing or wrong.
+    pub unplaced: Vec<UrdfError>,
 }
 
 /// The path between two links.
@@ -103,15 +124,19 @@ pub struct UrdfChain<'u> {
     pub masses: Vec<LinkMass>,
     /// Links with a mass that are fixed to the tip: a tool.
     pub on_tip: Vec<&'u str>,
+    /// A mass of the arm that cannot be read.
+    pub mass_defect: Option<&'u UrdfError>,
 }
 
 impl Urdf {
     /// Reads a URDF.
     ///
     /// # Errors
-    /// Not XML, not a URDF, or a joint that cannot be read.
+    /// Not XML, or not a URDF.
     pub fn parse(text: &str) -> Result<Self, UrdfError> {
-        let document = Document::parse(text).map_err(|error| UrdfError::Xml {
+        let text = parseable(text);
+        let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
+        let document = Document::parse_with_options(&text, options).map_err(|error| UrdfError::Xml {
             line: error.pos().row,
             column: error.pos().col,
             message: printable(&error.to_string()),
@@ -126,41 +151,49 @@ impl Urdf {
             let message = "this is xacro, not URDF; expand it first: 'xacro FILE.xacro > FILE.urdf'";
             return Err(reader.element(node, format!("<xacro:{}>", printable(node.tag_name().name())), message));
         }
+        let mut urdf = Self {
+            robot: root.attribute("name").unwrap_or("robot").to_owned(),
+            links: Vec::new(),
+            joints: Vec::new(),
+            masses: BTreeMap::new(),
+            mass_defects: BTreeMap::new(),
+            repeated_links: BTreeMap::new(),
+            unplaced: Vec::new(),
+        };
         let mut links: BTreeMap<&str, u32> = BTreeMap::new();
-        let mut link_names = Vec::new();
-        let mut masses = BTreeMap::new();
         for node in elements(root, "link") {
-            let name = reader.attribute(node, "<link>", "name")?;
-            if let Some(line) = links.insert(name, reader.line(node)) {
+            let name = match reader.attribute(node, "<link>", "name") {
+                Ok(name) => name,
+                Err(defect) => {
+                    urdf.unplaced.push(defect);
+                    continue;
+                }
+            };
+            if let Some(line) = links.get(name) {
                 let message = format!("the link of line {line} has the same name");
-                return Err(reader.element(node, format!("link '{}'", printable(name)), message));
+                let defect = reader.element(node, format!("link '{}'", printable(name)), message);
+                urdf.repeated_links.entry(name.to_owned()).or_insert(defect);
+                continue;
             }
-            link_names.push(name.to_owned());
-            if let Some(inertial) = elements(node, "inertial").next() {
-                masses.insert(name.to_owned(), reader.mass(inertial, name)?);
+            links.insert(name, reader.line(node));
+            urdf.links.push(name.to_owned());
+            match elements(node, "inertial").next().map(|inertial| reader.mass(inertial, name)) {
+                None => {}
+                Some(Ok(mass)) => {
+                    urdf.masses.insert(name.to_owned(), mass);
+                }
+                Some(Err(defect)) => {
+                    urdf.mass_defects.insert(name.to_owned(), defect);
+                }
             }
         }
-        let mut joints: Vec<UrdfJoint> = Vec::new();
         for node in elements(root, "joint") {
-            let joint = reader.joint(node, &links)?;
-            let what = || format!("joint '{}'", printable(&joint.name));
-            if let Some(other) = joints.iter().find(|other| other.name == joint.name) {
-                let message = format!("the joint of line {} has the same name", other.line);
-                return Err(reader.element(node, what(), message));
+            match reader.joint(node, &links) {
+                Ok(joint) => urdf.joints.push(joint),
+                Err(defect) => urdf.unplaced.push(defect),
             }
-            if let Some(other) = joints.iter().find(|other| other.child == joint.child) {
-                let message = format!(
-                    "link '{}' already hangs on joint '{}' (line {}); a URDF is a tree",
-                    printable(&joint.child),
-                    printable(&other.name),
-                    other.line
-                );
-                return Err(reader.element(node, what(), message));
-            }
-            joints.push(joint);
         }
-        let robot = root.attribute("name").unwrap_or("robot").to_owned();
-        Ok(Self { robot, links: link_names, joints, masses })
+        Ok(urdf)
     }
 
     /// The chain from the frame of link `base` to that of link `tip`. From the base the way may lead up, but only over fixed
@@ -183,9 +216,11 @@ impl Urdf {
         let up: Vec<&UrdfJoint> = up.into_iter().rev().skip(shared).rev().collect();
         let down: Vec<&UrdfJoint> = down.into_iter().rev().skip(shared).collect();
         if !is_connected {
-            let message = format!("links '{}' and '{}' are not connected", printable(base), printable(tip));
+            let cause = self.unplaced.first().map_or_else(String::new, |defect| format!("; {defect}"));
+            let message = format!("links '{}' and '{}' are not connected{cause}", printable(base), printable(tip));
             return Err(UrdfError::Chain(message));
         }
+        self.check(&up, &down)?;
         let mut base_from_top = Isometry3::identity();
         for joint in up {
             if joint.joint_type != UrdfJointType::Fixed {
@@ -216,6 +251,7 @@ impl Urdf {
             }
         }
         let masses = self.carried(&down, tip);
+        let mass_defect = self.unreadable_mass(&down, tip);
         let mut on_tip = Vec::new();
         self.fixed_to(tip, None, &mut |link, _| {
             if let Some((name, mass)) = self.masses.get_key_value(link)
@@ -225,12 +261,30 @@ impl Urdf {
                 on_tip.push(name.as_str());
             }
         });
-        let chain = UrdfChain { base_from_top, joints: down, masses, on_tip };
+        let chain = UrdfChain { base_from_top, joints: down, masses, on_tip, mass_defect };
         if chain.moving().next().is_none() {
             let message = format!("no joint moves between '{}' and '{}'", printable(base), printable(tip));
             return Err(UrdfError::Chain(message));
         }
         Ok(chain)
+    }
+
+    /// Refuses a way with a defect on it.
+    fn check(&self, up: &[&UrdfJoint], down: &[&UrdfJoint]) -> Result<(), UrdfError> {
+        let way: Vec<&UrdfJoint> = up.iter().chain(down).copied().collect();
+        for (index, joint) in way.iter().enumerate() {
+            if let Some(defect) = &joint.defect {
+                return Err(defect.clone());
+            }
+            let repeated = [&joint.parent, &joint.child].into_iter().find_map(|link| self.repeated_links.get(link));
+            if let Some(defect) = repeated {
+                return Err(defect.clone());
+            }
+            if let Some(other) = way.iter().take(index).find(|other| other.name == joint.name) {
+                return Err(joint.error(format!("the joint of line {} has the same name", other.line)));
+            }
+        }
+        Ok(())
     }
 
     /// What each moving joint of `way` carries up to the next one.
@@ -249,6 +303,17 @@ impl Urdf {
                 LinkMass { mass, centre }
             })
             .collect()
+    }
+
+    /// The first mass of the moving arm that cannot be read.
+    fn unreadable_mass(&self, way: &[&UrdfJoint], tip: &str) -> Option<&UrdfError> {
+        let mut found = None;
+        for joint in way.iter().filter(|joint| joint.joint_type != UrdfJointType::Fixed) {
+            self.fixed_to(&joint.child, Some(tip), &mut |link, _| {
+                found = found.or_else(|| self.mass_defects.get(link));
+            });
+        }
+        found
     }
 
     /// Visits a link and all that is fixed to it, with their poses in its frame. What hangs on the link `end` is left out.
@@ -275,6 +340,15 @@ impl Urdf {
         while let Some(joint) = self.joints.iter().find(|joint| joint.child == below) {
             if joints.len() > self.joints.len() {
                 return Err(joint.error("it is part of a ring; a URDF is a tree".to_owned()));
+            }
+            if let Some(second) = self.joints.iter().find(|other| other.child == below && other.line != joint.line) {
+                let message = format!(
+                    "link '{}' already hangs on joint '{}' (line {}); a URDF is a tree",
+                    printable(below),
+                    printable(&joint.name),
+                    joint.line
+                );
+                return Err(second.error(message));
             }
             joints.push(joint);
             below = &joint.parent;
@@ -322,6 +396,24 @@ fn elements<'a, 'i>(parent: Node<'a, 'i>, name: &'static str) -> impl Iterator<I
 
 fn is_xacro(node: &Node<'_, '_>) -> bool {
     node.is_element() && node.tag_name().namespace().is_some_and(|space| space.contains("xacro"))
+}
+
+/// Says of an angle that is a rounded multiple of 45° which one may be meant.
+fn rounded_angle(joint: &str, text: &str) -> Option<String> {
+    let value: f64 = text.parse().ok().filter(|value: &f64| value.is_finite())?;
+    let decimals = text.rsplit_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let exact = (value / FRAC_PI_4).round() * FRAC_PI_4;
+    let off = (value - exact).abs();
+    // Rounded or cut off at its last decimal; a measured angle near 90° is neither.
+    let is_rounded = (2..=MOST_DECIMALS).contains(&decimals) && off < 0.1_f64.powi(i32::try_from(decimals).unwrap_or(i32::MAX));
+    (is_rounded && exact.abs() > 0.0 && off > NOT_WORTH_A_WORD).then(|| {
+        format!(
+            "joint '{}': {text} rad is {:.4} deg; if {:.0} deg is meant, write {exact}",
+            printable(joint),
+            to_deg(value),
+            to_deg(exact)
+        )
+    })
 }
 
 /// Lowest and highest value, and highest speed.
@@ -387,64 +479,105 @@ impl Reader<'_, '_> {
             Err(self.element(node, format!("<{tag}> of {what}"), message))
         };
         let (parent, child) = (link("parent")?, link("child")?);
-        let origins: Vec<Node<'_, '_>> = elements(node, "origin").collect();
-        if let Some(second) = origins.get(1) {
-            return Err(self.element(*second, format!("<origin> of {what}"), "the joint has two of them"));
-        }
-        let (origin, origin_bytes) = if let Some(origin) = origins.first() {
-            let element = format!("<origin> of {what}");
-            let position = self.triple(*origin, &element, "xyz")?.unwrap_or([0.0; 3]);
-            let angles = self.triple(*origin, &element, "rpy")?.unwrap_or([0.0; 3]);
-            (from_roll_pitch_yaw(position, angles), origin.range())
-        } else {
-            // There is a child: <parent> was found.
-            let place = node.first_child().map_or_else(|| node.range().start, |child| child.range().start);
-            (Isometry3::identity(), place..place)
-        };
-        let axis = match elements(node, "axis").next() {
-            Some(axis) => self.triple(axis, &format!("<axis> of {what}"), "xyz")?.unwrap_or([1.0, 0.0, 0.0]),
-            None => [1.0, 0.0, 0.0],
-        };
-        let axis = Unit::try_new(Vector3::from(axis), 1e-9);
-        let axis = axis.ok_or_else(|| self.element(node, format!("<axis> of {what}"), "it has no direction"))?;
-        let (limits, max_speed) = self.limits(node, &what, type_name)?;
-        let mimic = elements(node, "mimic").next().map(|mimic| mimic.attribute("joint").unwrap_or("?").to_owned());
-        Ok(UrdfJoint {
+        let mut joint = UrdfJoint {
             name: name.to_owned(),
             joint_type,
             type_name: type_name.to_owned(),
             parent,
             child,
-            origin,
-            axis,
-            limits,
-            max_speed,
-            mimic,
+            origin: Isometry3::identity(),
+            axis: Vector3::x_axis(),
+            limits: None,
+            max_speed: None,
+            mimic: elements(node, "mimic").next().map(|mimic| mimic.attribute("joint").unwrap_or("?").to_owned()),
+            defect: None,
+            notes: Vec::new(),
             line: self.line(node),
-            origin_bytes,
-        })
+            // There is a child: <parent> was found.
+            origin_bytes: node.first_child().map_or_else(
+                || node.range().start..node.range().start,
+                |child| child.range().start..child.range().start,
+            ),
+        };
+        let origins: Vec<Node<'_, '_>> = elements(node, "origin").collect();
+        if let Some(second) = origins.get(1) {
+            joint.defect = Some(self.element(*second, format!("<origin> of {what}"), "the joint has two of them"));
+        } else if let Some(origin) = origins.first() {
+            joint.origin_bytes = origin.range();
+            match self.origin(*origin, &format!("<origin> of {what}")) {
+                Ok(pose) => joint.origin = pose,
+                Err(defect) => joint.defect = Some(defect),
+            }
+            let angles = origin.attribute("rpy").unwrap_or_default();
+            joint.notes.extend(angles.split_whitespace().filter_map(|angle| rounded_angle(&joint.name, angle)));
+        }
+        // A fixed joint has no axis and no limits, whatever stands there.
+        if matches!(joint_type, UrdfJointType::Moving(_)) {
+            match self.axis(node, &what) {
+                Ok(axis) => joint.axis = axis,
+                Err(defect) => joint.defect = joint.defect.or(Some(defect)),
+            }
+            let (limits, max_speed) = self.limits(node, type_name, &mut joint.notes, &what);
+            (joint.limits, joint.max_speed) = (limits, max_speed);
+        }
+        Ok(joint)
     }
 
-    /// Range and speed. An empty range (such as `lower="0" upper="0"`) counts as none.
-    fn limits(&self, node: Node<'_, '_>, what: &str, type_name: &str) -> Result<RangeAndSpeed, UrdfError> {
-        let Some(limit) = elements(node, "limit").next() else { return Ok((None, None)) };
-        let element = format!("<limit> of {what}");
-        let value = |name: &str| match limit.attribute(name) {
-            Some(text) => self.finite(limit, &element, name, text).map(Some),
-            None => Ok(None),
+    fn origin(&self, origin: Node<'_, '_>, element: &str) -> Result<Isometry3<f64>, UrdfError> {
+        let position = self.triple(origin, element, "xyz")?.unwrap_or([0.0; 3]);
+        let angles = self.triple(origin, element, "rpy")?.unwrap_or([0.0; 3]);
+        Ok(from_roll_pitch_yaw(position, angles))
+    }
+
+    fn axis(&self, node: Node<'_, '_>, what: &str) -> Result<Unit<Vector3<f64>>, UrdfError> {
+        let axis = match elements(node, "axis").next() {
+            Some(axis) => self.triple(axis, &format!("<axis> of {what}"), "xyz")?.unwrap_or([1.0, 0.0, 0.0]),
+            None => [1.0, 0.0, 0.0],
         };
-        let (low, high) = (value("lower")?.unwrap_or(0.0), value("upper")?.unwrap_or(0.0));
-        let speed = value("velocity")?.filter(|speed| *speed > 0.0);
-        if low > high {
-            return Err(self.element(limit, element, format!("lower {low} is above upper {high}")));
+        let axis = Unit::try_new(Vector3::from(axis), 1e-9);
+        axis.ok_or_else(|| self.element(node, format!("<axis> of {what}"), "it has no direction"))
+    }
+
+    /// Range and speed. An empty range (such as `lower="0" upper="0"`), an endless and a reversed one count as none; the geometry does
+    /// not depend on them.
+    fn limits(&self, node: Node<'_, '_>, type_name: &str, notes: &mut Vec<String>, what: &str) -> RangeAndSpeed {
+        let Some(limit) = elements(node, "limit").next() else { return (None, None) };
+        let mut value = |name: &str| {
+            let text = limit.attribute(name)?.trim();
+            match text.parse::<f64>() {
+                Ok(value) => Some(value).filter(|value| value.is_finite()),
+                Err(_not_a_number) => {
+                    let line = self.line(limit);
+                    let shown = printable(text);
+                    notes.push(format!("line {line}: {what}: {name} '{shown}' is not a number and is left out{}", beside_xacro(text)));
+                    None
+                }
+            }
+        };
+        let speed = value("velocity").filter(|speed| *speed > 0.0);
+        let ends = (value("lower"), value("upper"));
+        let is_stated = |name: &str| limit.has_attribute(name);
+        // An end that is not stated is zero, one that is endless is none.
+        let (low, high) = match ends {
+            (None, Some(high)) if !is_stated("lower") => (0.0, high),
+            (Some(low), None) if !is_stated("upper") => (low, 0.0),
+            (Some(low), Some(high)) => (low, high),
+            _ => return (None, speed),
+        };
+        if low > high && type_name != "continuous" {
+            notes.push(format!(
+                "line {}: {what}: lower {low} is above upper {high}, taken as no limits",
+                self.line(limit)
+            ));
         }
-        Ok(((low < high && type_name != "continuous").then_some((low, high)), speed))
+        ((low < high && type_name != "continuous").then_some((low, high)), speed)
     }
 
     fn finite(&self, node: Node<'_, '_>, element: &str, name: &str, text: &str) -> Result<f64, UrdfError> {
         let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
         value.ok_or_else(|| {
-            let message = format!("attribute '{name}' has '{}', which is not a number", printable(text));
+            let xacro = beside_xacro(text);
+            let message = format!("attribute '{name}' has '{}', which is not a number{xacro}", printable(text));
             self.element(node, element.to_owned(), message)
         })
     }

@@ -114,7 +114,7 @@ fn origin_element(origin: &Isometry3<f64>) -> String {
     )
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
@@ -141,6 +141,10 @@ pub(super) fn patch(
     identified: &KinematicChain,
     limits: &[Option<(f64, f64)>],
 ) -> Result<Patched, ModelError> {
+    if text.contains("<!DOCTYPE") {
+        let message = "the URDF has a document type with entities, which cannot be changed in place; expand it first: 'xmllint --noent --dropdtd FILE.urdf'";
+        return Err(ModelError::Unsuitable(message.to_owned()));
+    }
     let urdf = Urdf::parse(text)?;
     let chain = urdf.chain(base, tip)?;
     same_joints(&chain, nominal)?;

@@ -14,10 +14,11 @@ use super::events::Events;
 use crate::link::{Link, LinkError, LinkEvent, RawLog, Rehearsal, Replay, SimulatedCell, Wired};
 use crate::profile::Profile;
 use crate::session::filter::Filter;
-use crate::session::measurements::{Layout, read_as};
+use crate::session::measurements::{Expected, Layout, Reading as TableReading, SavedLayout, read_for};
 use crate::session::plan::PlannedPose;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{InstrumentChoice, RecordedSet};
+use crate::session::workbook;
 use crate::store;
 use crate::wizard::{Answer, Event, Notice, Problem, RequestId};
 
@@ -223,9 +224,13 @@ fn recording(
         let cause = std::error::Error::source(&error).map(|cause| format!(": {cause}")).unwrap_or_default();
         set_up(format!("{error}{cause}"))
     })?;
-    let layout: Layout = set.layout.parse().map_err(|error| set_up(format!("'{}': {error}", set.layout)))?;
+    let (layout, reading) = layout(set)?;
     let joints = profile.chain().joints().iter().map(|joint| joint.joint_type).collect::<Vec<_>>();
-    let mut table = read_as(layout, &bytes, &set.file, &joints).map_err(|errors| set_up(errors.to_string()))?;
+    let sheet = workbook::is_workbook(&bytes).then(|| workbook::sheet_text(&bytes, &set.file, None)).transpose();
+    let sheet = sheet.map_err(|errors| set_up(errors.to_string()))?;
+    let content = sheet.as_deref().map_or(bytes.as_slice(), str::as_bytes);
+    let mut table = read_for(&Expected::of(profile, &joints), layout, &reading, content, &set.file)
+        .map_err(|errors| set_up(errors.to_string()))?;
     let distinct = table.distinct_rows().cloned().collect();
     (table.rows, table.duplicates) = (distinct, Vec::new());
     if let Some(condition) = &set.rows {
@@ -264,6 +269,23 @@ fn recording(
         })
         .collect();
     Ok((replay, poses))
+}
+
+/// The layout of a table: one that the program knows, or one that was saved beside the table or in the current folder.
+fn layout(set: &RecordedSet) -> Result<(Layout, TableReading), LinkError> {
+    let set_up = |reason: String| LinkError::SetUp(format!("'{}': {reason}", set.layout));
+    let known = match set.layout.parse::<Layout>() {
+        Ok(layout) => return Ok((layout, TableReading::default())),
+        Err(unknown) => unknown,
+    };
+    let file = SavedLayout::file_name(&set.layout);
+    let beside = Path::new(&set.file).with_file_name(&file);
+    let Some(path) = [beside, file.into()].into_iter().find(|path| path.is_file()) else {
+        return Err(set_up(known.to_string()));
+    };
+    let bytes = store::read(&path).map_err(|error| set_up(error.to_string()))?;
+    let reading = SavedLayout::parse(&String::from_utf8_lossy(&bytes)).map_err(set_up)?;
+    Ok((Layout::Named, reading))
 }
 
 impl Link for Recordings {

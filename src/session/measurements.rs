@@ -12,19 +12,31 @@
 //! - `target`, `sigma` and `temperature` may be missing, and their cells empty.
 //! - Any other column is kept as text for filters.
 //!
+//! Tables of others are read as well: with other names and separators, with units in brackets or in a row of their own, with several
+//! SMRs in one row. What they mean is found out before anything is read, and refused where it is not clear.
+//!
 //! Nothing is dropped: copies of rows are kept and listed in [`Measurements::duplicates`].
 
+mod columns;
 mod consistency;
+mod foreign;
 mod imported;
+mod join;
 mod layout;
+mod names;
+mod saved;
 mod writer;
 
 use std::mem;
 
 use nalgebra::Point3;
 
+pub use columns::{Columns, ColumnsError, Units};
 pub(super) use consistency::farthest_joint;
+pub use foreign::{ColumnRead, Expected, Reading, Understood};
+pub use join::{JoinBy, PointFile, joined};
 pub use layout::Layout;
+pub use saved::SavedLayout;
 pub use writer::write;
 pub(super) use writer::{joint_cells, quoted};
 
@@ -32,6 +44,7 @@ use super::table::{
     self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,
 };
 use crate::kinematics::JointType;
+use foreign::{Foreign, Wanted, understand};
 
 /// The rows of a measurement table.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +60,8 @@ pub struct Measurements {
     pub duplicates: Vec<usize>,
     /// Oddities of the table that do not forbid its use, in the order of its lines.
     pub warnings: Vec<TableProblem>,
+    /// What was understood of its columns.
+    pub understood: Understood,
 }
 
 /// One reading: the configuration of the robot and the measured point.
@@ -78,11 +93,10 @@ impl Measurements {
     }
 }
 
-/// Reads a table with named columns for a robot with the given joints: UTF-8, with or without byte order mark. `file` is its
-/// name in messages.
+/// Reads a table with named columns for a robot with the given joints. `file` is its name in messages.
 ///
 /// # Errors
-/// All defects of the table together, lines that are not UTF-8 among them.
+/// All defects of the table together.
 pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Result<Measurements, TableErrors> {
     read_as(Layout::Named, content, file, joints)
 }
@@ -90,28 +104,87 @@ pub fn read(content: impl AsRef<[u8]>, file: &str, joints: &[JointType]) -> Resu
 /// As [`read`], in a layout chosen by the user.
 ///
 /// # Errors
-/// All defects of the table together, lines that are not UTF-8 among them.
+/// All defects of the table together.
 pub fn read_as(
     layout: Layout,
     content: impl AsRef<[u8]>,
     file: &str,
     joints: &[JointType],
 ) -> Result<Measurements, TableErrors> {
+    read_for(&Expected::joints(joints), layout, &Reading::default(), content, file)
+}
+
+/// As [`read_as`], for a robot whose names are known, as a person says that it should be read.
+///
+/// # Errors
+/// All defects of the table together.
+pub fn read_for(
+    expected: &Expected<'_>,
+    layout: Layout,
+    reading: &Reading,
+    content: impl AsRef<[u8]>,
+    file: &str,
+) -> Result<Measurements, TableErrors> {
     let (text, mut problems) = decode(content.as_ref(), file)?;
     let mut warnings: Vec<TableProblem> = table::changed(&text).into_iter().collect();
-    let split = match layout {
-        Layout::Named => split_named(&text, joints, &mut problems),
-        Layout::RoboDk => imported::split_robodk(&text, joints, &mut problems, &mut warnings),
-        Layout::Delmia => Some(imported::split_delmia(&text, joints, &mut problems, &mut warnings)),
+    let joints = expected.joints;
+    let foreign = match layout {
+        Layout::Named => {
+            let table = table::split(&text, Shape::Named, &mut problems);
+            understand(table, expected, reading, Wanted::Rows, &mut problems)
+        }
+        Layout::RoboDk => {
+            let split = imported::split_robodk(&text, joints, &mut problems, &mut warnings);
+            return finished(split, Understood::default(), layout, file, joints, problems, warnings);
+        }
+        Layout::Delmia => {
+            let split = imported::split_delmia(&text, joints, &mut problems, &mut warnings);
+            return finished(Some(split), Understood::default(), layout, file, joints, problems, warnings);
+        }
     };
+    read_understood(foreign, file, joints, problems, warnings)
+}
+
+/// Reads the rows of a table whose columns are understood.
+fn read_understood(
+    foreign: Result<Foreign, Understood>,
+    file: &str,
+    joints: &[JointType],
+    mut problems: Vec<TableProblem>,
+    warnings: Vec<TableProblem>,
+) -> Result<Measurements, TableErrors> {
+    let (split, understood) = match foreign {
+        Ok(mut foreign) => {
+            let understood = mem::take(&mut foreign.understood);
+            (Some(split_named(foreign, joints, &mut problems)), understood)
+        }
+        Err(understood) => (None, understood),
+    };
+    finished(split, understood, Layout::Named, file, joints, problems, warnings)
+}
+
+/// Reads the rows of a table that is split, and checks them against each other.
+fn finished(
+    split: Option<Split>,
+    understood: Understood,
+    layout: Layout,
+    file: &str,
+    joints: &[JointType],
+    mut problems: Vec<TableProblem>,
+    mut warnings: Vec<TableProblem>,
+) -> Result<Measurements, TableErrors> {
     let headers = if layout == Layout::Named { vec![header(joints)] } else { Vec::new() };
-    let Some(Split { mut columns, places, records, decimal_comma }) = split else {
-        return Err(TableErrors::new(file, problems, headers));
+    let refused = |problems: Vec<TableProblem>, understood: Understood| {
+        let understood = Some(Box::new(understood)).filter(|_| layout == Layout::Named);
+        Err(TableErrors { understood, ..TableErrors::new(file, problems, headers.clone()) })
+    };
+    let Some(Split { mut columns, shown, places, records, decimal_comma }) = split else {
+        return refused(problems, understood);
     };
     if records.is_empty() && problems.is_empty() {
         problems.push(Defect::NoRows.of_table());
     }
-    let mut numbers = Numbers::new(&columns, decimal_comma);
+    let mut numbers = Numbers::new(&shown, decimal_comma);
     let numbered = places.pose.is_none();
     let mut rows = Vec::with_capacity(records.len());
     for (index, record) in records.into_iter().enumerate() {
@@ -129,9 +202,9 @@ pub fn read_as(
     let duplicates = consistency::check(&rows, joints, &mut problems, &mut warnings);
     if problems.is_empty() {
         warnings.sort_by_key(|warning| warning.line);
-        Ok(Measurements { rows, columns, layout, duplicates, warnings })
+        Ok(Measurements { rows, columns, layout, duplicates, warnings, understood })
     } else {
-        Err(TableErrors::new(file, problems, headers))
+        refused(problems, understood)
     }
 }
 
@@ -182,20 +255,19 @@ struct Places {
 
 /// A table before its cells are read: names, places and rows of text.
 struct Split {
+    /// Names for filters.
     columns: Vec<String>,
+    /// Names in the file, for messages.
+    shown: Vec<String>,
     places: Places,
     records: Vec<Record>,
     decimal_comma: bool,
 }
 
 /// Finds the columns of the table's own layout.
-fn split_named(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> Option<Split> {
-    let table = table::split(text, Shape::Named, problems);
-    let Some(record) = table.header else {
-        problems.push(Defect::NoRows.of_table());
-        return None;
-    };
-    let mut header = Header::new(record, problems)?;
+fn split_named(foreign: Foreign, joints: &[JointType], problems: &mut Vec<TableProblem>) -> Split {
+    let Foreign { line, shown, canonical, records, decimal_comma, understood: _ } = foreign;
+    let mut header = Header::renamed(line, shown, &canonical, problems);
     let places = Places {
         pose: header.text("pose"),
         target: header.text("target"),
@@ -207,8 +279,8 @@ fn split_named(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem
         sigma: header.number("sigma", Measure::Length, problems),
         temperature: header.number("temperature", Measure::Temperature, problems),
     };
-    let columns = header.finish(problems);
-    Some(Split { columns, places, records: table.records, decimal_comma: table.decimal_comma })
+    let shown = header.finish(problems);
+    Split { columns: canonical, shown, places, records, decimal_comma }
 }
 
 /// Reads one row. All its cells are checked, also after the first defect.

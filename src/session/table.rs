@@ -1,18 +1,20 @@
 //! Separated-value tables as text cells with true line numbers; shared by every table a session reads.
 //!
-//! Comma, semicolon or tab is detected from the line of column names. A byte order mark, CRLF, blank lines, rows of
-//! nothing but separators (spreadsheets leave them at the end) and lines that begin with `#` are passed over. Cells lose
-//! surrounding blanks; control characters in them are replaced, so that no cell can disturb a terminal.
+//! What separates the cells (commas, semicolons, tabs, bars or blanks) is detected from the line of column names. A byte order mark,
+//! line ends of all kinds, blank lines, rows of nothing but separators (spreadsheets leave them at the end) and comments are passed
+//! over. Cells lose surrounding blanks; control characters in them are replaced, so that no cell can disturb a terminal.
 //!
 //! What a column means is not known here.
 
 mod columns;
 mod encoding;
+mod lines;
 mod number;
 mod problem;
 
 pub(super) use columns::{Header, Measure, NumberColumn};
 pub(super) use encoding::decode;
+pub(super) use lines::{Separator, is_number};
 pub(super) use number::Numbers;
 pub use problem::{Defect, TableErrors, TableProblem};
 
@@ -27,7 +29,7 @@ const LONGEST_LINE: usize = 64 * 1024;
 const MOST_COLUMNS: usize = 1000;
 
 /// One line of a table, split into cells.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Record {
     /// 1-based line in the file.
     pub(super) line: usize,
@@ -36,7 +38,7 @@ pub(super) struct Record {
 }
 
 /// The lines of a table, the line of column names apart.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Table {
     /// The first line that is neither blank nor a comment.
     pub(super) header: Option<Record>,
@@ -44,6 +46,12 @@ pub(super) struct Table {
     pub(super) records: Vec<Record>,
     /// Whether `1,5` can be a number: the comma does not separate cells.
     pub(super) decimal_comma: bool,
+    /// What separates the cells.
+    pub(super) separator: Separator,
+    /// The last comment above the first row, split like one: some programs write the column names there.
+    pub(super) heading: Option<Record>,
+    /// The comments, without their marks.
+    pub(super) comments: Vec<String>,
 }
 
 /// How the cells of a table are separated and counted.
@@ -65,18 +73,29 @@ pub(super) enum Shape {
 
 /// Splits `text` into records. Rows with a wrong number of cells or an open quotation mark go to `problems` instead.
 pub(super) fn split(text: &str, shape: Shape, problems: &mut Vec<TableProblem>) -> Table {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = &lines::unified(text);
     // Looked at before anything is taken apart, which would multiply the memory.
     if let Some(problem) = beyond_limits(text) {
         problems.push(problem);
-        return Table { header: None, records: Vec::new(), decimal_comma: false };
+        return Table::default();
     }
-    let separator = match shape {
-        Shape::Named => separator(content_lines(text).next()),
-        Shape::Fixed { .. } => separator(content_lines(text).nth(1)),
-        Shape::Tabs { .. } => b'\t',
+    let mut table = match shape {
+        Shape::Named => Table::default(),
+        Shape::Fixed { .. } => Table { separator: of_fixed(content_lines(text).nth(1)), ..Table::default() },
+        Shape::Tabs { .. } => Table { separator: Separator::Tab, ..Table::default() },
     };
-    let mut table = Table { header: None, records: Vec::new(), decimal_comma: separator != b',' };
+    let prepared = matches!(shape, Shape::Named).then(|| lines::prepared(text));
+    let text = prepared.as_ref().map_or(text, |prepared| &prepared.text);
+    if let Some(prepared) = &prepared {
+        table.separator = prepared.separator;
+        table.heading = prepared.heading.as_ref().map(|(line, said)| Record {
+            line: *line,
+            cells: lines::cells(said, prepared.separator).iter().map(|cell| printable(cell)).collect(),
+        });
+        table.comments = prepared.comments.iter().map(|said| printable(said)).collect();
+    }
+    let separator = table.separator.byte();
+    table.decimal_comma = separator != b',';
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(separator)
         .has_headers(false)
@@ -160,12 +179,13 @@ fn content_lines(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// The separator that a line has most of; the comma for a line without any.
-fn separator(line: Option<&str>) -> u8 {
+/// The separator that a line of a fixed layout has most of; the comma for a line without any.
+fn of_fixed(line: Option<&str>) -> Separator {
     let line = line.unwrap_or_default();
-    let count = |wanted: u8| line.bytes().filter(|&byte| byte == wanted).count();
-    // The last of equal counts wins, so the preferred one stands last.
-    [b',', b';', b'\t'].into_iter().filter(|&byte| count(byte) > 0).max_by_key(|&byte| count(byte)).unwrap_or(b',')
+    let count = |separator: &Separator| line.bytes().filter(|byte| *byte == separator.byte()).count();
+    // The last of equal counts wins, so the preferred one comes last.
+    let known = [Separator::Comma, Separator::Semicolon, Separator::Tab];
+    known.into_iter().filter(|separator| count(separator) > 0).max_by_key(count).unwrap_or(Separator::Comma)
 }
 
 /// Follows the line numbers of records: the ones of the `csv` crate count neither blank lines nor CRLF as wanted here.
@@ -245,13 +265,7 @@ mod tests {
             let text =
                 ["\u{feff}# from the cell", "", "a,b", "1,2", "", "# x, y", "  # indented", "3,4", ",", "5,6", ""]
                     .join(ending);
-            let expected = if ending == "\r" {
-                // A comment ends at a line feed; a file of lone carriage returns is one comment.
-                vec![]
-            } else {
-                vec![3, 4, 8, 10]
-            };
-            assert_eq!(lines(&text), (expected, vec![]), "{ending:?}");
+            assert_eq!(lines(&text), (vec![3, 4, 8, 10], vec![]), "{ending:?}");
         }
         assert_eq!(lines("a,b\r1,2\r\r3,4"), (vec![1, 2, 4], vec![]));
     }

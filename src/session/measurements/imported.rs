@@ -97,5 +97,5 @@ fn split(
             warnings.push(Defect::NumbersIgnored.at(header.line));
         }
     }
-    Split { columns, places, records, decimal_comma: table.decimal_comma }
+    Split { shown: columns.clone(), columns, places, records, decimal_comma: table.decimal_comma }
 }

@@ -2,7 +2,7 @@
 
 use super::{Defect, Record, TableProblem};
 use crate::kinematics::JointType;
-use crate::units::{DEGREE, INCH, MICROMETRE, MILLIMETRE, Quantity};
+use crate::units::{CENTIMETRE, DEGREE, INCH, MICROMETRE, MILLIMETRE, Quantity};
 
 /// What the numbers of a column measure, and so which units its name may end with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ impl Measure {
     /// Unit names with their size in the unit of the inside; the usual one first.
     const fn units(self) -> &'static [(&'static str, f64)] {
         match self {
-            Self::Length => &[("mm", MILLIMETRE), ("m", 1.0), ("um", MICROMETRE), ("in", INCH)],
+            Self::Length => &[("mm", MILLIMETRE), ("m", 1.0), ("um", MICROMETRE), ("in", INCH), ("cm", CENTIMETRE)],
             Self::Angle => &[("deg", DEGREE), ("rad", 1.0)],
             Self::Temperature => &[("degc", 1.0)],
         }
@@ -51,6 +51,12 @@ impl NumberColumn {
     /// A column in the usual unit of `measure` (mm, degree, °C).
     pub(in crate::session) fn usual(index: usize, measure: Measure) -> Self {
         Self { index, unit: measure.units().first().map_or(1.0, |(_, size)| *size) }
+    }
+
+    /// A column in a unit by its name; in that of the inside if there is no such unit.
+    pub(in crate::session) fn in_unit(index: usize, unit: &str) -> Self {
+        let all = [Measure::Length, Measure::Angle].into_iter().flat_map(Measure::units);
+        Self { index, unit: all.into_iter().find(|(name, _)| *name == unit).map_or(1.0, |(_, size)| *size) }
     }
 }
 
@@ -80,14 +86,25 @@ impl Header {
             if cell.is_empty() { format!("column{}", index + 1) } else { cell }
         };
         let names: Vec<String> = cells.into_iter().enumerate().map(named).collect();
-        let lower: Vec<String> = names.iter().map(|name| name.to_lowercase()).collect();
+        let lower = names.clone();
+        Some(Self::renamed(line, names, &lower, problems))
+    }
+
+    /// A line whose `names` are those of the file, and mean the names in `known`. Reports those that appear twice.
+    pub(in crate::session) fn renamed(
+        line: usize,
+        names: Vec<String>,
+        known: &[String],
+        problems: &mut Vec<TableProblem>,
+    ) -> Self {
+        let lower: Vec<String> = known.iter().map(|name| name.to_lowercase()).collect();
         for (index, name) in lower.iter().enumerate() {
             if let Some(first) = lower.iter().take(index).position(|earlier| earlier == name) {
                 let shown = names.get(index).map_or("", String::as_str);
                 problems.push(Defect::DuplicateColumn { first: first + 1, second: index + 1 }.at_cell(line, shown));
             }
         }
-        Some(Self { line, names, lower, without_unit: Vec::new(), unit_example: None, missing: Vec::new() })
+        Self { line, names, lower, without_unit: Vec::new(), unit_example: None, missing: Vec::new() }
     }
 
     /// Place of the text column `name`.
@@ -169,19 +186,18 @@ impl Header {
         joints: &[JointType],
         problems: &mut Vec<TableProblem>,
     ) -> Vec<NumberColumn> {
-        let found: Vec<String> = self
+        let (found, lower): (Vec<String>, Vec<String>) = self
             .names
             .iter()
             .zip(&self.lower)
             .filter(|(_, lower)| is_joint(lower, prefix))
-            .map(|(name, _)| name.clone())
-            .collect();
+            .map(|(name, lower)| (name.clone(), lower.clone()))
+            .unzip();
         let mut columns = Vec::with_capacity(joints.len());
         for (index, joint) in joints.iter().enumerate() {
             let name = format!("{prefix}q{}", index + 1);
             columns.extend(self.number(&name, Measure::of_joint(*joint), problems));
         }
-        let lower: Vec<String> = found.iter().map(|name| name.to_lowercase()).collect();
         let expected = |name: &String| (1..=joints.len()).any(|i| unit_after(name, &format!("{prefix}q{i}")).is_some());
         if columns.len() != joints.len() || !lower.iter().all(expected) {
             let prefix = prefix.to_owned();

@@ -55,7 +55,8 @@ impl<'a> Numbers<'a> {
         let comma = self.decimal_comma && text.bytes().filter(|&byte| byte == b',').count() == 1 && !text.contains('.');
         let value = if comma { text.replacen(',', ".", 1).parse::<f64>() } else { text.parse::<f64>() };
         let Ok(value) = value else {
-            return refuse(Defect::NotANumber { text: text.to_owned() });
+            let text = text.to_owned();
+            return refuse(if is_grouped(&text) { Defect::Grouped { text } } else { Defect::NotANumber { text } });
         };
         if !value.is_finite() || (value * column.unit).abs() > LARGEST {
             return refuse(Defect::NotFinite { text: text.to_owned() });
@@ -102,5 +103,22 @@ impl<'a> Numbers<'a> {
     /// Name of a column as written.
     pub(in crate::session) fn name(&self, column: NumberColumn) -> &'a str {
         self.names.get(column.index).map_or("", String::as_str)
+    }
+}
+
+/// Whether a text is a number whose digits are in groups of three: `1,234.5`, `1.234,5`, `1 234.5` or `1'234.5`.
+fn is_grouped(text: &str) -> bool {
+    let is_between = |c: char| matches!(c, ',' | '.' | ' ' | '\'' | '\u{a0}' | '\u{2009}' | '\u{202f}' | '’');
+    let whole = text.trim_start_matches(['-', '+']);
+    let parts: Vec<&str> = whole.split(is_between).collect();
+    let is_digits = |part: &&str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    match parts.as_slice() {
+        [first, groups @ .., _last] => {
+            !groups.is_empty()
+                && parts.iter().all(|part| is_digits(&part))
+                && first.len() <= 3
+                && groups.iter().all(|group| group.len() == 3)
+        }
+        _ => false,
     }
 }

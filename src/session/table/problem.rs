@@ -4,6 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::session::measurements::Understood;
 use crate::text::printable;
 
 /// Problems shown in a message; the others are counted.
@@ -28,15 +29,75 @@ pub enum Defect {
     /// The check sum of a table that this program wrote does not fit.
     #[error("the table has changed since the program wrote it: a number or a row may be wrong")]
     Changed,
-    /// Text in UTF-16, as spreadsheets write "Unicode text".
-    #[error("the file is UTF-16 text; save it as 'CSV UTF-8'")]
+    /// Text in UTF-16 that ends within a character.
+    #[error("the file is UTF-16 text, and damaged; save it again, as 'CSV UTF-8'")]
     Utf16,
-    /// A byte that is not UTF-8.
-    #[error("byte 0x{byte:02X} is not UTF-8 text; save the file as 'CSV UTF-8'")]
-    NotUtf8 {
-        /// First offending byte of the line.
-        byte: u8,
+    /// Zero bytes.
+    #[error("the file is no text: it has zero bytes; export the table as text, such as CSV")]
+    NotText,
+    /// A workbook where only text can be read.
+    #[error("the file is a workbook (.xlsx) or another archive; save the sheet as CSV, or import it")]
+    Workbook,
+    /// A workbook of before 2007.
+    #[error("the file is an old workbook (.xls); save it as .xlsx or as CSV")]
+    OldWorkbook,
+    /// A workbook that cannot be read.
+    #[error("the workbook cannot be read: {reason}")]
+    BadWorkbook {
+        /// What is wrong, and what to do.
+        reason: String,
     },
+    /// Names of two sets of joints.
+    #[error("several sets of columns could be the joints: {}; name those that the pendant showed", sets.join("; "))]
+    SeveralJointSets {
+        /// The columns of each.
+        sets: Vec<String>,
+    },
+    /// Names of two sets of coordinates.
+    #[error("several sets of columns could be the measured point: {}; name the measured ones", sets.join("; "))]
+    SeveralPoints {
+        /// The columns of each.
+        sets: Vec<String>,
+    },
+    /// More SMRs in a row than the robot has.
+    #[error("{source_name}, but the profile has {known}; add the others to its 'targets'")]
+    MoreTargets {
+        /// What the table has, in words.
+        source_name: String,
+        /// Targets of the profile, counted.
+        known: String,
+    },
+    /// Another tool centre in each row, in columns that are not read.
+    #[error(
+        "{} different values: these are different targets, which must not be mixed; read the table in the layout 'robodk', or name a column 'target'",
+        named(columns, "has", "have")
+    )]
+    VaryingTool {
+        /// Names of the columns.
+        columns: Vec<String>,
+    },
+    /// A column that was asked for and is not there.
+    #[error("there is no column '{}'; columns: {known}", excerpt(name))]
+    NoSuchColumn {
+        /// The name that was asked for.
+        name: String,
+        /// The names in the file, or their number.
+        known: String,
+    },
+    /// A name and its mapping that state different units.
+    #[error("the name states '{stated}', but {against}")]
+    OtherUnit {
+        /// Unit in the name of the column.
+        stated: String,
+        /// What states another one, in words.
+        against: String,
+    },
+    /// A row of a point file that belongs to no row of the joint file, or the reverse.
+    #[error("{0}")]
+    NotJoined(String),
+    /// A file that is asked for something it does not have.
+    #[error("{0}")]
+    Lacking(String),
     /// The splitter gave up.
     #[error("the line cannot be split into cells: {reason}")]
     Unreadable {
@@ -188,6 +249,12 @@ pub enum Defect {
     /// Text where a number is needed.
     #[error("'{}' is not a number; write one such as '-12.5'", excerpt(text))]
     NotANumber {
+        /// Text of the cell.
+        text: String,
+    },
+    /// A number whose digits are in groups.
+    #[error("'{}' has a thousands separator; write the number without it, as the same text could be another number elsewhere", excerpt(text))]
+    Grouped {
         /// Text of the cell.
         text: String,
     },
@@ -440,6 +507,28 @@ impl TableProblem {
     pub fn is_change(&self) -> bool {
         self.defect == Defect::Changed
     }
+
+    /// Whether a reading has no point.
+    pub fn is_without_point(&self) -> bool {
+        let name = self.column.as_deref().unwrap_or_default().to_lowercase();
+        let is_of_point = name.starts_with(['x', 'y', 'z']);
+        matches!(self.defect, Defect::ZeroPoint)
+            || (is_of_point && matches!(self.defect, Defect::Empty | Defect::NotFinite { .. }))
+    }
+
+    /// Whether it is not clear which sheet of a workbook is meant.
+    pub fn is_about_sheets(&self) -> bool {
+        matches!(&self.defect, Defect::BadWorkbook { reason } if reason.contains("sheets"))
+    }
+
+    /// Whether the names of the columns are at fault.
+    pub fn is_of_columns(&self) -> bool {
+        self.defect.is_of_header()
+            || matches!(
+                self.defect,
+                Defect::Lacking(_) | Defect::SeveralJointSets { .. } | Defect::SeveralPoints { .. }
+            )
+    }
 }
 
 impl fmt::Display for TableProblem {
@@ -463,13 +552,15 @@ pub struct TableErrors {
     pub problems: Vec<TableProblem>,
     /// How the line of column names should read for this robot; one entry per kind of table.
     pub headers: Vec<String>,
+    /// What was understood of the columns, where that can help.
+    pub understood: Option<Box<Understood>>,
 }
 
 impl TableErrors {
     /// The problems of `file` in the order of its lines.
     pub(in crate::session) fn new(file: &str, mut problems: Vec<TableProblem>, headers: Vec<String>) -> Self {
         problems.sort_by_key(|problem| problem.line);
-        Self { file: printable(file), problems, headers }
+        Self { file: printable(file), problems, headers, understood: None }
     }
 }
 
