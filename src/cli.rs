@@ -31,8 +31,8 @@ use crate::session::summary::Refit;
 use crate::units::{from_mm, to_mm};
 
 pub use identity::IdentityArgs;
-use link::wires;
 pub use import::ImportArgs;
+use link::wires;
 pub use link::{LinkCommand, LinkTestArgs, SimulateArgs, Wires};
 pub use payload::PayloadArgs;
 use profile::NEW_EXAMPLES;
@@ -335,9 +335,7 @@ pub enum ProfileCommand {
     /// Make a profile from the serial chain of a URDF
     ImportUrdf(compensate::ImportUrdfArgs),
     /// Make a profile from the factory calibration of a Universal Robots arm
-    #[command(
-        after_help = "Example:\n  trupose profile import-ur calibration.conf --model ur10e --out my-ur10e.ron"
-    )]
+    #[command(after_help = "Example:\n  trupose profile import-ur calibration.conf --model ur10e --out my-ur10e.ron")]
     ImportUr(compensate::ImportUrArgs),
 }
 

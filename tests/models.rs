@@ -275,7 +275,9 @@ fn defects_elsewhere_do_not_matter() {
     let limit = "<limit lower='-1' upper='1'/>";
     let (expected, notes) = pose(&arm(limit, ""));
     assert!(notes.is_empty(), "{notes:?}");
-    let joint = |inside: &str| format!("<link name='g'/><joint name='f' type='prismatic'><parent link='c'/><child link='g'/>{inside}</joint>");
+    let joint = |inside: &str| {
+        format!("<link name='g'/><joint name='f' type='prismatic'><parent link='c'/><child link='g'/>{inside}</joint>")
+    };
     for text in [
         arm(limit, &joint("<axis xyz='0 0 0'/>")),
         arm(limit, &joint("<axis xyz='0 0 x'/>")),
@@ -288,7 +290,10 @@ fn defects_elsewhere_do_not_matter() {
         arm(limit, "<link/><joint/><link name='g'/><link name='g'/>"),
         arm(limit, "<link name='g'><inertial/></link>"),
         format!("\n\n<?xml version='1.0'?>\n{}", arm(limit, "")),
-        format!("<?xml version='1.0'?><!DOCTYPE robot [<!ENTITY h '0.3'>]>{}", arm(limit, "").replace("0.2 0.3'", "0.2 &h;'")),
+        format!(
+            "<?xml version='1.0'?><!DOCTYPE robot [<!ENTITY h '0.3'>]>{}",
+            arm(limit, "").replace("0.2 0.3'", "0.2 &h;'")
+        ),
     ] {
         let (found, notes) = pose(&text);
         assert!(differs(&found, &expected) < 1e-15 && notes.is_empty(), "{notes:?}\n{text}");
@@ -297,15 +302,22 @@ fn defects_elsewhere_do_not_matter() {
     for (inside, note) in [
         ("<limit lower='-inf' upper='inf' velocity='inf'/>", "has no usable <limit>"),
         ("<limit lower='1' upper='-1'/>", "lower 1 is above upper -1, taken as no limits"),
-        ("<limit lower='${low}' upper='1'/>", "lower '${low}' is not a number and is left out; it is xacro: expand it first"),
+        (
+            "<limit lower='${low}' upper='1'/>",
+            "lower '${low}' is not a number and is left out; it is xacro: expand it first",
+        ),
     ] {
         let (found, notes) = pose(&arm(inside, ""));
         assert!(differs(&found, &expected) < 1e-15 && notes.iter().any(|said| said.contains(note)), "{notes:?}");
     }
     // A mass of the arm that cannot be read: the geometry without masses.
-    let heavy = arm(limit, "").replace("<link name='b'/>", "<link name='b'><inertial><mass value='x'/></inertial></link>");
+    let heavy =
+        arm(limit, "").replace("<link name='b'/>", "<link name='b'><inertial><mass value='x'/></inertial></link>");
     let (found, notes) = pose(&heavy);
-    assert!(differs(&found, &expected) < 1e-15 && notes[0].starts_with("no masses are taken: line 1: <mass> of link 'b'"), "{notes:?}");
+    assert!(
+        differs(&found, &expected) < 1e-15 && notes[0].starts_with("no masses are taken: line 1: <mass> of link 'b'"),
+        "{notes:?}"
+    );
 }
 
 #[test]
@@ -318,7 +330,11 @@ fn rounded_angles_are_pointed_out() {
         let urdf = Urdf::parse(&text).unwrap();
         import(&urdf.chain("a", "b").unwrap(), Convention::Standard).unwrap().notes
     };
-    for (angle, meant) in [("1.57", "89.9544 deg; if 90 deg is meant, write 1.5707963267948966"), ("3.141", "if 180 deg"), ("-0.785", "if -45 deg")] {
+    for (angle, meant) in [
+        ("1.57", "89.9544 deg; if 90 deg is meant, write 1.5707963267948966"),
+        ("3.141", "if 180 deg"),
+        ("-0.785", "if -45 deg"),
+    ] {
         let notes = said(angle);
         assert!(notes.len() == 1 && notes[0].contains(meant), "{notes:?}");
     }
@@ -332,8 +348,12 @@ fn rounded_angles_are_pointed_out() {
 fn a_coupling_makes_pendant_values_of_joint_values() {
     let profile = profile("fanuc_lrmate200id");
     let chain = profile.chain();
-    let coupled: Vec<(usize, &trupose::kinematics::Joint)> =
-        chain.joints().iter().enumerate().filter(|(_, joint)| joint.coupling.iter().any(|factor| *factor != 0.0)).collect();
+    let coupled: Vec<(usize, &trupose::kinematics::Joint)> = chain
+        .joints()
+        .iter()
+        .enumerate()
+        .filter(|(_, joint)| joint.coupling.iter().any(|factor| *factor != 0.0))
+        .collect();
     let [(index, joint)] = coupled.as_slice() else { panic!("one coupled joint") };
     let other = joint.coupling.iter().position(|factor| *factor != 0.0).unwrap();
     let text = urdf_text("fanuc", &[], chain, profile.joints()).unwrap();
@@ -343,13 +363,16 @@ fn a_coupling_makes_pendant_values_of_joint_values() {
     let sign = if joint.coupling[other] > 0.0 { "" } else { "-" };
     let option = format!("{}={sign}{}", joint.name, chain.joints()[other].name);
     let arm = import_coupled(&way, Convention::Standard, &[option.parse().unwrap()]).unwrap();
-    assert!(arm.notes.iter().any(|note| note.contains(&format!("'{}' counts with another", chain.joints()[*index].name))));
+    assert!(
+        arm.notes.iter().any(|note| note.contains(&format!("'{}' counts with another", chain.joints()[*index].name)))
+    );
     let read = through_text(&arm);
     let (ours, theirs) = (ForwardKinematics::new(&read), ForwardKinematics::new(chain));
     for q in configurations(chain, &limits(&profile), 200) {
         assert!(differs(&ours.base_from_flange(&q), &theirs.base_from_flange(&q)) < 1e-8);
     }
-    let uncoupled = ForwardKinematics::new(&import(&way, Convention::Standard).unwrap().chain).base_from_flange(&[0.3; 6]);
+    let uncoupled =
+        ForwardKinematics::new(&import(&way, Convention::Standard).unwrap().chain).base_from_flange(&[0.3; 6]);
     assert!(differs(&uncoupled, &theirs.base_from_flange(&[0.3; 6])) > 0.05);
     assert!("J3".parse::<Coupling>().is_err() && "J3=J3".parse::<Coupling>().is_err());
     let unknown = import_coupled(&way, Convention::Standard, &["J3=J9".parse().unwrap()]).unwrap_err().to_string();
@@ -390,7 +413,10 @@ fn a_factory_calibration_is_the_nominal_arm() {
     let conf = |d: &[f64; 6], theta: &[f64; 6]| {
         format!(
             "[mounting]\ndelta_theta = [ {}]\ndelta_a = [{}]\ndelta_d = [ {}]\ndelta_alpha = [{}]\ncalibration_status = 2 # Linearised\n",
-            list(theta), list(&a), list(d), list(&alpha)
+            list(theta),
+            list(&a),
+            list(d),
+            list(&alpha)
         )
     };
     let plain = |d: &[f64; 6], theta: &[f64; 6]| {
@@ -404,7 +430,8 @@ fn a_factory_calibration_is_the_nominal_arm() {
             },
             ..joint.clone()
         });
-        KinematicChain::new(Convention::Standard, *profile.chain().base(), joints.collect(), *profile.chain().flange()).unwrap()
+        KinematicChain::new(Convention::Standard, *profile.chain().base(), joints.collect(), *profile.chain().flange())
+            .unwrap()
     };
     // Large angles make another arm, which is refused; with the nominal ones it is this arm.
     let refused = read_factory(&conf(&d, &theta), &profile).unwrap_err().to_string();
@@ -412,9 +439,14 @@ fn a_factory_calibration_is_the_nominal_arm() {
     let (theta, d) = ([1e-6, 2e-4, -3e-4, 1e-4, 6e-6, -5e-7], [9e-5, 1.2062, 1.7671, -2.9733, -3e-5, 2e-4]);
     let alpha_free = read_factory(&conf(&d, &theta), &profile).unwrap();
     let meant = ForwardKinematics::new(&plain(&d, &theta)).base_from_flange(&[0.3, -1.0, 1.2, -0.4, 0.9, 2.0]);
-    let found = ForwardKinematics::new(&through_text(&alpha_free.arm)).base_from_flange(&[0.3, -1.0, 1.2, -0.4, 0.9, 2.0]);
+    let found =
+        ForwardKinematics::new(&through_text(&alpha_free.arm)).base_from_flange(&[0.3, -1.0, 1.2, -0.4, 0.9, 2.0]);
     assert!(differs(&found, &meant) < 1e-8);
-    assert!(alpha_free.arm.chain.joints().iter().all(|joint| joint.link.d.abs() < 0.2), "{}", table(&alpha_free.arm.chain));
+    assert!(
+        alpha_free.arm.chain.joints().iter().all(|joint| joint.link.d.abs() < 0.2),
+        "{}",
+        table(&alpha_free.arm.chain)
+    );
     assert_eq!(alpha_free.arm.beta_joints, profile.beta_joints());
     assert!(alpha_free.moved > 1e-4 && alpha_free.moved < 0.05);
 
@@ -422,7 +454,10 @@ fn a_factory_calibration_is_the_nominal_arm() {
     let mut arm = calibrated(&profile);
     arm.geometry.chain = alpha_free.arm.chain.clone();
     arm.identified = arm.geometry.clone();
-    let yaml = export(&arm, Format::UrKinematics, &ExportOptions { with_tool_offset: true, ..ExportOptions::default() }).unwrap().text;
+    let yaml =
+        export(&arm, Format::UrKinematics, &ExportOptions { with_tool_offset: true, ..ExportOptions::default() })
+            .unwrap()
+            .text;
     let back = read_factory(&yaml, &profile).unwrap().arm.chain;
     let (one, other) = (ForwardKinematics::new(&back), ForwardKinematics::new(&alpha_free.arm.chain));
     for q in configurations(&back, &limits(&profile), 100) {
@@ -508,7 +543,10 @@ fn masses_of_a_urdf_arrive_at_the_same_places() {
         assert_eq!(arm.masses, Masses::Unknown);
         assert!(arm.notes.contains(&format!("no masses are taken: {message}")), "{:?}", arm.notes);
         let base = Urdf::parse(&text.replacen("<inertial><mass value='9'/>", wrong, 1)).unwrap();
-        assert_ne!(import(&base.chain("base", "flange").unwrap(), Convention::Standard).unwrap().masses, Masses::Unknown);
+        assert_ne!(
+            import(&base.chain("base", "flange").unwrap(), Convention::Standard).unwrap().masses,
+            Masses::Unknown
+        );
     }
     // A corrected profile keeps what gravity acts on.
     let given = builtin("ur5").unwrap().replacen("    targets: [", "    payload: (mass_kg: 2.0, centre_mm: (0.0, 1.0, 60.0)),\n    gravity_in_base: (0.0, 0.6, -0.8),\n    targets: [", 1);

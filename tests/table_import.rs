@@ -14,8 +14,11 @@ use trupose::session::{TableErrors, workbook};
 const JOINTS: [JointType; 3] = [Revolute; 3];
 
 /// Rows of the plain table that every other one must equal: joints in degrees, points in mm.
-const ROWS: [[f64; 6]; 3] =
-    [[10.5, -20.25, 30.0, 1000.125, -200.5, 300.0], [11.0, 21.5, -31.0, 1001.0, 201.75, 301.5], [12.0, 22.0, 32.5, -999.5, 202.0, 302.0]];
+const ROWS: [[f64; 6]; 3] = [
+    [10.5, -20.25, 30.0, 1000.125, -200.5, 300.0],
+    [11.0, 21.5, -31.0, 1001.0, 201.75, 301.5],
+    [12.0, 22.0, 32.5, -999.5, 202.0, 302.0],
+];
 
 fn robot(targets: &[&str]) -> Expected<'static> {
     Expected {
@@ -109,15 +112,24 @@ fn columns_are_taken_as_a_person_names_them() {
     let columns: Columns = "q1_deg=a, q2_deg=B, q3_deg=#3, x_mm=d, y_mm=e, z_mm=f".parse().unwrap();
     let reading = Reading { columns: Some(columns), ..Reading::default() };
     assert_same(&read(&text, &reading).unwrap(), "named");
-    let listed = Reading { columns: Some("q1_deg,q2_deg,q3_deg,x_mm,y_mm,z_mm".parse().unwrap()), ..Reading::default() };
+    let listed =
+        Reading { columns: Some("q1_deg,q2_deg,q3_deg,x_mm,y_mm,z_mm".parse().unwrap()), ..Reading::default() };
     assert_same(&read(written("", ",", plain).trim_start(), &listed).unwrap(), "no names");
     let units = Reading { units: "deg,mm".parse().unwrap(), ..Reading::default() };
     assert_same(&read(written("J1,J2,J3,X,Y,Z", ",", plain), &units).unwrap(), "units");
 
     for (header, columns, expected) in [
         ("a,b,c,d,e,f", "q1_deg=a, q2_deg=b, q3_deg=c, x_mm=d, y_mm=e, z_mm=g", "there is no column 'g'"),
-        ("a,b,c,d,e,f", "q1_deg=a, q2_deg=b, q3_deg=c, x_mm=d, y_mm=e, z_mm=#7", "there is no column '#7'; columns: 6 columns"),
-        ("a,b,c,d [m],e,f", "q1_deg=a, q2_deg=b, q3_deg=c, x_mm=d, y_mm=e, z_mm=f", "the name states 'm', but 'x_mm' is asked for"),
+        (
+            "a,b,c,d,e,f",
+            "q1_deg=a, q2_deg=b, q3_deg=c, x_mm=d, y_mm=e, z_mm=#7",
+            "there is no column '#7'; columns: 6 columns",
+        ),
+        (
+            "a,b,c,d [m],e,f",
+            "q1_deg=a, q2_deg=b, q3_deg=c, x_mm=d, y_mm=e, z_mm=f",
+            "the name states 'm', but 'x_mm' is asked for",
+        ),
         ("a,b,c,d,e,f", "q1_deg,q2_deg,x_mm,y_mm,z_mm", "5 columns are listed, but the table has 6"),
     ] {
         let reading = Reading { columns: Some(columns.parse().unwrap()), ..Reading::default() };
@@ -130,13 +142,20 @@ fn columns_are_taken_as_a_person_names_them() {
 #[test]
 fn a_proposal_can_be_pasted_back() {
     for text in [
-        written("Point;A1;A2;A3;X;Y;Z", ";", |index, value| if index == 0 { format!("P;{}", comma(0, value)) } else { comma(index, value) }),
-        written("field.position0,field.position1,field.position2,field.point.x,field.point.y,field.point.z", ",", plain),
+        written("Point;A1;A2;A3;X;Y;Z", ";", |index, value| {
+            if index == 0 { format!("P;{}", comma(0, value)) } else { comma(index, value) }
+        }),
+        written(
+            "field.position0,field.position1,field.position2,field.point.x,field.point.y,field.point.z",
+            ",",
+            plain,
+        ),
         written("", "  ", plain).trim_start().to_owned(),
         written("u,v,w,X,Y,Z", ",", plain),
     ] {
         let errors = read(&text, &Reading::default()).unwrap_err();
-        let proposal = errors.understood.as_ref().unwrap().proposal.clone().unwrap_or_else(|| panic!("{errors}\n{text}"));
+        let proposal =
+            errors.understood.as_ref().unwrap().proposal.clone().unwrap_or_else(|| panic!("{errors}\n{text}"));
         let columns = proposal.parse().unwrap_or_else(|error| panic!("{proposal}: {error}"));
         let table = read(&text, &Reading { columns: Some(columns), ..Reading::default() });
         assert_same(&table.unwrap_or_else(|errors| panic!("{errors}\n{proposal}")), &proposal);
@@ -193,7 +212,8 @@ fn joints_and_points_of_two_files_are_joined() {
 
     let timed = "time,q1,q2,q3\n99.9,10.5,-20.25,30\n100,10.5,-20.25,30\n105,11,21.5,-31\n110,12,22,32.5\n";
     let seen = "t,x,y,z\n100.2,1000.125,-200.5,300\n104.9,1001,201.75,301.5\n110,-999.5,202,302\n";
-    let table = join(timed, &[point_file(seen, None)], Some(JoinBy::Time), &["smr"]).unwrap_or_else(|errors| panic!("{errors}"));
+    let table = join(timed, &[point_file(seen, None)], Some(JoinBy::Time), &["smr"])
+        .unwrap_or_else(|errors| panic!("{errors}"));
     assert_same(&table, "by time");
     let moving = timed.replace("99.9,10.5", "99.9,10.9");
     let errors = join(&moving, &[point_file(seen, None)], Some(JoinBy::Time), &["smr"]).unwrap_err().to_string();
@@ -222,16 +242,20 @@ fn joints_and_points_of_two_files_are_joined() {
 
 /// A workbook of stored parts.
 fn workbook(sheets: &[(&str, &str)], shared: &str) -> Vec<u8> {
-    let mut parts = vec![
-        ("xl/sharedStrings.xml".to_owned(), format!("<sst>{shared}</sst>")),
-    ];
+    let mut parts = vec![("xl/sharedStrings.xml".to_owned(), format!("<sst>{shared}</sst>"))];
     let (mut names, mut links) = (String::new(), String::new());
     for (index, (name, cells)) in sheets.iter().enumerate() {
         names += &format!("<sheet name=\"{name}\" r:id=\"r{index}\"/>");
         links += &format!("<Relationship Id=\"r{index}\" Target=\"worksheets/sheet{index}.xml\"/>");
-        parts.push((format!("xl/worksheets/sheet{index}.xml"), format!("<worksheet><sheetData>{cells}</sheetData></worksheet>")));
+        parts.push((
+            format!("xl/worksheets/sheet{index}.xml"),
+            format!("<worksheet><sheetData>{cells}</sheetData></worksheet>"),
+        ));
     }
-    parts.push(("xl/workbook.xml".to_owned(), format!("<workbook xmlns:r=\"urn:r\"><sheets>{names}</sheets></workbook>")));
+    parts.push((
+        "xl/workbook.xml".to_owned(),
+        format!("<workbook xmlns:r=\"urn:r\"><sheets>{names}</sheets></workbook>"),
+    ));
     parts.push(("xl/_rels/workbook.xml.rels".to_owned(), format!("<Relationships>{links}</Relationships>")));
     let (mut file, mut directory) = (Vec::new(), Vec::new());
     for (name, text) in &parts {
@@ -320,17 +344,38 @@ fn a_layout_is_saved_beside_the_profile_and_used_again() {
     let proposal = words.split("--columns '").nth(1).unwrap().split('\'').next().unwrap().to_owned();
     let done = run(
         path,
-        &["import", "kuka.csv", "--profile", "cell/arm.ron", "--columns", &proposal, "--save-layout", "kuka", "--rows", "--out", "points.csv"],
+        &[
+            "import",
+            "kuka.csv",
+            "--profile",
+            "cell/arm.ron",
+            "--columns",
+            &proposal,
+            "--save-layout",
+            "kuka",
+            "--rows",
+            "--out",
+            "points.csv",
+        ],
     );
     let words = said(&done);
     assert_eq!(done.status.code(), Some(0), "{words}");
-    assert!(words.contains("3 readings, 3 poses, target 'smr'") && words.contains("600.1000 10.5000 900.2500"), "{words}");
+    assert!(
+        words.contains("3 readings, 3 poses, target 'smr'") && words.contains("600.1000 10.5000 900.2500"),
+        "{words}"
+    );
     assert!(path.join("cell/kuka.layout.ron").is_file());
-    let again = run(path, &["import", "kuka.csv", "--profile", "cell/arm.ron", "--layout", "kuka", "--out", "again.csv"]);
+    let again =
+        run(path, &["import", "kuka.csv", "--profile", "cell/arm.ron", "--layout", "kuka", "--out", "again.csv"]);
     assert_eq!(again.status.code(), Some(0), "{}", said(&again));
     assert_eq!(fs::read(path.join("points.csv")).unwrap(), fs::read(path.join("again.csv")).unwrap());
-    let unknown = run(path, &["identify", "--measurements", "kuka.csv", "--profile", "cell/arm.ron", "--layout", "faro"]);
-    assert!(said(&unknown).contains("there is no 'faro' here") && said(&unknown).contains("--save-layout faro"), "{}", said(&unknown));
+    let unknown =
+        run(path, &["identify", "--measurements", "kuka.csv", "--profile", "cell/arm.ron", "--layout", "faro"]);
+    assert!(
+        said(&unknown).contains("there is no 'faro' here") && said(&unknown).contains("--save-layout faro"),
+        "{}",
+        said(&unknown)
+    );
     // `identify` reads the same table by the same layout: three points are too few for it, but they were read.
     let read = run(path, &["identify", "--measurements", "kuka.csv", "--profile", "cell/arm.ron", "--layout", "kuka"]);
     assert!(!said(&read).contains("has no unit") && !said(&read).contains("joint columns"), "{}", said(&read));

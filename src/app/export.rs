@@ -7,8 +7,8 @@ use super::{Console, load};
 use crate::cli::compensate::{ExportArgs, ImportUrArgs, ImportUrdfArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::model::{
-    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ModelError, Urdf, complete, decode_xml, export, geometry_only,
-    import_coupled, read_factory,
+    Arm, CalibratedArm, ExportOptions, Format, GivenUrdf, Heading, ModelError, Urdf, complete, decode_xml, export,
+    geometry_only, import_coupled, read_factory,
 };
 use crate::session::calibration::Calibration;
 use crate::store;
@@ -123,8 +123,8 @@ pub(super) fn import_ur<O: Write, E: Write>(
     let file = args.file.display().to_string();
     let model = load::profile(&args.model)?.profile;
     let text = load::text(&args.file)?;
-    let factory = read_factory(&text, &model)
-        .map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))?;
+    let factory =
+        read_factory(&text, &model).map_err(|error| Failure::new(ExitStatus::Usage, format!("'{file}': {error}")))?;
     let moved = to_mm(factory.moved);
     let title = format!("{}, with its factory calibration", model.title());
     let comments = vec![

@@ -64,9 +64,8 @@ pub(super) fn run<O: Write, E: Write>(args: &ImportArgs, console: &mut Console<O
     let status = triage(&table, profile, console)?;
     if let Some(name) = &args.save_layout {
         let path = layout_path(name, &args.profile)?;
-        let text = SavedLayout::new(&reading)
-            .to_text()
-            .map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
+        let text =
+            SavedLayout::new(&reading).to_text().map_err(|error| Failure::from_error(ExitStatus::Internal, &error))?;
         store::replace(&path, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         console.say_written(&path)?;
     }
@@ -162,7 +161,8 @@ fn read_joined(
         let content = content(Path::new(path), args.sheet.as_deref())?;
         points.push(PointFile { name: path.to_owned(), content, target });
     }
-    let of_points = Reading { columns: args.point_columns.clone().or_else(|| reading.columns.clone()), ..reading.clone() };
+    let of_points =
+        Reading { columns: args.point_columns.clone().or_else(|| reading.columns.clone()), ..reading.clone() };
     let file = joints.display().to_string();
     Ok(joined(expected, (reading, &of_points), (&file, &of_joints), &points, args.join)?)
 }
@@ -180,7 +180,8 @@ fn refused(errors: &TableErrors, args: &ImportArgs) -> Failure {
     }
     let of_robodk = errors.understood.as_ref().is_some_and(|understood| understood.columns.len() == ROBODK_COLUMNS);
     if of_robodk && errors.problems.iter().any(|problem| problem.is_of_columns()) {
-        failure = failure.hint("a table of RoboDK (six joints, point, target on the flange) is read with '--layout robodk'");
+        failure =
+            failure.hint("a table of RoboDK (six joints, point, target on the flange) is read with '--layout robodk'");
     }
     let is_half = errors.problems.iter().any(|problem| problem.to_string().contains("without joint values"));
     if is_half && args.joints.is_none() {
@@ -267,28 +268,33 @@ fn triage<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let distinct: Vec<&Row> = table.distinct_rows().collect();
     let points = load::samples(&distinct, profile)?;
-    let range = checks::limit_warning(profile, None, distinct.iter().map(|row| (row.line, row.configuration.as_slice())));
+    let range =
+        checks::limit_warning(profile, None, distinct.iter().map(|row| (row.line, row.configuration.as_slice())));
     if let Some(warning) = range {
         console.remark(&format!("WARNING: {}", warning.message));
     }
     if points.len() < ENOUGH {
-        console.say(&format!("with fewer than {ENOUGH} points it cannot be checked whether they are those of this robot\n"))?;
+        console.say(&format!(
+            "with fewer than {ENOUGH} points it cannot be checked whether they are those of this robot\n"
+        ))?;
         return Ok(ExitStatus::Accepted);
     }
     let observations = Observations { points, ..Observations::default() };
     let parameters = profile.parameters(Level::Geometric);
     let problem = Problem { arm: &profile.arm(), parameters: &parameters, observations: &observations };
     match checks::check_plausibility(&problem, "") {
-        Ok(compared) => match compared.warning {
-            None => {
-                console.say("the distances between the points are those of this robot, up to the errors that are to be found\n")?;
-                Ok(ExitStatus::Accepted)
+        Ok(compared) => {
+            match compared.warning {
+                None => {
+                    console.say("the distances between the points are those of this robot, up to the errors that are to be found\n")?;
+                    Ok(ExitStatus::Accepted)
+                }
+                Some(warning) => {
+                    console.remark(&format!("WARNING: {}", warning.message));
+                    Ok(ExitStatus::NotAccepted)
+                }
             }
-            Some(warning) => {
-                console.remark(&format!("WARNING: {}", warning.message));
-                Ok(ExitStatus::NotAccepted)
-            }
-        },
+        }
         Err(error) => {
             console.remark(&format!("WARNING: {error}"));
             Ok(ExitStatus::NotAccepted)

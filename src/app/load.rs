@@ -14,8 +14,8 @@ use crate::session::calibration::{Calibration, Integrity};
 use crate::session::export::simulation_of_table;
 use crate::session::filter::Filter;
 use crate::session::measurements::{Expected, Layout, Measurements, Reading, Row, SavedLayout, read_for};
-use crate::session::{TableErrors, TableProblem, workbook};
 use crate::session::summary::{InputFile, InputRole, Warning, WarningCode};
+use crate::session::{TableErrors, TableProblem, workbook};
 use crate::store;
 use crate::text::counted;
 

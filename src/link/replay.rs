@@ -49,7 +49,8 @@ impl Replay {
     pub fn new(profile: &Profile, bytes: &[u8], file: &str, layout: Layout) -> Result<Self, LinkError> {
         let joints: Vec<JointType> = profile.chain().joints().iter().map(|joint| joint.joint_type).collect();
         let expected = Expected::of(profile, &joints);
-        let table = read_for(&expected, layout, &TableReading::default(), bytes, file).map_err(|errors| LinkError::SetUp(errors.to_string()))?;
+        let table = read_for(&expected, layout, &TableReading::default(), bytes, file)
+            .map_err(|errors| LinkError::SetUp(errors.to_string()))?;
         Self::of_table(profile, &table, file)
     }
 

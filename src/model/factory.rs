@@ -43,7 +43,10 @@ pub struct FactoryArm {
 pub fn read_factory(text: &str, profile: &Profile) -> Result<FactoryArm, ModelError> {
     let nominal = profile.chain();
     if nominal.dof() != JOINTS {
-        return Err(ModelError::Unsuitable(format!("a factory calibration of Universal Robots is of {JOINTS} joints, and the profile has {}", nominal.dof())));
+        return Err(ModelError::Unsuitable(format!(
+            "a factory calibration of Universal Robots is of {JOINTS} joints, and the profile has {}",
+            nominal.dof()
+        )));
     }
     let mut notes = Vec::new();
     let description = if text.contains("delta_theta") {
@@ -80,9 +83,15 @@ pub fn read_factory(text: &str, profile: &Profile) -> Result<FactoryArm, ModelEr
 }
 
 /// The nominal arm with the deviations of a `calibration.conf` added to its constants (rad, m).
-fn with_deviations(text: &str, nominal: &KinematicChain, notes: &mut Vec<String>) -> Result<KinematicChain, ModelError> {
+fn with_deviations(
+    text: &str,
+    nominal: &KinematicChain,
+    notes: &mut Vec<String>,
+) -> Result<KinematicChain, ModelError> {
     if nominal.convention() != Convention::Standard {
-        return Err(ModelError::Unsuitable("the deviations belong to constants in the standard convention, and the profile is modified".to_owned()));
+        return Err(ModelError::Unsuitable(
+            "the deviations belong to constants in the standard convention, and the profile is modified".to_owned(),
+        ));
     }
     let [theta, a, d, alpha] = ["delta_theta", "delta_a", "delta_d", "delta_alpha"].map(|name| six(text, name));
     let (theta, a, d, alpha) = (theta?, a?, d?, alpha?);
@@ -124,7 +133,8 @@ fn six(text: &str, name: &str) -> Result<[f64; JOINTS], ModelError> {
     let numbers: Option<Vec<f64>> =
         inner.split(',').map(|number| number.trim().parse().ok().filter(|number: &f64| number.is_finite())).collect();
     let numbers = numbers.ok_or_else(|| unsuitable("has something that is not a number"))?;
-    <[f64; JOINTS]>::try_from(numbers).map_err(|numbers| unsuitable(&format!("has {} numbers; {JOINTS} are needed", numbers.len())))
+    <[f64; JOINTS]>::try_from(numbers)
+        .map_err(|numbers| unsuitable(&format!("has {} numbers; {JOINTS} are needed", numbers.len())))
 }
 
 /// A description of joints that turn about the z axes of these frames.
@@ -134,7 +144,9 @@ fn of_origins(origins: &[Isometry3<f64>], nominal: &KinematicChain, profile: &Pr
     for (index, (origin, joint)) in origins.iter().zip(nominal.joints()).enumerate() {
         let child = format!("link_{}", index + 1);
         let range = profile.joints().get(index).and_then(|range| range.limits);
-        let limit = range.map_or_else(String::new, |(low, high)| format!("<limit lower=\"{}\" upper=\"{}\"/>", number(low), number(high)));
+        let limit = range.map_or_else(String::new, |(low, high)| {
+            format!("<limit lower=\"{}\" upper=\"{}\"/>", number(low), number(high))
+        });
         text.push_str(&format!(
             "<link name=\"{child}\"/>\n<joint name=\"{}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"{}\" rpy=\"{}\"/><axis xyz=\"0 0 1\"/>{limit}</joint>\n",
             urdf_write::escaped(&joint.name),

@@ -62,7 +62,9 @@ impl FromStr for Coupling {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("'{}' is no coupling; write for example 'joint_3=joint_2', or 'joint_3=-joint_2'", printable(text));
+        let wrong = || {
+            format!("'{}' is no coupling; write for example 'joint_3=joint_2', or 'joint_3=-joint_2'", printable(text))
+        };
         let (joint, with) = text.split_once('=').ok_or_else(wrong)?;
         let (factor, with) = match with.trim().strip_prefix('-') {
             Some(with) => (-1.0, with),

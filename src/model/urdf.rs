@@ -14,8 +14,8 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
-use super::urdf_text::{beside_xacro, parseable};
 use super::transforms::{from_roll_pitch_yaw, motion};
+use super::urdf_text::{beside_xacro, parseable};
 use crate::kinematics::{JointType, LinkMass};
 use crate::text::printable;
 use crate::units::to_deg;
@@ -405,7 +405,8 @@ fn rounded_angle(joint: &str, text: &str) -> Option<String> {
     let exact = (value / FRAC_PI_4).round() * FRAC_PI_4;
     let off = (value - exact).abs();
     // Rounded or cut off at its last decimal; a measured angle near 90° is neither.
-    let is_rounded = (2..=MOST_DECIMALS).contains(&decimals) && off < 0.1_f64.powi(i32::try_from(decimals).unwrap_or(i32::MAX));
+    let is_rounded =
+        (2..=MOST_DECIMALS).contains(&decimals) && off < 0.1_f64.powi(i32::try_from(decimals).unwrap_or(i32::MAX));
     (is_rounded && exact.abs() > 0.0 && off > NOT_WORTH_A_WORD).then(|| {
         format!(
             "joint '{}': {text} rad is {:.4} deg; if {:.0} deg is meant, write {exact}",
@@ -549,7 +550,10 @@ impl Reader<'_, '_> {
                 Err(_not_a_number) => {
                     let line = self.line(limit);
                     let shown = printable(text);
-                    notes.push(format!("line {line}: {what}: {name} '{shown}' is not a number and is left out{}", beside_xacro(text)));
+                    notes.push(format!(
+                        "line {line}: {what}: {name} '{shown}' is not a number and is left out{}",
+                        beside_xacro(text)
+                    ));
                     None
                 }
             }

@@ -12,7 +12,8 @@ const SINGLE_BYTE: [&str; 6] = ["iso-8859-1", "iso-8859-15", "latin1", "latin-1"
 /// The bytes are not what the file declares, in words.
 pub fn decode_xml(bytes: &[u8]) -> Result<String, String> {
     let wide = |from: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes.get(2..).unwrap_or_default().as_chunks::<2>().0.iter().map(|pair| from(*pair)).collect();
+        let units: Vec<u16> =
+            bytes.get(2..).unwrap_or_default().as_chunks::<2>().0.iter().map(|pair| from(*pair)).collect();
         String::from_utf16(&units).map_err(|_damaged| "it is damaged UTF-16 text; save it as UTF-8".to_owned())
     };
     let text = match bytes {
@@ -24,7 +25,10 @@ pub fn decode_xml(bytes: &[u8]) -> Result<String, String> {
                 let declared = declared(bytes);
                 if !declared.as_deref().is_some_and(|name| SINGLE_BYTE.contains(&name)) {
                     let place = error.valid_up_to();
-                    let stated = declared.map_or_else(|| "it declares no other encoding".to_owned(), |name| format!("it declares '{name}'"));
+                    let stated = declared.map_or_else(
+                        || "it declares no other encoding".to_owned(),
+                        |name| format!("it declares '{name}'"),
+                    );
                     return Err(format!("it is not UTF-8 text (byte {place}), and {stated}; save it as UTF-8"));
                 }
                 bytes.iter().map(|byte| char::from(*byte)).collect()
@@ -53,7 +57,9 @@ fn encoding_of(text: &str) -> Option<(usize, usize)> {
 
 fn as_utf8(text: &str) -> String {
     match encoding_of(text) {
-        Some((from, to)) => format!("{}UTF-8{}", text.get(..from).unwrap_or_default(), text.get(to..).unwrap_or_default()),
+        Some((from, to)) => {
+            format!("{}UTF-8{}", text.get(..from).unwrap_or_default(), text.get(to..).unwrap_or_default())
+        }
         None => text.to_owned(),
     }
 }
@@ -68,7 +74,8 @@ pub(super) fn parseable(text: &str) -> Cow<'_, str> {
         Some(end) if start.starts_with("<?xml") && body.len() != start.len() => {
             let blank = |c: char| if c == '\n' { '\n' } else { ' ' };
             let declaration = start.get(..end).unwrap_or_default();
-            let blanks: String = declaration.chars().flat_map(|c| std::iter::repeat_n(blank(c), c.len_utf8())).collect();
+            let blanks: String =
+                declaration.chars().flat_map(|c| std::iter::repeat_n(blank(c), c.len_utf8())).collect();
             let (head, tail) = (text.get(..before).unwrap_or_default(), start.get(end..).unwrap_or_default());
             Cow::Owned(format!("{head}{blanks}{tail}"))
         }
@@ -78,7 +85,11 @@ pub(super) fn parseable(text: &str) -> Cow<'_, str> {
 
 /// What to do about a value that only xacro can calculate.
 pub(super) fn beside_xacro(text: &str) -> &'static str {
-    if text.contains("${") || text.contains("$(") { "; it is xacro: expand it first, 'xacro FILE.xacro > FILE.urdf'" } else { "" }
+    if text.contains("${") || text.contains("$(") {
+        "; it is xacro: expand it first, 'xacro FILE.xacro > FILE.urdf'"
+    } else {
+        ""
+    }
 }
 
 #[cfg(test)]

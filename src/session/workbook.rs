@@ -30,7 +30,8 @@ pub fn is_workbook(content: &[u8]) -> bool {
 /// # Errors
 /// No workbook, or not clear which sheet.
 pub fn sheet_text(content: &[u8], file: &str, sheet: Option<&str>) -> Result<String, TableErrors> {
-    read(content, sheet).map_err(|reason| TableErrors::new(file, vec![Defect::BadWorkbook { reason }.of_table()], Vec::new()))
+    read(content, sheet)
+        .map_err(|reason| TableErrors::new(file, vec![Defect::BadWorkbook { reason }.of_table()], Vec::new()))
 }
 
 fn read(content: &[u8], wanted: Option<&str>) -> Result<String, String> {
@@ -43,7 +44,8 @@ fn read(content: &[u8], wanted: Option<&str>) -> Result<String, String> {
     let known: Vec<String> = sheets.iter().map(|(name, _)| format!("'{}'", printable(name))).collect();
     if let Some(wanted) = wanted {
         let part = sheets.iter().find(|(name, _)| name == wanted).map(|(_, part)| part);
-        let part = part.ok_or_else(|| format!("it has no sheet '{}'; sheets: {}", printable(wanted), known.join(", ")))?;
+        let part =
+            part.ok_or_else(|| format!("it has no sheet '{}'; sheets: {}", printable(wanted), known.join(", ")))?;
         return text_of(&archive, part, &shared);
     }
     let mut filled = Vec::new();
@@ -76,8 +78,11 @@ fn sheets(archive: &Archive<'_>) -> Result<Vec<(String, String)>, String> {
     };
     let (book, links) = (required("xl/workbook.xml")?, required("xl/_rels/workbook.xml.rels")?);
     let (book, links) = (xml(&book, "xl/workbook.xml")?, xml(&links, "xl/_rels/workbook.xml.rels")?);
-    let targets: BTreeMap<&str, &str> =
-        links.root_element().children().filter_map(|link| Some((link.attribute("Id")?, link.attribute("Target")?))).collect();
+    let targets: BTreeMap<&str, &str> = links
+        .root_element()
+        .children()
+        .filter_map(|link| Some((link.attribute("Id")?, link.attribute("Target")?)))
+        .collect();
     let named = |node: Node<'_, '_>| {
         let id = node.attributes().find(|attribute| attribute.name() == "id" && attribute.namespace().is_some())?;
         let target = targets.get(id.value())?;
@@ -94,7 +99,8 @@ fn shared_strings(document: &Document<'_>) -> Vec<String> {
 
 /// The text of all runs of an element, without phonetic guides.
 fn text_within(node: Node<'_, '_>) -> String {
-    let is_text = |node: &Node<'_, '_>| node.has_tag_name_of("t") && !node.ancestors().any(|above| above.has_tag_name_of("rPh"));
+    let is_text =
+        |node: &Node<'_, '_>| node.has_tag_name_of("t") && !node.ancestors().any(|above| above.has_tag_name_of("rPh"));
     node.descendants().filter(is_text).filter_map(|node| node.text()).collect()
 }
 
@@ -120,7 +126,9 @@ fn text_of(archive: &Archive<'_>, part: &str, shared: &[String]) -> Result<Strin
         for cell in node.children().filter(|cell| cell.has_tag_name_of("c")) {
             column = cell.attribute("r").and_then(column_of).unwrap_or(column + 1);
             if row == 0 || row > LAST_ROW || column > LAST_COLUMN {
-                return Err(format!("a cell is in row {row}, column {column}; at most {LAST_ROW} rows and {LAST_COLUMN} columns are read"));
+                return Err(format!(
+                    "a cell is in row {row}, column {column}; at most {LAST_ROW} rows and {LAST_COLUMN} columns are read"
+                ));
             }
             let value = value_of(cell, shared)?;
             if !value.is_empty() {
@@ -147,7 +155,8 @@ fn text_of(archive: &Archive<'_>, part: &str, shared: &[String]) -> Result<Strin
 
 /// What a cell holds, on one line.
 fn value_of(cell: Node<'_, '_>, shared: &[String]) -> Result<String, String> {
-    let value = || cell.children().find(|node| node.has_tag_name_of("v")).and_then(|node| node.text()).unwrap_or_default();
+    let value =
+        || cell.children().find(|node| node.has_tag_name_of("v")).and_then(|node| node.text()).unwrap_or_default();
     let text = match cell.attribute("t") {
         Some("s") => {
             let place = number(Some(value())).ok_or("a cell refers to no text")?;

@@ -32,7 +32,9 @@ written_as_text!(Columns);
 /// A list of columns that cannot be understood.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ColumnsError {
-    #[error("'{0}' is not a column of a table; write pose, target, time, q1_deg …, x_mm, y_mm, z_mm, x1_mm … or sigma_mm, with the unit at the end")]
+    #[error(
+        "'{0}' is not a column of a table; write pose, target, time, q1_deg …, x_mm, y_mm, z_mm, x1_mm … or sigma_mm, with the unit at the end"
+    )]
     NoColumn(String),
     #[error("column '{0}' is given twice")]
     Twice(String),
@@ -129,9 +131,8 @@ fn canonical(name: &str) -> Option<String> {
     }
     let (base, unit) = lower.split_once('_')?;
     let known = names::unit(unit, false).filter(|known| *known == unit)?;
-    let is_numbered = |letter: &str| {
-        base.strip_prefix(letter).is_some_and(|number| matches!(number.parse::<usize>(), Ok(1..=99)))
-    };
+    let is_numbered =
+        |letter: &str| base.strip_prefix(letter).is_some_and(|number| matches!(number.parse::<usize>(), Ok(1..=99)));
     let is_length = matches!(known, "mm" | "m" | "um" | "in" | "cm");
     let fits = match base {
         "x" | "y" | "z" | "sigma" => is_length,
@@ -180,7 +181,9 @@ impl FromStr for Units {
         let words = text.split(',').map(str::trim).filter(|word| !word.is_empty());
         let known = words.clone().all(|word| names::unit(word, false).is_some_and(|unit| unit != "degc"));
         let units = Self::in_text(text).filter(|units| known && *units != Self::default());
-        units.ok_or_else(|| format!("'{}' are no units; write one for angles and one for lengths, such as 'deg,mm'", printable(text)))
+        units.ok_or_else(|| {
+            format!("'{}' are no units; write one for angles and one for lengths, such as 'deg,mm'", printable(text))
+        })
     }
 }
 
@@ -217,7 +220,9 @@ mod tests {
 
     #[test]
     fn what_is_no_column_is_refused() {
-        for text in ["", "q1=A1", "q1_mmm=A1", "q1_deg=A1, x_mm", "q1_deg=A1, q1_deg=A2", "speed=V", "x_deg=X", "sigma_deg=S"] {
+        for text in
+            ["", "q1=A1", "q1_mmm=A1", "q1_deg=A1, x_mm", "q1_deg=A1, q1_deg=A2", "speed=V", "x_deg=X", "sigma_deg=S"]
+        {
             assert!(text.parse::<Columns>().is_err(), "{text}");
         }
     }

@@ -262,7 +262,10 @@ impl Study<'_> {
         let row = self.records.first().map(|record| record.cells.as_slice()).unwrap_or_default();
         let numbers = row.iter().filter(|cell| is_number(cell)).count();
         if wanted == Wanted::Rows && is_point_row(row) && numbers < row.len() {
-            return Defect::Lacking("these are points without joint values; give the table of the joint values as well, to join them".to_owned());
+            return Defect::Lacking(
+                "these are points without joint values; give the table of the joint values as well, to join them"
+                    .to_owned(),
+            );
         }
         Defect::NoHeader { cells }
     }
@@ -305,7 +308,8 @@ impl Study<'_> {
         };
         let is_of_units = |record: &Record| {
             let words = record.cells.iter().filter(|cell| !cell.is_empty() && *cell != "-").count();
-            words > 1 && record.cells.iter().filter(|cell| unit(cell).is_some()).count() * 2 > words
+            words > 1
+                && record.cells.iter().filter(|cell| unit(cell).is_some()).count() * 2 > words
                 && !record.cells.iter().any(|cell| is_number(cell))
         };
         let Some(first) = self.records.first().filter(|record| is_of_units(record)).cloned() else { return };
@@ -315,7 +319,8 @@ impl Study<'_> {
                 && stated != *below
             {
                 let shown = self.shown.get(index).map_or("", String::as_str);
-                let defect = Defect::OtherUnit { stated: stated.to_owned(), against: format!("the row below it '{below}'") };
+                let defect =
+                    Defect::OtherUnit { stated: stated.to_owned(), against: format!("the row below it '{below}'") };
                 problems.push(defect.at_cell(first.line, shown));
             }
         }
@@ -438,7 +443,8 @@ impl Study<'_> {
         };
         let full: Vec<&Vec<(usize, usize)>> = sets.values().filter(|columns| complete(columns)).collect();
         let own = sets.get("q").filter(|columns| {
-            let has_unit = |(index, _): &(usize, usize)| self.parsed.get(*index).is_some_and(|name| name.unit.is_some());
+            let has_unit =
+                |(index, _): &(usize, usize)| self.parsed.get(*index).is_some_and(|name| name.unit.is_some());
             complete(columns) && columns.iter().all(has_unit)
         });
         if let Some(own) = own {
@@ -503,11 +509,15 @@ impl Study<'_> {
             let group = set.1.filter(|_| group);
             columns.iter().map(|(index, axis)| (*index, *axis, group)).collect::<Vec<_>>()
         };
-        let one_family = full.iter().all(|(set, _)| set.1.is_some() && full.first().is_some_and(|(first, _)| first.0 == set.0));
+        let one_family =
+            full.iter().all(|(set, _)| set.1.is_some() && full.first().is_some_and(|(first, _)| first.0 == set.0));
         match full.as_slice() {
             [] => {
                 let plain = sets.iter().filter(|(set, _)| set.0.is_empty() && set.1.is_none());
-                (plain.flat_map(|(_, columns)| columns.iter().map(|(index, axis)| (*index, *axis, None))).collect(), Vec::new())
+                (
+                    plain.flat_map(|(_, columns)| columns.iter().map(|(index, axis)| (*index, *axis, None))).collect(),
+                    Vec::new(),
+                )
             }
             [only] => (taken(only, false), Vec::new()),
             several if one_family => (several.iter().flat_map(|set| taken(set, true)).collect(), Vec::new()),
@@ -520,7 +530,9 @@ impl Study<'_> {
         let is_of_tool = |index: &usize| {
             let is_free = self.canonical.get(*index).is_some_and(Option::is_none);
             let first = self.records.first().and_then(|record| record.cells.get(*index));
-            is_free && self.parsed.get(*index).is_some_and(Name::is_of_tool) && first.is_some_and(|cell| is_number(cell))
+            is_free
+                && self.parsed.get(*index).is_some_and(Name::is_of_tool)
+                && first.is_some_and(|cell| is_number(cell))
         };
         let of_tool: Vec<usize> = (0..self.shown.len()).filter(is_of_tool).collect();
         let place = |record: &Record| -> Vec<String> {
@@ -541,9 +553,7 @@ impl Study<'_> {
         let names: Vec<&str> = self.canonical.iter().flatten().map(String::as_str).collect();
         let is_joint = |name: &&&str| name.starts_with('q');
         let is_point = |name: &&&str| name.starts_with(['x', 'y', 'z']);
-        let without = names.iter().any(|name| {
-            !name.contains('_') && (is_joint(&name) || is_point(&name))
-        });
+        let without = names.iter().any(|name| !name.contains('_') && (is_joint(&name) || is_point(&name)));
         let joints = names.iter().filter(is_joint).count();
         let points = names.iter().filter(is_point).count();
         without
@@ -605,7 +615,10 @@ fn is_numbered_q(name: &str) -> bool {
 /// Whether a table of trupose would read a column of this name.
 fn is_ours(lower: &str) -> bool {
     let base = lower.split_once('_').map_or(lower, |(base, _)| base);
-    is_numbered_q(lower) || ["x", "y", "z", "sigma", "temperature"].contains(&base) || lower == "target" || lower == "pose"
+    is_numbered_q(lower)
+        || ["x", "y", "z", "sigma", "temperature"].contains(&base)
+        || lower == "target"
+        || lower == "pose"
 }
 
 fn counted_as_repeats(count: usize) -> String {

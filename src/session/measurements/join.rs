@@ -60,7 +60,8 @@ pub fn joined(
     let mut whole: Option<Foreign> = None;
     for (index, file) in points.iter().enumerate() {
         let mut of_points = part(expected, reading.1, &file.name, &file.content, Wanted::Points)?;
-        let target = file.target.clone().or_else(|| (count > 1).then(|| expected.targets.get(index).cloned()).flatten());
+        let target =
+            file.target.clone().or_else(|| (count > 1).then(|| expected.targets.get(index).cloned()).flatten());
         if count > 1 && target.is_none() && !of_points.has("target") {
             let message = format!(
                 "there are {} of points, and the profile has {}; add the others to its 'targets'",
@@ -76,7 +77,10 @@ pub fn joined(
         match &mut whole {
             None => whole = Some(table),
             Some(whole) if whole.canonical == table.canonical => whole.records.extend(table.records),
-            Some(_) => return Err(of_points.refused(Defect::Lacking("its columns are not those of the other file of points".to_owned()))),
+            Some(_) => {
+                return Err(of_points
+                    .refused(Defect::Lacking("its columns are not those of the other file of points".to_owned())));
+            }
         }
     }
     let Some(whole) = whole else {
@@ -87,12 +91,19 @@ pub fn joined(
 }
 
 /// Understands one of the files.
-fn part(expected: &Expected<'_>, reading: &Reading, file: &str, content: &[u8], wanted: Wanted) -> Result<Part, TableErrors> {
+fn part(
+    expected: &Expected<'_>,
+    reading: &Reading,
+    file: &str,
+    content: &[u8],
+    wanted: Wanted,
+) -> Result<Part, TableErrors> {
     let (text, mut problems) = decode(content, file)?;
     let table = table::split(&text, Shape::Named, &mut problems);
     let found = understand(table, expected, reading, wanted, &mut problems);
-    let refused = |problems: Vec<TableProblem>, understood: Understood| {
-        TableErrors { understood: Some(Box::new(understood)), ..TableErrors::new(file, problems, Vec::new()) }
+    let refused = |problems: Vec<TableProblem>, understood: Understood| TableErrors {
+        understood: Some(Box::new(understood)),
+        ..TableErrors::new(file, problems, Vec::new())
     };
     let foreign = match found {
         Ok(foreign) if problems.is_empty() => foreign,
@@ -163,12 +174,8 @@ impl Part {
     fn numbers(&self, column: NumberColumn) -> Result<Vec<f64>, TableErrors> {
         let mut numbers = Numbers::new(&self.foreign.shown, self.foreign.decimal_comma);
         let mut problems = Vec::new();
-        let values: Vec<f64> = self
-            .foreign
-            .records
-            .iter()
-            .filter_map(|record| numbers.required(record, column, &mut problems))
-            .collect();
+        let values: Vec<f64> =
+            self.foreign.records.iter().filter_map(|record| numbers.required(record, column, &mut problems)).collect();
         if problems.is_empty() { Ok(values) } else { Err(TableErrors::new(&self.file, problems, Vec::new())) }
     }
 }
@@ -183,14 +190,19 @@ fn join(joints: &Part, points: &Part, expected: &Expected<'_>, by: Option<JoinBy
         JoinBy::Time => by_time(joints, points, expected)?,
     };
     let repeated: BTreeSet<&String> = points.foreign.canonical.iter().collect();
-    let own: Vec<usize> =
-        (0..joints.foreign.canonical.len()).filter(|index| joints.foreign.canonical.get(*index).is_some_and(|name| !repeated.contains(name) || name == "pose")).collect();
+    let own: Vec<usize> = (0..joints.foreign.canonical.len())
+        .filter(|index| {
+            joints.foreign.canonical.get(*index).is_some_and(|name| !repeated.contains(name) || name == "pose")
+        })
+        .collect();
     // The pose of the joints names the row; that of the points is the same, or has no meaning here.
     let takes_pose = joints.has("pose");
     let others: Vec<usize> = (0..points.foreign.canonical.len())
         .filter(|index| !takes_pose || points.foreign.canonical.get(*index).is_some_and(|name| name != "pose"))
         .collect();
-    let pick = |list: &[String], of: &[usize]| -> Vec<String> { of.iter().filter_map(|index| list.get(*index).cloned()).collect() };
+    let pick = |list: &[String], of: &[usize]| -> Vec<String> {
+        of.iter().filter_map(|index| list.get(*index).cloned()).collect()
+    };
     let concatenated = |first: Vec<String>, second: Vec<String>| first.into_iter().chain(second).collect::<Vec<_>>();
     let records = pairs
         .iter()
@@ -263,10 +275,18 @@ fn by_name(joints: &Part, points: &Part) -> Result<Vec<(usize, usize)>, TableErr
             return Err(joints.refused(Defect::NotJoined(message)));
         }
     }
-    let unknown: Vec<String> =
-        point_names.iter().filter(|name| !known.contains_key(*name)).take(SHOWN).map(|name| format!("'{name}'")).collect();
+    let unknown: Vec<String> = point_names
+        .iter()
+        .filter(|name| !known.contains_key(*name))
+        .take(SHOWN)
+        .map(|name| format!("'{name}'"))
+        .collect();
     if !unknown.is_empty() {
-        let message = format!("'{}' has no joints for the points {}; names must be the same in both files", joints.file, unknown.join(", "));
+        let message = format!(
+            "'{}' has no joints for the points {}; names must be the same in both files",
+            joints.file,
+            unknown.join(", ")
+        );
         return Err(points.refused(Defect::NotJoined(message)));
     }
     Ok(point_names.iter().enumerate().filter_map(|(index, name)| Some((*known.get(name)?, index))).collect())
@@ -283,19 +303,26 @@ fn by_time(joints: &Part, points: &Part, expected: &Expected<'_>) -> Result<Vec<
     let mut pairs = Vec::with_capacity(point_times.len());
     for (index, time) in point_times.iter().enumerate() {
         let line = points.foreign.records.get(index).map_or(0, |record| record.line);
-        let near: Vec<usize> =
-            joint_times.iter().enumerate().filter(|(_, other)| (*other - time).abs() <= SAME_TIME).map(|(joint, _)| joint).collect();
+        let near: Vec<usize> = joint_times
+            .iter()
+            .enumerate()
+            .filter(|(_, other)| (*other - time).abs() <= SAME_TIME)
+            .map(|(joint, _)| joint)
+            .collect();
         let nearest = near.iter().copied().min_by(|a, b| {
             let gap = |joint: &usize| joint_times.get(*joint).map_or(f64::INFINITY, |other| (other - time).abs());
             gap(a).total_cmp(&gap(b))
         });
         let Some(nearest) = nearest else {
-            let message = format!("no joints were read within {SAME_TIME} s of this point; do both files count time from the same moment?");
+            let message = format!(
+                "no joints were read within {SAME_TIME} s of this point; do both files count time from the same moment?"
+            );
             return Err(TableErrors::new(&points.file, vec![Defect::NotJoined(message).at(line)], Vec::new()));
         };
         let of = |joint: usize| configurations.get(joint).map_or(&[][..], Vec::as_slice);
         if near.iter().any(|joint| farthest_joint(of(nearest), of(*joint), expected.joints).is_some()) {
-            let message = format!("the robot moved within {SAME_TIME} s of this point, so that its joints are not known");
+            let message =
+                format!("the robot moved within {SAME_TIME} s of this point, so that its joints are not known");
             return Err(TableErrors::new(&points.file, vec![Defect::NotJoined(message).at(line)], Vec::new()));
         }
         pairs.push((nearest, index));
@@ -316,7 +343,8 @@ fn seconds(part: &Part, column: usize) -> Result<Vec<f64>, TableErrors> {
             _ => value,
         });
         let Some(time) = clock.or(value) else {
-            let defect = Defect::Lacking(format!("'{cell}' is no time; write seconds, or a date and time as in RFC 3339"));
+            let defect =
+                Defect::Lacking(format!("'{cell}' is no time; write seconds, or a date and time as in RFC 3339"));
             return Err(TableErrors::new(&part.file, vec![defect.at(record.line)], Vec::new()));
         };
         times.push(time);
@@ -328,7 +356,8 @@ fn configurations(joints: &Part, expected: &Expected<'_>) -> Result<Vec<Vec<f64>
     let mut columns = Vec::with_capacity(expected.joints.len());
     for joint in 1..=expected.joints.len() {
         let index = joints.quantity(&format!("q{joint}")).unwrap_or(usize::MAX);
-        let unit = joints.foreign.canonical.get(index).and_then(|name| name.split_once('_')).map_or("", |(_, unit)| unit);
+        let unit =
+            joints.foreign.canonical.get(index).and_then(|name| name.split_once('_')).map_or("", |(_, unit)| unit);
         columns.push(joints.numbers(NumberColumn::in_unit(index, unit))?);
     }
     let rows = joints.foreign.records.len();

@@ -5,8 +5,29 @@
 
 /// Words for a joint. The single letters count only beside nothing but such words.
 const JOINT_WORDS: &[&str] = &[
-    "joint", "joints", "jnt", "jt", "axis", "ax", "rax", "theta", "th", "θ", "achse", "gelenk", "axe", "articulation", "eje",
-    "asse", "giunto", "关节", "關節", "轴", "軸", "関節", "ジョイント",
+    "joint",
+    "joints",
+    "jnt",
+    "jt",
+    "axis",
+    "ax",
+    "rax",
+    "theta",
+    "th",
+    "θ",
+    "achse",
+    "gelenk",
+    "axe",
+    "articulation",
+    "eje",
+    "asse",
+    "giunto",
+    "关节",
+    "關節",
+    "轴",
+    "軸",
+    "関節",
+    "ジョイント",
 ];
 const JOINT_LETTERS: &[&str] = &["q", "j", "a"];
 
@@ -16,15 +37,66 @@ const VALUE_WORDS: &[&str] =
 
 /// Words for the measured point.
 const POINT_WORDS: &[&str] = &[
-    "pos", "position", "point", "punkt", "coord", "coordinate", "koordinate", "koord", "measured", "measurement", "meas",
-    "gemessen", "messpunkt", "mesure", "mesuré", "tracker", "lasertracker", "laser", "field", "smr", "nest", "reflector",
-    "reflektor", "prism", "prisma", "marker", "p", "pt", "坐标", "座標", "坐標",
+    "pos",
+    "position",
+    "point",
+    "punkt",
+    "coord",
+    "coordinate",
+    "koordinate",
+    "koord",
+    "measured",
+    "measurement",
+    "meas",
+    "gemessen",
+    "messpunkt",
+    "mesure",
+    "mesuré",
+    "tracker",
+    "lasertracker",
+    "laser",
+    "field",
+    "smr",
+    "nest",
+    "reflector",
+    "reflektor",
+    "prism",
+    "prisma",
+    "marker",
+    "p",
+    "pt",
+    "坐标",
+    "座標",
+    "坐標",
 ];
 
 /// Whole names of columns that name the pose.
 const POSE_NAMES: &[&str] = &[
-    "pose", "name", "point", "punkt", "nr", "no", "number", "id", "index", "pose id", "pose name", "pose nr", "point name",
-    "point id", "messpunkt", "punktname", "pt", "点", "点号", "点名", "序号", "编号", "番号", "姿勢", "姿态",
+    "pose",
+    "name",
+    "point",
+    "punkt",
+    "nr",
+    "no",
+    "number",
+    "id",
+    "index",
+    "pose id",
+    "pose name",
+    "pose nr",
+    "point name",
+    "point id",
+    "messpunkt",
+    "punktname",
+    "pt",
+    "点",
+    "点号",
+    "点名",
+    "序号",
+    "编号",
+    "番号",
+    "姿勢",
+    "姿态",
 ];
 
 /// Whole names of columns that name the SMR.
@@ -32,7 +104,8 @@ const TARGET_NAMES: &[&str] =
     &["target", "smr", "nest", "reflector", "reflektor", "réflecteur", "prism", "prisma", "靶球", "反射球"];
 
 /// Whole names of columns with times.
-const TIME_NAMES: &[&str] = &["time", "t", "timestamp", "stamp", "zeit", "zeitstempel", "temps", "时间", "時間", "時刻"];
+const TIME_NAMES: &[&str] =
+    &["time", "t", "timestamp", "stamp", "zeit", "zeitstempel", "temps", "时间", "時間", "時刻"];
 
 /// Whole names of columns with temperatures.
 const TEMPERATURE_NAMES: &[&str] = &["temperature", "temp", "temperatur", "température", "温度"];
@@ -46,7 +119,9 @@ pub(super) fn unit(word: &str, is_german: bool) -> Option<&'static str> {
         "deg" | "degs" | "degree" | "degrees" | "°" | "º" | "degré" | "degrés" | "度" => "deg",
         "grad" if is_german => "deg",
         "rad" | "rads" | "radian" | "radians" | "radiant" | "弧度" | "ラジアン" => "rad",
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" | "毫米" | "ミリ" | "ミリメートル" => "mm",
+        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" | "毫米" | "ミリ" | "ミリメートル" => {
+            "mm"
+        }
         "cm" | "centimeter" | "centimeters" | "centimetre" | "centimetres" | "厘米" => "cm",
         "m" | "meter" | "meters" | "metre" | "metres" | "mètre" | "mètres" | "米" | "メートル" => "m",
         "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometers" | "micrometre" | "微米" => "um",
@@ -81,9 +156,16 @@ pub(super) struct Name {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     /// A number of a joint as the name writes it; names with the same `set` belong together.
-    Joint { set: String, number: usize },
+    Joint {
+        set: String,
+        number: usize,
+    },
     /// Coordinate 0, 1 or 2 of a point; several points in a row are numbered.
-    Coordinate { set: String, axis: usize, group: Option<usize> },
+    Coordinate {
+        set: String,
+        axis: usize,
+        group: Option<usize>,
+    },
     Pose,
     Target,
     Time,
@@ -278,7 +360,9 @@ mod tests {
         ] {
             assert_eq!(joint(name), Some((set.to_owned(), number)), "{name}");
         }
-        for name in ["shoulder_pan_joint", "q1_cmd", "dq1", "a", "x1", "m_03", "field.position0", "current 1", "torque_j1"] {
+        for name in
+            ["shoulder_pan_joint", "q1_cmd", "dq1", "a", "x1", "m_03", "field.position0", "current 1", "torque_j1"]
+        {
             assert_eq!(joint(name), None, "{name}");
         }
     }

@@ -119,7 +119,9 @@ fn comment(start: &str) -> Option<&str> {
 
 /// A line that only draws the frame of a table, as in Markdown.
 fn is_rule(start: &str) -> bool {
-    start.len() > 2 && start.starts_with('|') && start.bytes().all(|byte| matches!(byte, b'|' | b'-' | b':' | b' ' | b'+'))
+    start.len() > 2
+        && start.starts_with('|')
+        && start.bytes().all(|byte| matches!(byte, b'|' | b'-' | b':' | b' ' | b'+'))
 }
 
 /// A line of a table with bars, without those at its ends.
@@ -159,7 +161,9 @@ fn separator(line: &str) -> Separator {
 fn has_decimal_commas_between_blanks(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
     let within = |word: &&&str| !word.ends_with(',') && !word.starts_with(',') && is_number(word) && word.contains(',');
-    words.len() > 1 && words.iter().filter(within).count() * 2 > words.len() && !words.iter().any(|word| word.ends_with(','))
+    words.len() > 1
+        && words.iter().filter(within).count() * 2 > words.len()
+        && !words.iter().any(|word| word.ends_with(','))
 }
 
 /// The words of a line. What is in quotation marks stays together, and so does a unit in brackets with the name before it.

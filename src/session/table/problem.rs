@@ -253,7 +253,10 @@ pub enum Defect {
         text: String,
     },
     /// A number whose digits are in groups.
-    #[error("'{}' has a thousands separator; write the number without it, as the same text could be another number elsewhere", excerpt(text))]
+    #[error(
+        "'{}' has a thousands separator; write the number without it, as the same text could be another number elsewhere",
+        excerpt(text)
+    )]
     Grouped {
         /// Text of the cell.
         text: String,

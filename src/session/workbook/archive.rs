@@ -61,7 +61,9 @@ impl<'a> Archive<'a> {
 
     /// The text of a part; `None` if there is none of this name.
     pub(super) fn part(&self, name: &str) -> Result<Option<String>, String> {
-        let Some(entry) = self.entries.iter().find(|entry| entry.name.eq_ignore_ascii_case(name)) else { return Ok(None) };
+        let Some(entry) = self.entries.iter().find(|entry| entry.name.eq_ignore_ascii_case(name)) else {
+            return Ok(None);
+        };
         let name = printable(name);
         if entry.is_encrypted {
             return Err("it has a password; save it without one".to_owned());

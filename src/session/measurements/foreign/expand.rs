@@ -29,7 +29,8 @@ impl Study<'_> {
             match chosen {
                 Some(index) => self.set(index, "pose"),
                 None if !candidates.is_empty() => {
-                    let names: Vec<String> = candidates.iter().filter_map(|index| self.shown.get(*index).cloned()).collect();
+                    let names: Vec<String> =
+                        candidates.iter().filter_map(|index| self.shown.get(*index).cloned()).collect();
                     self.note(format!("poses are numbered: {} names no row alone", quoted_list(&names)));
                 }
                 None => {}
@@ -83,9 +84,8 @@ impl Study<'_> {
 
     /// Point names of SpatialAnalyzer, `Collection::Group::Point`: the point is the pose, the group a target where there are several.
     fn shorten_point_names(&mut self, problems: &mut Vec<TableProblem>) {
-        let is_qualified = |study: &Self, index: usize| {
-            study.records.len() > 1 && study.cells(index).all(|cell| cell.contains("::"))
-        };
+        let is_qualified =
+            |study: &Self, index: usize| study.records.len() > 1 && study.cells(index).all(|cell| cell.contains("::"));
         let Some(index) = (0..self.shown.len()).find(|index| is_qualified(self, *index)) else { return };
         let groups: BTreeSet<String> =
             self.cells(index).filter_map(|cell| cell.rsplit_once("::")).map(|(group, _)| group.to_owned()).collect();
@@ -99,7 +99,8 @@ impl Study<'_> {
                 return;
             }
             for record in &mut self.records {
-                let group = record.cells.get(index).and_then(|cell| cell.rsplit_once("::")).map(|(group, _)| last(group));
+                let group =
+                    record.cells.get(index).and_then(|cell| cell.rsplit_once("::")).map(|(group, _)| last(group));
                 record.cells.push(group.unwrap_or_default());
             }
             self.add_column("group", Some("target".to_owned()));
@@ -154,7 +155,10 @@ impl Study<'_> {
                 cell.clone_from(target);
             }
         }
-        self.note(format!("column '{name}' counts the targets of the profile: 1 is '{}'", known.first().map_or("", String::as_str)));
+        self.note(format!(
+            "column '{name}' counts the targets of the profile: 1 is '{}'",
+            known.first().map_or("", String::as_str)
+        ));
         self.set(index, "target");
     }
 
@@ -179,10 +183,12 @@ impl Study<'_> {
 
     /// The numbered points of a row: number, and per coordinate the column, the letter and the unit with its underscore.
     fn groups(&self) -> Vec<(usize, Vec<(usize, char, String)>)> {
-        let mut groups: std::collections::BTreeMap<usize, Vec<(usize, char, String)>> = std::collections::BTreeMap::new();
+        let mut groups: std::collections::BTreeMap<usize, Vec<(usize, char, String)>> =
+            std::collections::BTreeMap::new();
         for (index, name) in self.canonical.iter().enumerate() {
             let Some(name) = name else { continue };
-            let (base, unit) = name.split_once('_').map_or((name.as_str(), String::new()), |(base, unit)| (base, format!("_{unit}")));
+            let (base, unit) =
+                name.split_once('_').map_or((name.as_str(), String::new()), |(base, unit)| (base, format!("_{unit}")));
             let mut letters = base.chars();
             if let Some(letter @ ('x' | 'y' | 'z')) = letters.next()
                 && let Ok(number) = letters.as_str().parse()
@@ -200,9 +206,12 @@ impl Study<'_> {
             problems.push(self.more_targets(source_name).at(self.line));
             return;
         }
-        let units: BTreeSet<&String> = groups.iter().flat_map(|(_, columns)| columns.iter().map(|(.., unit)| unit)).collect();
+        let units: BTreeSet<&String> =
+            groups.iter().flat_map(|(_, columns)| columns.iter().map(|(.., unit)| unit)).collect();
         if units.len() != 1 || groups.iter().any(|(_, columns)| columns.len() != 3) {
-            problems.push(Defect::Lacking("every numbered point needs x, y and z in the same unit".to_owned()).at(self.line));
+            problems.push(
+                Defect::Lacking("every numbered point needs x, y and z in the same unit".to_owned()).at(self.line),
+            );
             return;
         }
         let unit = units.into_iter().next().cloned().unwrap_or_default();
@@ -211,13 +220,15 @@ impl Study<'_> {
             .enumerate()
             .map(|(place, (number, _))| known.get(place).cloned().unwrap_or_else(|| number.to_string()))
             .collect();
-        let used: BTreeSet<usize> = groups.iter().flat_map(|(_, columns)| columns.iter().map(|(index, ..)| *index)).collect();
+        let used: BTreeSet<usize> =
+            groups.iter().flat_map(|(_, columns)| columns.iter().map(|(index, ..)| *index)).collect();
         let numbered = !self.has("pose");
         let kept: Vec<usize> = (0..self.shown.len()).filter(|index| !used.contains(index)).collect();
         let mut records = Vec::with_capacity(self.records.len() * groups.len());
         for (row, record) in self.records.iter().enumerate() {
             for ((_, columns), name) in groups.iter().zip(&names) {
-                let mut cells: Vec<String> = kept.iter().filter_map(|index| record.cells.get(*index).cloned()).collect();
+                let mut cells: Vec<String> =
+                    kept.iter().filter_map(|index| record.cells.get(*index).cloned()).collect();
                 cells.extend(numbered.then(|| row.to_string()));
                 cells.push(name.clone());
                 for letter in ['x', 'y', 'z'] {
@@ -241,12 +252,18 @@ impl Study<'_> {
             self.shown.push(letter.to_owned());
             self.canonical.push(Some(format!("{letter}{unit}")));
         }
-        self.note(format!("every row has {}, taken as targets {}", counted(groups.len(), "point"), quoted_list(&names)));
+        self.note(format!(
+            "every row has {}, taken as targets {}",
+            counted(groups.len(), "point"),
+            quoted_list(&names)
+        ));
     }
 
     fn leave_out_missing(&mut self) {
         let is_of_point = |name: &Option<String>| {
-            name.as_ref().is_some_and(|name| name.starts_with(['x', 'y', 'z']) && name.split('_').next().is_some_and(|base| base.len() == 1))
+            name.as_ref().is_some_and(|name| {
+                name.starts_with(['x', 'y', 'z']) && name.split('_').next().is_some_and(|base| base.len() == 1)
+            })
         };
         let columns: Vec<usize> =
             self.canonical.iter().enumerate().filter(|(_, name)| is_of_point(name)).map(|(index, _)| index).collect();
@@ -255,7 +272,8 @@ impl Study<'_> {
         }
         let mut lines = BTreeSet::new();
         self.records.retain(|record| {
-            let cells: Vec<&str> = columns.iter().filter_map(|index| record.cells.get(*index)).map(String::as_str).collect();
+            let cells: Vec<&str> =
+                columns.iter().filter_map(|index| record.cells.get(*index)).map(String::as_str).collect();
             let is_missing = is_missing(&cells);
             if is_missing {
                 lines.insert(record.line);
@@ -273,7 +291,9 @@ impl Study<'_> {
 /// Whether a tracker had no target: all coordinates are empty, not numbers, or zero.
 fn is_missing(cells: &[&str]) -> bool {
     let is_empty = |cell: &&str| cell.is_empty() || cell.eq_ignore_ascii_case("nan") || *cell == "-";
-    let is_zero = |cell: &&str| is_number(cell) && cell.replacen(',', ".", 1).parse::<f64>().is_ok_and(|value| value.abs() <= 0.0);
+    let is_zero = |cell: &&str| {
+        is_number(cell) && cell.replacen(',', ".", 1).parse::<f64>().is_ok_and(|value| value.abs() <= 0.0)
+    };
     cells.iter().all(is_empty) || cells.iter().all(is_zero)
 }
 

@@ -131,7 +131,8 @@ impl Study<'_> {
         let numbers: Option<Vec<usize>> =
             self.records.iter().map(|record| record.cells.get(index).and_then(|cell| cell.parse().ok())).collect();
         numbers.is_some_and(|numbers| {
-            numbers.len() > 1 && numbers.windows(2).all(|pair| pair.first().map(|first| first + 1) == pair.last().copied())
+            numbers.len() > 1
+                && numbers.windows(2).all(|pair| pair.first().map(|first| first + 1) == pair.last().copied())
         })
     }
 
