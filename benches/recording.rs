@@ -1,4 +1,4 @@
-//! What a recording costs: the wizard's thread, the disk, and the reader. The session of the demo, drawn from its journal.
+//! What a recording costs: the wizard's thread, and the disk. The session of the demo, drawn from its journal.
 
 #![expect(
     clippy::unwrap_used,
@@ -92,13 +92,4 @@ fn rebuild(bencher: Bencher<'_, '_>) {
     let lines = session();
     let folder = tempfile::tempdir().unwrap();
     bencher.counter(ItemsCount::new(samples(lines))).bench_local(|| recording::rebuild(folder.path(), lines).unwrap());
-}
-
-/// The journal read out of a recording, as a replay does.
-#[divan::bench(sample_count = 20)]
-fn replay_scan(bencher: Bencher<'_, '_>) {
-    let lines = session();
-    let folder = tempfile::tempdir().unwrap();
-    let path = recording::rebuild(folder.path(), lines).unwrap().path;
-    bencher.counter(ItemsCount::new(samples(lines))).bench_local(|| recording::read(&path).unwrap());
 }

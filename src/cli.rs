@@ -70,7 +70,7 @@ Apply the result:
 Instruments and recordings:
   link         Test the link to an instrument
   simulate     Simulate an instrument or a robot's controller on a wire
-  record       Make, compact or check recordings for the 3D viewer
+  record       Make recordings for the 3D viewer again
 
 Shell:
   completions  Print the completions of a shell
@@ -213,8 +213,8 @@ pub struct ResumeArgs {
 /// Arguments of `replay`.
 #[derive(Args, Clone, Debug)]
 pub struct ReplayArgs {
-    /// Folder of the session, or a recording of it
-    #[arg(value_name = "DIR|FILE.rrd")]
+    /// Folder of the session
+    #[arg(value_name = "DIR")]
     pub folder: PathBuf,
     /// Entry of the journal to start with [default: the first; with '--print' and '--csv' the last]
     #[arg(long, value_name = "N")]
@@ -281,7 +281,7 @@ pub enum Command {
     /// List, show or export sessions
     #[command(subcommand)]
     Session(SessionCommand),
-    /// Make, compact or check recordings for the 3D viewer
+    /// Make recordings for the 3D viewer again
     #[command(subcommand)]
     Record(RecordCommand),
     /// List, show, write or check robot profiles

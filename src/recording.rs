@@ -1,46 +1,41 @@
-//! Recordings of sessions for a 3D viewer: every pose, error and arm. The only module that knows the viewer's library.
+//! Recordings of sessions for a 3D viewer: a film of the calibration. The only module that knows the viewer's library.
 //!
 //! A recording is a function of the journal: `renderer` turns journal lines into rows, `rrd` encodes them, and [`rebuild`] replaces
 //! the whole file. While a session is measured, a thread ([`Recorder`]) does that every few seconds and at the end. A recording
-//! that is lost or lacks the last lines can be made again at any time. It carries the text of the journal as well, so a recording
-//! that was sent by mail can be replayed in a terminal ([`read()`]).
+//! that is lost or lacks the last lines can be made again at any time, and this program never reads one.
 //!
-//! Positions and transforms in a recording are 32-bit floats, as the viewer wants them: exact to 0.25 µm at 3 m. Numbers that
-//! are plotted, and the journal's text, are exact.
+//! Positions in a recording are 32-bit floats, as the viewer wants them: exact to 0.25 µm at 3 m. Numbers for plots and tables are
+//! exact.
 
+mod arm;
 mod blueprint;
 mod canvas;
+mod chart;
 mod file;
 mod identity;
 mod latin;
 mod live;
 mod names;
-mod posture;
-mod read;
 mod recorder;
 mod renderer;
 mod rrd;
 mod style;
 mod targets;
 
-use std::path::{Path, PathBuf};
-
 use thiserror::Error;
 
-pub use file::{FILE_NAME, Written, rebuild, remove_old_parts, write};
+pub use file::{FILE_NAME, Written, is_recording, rebuild, remove_old_parts, write};
 pub use live::Live;
-pub use read::{is_recording, read};
 pub use recorder::{Recorder, RecordingEvent};
 pub use targets::{DrawnTarget, write_targets};
 
-use crate::session::journal::JournalError;
 use crate::store::StoreError;
 
-/// A recording cannot be written or read. The session itself is never affected.
+/// A recording cannot be written. The session itself is never affected.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// A file cannot be read or written.
+    /// The file cannot be written.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// Too little of the disk is free; the rest is left to the session.
@@ -52,12 +47,6 @@ pub enum RecordingError {
     /// The library has failed.
     #[error("{what}: {message}")]
     Library { what: &'static str, message: String },
-    /// The file is not a recording of this program.
-    #[error("'{}' is not a recording of trupose: {message}", path.display())]
-    Foreign { path: PathBuf, message: String },
-    /// The journal in a recording is damaged.
-    #[error("the journal in '{}'", path.display())]
-    Journal { path: PathBuf, source: JournalError },
     /// The port of the live view cannot be used.
     #[error("the live view cannot listen on 127.0.0.1:{port}: {message}")]
     Port { port: u16, message: String },
@@ -66,9 +55,5 @@ pub enum RecordingError {
 impl RecordingError {
     fn library(what: &'static str, error: impl std::fmt::Display) -> Self {
         Self::Library { what, message: error.to_string() }
-    }
-
-    fn foreign(path: &Path, message: impl Into<String>) -> Self {
-        Self::Foreign { path: path.to_owned(), message: message.into() }
     }
 }

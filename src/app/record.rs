@@ -1,14 +1,13 @@
-//! `trupose record rebuild | check`, and the recordings of commands without a session.
+//! `trupose record rebuild`, and the recordings of commands without a session.
 
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use jiff::Timestamp;
 
 use super::script::session_failure;
 use super::session::torn;
-use super::{Console, load, refused};
+use super::{Console, load};
 use crate::cli::RecordCommand;
 use crate::error::{ExitStatus, Failure};
 use crate::kinematics::JointType;
@@ -35,30 +34,7 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     match command {
         RecordCommand::Rebuild { folder } => rebuild(folder, console),
-        RecordCommand::Check { file } => check(file, console),
     }
-}
-
-/// Reads the journal of a recording.
-fn check<O: Write, E: Write>(file: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let journal = recording::read(file).map_err(|error| failure(&error))?;
-    let entries = counted_as(journal.lines.len(), "journal entry", "journal entries");
-    console.say(&format!("{}: {entries}, none damaged\n", file.display()))?;
-    Ok(ExitStatus::Accepted)
-}
-
-/// Reads the journal of a recording that may be damaged. The library that decodes recordings ends the process at some kinds of
-/// damage, so another process tries it first.
-pub(super) fn journal(path: &Path) -> Result<Journal, Failure> {
-    let tried = std::env::current_exe()
-        .and_then(|program| Command::new(program).args(["record", "check"]).arg(path).stdin(Stdio::null()).output());
-    let tried = tried.map_err(|error| refused(&error))?;
-    if tried.status.code().is_none_or(|code| code > i32::from(ExitStatus::Internal.code())) {
-        let message = format!("'{}' is damaged: the program that decodes recordings cannot read it", path.display());
-        return Err(Failure::new(ExitStatus::Store, message)
-            .hint("'trupose record rebuild DIR' makes it again from the journal"));
-    }
-    recording::read(path).map_err(|error| failure(&error))
 }
 
 fn rebuild<O: Write, E: Write>(folder: &Path, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
@@ -106,7 +82,7 @@ pub(super) fn identification(
     identified: &Identified,
 ) -> Result<(), Failure> {
     let lines = identification_lines(path, source, about, request, identified);
-    recording::write(path, &lines, false).map_err(|error| failure(&error))
+    recording::write(path, &lines, None).map_err(|error| failure(&error))
 }
 
 /// Returns an identification from tables as a session, for its report.
@@ -212,7 +188,7 @@ pub(super) fn plan(
     let origin =
         summary.objective.map_or_else(|| "a list that was checked".to_owned(), |objective| objective.to_string());
     lines.push(Entry::Plan(PlanText::new(origin, Some(summary), &rows, &types)));
-    recording::write(path, &lines.lines, true).map_err(|error| failure(&error))
+    recording::write(path, &lines.lines, Some(summary)).map_err(|error| failure(&error))
 }
 
 /// Journal lines of a calculation without a session.

@@ -1,10 +1,10 @@
-//! `trupose replay DIR|FILE.rrd`: shows a session entry by entry, without holding or changing it.
+//! `trupose replay DIR`: shows a session entry by entry, without holding or changing it.
 
 use std::io::Write;
 use std::path::Path;
 
 use super::script::session_failure;
-use super::{Console, record, session, wizard};
+use super::{Console, session, wizard};
 use crate::cli::{ReplayArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
 use crate::report;
@@ -66,13 +66,11 @@ pub(super) fn run<O: Write, E: Write>(args: &ReplayArgs, console: &mut Console<O
     })
 }
 
-/// Reads the journal of a session's folder, or the one that a recording carries.
+/// Reads the journal of a session's folder. A file in it means the folder: its recording is only a picture of the journal.
 fn journal(path: &Path) -> Result<Journal, Failure> {
-    if !path.is_file() {
-        tidy(path);
-        return read_journal(path).map_err(|error| session_failure(&error));
-    }
-    record::journal(path)
+    let folder = path.parent().filter(|_| path.is_file()).unwrap_or(path);
+    tidy(folder);
+    read_journal(folder).map_err(|error| session_failure(&error))
 }
 
 /// Lists the entries, then the measured points with the errors of both arms once these are known.

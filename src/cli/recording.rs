@@ -29,12 +29,6 @@ pub struct RecordArgs {
 /// Subcommands of `record`.
 #[derive(Debug, Subcommand)]
 pub enum RecordCommand {
-    /// Read the journal that a recording carries, as a replay does, and say whether it is whole
-    Check {
-        /// The recording
-        #[arg(value_name = "FILE.rrd")]
-        file: PathBuf,
-    },
     /// Make the recording of a session again from its journal
     Rebuild {
         /// Folder of the session

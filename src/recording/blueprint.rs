@@ -1,69 +1,123 @@
 //! The layout that a viewer opens with.
 //!
-//! The library's layout builder has no cameras, legends or trails, and random ids. So this module writes the entities of a layout
+//! The library's layout builder has no cameras, regions or trails, and random ids. So this module writes the entities of a layout
 //! itself: containers and views at paths that contain their ids, and the properties of a view below its path.
 
 use nalgebra::{Point3, Vector3};
 use rerun::blueprint::components::{
-    BackgroundKind, ContainerKind, Corner2D, Eye3DKind, PanelState, PlayState, RootContainer,
+    BackgroundKind, ContainerKind, Corner2D, Eye3DKind, LoopMode, PanelState, PlayState, RootContainer,
 };
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, ContainerBlueprint, EntityBehavior, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
-    TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisibleTimeRanges,
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TimePanelBlueprint,
+    ViewBlueprint, ViewContents, ViewportBlueprint, VisibleTimeRanges, VisualBounds2D,
 };
 use rerun::external::re_sdk_types::datatypes;
-use rerun::{AsComponents, Color, TimeCell, TimePoint};
+use rerun::{AsComponents, TimeCell, TimePoint};
 
+use super::arm::{Posture, reach, rest};
 use super::canvas::Row;
-use super::posture::Posture;
+use super::chart::SHEET;
+use super::renderer::{Magnified, legend_region, pairs_region, significant};
 use super::{names, style};
 use crate::profile::Profile;
-
-/// What the layout depends on.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Contents {
-    pub(super) purpose: Purpose,
-    pub(super) has_temperatures: bool,
-}
+use crate::session::journal::IdentifiedText;
+use crate::session::state::Session;
 
 /// The purpose of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// A session that is being measured: the poses and the course of the measurement.
-    Capture,
-    /// A session with a result: errors of both arms at the poses.
-    Result,
-    /// A plan: the search for its poses.
+    /// A session: its story is played.
+    Story,
+    /// A session that is being measured: a viewer follows the latest pose.
+    Live,
+    /// A plan: the arm drives through it.
     Plan,
 }
 
-/// Background of the picture.
-const BACKGROUND: Color = style::rgb(24, 28, 33);
+/// What the layout depends on.
+pub(super) struct Contents<'a> {
+    pub(super) purpose: Purpose,
+    /// The result, and how many times larger its errors are drawn.
+    pub(super) result: Option<(&'a IdentifiedText, Magnified)>,
+    /// There is a search to show.
+    pub(super) has_search: bool,
+    pub(super) has_report: bool,
+    /// Series that have values. A plot of others would be empty.
+    pub(super) series: &'a [&'static str],
+    pub(super) eye: Eye,
+}
 
-/// Returns the rows of the layout for the cell of `profile`.
-pub(super) fn rows(profile: &Profile, contents: Contents) -> Vec<Row> {
-    let mut layout = Builder::default();
-    let picture = picture(profile, &mut layout);
-    let (right, timeline) = match contents.purpose {
-        Purpose::Capture => (capturing(contents.has_temperatures, &mut layout), names::POSE),
-        Purpose::Result => (result(contents.has_temperatures, &mut layout), names::POSE),
-        Purpose::Plan => (planning(&mut layout), names::PLAN_ITERATION),
-    };
-    layout.shared(ContainerKind::Horizontal, &[1.45, 1.0], &[picture, right]);
-    // The container that was made last holds all others.
-    let root = RootContainer(datatypes::Uuid { bytes: u128::from(layout.items).to_be_bytes() });
-    let viewport = ViewportBlueprint::new().with_root_container(root).with_auto_layout(false).with_auto_views(false);
-    layout.put("viewport", &viewport);
-    for panel in ["blueprint_panel", "selection_panel"] {
-        layout.put(panel, &PanelBlueprint::new().with_state(PanelState::Collapsed));
+/// Where the camera is, and the point that it looks at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Eye {
+    position: Point3<f64>,
+    target: Point3<f64>,
+}
+
+/// An instrument farther than this many reaches away would leave only a few pixels for the arm.
+const FAR: f64 = 3.0;
+/// Distance of the camera in radii of what it shows.
+const DISTANCE: f64 = 1.9;
+/// Most postures that it is made for.
+const POSTURES: usize = 100;
+
+/// Returns the camera that shows these places.
+pub(super) fn eye_on(places: &[Point3<f64>]) -> Eye {
+    eye_of(places, None)
+}
+
+/// Returns the camera that shows the arm and its poses, and the instrument at the edge.
+pub(super) fn eye(profile: &Profile, session: &Session, instrument: Option<Point3<f64>>) -> Eye {
+    let planned = session.rows.iter().map(|row| row.planned.configuration.clone());
+    let measured = session.samples.iter().map(|sample| session.configuration_of(sample));
+    let mut all: Vec<Vec<f64>> = planned.chain(measured).collect();
+    if all.is_empty() {
+        all.push(rest(profile));
     }
-    let time_panel = TimePanelBlueprint::new()
-        .with_state(PanelState::Collapsed)
-        .with_timeline(timeline)
-        .with_fps(4.0)
-        .with_play_state(PlayState::Following);
-    layout.put("time_panel", &time_panel);
-    layout.rows
+    let some = all.iter().step_by(all.len().div_ceil(POSTURES));
+    let places: Vec<Point3<f64>> = some
+        .flat_map(|q| {
+            let posture = Posture::nominal(profile, q);
+            let frames = posture.frames.into_iter().map(|frame| Point3::from(frame.translation.vector));
+            frames.chain([posture.reflector]).collect::<Vec<_>>()
+        })
+        .collect();
+    eye_of(&places, instrument.filter(|place| place.coords.norm() < FAR * reach(profile)))
+}
+
+fn eye_of(places: &[Point3<f64>], near: Option<Point3<f64>>) -> Eye {
+    let (low, high) = places.iter().fold((Point3::origin(), Point3::origin()), |(low, high), place| (low.inf(place), high.sup(place)));
+    let centre = nalgebra::center(&low, &high);
+    let radius = places.iter().map(|place| (place - centre).norm()).fold(0.1, f64::max);
+    // The side from which most is seen: across the line to the instrument, or else to the middle of the poses.
+    let aim = near.map_or(centre.coords, |place| place - centre);
+    let towards = Vector3::new(aim.x, aim.y, 0.0).try_normalize(1e-6).unwrap_or_else(Vector3::x);
+    let aside = Vector3::new(towards.y, -towards.x, 0.0);
+    let behind = near.map_or(0.0, |place| ((place - centre).norm() - radius).clamp(0.0, radius));
+    let target = centre + towards * (0.35 * behind);
+    let from = if near.is_some() { aside * 0.85 - towards * 0.6 } else { towards * 0.8 + aside * 0.6 };
+    let from = (from + Vector3::z() * 0.42).normalize();
+    Eye { position: target + from * (DISTANCE * radius + 0.6 * behind), target }
+}
+
+/// Returns the rows of the layout.
+pub(super) fn rows(contents: &Contents<'_>) -> Vec<Row> {
+    let mut layout = Builder::default();
+    let texts = [("The result", names::HEADLINE), ("The story", names::CAPTION)];
+    let texts = texts.map(|(name, entity)| layout.entity("TextDocument", name, entity));
+    let top = layout.shared(ContainerKind::Horizontal, "", &[2.0, 1.0], &texts);
+    if let Some((result, magnified)) = contents.result {
+        let pictures = before_and_after(contents, result, magnified, &mut layout);
+        let below = below(contents, result, &mut layout);
+        layout.shared(ContainerKind::Vertical, "", &[0.17, 0.5, 0.33], &[top, pictures, below]);
+    } else {
+        let cell = layout.picture("The cell", contents.eye, &["nominal", "trail/path"]);
+        let beside = beside(contents, &mut layout);
+        let middle = layout.shared(ContainerKind::Horizontal, "", &[1.7, 1.0], &[cell, beside]);
+        layout.shared(ContainerKind::Vertical, "", &[0.17, 0.83], &[top, middle]);
+    }
+    let play = if contents.purpose == Purpose::Live { PlayState::Following } else { PlayState::Playing };
+    layout.finish(play)
 }
 
 /// Collects the entities of a layout. Every view and container has a path; a container lists the paths of its contents.
@@ -110,9 +164,9 @@ impl Builder {
         self.container(&ContainerBlueprint::new(kind).with_display_name(name), contents)
     }
 
-    /// Adds a row or a column that is divided in these shares.
-    fn shared(&mut self, kind: ContainerKind, shares: &[f32], contents: &[String]) -> String {
-        let container = ContainerBlueprint::new(kind);
+    /// Adds a row or a column that is divided in these shares. It needs a name where it is a tab.
+    fn shared(&mut self, kind: ContainerKind, name: &str, shares: &[f32], contents: &[String]) -> String {
+        let container = ContainerBlueprint::new(kind).with_display_name(name);
         let shares = shares.iter().copied();
         let container = match kind {
             ContainerKind::Horizontal => container.with_col_shares(shares),
@@ -120,171 +174,148 @@ impl Builder {
         };
         self.container(&container, contents)
     }
-}
 
-/// Adds the right half while there is no result, without views that would be empty.
-fn capturing(has_temperatures: bool, layout: &mut Builder) -> String {
-    let plots = [capture(has_temperatures, layout), search(layout)];
-    let plots = layout.named(ContainerKind::Tabs, "Measurement", &plots);
-    let log = log(layout);
-    let texts = [guide(layout), report(layout)];
-    let texts = layout.named(ContainerKind::Tabs, "Texts", &texts);
-    layout.shared(ContainerKind::Vertical, &[1.0, 0.7, 1.3], &[plots, log, texts])
-}
-
-/// Adds the right half once there is a result.
-fn result(has_temperatures: bool, layout: &mut Builder) -> String {
-    let [positions, distances] = errors(layout);
-    let plots = [positions, distances, capture(has_temperatures, layout), solver(layout), search(layout)];
-    let plots = layout.named(ContainerKind::Tabs, "Errors", &plots);
-    let bars = [
-        layout.entity("BarChart", "Deviations in sigma (bar numbers: see report)", names::SIGNIFICANCE),
-        layout.entity("Tensor", "All pairs, nominal (um)", names::MAP_NOMINAL),
-        layout.entity("Tensor", "All pairs, identified (um)", names::MAP_IDENTIFIED),
-    ];
-    let bars = layout.named(ContainerKind::Tabs, "Parameters and pairs", &bars);
-    let texts = [report(layout), guide(layout), log(layout)];
-    let texts = layout.named(ContainerKind::Tabs, "Texts", &texts);
-    layout.shared(ContainerKind::Vertical, &[1.1, 0.8, 1.1], &[plots, bars, texts])
-}
-
-/// Adds the right half of a plan.
-fn planning(layout: &mut Builder) -> String {
-    let search = search(layout);
-    let texts = [guide(layout), report(layout), log(layout)];
-    let texts = layout.named(ContainerKind::Tabs, "Texts", &texts);
-    layout.container(&ContainerBlueprint::new(ContainerKind::Vertical), &[search, texts])
-}
-
-fn report(layout: &mut Builder) -> String {
-    layout.entity("TextDocument", "Report", names::REPORT)
-}
-
-fn guide(layout: &mut Builder) -> String {
-    layout.entity("TextDocument", "How to read this picture", names::GUIDE)
-}
-
-fn log(layout: &mut Builder) -> String {
-    layout.entity("TextLog", "Log", names::LOG)
-}
-
-/// Adds the 3D view.
-fn picture(profile: &Profile, layout: &mut Builder) -> String {
-    let path = layout.entity("3D", "Cell", names::WORLD);
-    let (eye, target) = camera(profile);
-    let controls = EyeControls3D::new()
-        .with_kind(Eye3DKind::Orbital)
-        .with_position(style::at(&eye))
-        .with_look_target(style::at(&target))
-        .with_eye_up([0.0, 0.0, 1.0]);
-    layout.put(&format!("{path}/EyeControls3D"), &controls);
-    layout.put(&format!("{path}/LineGrid3D"), &LineGrid3D::new().with_visible(false));
-    let background = Background::new(BackgroundKind::SolidColor).with_color(BACKGROUND);
-    layout.put(&format!("{path}/Background"), &background);
-    let visualizers = |entity: &str| format!("{path}/ViewContents/overrides/{entity}/visualizers");
-    layout.put(&visualizers(names::MEASURED), &trail());
-    for hidden in [names::PAIRS_NOMINAL, names::PAIRS_IDENTIFIED, names::UNCERTAINTY] {
-        layout.put(&visualizers(hidden), &EntityBehavior::new().with_visible(false));
+    /// Adds the panels around the views.
+    fn finish(mut self, play: PlayState) -> Vec<Row> {
+        // The container that was made last holds all others.
+        let root = RootContainer(datatypes::Uuid { bytes: u128::from(self.items).to_be_bytes() });
+        let viewport = ViewportBlueprint::new().with_root_container(root).with_auto_layout(false).with_auto_views(false);
+        self.put("viewport", &viewport);
+        for panel in ["blueprint_panel", "selection_panel"] {
+            self.put(panel, &PanelBlueprint::new().with_state(PanelState::Collapsed));
+        }
+        let time_panel = TimePanelBlueprint::new()
+            .with_state(PanelState::Collapsed)
+            .with_timeline(names::STORY)
+            .with_playback_speed(1.0)
+            .with_loop_mode(LoopMode::Off)
+            .with_play_state(play);
+        self.put("time_panel", &time_panel);
+        self.rows
     }
-    path
+
+    /// Adds a chart of which a region is visible.
+    fn sheet(&mut self, name: &str, entity: &str, [low, high]: [[f64; 2]; 2]) -> String {
+        let path = self.entity("2D", name, entity);
+        let region = datatypes::Range2D {
+            x_range: datatypes::Range1D([low[0], high[0]]),
+            y_range: datatypes::Range1D([low[1], high[1]]),
+        };
+        self.put(&format!("{path}/VisualBounds2D"), &VisualBounds2D::new(region));
+        path
+    }
+
+    /// Adds a 3D view of the cell with these parts of the world besides.
+    fn picture(&mut self, name: &str, eye: Eye, parts: &[&str]) -> String {
+        let shared = ["cell", "tracker", "trail/plan", "trail/measured", "next", "unused"];
+        let contents: Vec<String> = shared.iter().chain(parts).map(|part| format!("+ /{}/{part}/**", names::WORLD)).collect();
+        let path = self.view("3D", name, names::WORLD, &contents.iter().map(String::as_str).collect::<Vec<_>>());
+        let controls = EyeControls3D::new()
+            .with_kind(Eye3DKind::Orbital)
+            .with_position(style::at(&eye.position))
+            .with_look_target(style::at(&eye.target))
+            .with_eye_up([0.0, 0.0, 1.0]);
+        self.put(&format!("{path}/EyeControls3D"), &controls);
+        self.put(&format!("{path}/LineGrid3D"), &LineGrid3D::new().with_visible(false));
+        let background = Background::new(BackgroundKind::SolidColor).with_color(style::BACKGROUND);
+        self.put(&format!("{path}/Background"), &background);
+        for trail in shared.iter().chain(parts).filter(|part| part.starts_with(names::TRAIL)) {
+            self.put(&format!("{path}/ViewContents/overrides/{}/{trail}/visualizers", names::WORLD), &self::trail());
+        }
+        path
+    }
+}
+
+/// Returns the rows of the layout of a picture of targets.
+pub(super) fn rows_of_targets(eye: Eye, magnified: f64) -> Vec<Row> {
+    let mut layout = Builder::default();
+    let headline = layout.entity("TextDocument", "The result", names::HEADLINE);
+    let picture = layout.picture(&format!("Targets, corrections drawn {magnified} x"), eye, &["targets", "trail/targets"]);
+    let legend = layout.sheet("Scale", names::LEGEND, legend_region());
+    let below = layout.shared(ContainerKind::Horizontal, "", &[1.0, 0.12], &[picture, legend]);
+    layout.shared(ContainerKind::Vertical, "", &[0.17, 0.83], &[headline, below]);
+    layout.finish(PlayState::Playing)
+}
+
+/// Adds both arms beside each other, and a view of the errors that are left, magnified.
+fn before_and_after(contents: &Contents<'_>, result: &IdentifiedText, magnified: Magnified, layout: &mut Builder) -> String {
+    let figure = |of_nominal: bool| {
+        let verification = result.summary.verification.as_ref()?;
+        let model = if of_nominal { &verification.nominal } else { &verification.identified };
+        Some(format!(", mean error {} mm", significant(model.position_mm?.mean)))
+    };
+    let name = |arm: &str, of_nominal| format!("{arm} arm{}; drawn {} x", figure(of_nominal).unwrap_or_default(), magnified.both);
+    let before = layout.picture(&format!("BEFORE: {}", name("nominal", true)), contents.eye, &["nominal", "before", "trail/before"]);
+    let legend = layout.sheet("Scale", names::LEGEND, legend_region());
+    let after = layout.picture(&format!("AFTER: {}", name("identified", false)), contents.eye, &["identified", "after", "trail/after"]);
+    let pair = layout.shared(ContainerKind::Horizontal, "Before | after", &[1.0, 0.17, 1.0], &[before, legend, after]);
+    let residual = format!("What is left, drawn {} x", magnified.residual);
+    let residual = layout.picture(&residual, contents.eye, &["identified", "residual", "uncertainty"]);
+    layout.named(ContainerKind::Tabs, "Before and after", &[pair, residual])
+}
+
+/// Adds charts and texts of a result.
+fn below(contents: &Contents<'_>, result: &IdentifiedText, layout: &mut Builder) -> String {
+    let sheet = [[0.0, 0.0], SHEET];
+    let mut charts = vec![layout.sheet("Position error at every pose", names::ERRORS, sheet)];
+    charts.extend(plots(contents, layout));
+    let charts = layout.named(ContainerKind::Tabs, "Errors", &charts);
+    let mut others = vec![layout.sheet("Parameters, with 2 sigma", names::PARAMETERS, sheet)];
+    if !result.summary.joint_errors.is_empty() {
+        others.push(layout.sheet("Joints, µrad", names::JOINTS, sheet));
+    }
+    others.push(layout.sheet("All pairs", names::PAIRS, pairs_region()));
+    others.extend(texts(contents, layout));
+    let others = layout.named(ContainerKind::Tabs, "Details", &others);
+    layout.shared(ContainerKind::Horizontal, "", &[1.0, 1.0], &[charts, others])
+}
+
+/// Adds what is beside the cell while there is no result.
+fn beside(contents: &Contents<'_>, layout: &mut Builder) -> String {
+    let plots = plots(contents, layout);
+    let texts = texts(contents, layout);
+    let texts = layout.named(ContainerKind::Tabs, "Texts", &texts);
+    let rows: Vec<String> = plots.into_iter().chain([texts]).collect();
+    layout.container(&ContainerBlueprint::new(ContainerKind::Vertical), &rows)
+}
+
+/// Adds plots of the measurement and the search, as far as there is something to see.
+fn plots(contents: &Contents<'_>, layout: &mut Builder) -> Vec<String> {
+    let mut plots = Vec::new();
+    let groups: [(&str, &[&str]); 2] = [
+        ("Measurement, mm", &[names::PREDICTED, names::SCATTER, names::DRIFT]),
+        ("Temperature, °C", &[names::TEMPERATURE]),
+    ];
+    for (name, paths) in groups {
+        let known: Vec<String> =
+            paths.iter().filter(|path| contents.series.contains(path)).map(|path| format!("+ /{path}")).collect();
+        if !known.is_empty() {
+            let plot = layout.view("TimeSeries", name, "", &known.iter().map(String::as_str).collect::<Vec<_>>());
+            layout.put(&format!("{plot}/PlotLegend"), &PlotLegend::new().with_corner(Corner2D::LeftTop));
+            plots.push(plot);
+        }
+    }
+    if contents.has_search {
+        plots.push(layout.sheet("Search for poses", names::SEARCH, [[0.0, 0.0], SHEET]));
+    }
+    plots
+}
+
+/// Adds the texts.
+fn texts(contents: &Contents<'_>, layout: &mut Builder) -> Vec<String> {
+    let report = contents.has_report.then(|| layout.entity("TextDocument", "Report", names::REPORT));
+    let log = layout.entity("TextLog", "Log", names::LOG);
+    let guide = layout.entity("TextDocument", "How to read this", names::GUIDE);
+    report.into_iter().chain([log, guide]).collect()
 }
 
 /// Returns the range of all rows up to the time cursor.
 fn trail() -> VisibleTimeRanges {
-    VisibleTimeRanges::new([names::POSE, names::TIME].map(|timeline| datatypes::VisibleTimeRange {
+    VisibleTimeRanges::new([names::STORY, names::TIME].map(|timeline| datatypes::VisibleTimeRange {
         timeline: timeline.into(),
         range: datatypes::TimeRange {
             start: datatypes::TimeRangeBoundary::Infinite,
             end: datatypes::TimeRangeBoundary::CursorRelative(datatypes::TimeInt(0)),
         },
     }))
-}
-
-/// Number of postures from which the extent of an arm is estimated.
-const POSTURES: u32 = 64;
-/// Each joint goes through its range in steps of a power of this fraction, so that no two postures are alike.
-const STEP: f64 = 0.8567;
-
-/// Returns the position of the camera and the point that it looks at: across the line from robot to tracker, and as near as the
-/// extent of the arm allows.
-fn camera(profile: &Profile) -> (Point3<f64>, Point3<f64>) {
-    let postures = (1..=POSTURES).flat_map(|number| {
-        let q: Vec<f64> = (1..)
-            .zip(profile.joints())
-            .map(|(power, joint)| {
-                let (low, high) = joint.planning_limits.or(joint.limits).unwrap_or((-1.0, 1.0));
-                low + (high - low) * (f64::from(number) * STEP.powi(power)).fract()
-            })
-            .collect();
-        Posture::nominal(profile, &q).line
-    });
-    let places: Vec<Point3<f64>> = postures.collect();
-    let (mut low, mut high) = (Point3::origin(), Point3::origin());
-    for place in &places {
-        low = low.inf(place);
-        high = high.sup(place);
-    }
-    let centre = nalgebra::center(&low, &high);
-    let radius = places.iter().map(|place| (place - centre).norm()).fold(0.1, f64::max);
-    let tracker = profile.tracker().position_in_base;
-    let towards = Vector3::new(tracker.x - centre.x, tracker.y - centre.y, 0.0);
-    let distance = towards.norm();
-    let towards = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
-    let aside = Vector3::new(towards.y, -towards.x, 0.0);
-    // Showing a tracker that is far away would leave only a few pixels for the arm.
-    let behind = (distance - radius).clamp(0.0, 0.8 * radius);
-    let target = centre + towards * (0.5 * behind) - Vector3::z() * (0.1 * radius);
-    let from = (aside * 0.8 - towards * 0.75 + Vector3::z() * 0.45).normalize();
-    (target + from * (2.0 * radius + 0.7 * behind), target)
-}
-
-/// Adds plots of the errors of positions and of distances at the poses.
-fn errors(layout: &mut Builder) -> [String; 2] {
-    let plots = [
-        ("position", "Position error", "Position errors"),
-        ("distance", "Mean distance error to all others", "Distance errors"),
-    ];
-    plots.map(|(quantity, title, name)| {
-        // Each arm has its own plot: beside the nominal errors the identified ones would be invisible.
-        let arms = ["nominal", "identified"].map(|arm| {
-            let contents = format!("+ /{}/**", names::all_errors(quantity, arm));
-            let plot = series(&format!("{title}, {arm} arm (mm)"), &[&contents], layout);
-            layout.put(&format!("{plot}/PlotLegend"), &PlotLegend::new().with_corner(Corner2D::RightTop));
-            plot
-        });
-        layout.named(ContainerKind::Vertical, name, &arms)
-    })
-}
-
-/// Adds plots of the solver.
-fn solver(layout: &mut Builder) -> String {
-    let plots = [
-        series("Mean error of all samples (mm), per solver step", &["+ /solver/mean_error_mm"], layout),
-        series("Cost and largest step (log10), per solver step", &["+ /solver/cost_and_step_log10"], layout),
-    ];
-    layout.named(ContainerKind::Vertical, "Solver", &plots)
-}
-
-/// Adds plots of the search for poses.
-fn search(layout: &mut Builder) -> String {
-    let others = ["+ /search/observability_o1_mm", "+ /search/predicted_error_sigma"];
-    let plots = [
-        series("Condition number, per sweep", &["+ /search/condition_number"], layout),
-        series("Observability O1 (mm), predicted error (sigma), per sweep", &others, layout),
-    ];
-    layout.named(ContainerKind::Vertical, "Search", &plots)
-}
-
-/// Adds plots of the capture. Many instruments report no temperature: then there is no plot of it.
-fn capture(has_temperatures: bool, layout: &mut Builder) -> String {
-    let lengths = ["+ /capture/predicted_error_mm", "+ /capture/scatter_mm", "+ /capture/drift_mm"];
-    let mut plots = vec![series("Predicted error of a calibration so far, scatter, drift (mm)", &lengths, layout)];
-    if has_temperatures {
-        plots.push(series("Temperature (degC)", &["+ /capture/temperature_degc"], layout));
-    }
-    layout.named(ContainerKind::Vertical, "Capture", &plots)
-}
-
-fn series(name: &str, contents: &[&str], layout: &mut Builder) -> String {
-    layout.view("TimeSeries", name, "", contents)
 }

@@ -1,4 +1,4 @@
-//! The rows of a recording, collected until they are written or shown.
+//! The rows of a recording, collected until they are written or shown, and the two timelines that place them.
 
 use jiff::Timestamp;
 use rerun::external::re_log_types::EntityPath;
@@ -6,59 +6,62 @@ use rerun::{AsComponents, SerializedComponentBatch, TimeCell, TimePoint};
 
 use super::names;
 
-/// A place on the timelines.
-#[derive(Clone, Copy, Debug, Default)]
+/// Nanoseconds of a second.
+const SECOND: f64 = 1e9;
+
+/// A moment on both timelines: everything that is drawn has a place on either.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Moment {
-    /// Number of the measurement.
-    pub(super) pose: Option<i64>,
-    /// Number of the journal line.
-    pub(super) entry: Option<i64>,
-    /// Sweep of the pose search.
-    pub(super) plan_iteration: Option<i64>,
-    /// Step of the solver.
-    pub(super) solver_iteration: Option<i64>,
-    pub(super) time: Option<Timestamp>,
+    /// Since the story began (ns).
+    story: i64,
+    /// Clock time (ns since 1970).
+    time: i64,
 }
 
 impl Moment {
-    /// Returns the moment of a sweep of the pose search.
-    pub(super) fn search(step: usize) -> Self {
-        Self { plan_iteration: Some(index(step)), ..Self::default() }
-    }
-
-    /// Returns the moment of a step of the solver.
-    pub(super) fn solver(step: usize) -> Self {
-        Self { solver_iteration: Some(index(step)), ..Self::default() }
-    }
-
-    /// Returns the moment of a pose, without a clock time.
-    pub(super) fn pose(number: u64) -> Self {
-        Self { pose: Some(i64::try_from(number).unwrap_or(i64::MAX)), ..Self::default() }
+    /// Returns the moment at a `part` of the way to a later one.
+    pub(super) fn towards(self, end: Self, part: f64) -> Self {
+        let between = |from: i64, to: i64| from + nanoseconds_of((to - from) as f64 / SECOND * part);
+        Self { story: between(self.story, end.story), time: between(self.time, end.time) }
     }
 
     fn time_point(self) -> TimePoint {
-        let sequences = [
-            (names::POSE, self.pose),
-            (names::ENTRY, self.entry),
-            (names::PLAN_ITERATION, self.plan_iteration),
-            (names::SOLVER_ITERATION, self.solver_iteration),
-        ];
         let mut point = TimePoint::default();
-        for (timeline, value) in sequences {
-            if let Some(value) = value {
-                point.insert_cell(timeline, TimeCell::from_sequence(value));
-            }
-        }
-        if let Some(time) = self.time {
-            point.insert_cell(names::TIME, TimeCell::from_timestamp_nanos_since_epoch(nanoseconds(time)));
-        }
+        point.insert_cell(names::STORY, TimeCell::from_duration_nanos(self.story));
+        point.insert_cell(names::TIME, TimeCell::from_timestamp_nanos_since_epoch(self.time));
         point
     }
 }
 
-/// Returns an index of a timeline.
-fn index(value: usize) -> i64 {
-    i64::try_from(value).unwrap_or(i64::MAX)
+#[expect(clippy::cast_possible_truncation, reason = "no story lasts 290 years")]
+fn nanoseconds_of(seconds: f64) -> i64 {
+    (seconds * SECOND).round() as i64
+}
+
+/// The film so far. Its clock times never go back, even where those of the journal do.
+#[derive(Debug, Default)]
+pub(super) struct Film {
+    now: Moment,
+}
+
+impl Film {
+    /// Starts at a clock time.
+    pub(super) fn begin(time: Timestamp) -> Self {
+        Self { now: Moment { story: 0, time: nanoseconds(time) } }
+    }
+
+    pub(super) const fn now(&self) -> Moment {
+        self.now
+    }
+
+    /// Advances the story by `seconds`, and the clock to `time` or, where that is too early, by as many seconds. Returns where the
+    /// step begins and where it ends.
+    pub(super) fn advance(&mut self, seconds: f64, time: Timestamp) -> [Moment; 2] {
+        let step = nanoseconds_of(seconds);
+        let from = self.now;
+        self.now = Moment { story: from.story + step, time: nanoseconds(time).max(from.time + step) };
+        [from, self.now]
+    }
 }
 
 /// Returns the nanoseconds since 1970.

@@ -1,11 +1,12 @@
 //! Files of recordings. They are written whole, and replaced only when the new one is on disk.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use super::blueprint::Purpose;
-use super::{RecordingError, rrd};
+use super::{RecordingError, names, rrd};
 use crate::session::journal::Line;
+use crate::session::plan_summary::PlanSummary;
 use crate::store::{self, Links};
 
 /// Name of the recording in a session's folder.
@@ -14,6 +15,11 @@ pub const FILE_NAME: &str = "recording.rrd";
 /// Prefix and suffix of files that earlier versions left: parts of a recording, and the temporary file through which they were
 /// joined.
 const OLD_PARTS: [(&str, &str); 2] = [("recording.part-", ".rrd"), (".recording-", ".tmp")];
+
+/// First bytes of every recording of the library.
+const MAGIC: &[u8] = b"RRF";
+/// Bytes at the beginning that name the program (the library's message about the store comes first).
+const HEAD: u64 = 1024;
 
 /// The outcome of [`rebuild`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,18 +34,26 @@ pub struct Written {
 /// The file cannot be written; the old one stays as it was.
 pub fn rebuild(folder: &Path, lines: &[Line]) -> Result<Written, RecordingError> {
     let path = folder.join(FILE_NAME);
-    let bytes = rrd::encode(lines, Purpose::Capture)?;
+    let bytes = rrd::encode(lines, None)?;
     store::replace_all([(path.clone(), bytes.as_slice())], Links::Refused)?;
     Ok(Written { path, bytes: bytes.len() })
 }
 
-/// Writes a recording of these lines to `path`. With `of_plan` it opens on the search for the poses.
+/// Writes a recording of these lines to `path`, or of a `plan` through whose poses the arm drives.
 ///
 /// # Errors
 /// There are no lines, or the file cannot be written.
-pub fn write(path: &Path, lines: &[Line], of_plan: bool) -> Result<(), RecordingError> {
-    let bytes = rrd::encode(lines, if of_plan { Purpose::Plan } else { Purpose::Capture })?;
-    Ok(store::replace_bytes(path, &bytes)?)
+pub fn write(path: &Path, lines: &[Line], plan: Option<&PlanSummary>) -> Result<(), RecordingError> {
+    Ok(store::replace_bytes(path, &rrd::encode(lines, plan)?)?)
+}
+
+/// Returns whether the file at `path` begins like a recording of this program. It only compares bytes: this program never parses a
+/// recording.
+pub fn is_recording(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    let name = names::APPLICATION.as_bytes();
+    read.is_ok() && head.starts_with(MAGIC) && head.windows(name.len()).any(|part| part == name)
 }
 
 /// Removes the parts of a recording that an earlier version has left in `folder`, and returns their number: [`rebuild`] makes one file

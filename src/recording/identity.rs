@@ -22,8 +22,13 @@ impl Identity {
             Entry::Opened { name, .. } => name.as_str(),
             _ => "session",
         };
-        let id = sha256(format!("{name} {}", first.time).as_bytes()).chars().take(32).collect();
-        Self { id, name: latin::plain(name), start: first.time }
+        Self::named(name, first.time)
+    }
+
+    /// Derives the identity from a name and a start.
+    pub(super) fn named(name: &str, start: Timestamp) -> Self {
+        let id = sha256(format!("{name} {start}").as_bytes()).chars().take(32).collect();
+        Self { id, name: latin::plain(name), start }
     }
 
     /// Returns a builder of streams of this recording. Its properties are rows like all others, so the stream sends none.

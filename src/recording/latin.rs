@@ -11,14 +11,11 @@ pub(super) fn plain(text: &str) -> String {
             'α' => plain.push_str("alpha"),
             'β' => plain.push_str("beta"),
             'θ' => plain.push_str("theta"),
-            'µ' | 'μ' => plain.push('u'),
-            '°' => plain.push_str(" deg"),
-            '±' => plain.push_str("+-"),
+            'μ' => plain.push('µ'),
             '…' => plain.push_str("..."),
-            '²' => plain.push_str("^2"),
             '\u{2019}' => plain.push('\''),
-            // Every viewer draws Latin letters with diacritics.
-            '\n' | ' '..='~' | 'À'..='ÿ' => plain.push(c),
+            // Every viewer draws the letters and signs of Latin-1, and the arrow.
+            '\n' | ' '..='~' | '\u{a1}'..='ÿ' | '→' => plain.push(c),
             _ => plain.push('?'),
         }
     }

@@ -98,7 +98,7 @@ impl LiveView {
     pub(super) fn start(live: Live, first: &Line) -> Result<Self, RecordingError> {
         let identity = Identity::of(first);
         let (stream, gate) = live.stream(&identity)?;
-        Ok(Self { stream, _gate: gate, renderer: Renderer::new(&identity, Purpose::Capture), identity })
+        Ok(Self { stream, _gate: gate, renderer: Renderer::new(&identity, Purpose::Live), identity })
     }
 
     /// Shows lines. Never waits for a viewer.

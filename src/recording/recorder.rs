@@ -205,7 +205,7 @@ mod tests {
     use std::fs;
     use std::sync::mpsc::channel;
 
-    use super::super::read;
+    use super::super::rrd;
     use super::*;
     use crate::session::journal::{Entry, SCHEMA};
 
@@ -275,14 +275,18 @@ mod tests {
     fn the_file_comes_at_once_then_after_a_pause_and_always_at_the_end() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(file::FILE_NAME);
-        let recorded = || read(&path).map_or(0, |journal| journal.lines.len());
+        let both = [opened().remove(0), Line { number: 2, ..opened().remove(0) }];
+        let recorded = || {
+            let found = fs::read(&path).unwrap_or_default();
+            [1, 2].into_iter().find(|count| rrd::encode(&both[..*count], None).unwrap() == found).unwrap_or(0)
+        };
         let begin = || {
             let mut recorder = Recorder::start(folder.path(), opened(), None, |_event| ()).unwrap();
             let begun = now();
             while recorded() != 1 {
                 assert!(begun.elapsed() < Duration::from_secs(5));
             }
-            recorder.add(&[Line { number: 2, ..opened().remove(0) }]).unwrap();
+            recorder.add(&both[1..]).unwrap();
             thread::sleep(Duration::from_millis(200));
             assert_eq!(recorded(), 1, "the pause is not over");
             recorder

@@ -1,24 +1,39 @@
-//! Turns the lines of a journal into rows of a recording. Equal lines give equal rows.
+//! Turns the lines of a journal into a film, rows of a recording. Equal lines give equal rows.
 
 mod cell;
+mod charts;
 mod document;
-mod measured;
 mod plan;
 mod result;
-mod tracker;
+mod sample;
+mod station;
 
 use jiff::Timestamp;
-use rerun::components;
-use rerun::{RecordingInfo, TextDocument, TextLog};
+use rerun::{AsComponents, LineStrips3D, RecordingInfo, TextLog, components};
 
+use super::arm::{self, Posture};
 use super::blueprint::{self, Contents, Purpose};
-use super::canvas::{Canvas, Layout, Moment, nanoseconds};
+use super::canvas::{Canvas, Film, Layout, Moment, nanoseconds};
 use super::identity::Identity;
 use super::latin::plain;
-use super::names;
-use crate::session::journal::{Entry, Line, Sum, encode};
+use super::{names, style};
+use crate::profile::Profile;
+use crate::session::journal::{Entry, Line, MeasuredText};
+use crate::session::plan_summary::PlanSummary;
 use crate::session::state::Session;
-use tracker::Station;
+use station::Station;
+
+pub(super) use charts::{legend, legend_region, pairs_region};
+pub(super) use document::significant;
+pub(super) use result::Magnified;
+
+/// Length of the drive from pose to pose, however many there are (s).
+const DRIVE: f64 = 14.0;
+/// Shortest and longest step from one pose to the next (s).
+const STEP: (f64, f64) = (0.014, 0.4);
+/// Pictures of the arm during the whole drive, and the most from one pose to the next.
+const PICTURES: usize = 160;
+const MOST_PICTURES: usize = 5;
 
 /// Draws a session, line by line.
 #[derive(Debug)]
@@ -26,12 +41,18 @@ pub(super) struct Renderer {
     canvas: Canvas,
     purpose: Purpose,
     session: Session,
+    film: Film,
     station: Station,
-    sum: Sum,
-    /// Number of results so far.
-    runs: usize,
-    /// Some sample has a temperature.
-    has_temperatures: bool,
+    /// The configuration that the arm is drawn at.
+    q: Vec<f64>,
+    /// Every picture of the arm so far.
+    pictures: Vec<(Moment, Vec<f64>)>,
+    /// When each sample was taken.
+    moments: Vec<(u64, Moment)>,
+    /// Series that have a row, and with it their looks.
+    series: Vec<&'static str>,
+    /// How many times larger the errors of the identified arm are drawn in a view of their own; none without a result.
+    magnified: Option<Magnified>,
     /// A line did not fit the session, so nothing after it can be drawn.
     is_lost: bool,
 }
@@ -41,18 +62,19 @@ impl Renderer {
     pub(super) fn new(identity: &Identity, purpose: Purpose) -> Self {
         let mut canvas = Canvas::default();
         let start = components::Timestamp::from(nanoseconds(identity.start));
-        canvas.draw_static(
-            names::PROPERTIES,
-            &RecordingInfo::new().with_name(identity.name.as_str()).with_start_time(start),
-        );
+        let info = RecordingInfo::new().with_name(identity.name.as_str()).with_start_time(start);
+        canvas.draw_static(names::PROPERTIES, &info);
         Self {
             canvas,
             purpose,
             session: Session::default(),
+            film: Film::begin(identity.start),
             station: Station::default(),
-            sum: Sum::default(),
-            runs: 0,
-            has_temperatures: false,
+            q: Vec::new(),
+            pictures: Vec::new(),
+            moments: Vec::new(),
+            series: Vec::new(),
+            magnified: None,
             is_lost: false,
         }
     }
@@ -62,87 +84,158 @@ impl Renderer {
         std::mem::take(&mut self.canvas)
     }
 
+    /// Draws what the lines of a journal do not say about a plan.
+    pub(super) fn plan_report(&mut self, plan: &PlanSummary) {
+        document::plan_report(&mut self.canvas, plan);
+    }
+
     /// Draws a line of the journal.
     pub(super) fn draw(&mut self, line: &Line) {
-        if let Ok((text, sum)) = encode(line, &self.sum) {
-            self.sum = sum;
-            let number = i64::try_from(line.number).unwrap_or(i64::MAX);
-            let moment = Moment { entry: Some(number), ..Moment::default() };
-            self.canvas.draw(moment, names::JOURNAL, &TextDocument::new(text));
-        }
-        let had_temperatures = self.has_temperatures;
-        match &line.entry {
-            Entry::Identified(_) => self.runs += 1,
-            Entry::Sample(noted) => self.has_temperatures |= noted.temperature_degc.is_some(),
-            _ => {}
-        }
         self.is_lost = self.is_lost || self.session.apply(line).is_err();
-        self.log(line);
-        if self.is_lost {
-            return;
+        if !self.is_lost {
+            self.entry(line);
         }
-        if self.station.update(&self.session, &line.entry) {
-            let taken = if let Entry::Sample(noted) = &line.entry { Some(noted.number) } else { None };
-            self.station.draw_all(&mut self.canvas, &self.session, taken);
+        self.log(line);
+    }
+
+    fn entry(&mut self, line: &Line) {
+        if self.station.update(&self.session, &line.entry)
+            && let Some(profile) = self.session.mounted_profile()
+        {
+            self.station.draw(&mut self.canvas, &profile, self.film.now());
         }
         match &line.entry {
             Entry::Opened { program, name, .. } => document::opening(&mut self.canvas, program, name, line.time),
-            Entry::Profile { .. } => {
-                self.cell();
+            Entry::Profile { .. } => self.open(line),
+            Entry::Plan(plan) | Entry::PlanExtended(plan) => self.plan(plan.rows.len(), line),
+            Entry::Sample(noted) => self.sample(noted, line),
+            Entry::Identified(identified) => {
+                result::draw(self, identified, line.time);
                 self.layout(line.number);
-            }
-            Entry::Target(_) => self.cell(),
-            Entry::Plan(plan) | Entry::PlanExtended(plan) => {
-                plan::search(&mut self.canvas, &plan.search);
-                self.points();
-            }
-            Entry::Sample(noted) => {
-                measured::sample(&mut self.canvas, &self.session, &self.station, noted, line.time);
-                plan::points(&mut self.canvas, &self.session, false);
-                if self.has_temperatures != had_temperatures {
-                    self.layout(line.number);
-                }
             }
             Entry::Correction(_) => {
                 // It may have changed the configuration or the unit of any sample.
-                for sample in &self.session.samples {
-                    measured::sample(&mut self.canvas, &self.session, &self.station, &sample.noted, sample.time);
+                for (number, moment) in self.moments.clone() {
+                    self.corrected(number, moment);
                 }
-                self.points();
+                plan::points(&mut self.canvas, &self.session, self.film.now());
             }
-            Entry::Decision { .. } | Entry::Row(_) | Entry::Skipped { .. } => self.points(),
-            Entry::Identified(identified) => {
-                if self.runs == 1 {
-                    self.layout(line.number);
-                }
-                result::draw(&mut self.canvas, &self.session, &self.station, identified, self.runs, line.time);
+            Entry::Decision { .. } | Entry::Row(_) | Entry::Skipped { .. } => {
+                plan::points(&mut self.canvas, &self.session, self.film.now());
             }
             _ => {}
         }
     }
 
     /// Draws the cell as soon as the robot is known.
-    fn cell(&mut self) {
-        if let Some(profile) = self.session.mounted_profile() {
-            cell::draw(&mut self.canvas, &profile, &self.station);
+    fn open(&mut self, line: &Line) {
+        let Some(profile) = self.session.mounted_profile() else { return };
+        let now = self.film.now();
+        cell::draw(&mut self.canvas, &profile, now);
+        cell::arm(&mut self.canvas, &profile, names::NOMINAL, style::NOMINAL, now);
+        self.station.draw(&mut self.canvas, &profile, now);
+        self.q = arm::rest(&profile);
+        self.arm(&profile, now);
+        document::headline(&mut self.canvas, &document::waiting(&self.session));
+        document::caption(&mut self.canvas, now, "The cell", profile.title());
+        self.layout(line.number);
+    }
+
+    /// Draws the poses of a plan as they fall into place; a recording of a plan drives through them as well.
+    fn plan(&mut self, rows: usize, line: &Line) {
+        let Some(profile) = self.session.mounted_profile() else { return };
+        let first = self.session.rows.len().saturating_sub(rows);
+        plan::draw(&mut self.canvas, &mut self.film, &self.session, first, line.time);
+        document::headline(&mut self.canvas, &document::waiting(&self.session));
+        if self.purpose == Purpose::Plan {
+            let way = self.session.rows.iter().skip(first).map(|row| row.planned.clone()).collect::<Vec<_>>();
+            document::caption(&mut self.canvas, self.film.now(), "The program", "the arm drives from pose to pose");
+            for (number, row) in (1..).zip(&way) {
+                let before = Posture::nominal(&profile, &self.q).reflector;
+                let moment = self.drive(&profile, &row.configuration, way.len(), line.time);
+                plan::way(&mut self.canvas, moment, [before, Posture::nominal(&profile, &row.configuration).reflector]);
+                if number == way.len() {
+                    document::caption(&mut self.canvas, moment, "The plan", &document::plan_in_words(&self.session));
+                }
+            }
         }
+        plan::points(&mut self.canvas, &self.session, self.film.now());
+        self.layout(line.number);
+    }
+
+    fn sample(&mut self, noted: &MeasuredText, line: &Line) {
+        let (Some(profile), Some(sample)) = (self.session.mounted_profile(), self.session.sample(noted.number)) else {
+            return;
+        };
+        let q = self.session.configuration_of(sample);
+        if self.moments.is_empty() {
+            document::caption(&mut self.canvas, self.film.now(), "The measurement", "the arm drives from pose to pose");
+        }
+        let planned = self.session.rows.iter().filter(|row| row.planned.kind.is_measured()).count();
+        let moment = self.drive(&profile, &q, planned, line.time);
+        self.moments.push((noted.number, moment));
+        self.measured(noted.number, moment);
+        plan::points(&mut self.canvas, &self.session, moment);
+        if self.session.identified.is_none() {
+            document::headline(&mut self.canvas, &document::waiting(&self.session));
+        }
+    }
+
+    /// Draws again a sample that may have another configuration by now.
+    fn corrected(&mut self, number: u64, moment: Moment) {
+        if let (Some(profile), Some(sample)) = (self.session.mounted_profile(), self.session.sample(number)) {
+            let q = self.session.configuration_of(sample);
+            self.canvas.draw(moment, names::NOMINAL, &arm_and_beam(&self.station, &profile, &Posture::nominal(&profile, &q)));
+            self.pictures.retain(|(of, _)| *of != moment);
+            self.pictures.push((moment, q));
+        }
+        self.measured(number, moment);
+    }
+
+    /// Draws what belongs to a sample.
+    fn measured(&mut self, number: u64, moment: Moment) {
+        let Some(sample) = self.session.sample(number) else { return };
+        let series = self.series.len();
+        sample::draw(&mut self.canvas, &self.session, &self.station, sample, moment, &mut self.series);
+        if self.series.len() != series {
+            self.layout(self.session.lines);
+        }
+    }
+
+    /// Moves the arm to a configuration, one of `poses`, and returns when it is there.
+    fn drive(&mut self, profile: &Profile, q: &[f64], poses: usize, time: Timestamp) -> Moment {
+        let poses = poses.max(1);
+        let seconds = (DRIVE / poses as f64).clamp(STEP.0, STEP.1);
+        let pictures = PICTURES.div_ceil(poses).min(MOST_PICTURES);
+        let [from, to] = self.film.advance(seconds, time);
+        let begin = std::mem::replace(&mut self.q, q.to_vec());
+        for picture in 1..=pictures {
+            let part = picture as f64 / pictures as f64;
+            self.q = arm::between(&begin, q, part);
+            self.arm(profile, from.towards(to, part));
+        }
+        to
+    }
+
+    /// Draws the nominal arm where it is.
+    fn arm(&mut self, profile: &Profile, moment: Moment) {
+        let posture = Posture::nominal(profile, &self.q);
+        self.canvas.draw(moment, names::NOMINAL, &arm_and_beam(&self.station, profile, &posture));
+        self.pictures.push((moment, self.q.clone()));
     }
 
     /// Sets the layout of the viewer for what is known by now.
     fn layout(&mut self, line: u64) {
-        let purpose = match self.purpose {
-            Purpose::Capture if self.runs > 0 => Purpose::Result,
-            purpose => purpose,
+        let Some(profile) = self.session.mounted_profile() else { return };
+        let contents = Contents {
+            purpose: self.purpose,
+            has_report: self.purpose == Purpose::Plan || self.session.identified.is_some(),
+            result: self.session.identified.as_deref().zip(self.magnified),
+            has_search: self.session.plan.as_ref().is_some_and(|plan| !plan.search.is_empty()),
+            series: &self.series,
+            eye: blueprint::eye(&profile, &self.session, self.station.instrument(&profile)),
         };
-        let contents = Contents { purpose, has_temperatures: self.has_temperatures };
-        if let Some(profile) = self.session.mounted_profile() {
-            self.canvas.layout = Some(Layout { line, rows: blueprint::rows(&profile, contents) });
-        }
-    }
-
-    fn points(&mut self) {
-        plan::poses(&mut self.canvas, &self.session);
-        plan::points(&mut self.canvas, &self.session, true);
+        self.canvas.layout = Some(Layout { line, rows: blueprint::rows(&contents) });
     }
 
     /// Draws the line in words.
@@ -154,12 +247,12 @@ impl Renderer {
             _ => "INFO",
         };
         let text = TextLog::new(plain(&line.entry.describe())).with_level(level);
-        let pose = i64::try_from(self.session.measurements).unwrap_or(i64::MAX);
-        self.canvas.draw(Moment { pose: Some(pose), time: Some(line.time), ..Moment::default() }, names::LOG, &text);
+        self.canvas.draw(self.film.now(), names::LOG, &text);
     }
 }
 
-/// Returns the moment of a measurement.
-fn pose_moment(number: u64, time: Timestamp) -> Moment {
-    Moment { time: Some(time), ..Moment::pose(number) }
+/// Returns an arm with the beam to its reflector.
+fn arm_and_beam(station: &Station, profile: &Profile, posture: &Posture) -> Vec<Box<dyn AsComponents>> {
+    let beam = LineStrips3D::update_fields().with_strips(station.beam(profile, posture));
+    vec![Box::new(arm::placed(profile, posture)), Box::new(beam)]
 }

@@ -1,5 +1,4 @@
-//! Encodes recordings in the file format of the library. Equal lines give equal bytes up to the index, whose order the library
-//! draws at random.
+//! Encodes recordings in the file format of the library. Equal lines give equal bytes.
 
 use std::collections::BTreeMap;
 
@@ -12,44 +11,51 @@ use rerun::external::re_log_types::{BlueprintActivationCommand, SetStoreInfo, St
 use rerun::log::{Chunk, ChunkId, ChunkResult, LogMsg, RowId};
 
 use super::blueprint::Purpose;
-use super::canvas::{Layout, Row, nanoseconds};
+use super::canvas::{Canvas, Layout, Row, nanoseconds};
 use super::identity::Identity;
 use super::renderer::Renderer;
 use super::{RecordingError, names};
 use crate::session::journal::Line;
+use crate::session::plan_summary::PlanSummary;
 
-/// Returns the bytes of a recording of these lines.
-pub(super) fn encode(lines: &[Line], purpose: Purpose) -> Result<Vec<u8>, RecordingError> {
+/// Returns the bytes of a recording of these lines, or of the plan in them.
+pub(super) fn encode(lines: &[Line], plan: Option<&PlanSummary>) -> Result<Vec<u8>, RecordingError> {
     let (Some(first), Some(last)) = (lines.first(), lines.last()) else {
         return Err(RecordingError::library("drawing the recording", "there is nothing to record"));
     };
     let identity = Identity::of(first);
-    let mut renderer = Renderer::new(&identity, purpose);
+    let mut renderer = Renderer::new(&identity, if plan.is_some() { Purpose::Plan } else { Purpose::Story });
     for line in lines {
         renderer.draw(line);
     }
-    let drawn = renderer.take_drawn();
-    let mut ids = Ids::after(last);
+    if let Some(plan) = plan {
+        renderer.plan_report(plan);
+    }
+    write(&identity, renderer.take_drawn(), Ids::after(last))
+}
+
+/// Returns the bytes of a recording of what was drawn.
+pub(super) fn write(identity: &Identity, drawn: Canvas, mut ids: Ids) -> Result<Vec<u8>, RecordingError> {
     // The layout comes first, so that a viewer arranges itself before the data arrive.
     let mut messages = match drawn.layout {
-        Some(layout) => layout_messages(&identity, layout, &mut ids),
+        Some(layout) => layout_messages(identity, layout, &mut ids),
         None => Vec::new(),
     };
     messages.extend(store_messages(&identity.recording(), drawn.rows, &mut ids));
     encoded(messages)
 }
 
-/// Returns the bytes of a recording of these rows, without a layout.
-pub(super) fn encode_rows(store: &StoreId, time: Timestamp, rows: Vec<Row>) -> Result<Vec<u8>, RecordingError> {
-    let mut ids = Ids { time: nanoseconds(time).unsigned_abs(), next: 0 };
-    encoded(store_messages(store, rows, &mut ids))
-}
-
 fn encoded(messages: Vec<ChunkResult<LogMsg>>) -> Result<Vec<u8>, RecordingError> {
-    let mut bytes = Vec::new();
-    Encoder::encode_into(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, messages, &mut bytes)
-        .map_err(|error| RecordingError::library("encoding the recording", error))?;
-    Ok(bytes)
+    let failed = |error| RecordingError::library("encoding the recording", error);
+    let mut encoder =
+        Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, Vec::new()).map_err(failed)?;
+    // The index at the end is for files that are read in parts. It would take a third of the file, in an order drawn at random.
+    encoder.do_not_emit_footer();
+    for message in messages {
+        encoder.append(&message.map_err(|error| RecordingError::library("drawing the recording", error))?).map_err(failed)?;
+    }
+    encoder.finish().map_err(failed)?;
+    encoder.into_inner().map_err(failed)
 }
 
 /// Returns the messages of a layout with the command that activates it.
@@ -112,6 +118,11 @@ impl Ids {
     /// Starts the ids of a recording that ends with `last`.
     pub(super) fn after(last: &Line) -> Self {
         Self { time: nanoseconds(last.time).unsigned_abs(), next: last.number << 32 }
+    }
+
+    /// Starts the ids of a recording without a journal.
+    pub(super) fn at(time: Timestamp) -> Self {
+        Self { time: nanoseconds(time).unsigned_abs(), next: 0 }
     }
 
     fn next(&mut self) -> Tuid {

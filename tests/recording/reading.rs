@@ -1,17 +1,15 @@
-//! What stands in a recording, without the code that wrote it.
+//! What a recording contains, read by the library's own reader.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::Point3;
 use rerun::external::arrow::array::Array as _;
 use rerun::external::arrow::util::display::array_value_to_string;
-use rerun::external::re_log_encoding::{Decodable as _, DecoderApp, StreamFooter};
+use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
-use rerun::{TextDocument, TimelineName};
-use trupose::recording;
 use trupose::session::journal::{Entry, IdentifiedText, Journal};
 
 /// Positions are 32-bit floats in a recording (m).
@@ -76,35 +74,9 @@ pub(super) fn rows_in_order(path: &Path, of_layout: bool) -> Vec<(String, Row)> 
     temporal
 }
 
-/// The lines of the journal in a recording, as text.
-pub(super) fn journal_text(path: &Path) -> String {
-    let mut lines: Vec<(i64, String)> = Vec::new();
-    let text = TextDocument::descriptor_text().component;
-    for chunk in chunks(path, false).iter().filter(|chunk| chunk.entity_path().to_string() == "/journal") {
-        let at = chunk.iter_component_indices(TimelineName::from_static_str("entry"), text);
-        let texts = chunk.iter_slices::<String>(text);
-        lines.extend(at.zip(texts).map(|((time, _), text)| (time.as_i64(), text[0].to_string())));
-    }
-    lines.sort();
-    lines.into_iter().map(|(_, text)| text).collect()
-}
-
-/// Bytes before the index: its kind and its size.
-const INDEX_HEADER: usize = 16;
-
-/// The bytes of a recording before its index, whose order the library draws at random.
-pub(super) fn data(path: &Path) -> Vec<u8> {
-    let mut bytes = fs::read(path).unwrap();
-    let footer = StreamFooter::from_rrd_bytes(&bytes[bytes.len() - StreamFooter::ENCODED_SIZE_BYTES..]);
-    let index = footer.unwrap().entries[0].rrd_footer_byte_span_from_start_excluding_header.start;
-    bytes.truncate(usize::try_from(index).unwrap() - INDEX_HEADER);
-    bytes
-}
-
-/// The journal of a recording with an index.
-pub(super) fn whole(path: &Path) -> Journal {
-    assert!(!data(path).is_empty());
-    recording::read(path).unwrap()
+/// The number of journal lines in a recording that is whole.
+pub(super) fn whole(path: &Path) -> usize {
+    rows(path, false).iter().filter(|(entity, ..)| entity == "/text/log").count()
 }
 
 /// Numbers of a component on a timeline. Of several rows at one time the last counts, as in a viewer.
@@ -118,33 +90,6 @@ pub(super) fn numbers(path: &Path, entity: &str, timeline: &str, component: &str
         }
     }
     found.into_iter().collect()
-}
-
-/// Frames of an arm by pose and name.
-pub(super) fn frames(path: &Path, entity: &str, timeline: &str) -> BTreeMap<(i64, String), Isometry3<f64>> {
-    let mut found = BTreeMap::new();
-    for (_, (of, times, values)) in rows_in_order(path, false) {
-        let (true, Some(time)) = (of == entity, times.get(timeline)) else { continue };
-        let list = |name: &str| -> Vec<f64> {
-            let text = values[name].trim_matches(['[', ']']).to_owned();
-            text.split(',').map(|number| number.trim().parse().unwrap()).collect()
-        };
-        let (t, q) = (list("Transform3D:translation"), list("Transform3D:quaternion"));
-        assert_eq!(values["Transform3D:parent_frame"], "[tf#/world]");
-        let frame = Isometry3::from_parts(
-            Translation3::new(t[0], t[1], t[2]),
-            UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2])),
-        );
-        let name = values["Transform3D:child_frame"].trim_matches(['[', ']']).to_owned();
-        found.insert((*time, name), frame);
-    }
-    found
-}
-
-pub(super) fn assert_near(found: &Isometry3<f64>, expected: &Isometry3<f64>, what: &str) {
-    let apart = (found.translation.vector - expected.translation.vector).norm();
-    let turned = found.rotation.angle_to(&expected.rotation);
-    assert!(apart < SINGLE && turned < SINGLE, "{what}: {apart} m, {turned} rad");
 }
 
 pub(super) fn assert_points(found: &[f64], expected: impl Iterator<Item = Point3<f64>>, tolerance: f64, what: &str) {

@@ -1,91 +1,83 @@
-//! A result: both arms, their errors at every sample, and the steps of the solver.
-
-use std::iter;
+//! A result: the errors of the nominal arm appear, shrink to those of the identified one, and the verification poses follow.
 
 use jiff::Timestamp;
 use nalgebra::{Matrix3, Point3, Vector3};
-use rerun::{
-    Arrows3D, BarChart, Color, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Radius, Scalars, SeriesLines,
-    SeriesPoints, Tensor, TensorData,
-};
+use rerun::external::arrow::array::BooleanArray;
+use rerun::{AnyValues, Arrows3D, AsComponents, Color, Ellipsoids3D, FillMode, Points3D};
 
-use super::tracker::Station;
-use super::{cell, document};
-use crate::geometry::{enlargement, register};
+use super::sample::{numbers, text};
+use super::{Renderer, arm_and_beam, cell, charts, document};
+use crate::geometry::enlargement;
 use crate::profile::Profile;
+use crate::recording::arm::{Posture, reach};
 use crate::recording::canvas::{Canvas, Moment};
-use crate::recording::posture::{Posture, reach, rest};
+use crate::recording::chart::round_up;
 use crate::recording::{names, style};
 use crate::session::calibration::Calibration;
 use crate::session::journal::{IdentifiedText, PointErrorText, from_xyz_mm};
 use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, Session};
-use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
+use crate::units::{MICROMETRE, to_mm};
 
-/// Largest drawn length of errors and differences, as a fraction of the arm's reach.
+/// Part of the errors that the scale is made for. The colour of the others is the warmest, too.
+const USUAL: f64 = 0.95;
+/// Their largest drawn length, as a fraction of the arm's reach.
 const SHOWN: f64 = 0.15;
-/// Largest drawn half axis of ellipsoids, as a fraction of the arm's reach.
-const SHOWN_ELLIPSOID: f64 = 0.05;
-/// Number of pairs that are drawn.
-const WORST_PAIRS: usize = 12;
-/// Most samples in the map of all pairs; more are thinned out evenly.
-const MAP_SIZE: usize = 128;
+/// Errors that are drawn of many, evenly thinned out, and the worst that are drawn besides.
+const ARROWS: usize = 200;
+const WORST: usize = 20;
+/// Pictures in which the errors appear, and in which they shrink.
+const APPEARING: u32 = 5;
+const SHRINKING: u32 = 30;
+/// Groups of verification poses; the arm drives to the first of each.
+const GROUPS: usize = 20;
+/// The pace from group to group is that of a drive through so many poses.
+const PACE: usize = 100;
+/// How long each chapter takes (s).
+const APPEAR: f64 = 1.0;
+const LOOK: f64 = 1.0;
+const SHRINK: f64 = 3.0;
+const REST: f64 = 1.5;
+
+/// How many times larger errors are drawn.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::recording) struct Magnified {
+    /// Those of both arms.
+    pub(in crate::recording) both: f64,
+    /// Those of the identified arm in a view of their own.
+    pub(in crate::recording) residual: f64,
+}
 
 /// A sample with the errors of both arms (m).
-struct Judged<'a> {
+pub(super) struct Judged<'a> {
     sample: &'a Sample,
+    pub(super) is_verification: bool,
     /// Pendant values ((rad) or (m)).
     q: Vec<f64>,
-    /// Measured point in the frame of the tracker.
+    /// Measured point in the frame of the instrument.
     point: Point3<f64>,
-    /// Measured point in the base of the identified arm.
-    measured: Point3<f64>,
     /// Point of the nominal arm, in its own registration.
     nominal_at: Point3<f64>,
     /// Point of the identified arm.
     identified_at: Point3<f64>,
-    nominal: Vector3<f64>,
-    identified: Vector3<f64>,
-    text: &'a PointErrorText,
+    pub(super) nominal: Vector3<f64>,
+    pub(super) identified: Vector3<f64>,
+    pub(super) text: &'a PointErrorText,
 }
 
-/// Draws result number `run` of `session`.
-pub(super) fn draw(
-    canvas: &mut Canvas,
-    session: &Session,
-    station: &Station,
-    identified: &IdentifiedText,
-    run: usize,
-    time: Timestamp,
-) {
-    let Some(profile) = session.mounted_profile() else { return };
-    document::report(canvas, session, identified, time);
-    parameters(canvas, identified);
-    let Some(calibration) = &identified.calibration else { return };
-    let judged = judged(session, &profile, identified, calibration);
-    let trusted = || judged.iter().filter(|one| !one.text.rejected);
-    let scales = Scales {
-        nominal: scale(&profile, trusted().map(|one| one.nominal.norm())),
-        identified: scale(&profile, trusted().map(|one| one.identified.norm())),
-        arm: arm_scale(&profile, calibration, &judged),
-        ellipsoid: ellipsoid_scale(&profile, &judged),
-    };
-    vectors(canvas, &profile, &judged, &scales, time);
-    arms(canvas, session, &profile, calibration, scales.arm);
-    series(canvas, session, &judged, run);
-    pairs(canvas, &judged);
-    ellipsoids(canvas, &judged, scales.ellipsoid);
-    cell::pose(canvas, &profile, station, &rest(&profile), Moment::solver(0));
-    solver(canvas, &profile, identified, calibration, &judged, &scales);
-    note(canvas, &profile, &scales);
-}
+impl Judged<'_> {
+    /// Returns the distance errors (m) of the pair with another sample, measured less predicted: of the nominal and the identified arm.
+    pub(super) fn distance_errors(&self, other: &Self) -> [f64; 2] {
+        let measured = (self.point - other.point).norm();
+        let of = |one: Point3<f64>, other: Point3<f64>| measured - (one - other).norm();
+        [of(self.nominal_at, other.nominal_at), of(self.identified_at, other.identified_at)]
+    }
 
-/// Factors by which things are drawn larger than they are.
-struct Scales {
-    nominal: f64,
-    identified: f64,
-    arm: f64,
-    ellipsoid: f64,
+    /// Returns the covariance of the predicted position (m²).
+    fn covariance(&self) -> Option<Matrix3<f64>> {
+        let (xx, xy, xz, yy, yz, zz) = self.text.covariance_um2?;
+        Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * MICROMETRE.powi(2))
+    }
 }
 
 fn judged<'a>(
@@ -94,353 +86,234 @@ fn judged<'a>(
     identified: &'a IdentifiedText,
     calibration: &Calibration,
 ) -> Vec<Judged<'a>> {
-    let target = |index: usize| {
-        let (x, y, z) = calibration.nominal_targets_mm.get(index).copied()?;
-        Some(from_xyz_mm((x, y, z)))
-    };
+    let own = profile.targets().first().map_or_else(Point3::origin, |target| target.position_in_flange);
     let samples = identified.samples.iter().zip(&identified.points);
-    samples
+    let mut judged: Vec<Judged<'_>> = samples
         .filter_map(|(number, text)| {
             let sample = session.sample(*number)?;
             let q = session.configuration_of(sample);
-            let own = profile.targets().first().map(|target| target.position_in_flange)?;
-            let at = target(sample.noted.target).unwrap_or(own);
-            let identified_at = from_xyz_mm(text.at_mm);
-            let error = from_xyz_mm(text.identified_mm).coords;
+            let target = calibration.nominal_targets_mm.get(sample.noted.target).copied().map_or(own, from_xyz_mm);
             Some(Judged {
                 sample,
-                nominal_at: Posture::new(profile.chain(), &at, &q).reflector,
+                is_verification: session.kind_of(sample) == PoseKind::Verification,
+                nominal_at: Posture::new(profile.chain(), &target, &q).reflector,
                 q,
                 point: session.point_of(sample),
-                measured: identified_at + error,
-                identified_at,
+                identified_at: from_xyz_mm(text.at_mm),
                 nominal: from_xyz_mm(text.nominal_mm).coords,
-                identified: error,
+                identified: from_xyz_mm(text.identified_mm).coords,
                 text,
             })
         })
-        .collect()
+        .collect();
+    judged.sort_by_key(|one| one.sample.noted.number);
+    judged
 }
 
-fn scale(profile: &Profile, lengths: impl Iterator<Item = f64>) -> f64 {
-    enlargement(lengths.fold(0.0, f64::max), SHOWN * reach(profile))
-}
-
-/// Returns the factor by which the deviations of the arm are enlarged so that the difference is visible.
-fn arm_scale(profile: &Profile, calibration: &Calibration, judged: &[Judged<'_>]) -> f64 {
-    let Ok(arm) = calibration.identified(profile) else { return 1.0 };
-    let target = Point3::origin();
-    let difference = |one: &Judged<'_>| {
-        let (nominal, found) =
-            (Posture::new(profile.chain(), &target, &one.q), Posture::new(&arm.chain, &target, &one.q));
-        (found.reflector - nominal.reflector).norm()
+/// Draws the last result of the session.
+pub(super) fn draw(film: &mut Renderer, identified: &IdentifiedText, time: Timestamp) {
+    let Some(profile) = film.session.mounted_profile() else { return };
+    let session = film.session.clone();
+    document::result(&mut film.canvas, &session, identified, time);
+    charts::parameters(&mut film.canvas, &identified.summary);
+    let Some(calibration) = &identified.calibration else { return };
+    let judged = judged(&session, &profile, identified, calibration);
+    let usual = |of: fn(&Judged<'_>) -> f64| most(judged.iter().filter(|one| !one.text.rejected).map(of).collect());
+    let drawn = |largest: f64| enlargement(largest, SHOWN * reach(&profile));
+    let magnified = Magnified {
+        both: drawn(usual(|one| one.nominal.norm())),
+        residual: drawn(usual(|one| one.identified.norm())),
     };
-    enlargement(judged.iter().map(difference).fold(0.0, f64::max), SHOWN * reach(profile))
-}
-
-fn ellipsoid_scale(profile: &Profile, judged: &[Judged<'_>]) -> f64 {
-    let axes = judged.iter().filter_map(|one| covariance(one.text)).map(|one| style::ellipsoid(&one).0.max());
-    enlargement(axes.fold(0.0, f64::max), SHOWN_ELLIPSOID * reach(profile))
-}
-
-/// Returns an error as it is drawn. That of a rejected sample is cut, because the scale is not made for it.
-fn drawn_error(profile: &Profile, one: &Judged<'_>, error: &Vector3<f64>, scale: f64) -> Vector3<f64> {
-    let drawn = error * scale;
-    if one.text.rejected { drawn.cap_magnitude(SHOWN * reach(profile)) } else { drawn }
-}
-
-/// Draws errors as arrows from the point of the identified arm. The timeline of the solver has arrows of its own.
-fn vectors(canvas: &mut Canvas, profile: &Profile, judged: &[Judged<'_>], scales: &Scales, time: Timestamp) {
-    let moment = Moment { time: Some(time), ..Moment::pose(0) };
-    let arrows = |scale: f64, pick: fn(&Judged<'_>) -> Vector3<f64>| {
-        Arrows3D::update_fields()
-            .with_vectors(judged.iter().map(|one| style::vector(&drawn_error(profile, one, &pick(one), scale))))
-            .with_origins(judged.iter().map(|one| style::at(&one.identified_at)))
+    film.magnified = Some(magnified);
+    let scale = Scale {
+        magnified: magnified.both,
+        warmest: round_up(to_mm(usual(|one| one.nominal.norm()))),
+        longest: 3.0 * SHOWN * reach(&profile),
     };
-    let nominal = arrows(scales.nominal, |one| one.nominal);
-    let identified = arrows(scales.identified, |one| one.identified);
-    let all = [
-        (names::ERRORS_NOMINAL, nominal, style::NOMINAL_ERROR),
-        (names::ERRORS_IDENTIFIED, identified, style::IDENTIFIED),
-    ];
-    for (path, drawn, color) in all {
-        canvas.draw_static(path, &arrow_style(color));
-        canvas.draw(moment, path, &drawn);
+    let residual = Scale { magnified: magnified.residual, ..scale };
+
+    charts::legend(&mut film.canvas, "error, mm", scale.warmest, profile.acceptance().position_mean.map(to_mm));
+    charts::errors(&mut film.canvas, &judged, profile.acceptance());
+    charts::pairs(&mut film.canvas, &judged);
+    if !identified.summary.joint_errors.is_empty() {
+        charts::joints(&mut film.canvas, &identified.summary.joint_errors);
     }
+    magnified_errors(&mut film.canvas, &judged, residual);
+    data(film, &judged, &profile);
+    chapters(film, &profile, identified, &judged, scale, time);
+    identified_arm(film, &profile, calibration);
 }
 
-/// Returns the looks of arrows.
-fn arrow_style(color: Color) -> Arrows3D {
-    Arrows3D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_colors([color])
-}
-
-/// Draws the identified arm at every pose, true to scale and enlarged.
-fn arms(canvas: &mut Canvas, session: &Session, profile: &Profile, calibration: &Calibration, enlarged: f64) {
-    let larger = calibration.parameters.iter().map(|parameter| parameter.deviation * enlarged);
-    let (Ok(arm), Ok(bent)) = (calibration.identified(profile), calibration.identified_with(profile, larger)) else {
-        return;
-    };
-    cell::enlarged_style(canvas, profile);
-    if let Some(target) = bent.targets.first() {
-        // Before the first pose, and on the timeline of the search.
-        let posture = Posture::new(&bent.chain, target, &rest(profile));
-        cell::enlarged(canvas, profile, &posture, Moment::pose(0));
-        cell::enlarged(canvas, profile, &posture, Moment::search(0));
-    }
-    for sample in &session.samples {
-        let target = sample.noted.target;
-        let (Some(at), Some(bent_at)) = (arm.targets.get(target), bent.targets.get(target)) else { continue };
-        let moment = Moment::pose(sample.noted.number);
-        let q = session.configuration_of(sample);
-        let posture = Posture::new(&arm.chain, at, &q);
-        for (index, frame) in posture.frames.iter().enumerate() {
-            canvas.draw(moment, names::IDENTIFIED_FRAMES, &style::frame(frame, &names::frame("identified", index)));
-        }
-        cell::enlarged(canvas, profile, &Posture::new(&bent.chain, bent_at, &q), moment);
-    }
-}
-
-/// The use that the identification made of a sample.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Group {
-    Fit,
-    Verification,
-    Rejected,
-}
-
-impl Group {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Fit => "fit",
-            Self::Verification => "verification",
-            Self::Rejected => "rejected",
-        }
-    }
-}
-
-/// Plots errors at each pose. Those of samples that the identification used are residuals, and are named so.
-fn series(canvas: &mut Canvas, session: &Session, judged: &[Judged<'_>], run: usize) {
-    let is_verification = |one: &Judged<'_>| session.kind_of(one.sample) == PoseKind::Verification;
-    let group_of = |one: &Judged<'_>| match one.text.rejected {
-        true => Group::Rejected,
-        false if is_verification(one) => Group::Verification,
-        false => Group::Fit,
-    };
-    let again = if run > 1 { format!(" (result {run})") } else { String::new() };
-    let used: Vec<&Judged<'_>> = judged.iter().filter(|one| group_of(one) == Group::Fit).collect();
-    for group in [Group::Fit, Group::Verification, Group::Rejected] {
-        let suffix = group.name();
-        let members: Vec<&Judged<'_>> = judged.iter().filter(|one| group_of(one) == group).collect();
-        if members.is_empty() {
-            continue;
-        }
-        // A rejected sample is compared with those that were used.
-        let others = if group == Group::Rejected { &used } else { &members };
-        for quantity in ["position", "distance"] {
-            for (arm, color) in [("nominal", style::NOMINAL_ERROR), ("identified", style::IDENTIFIED)] {
-                let (path, name) = (names::errors(run, quantity, arm, suffix), format!("{arm}, {suffix}{again}"));
-                // A line between verification samples, which are far apart, would suggest values between them.
-                let points =
-                    |color| SeriesPoints::new().with_names([&*name]).with_colors([color]).with_marker_sizes([3.0]);
-                match group {
-                    Group::Fit => {
-                        canvas.draw_static(&path, &SeriesLines::new().with_names([&*name]).with_colors([color]));
-                    }
-                    Group::Verification => canvas.draw_static(&path, &points(style::VERIFICATION)),
-                    Group::Rejected => canvas.draw_static(&path, &points(style::OUT)),
-                }
-            }
-        }
-        for one in &members {
-            let moment = Moment::pose(one.sample.noted.number);
-            let mut plot = |quantity: &str, arm: &str, error: f64| {
-                canvas.draw(moment, &names::errors(run, quantity, arm, suffix), &Scalars::new([to_mm(error)]));
-            };
-            plot("position", "nominal", one.nominal.norm());
-            plot("position", "identified", one.identified.norm());
-            if let Some((nominal, identified)) = distance_errors(one, others) {
-                plot("distance", "nominal", nominal);
-                plot("distance", "identified", identified);
-            }
-        }
-    }
-}
-
-/// Returns the mean absolute distance errors (m) of the pairs of one sample with all others, of both arms.
-fn distance_errors(one: &Judged<'_>, group: &[&Judged<'_>]) -> Option<(f64, f64)> {
-    let others = group.iter().filter(|other| other.sample.noted.number != one.sample.noted.number);
-    let (mut count, mut nominal, mut identified) = (0_u32, 0.0, 0.0);
-    for other in others {
-        let errors = pair(one, other);
-        count += 1;
-        nominal += errors.0.abs();
-        identified += errors.1.abs();
-    }
-    (count > 0).then(|| (nominal / f64::from(count), identified / f64::from(count)))
-}
-
-/// Returns the distance errors (m) of a pair, measured less predicted: of the nominal and of the identified arm.
-fn pair(one: &Judged<'_>, other: &Judged<'_>) -> (f64, f64) {
-    let measured = (one.point - other.point).norm();
-    (measured - (one.nominal_at - other.nominal_at).norm(), measured - (one.identified_at - other.identified_at).norm())
-}
-
-/// Picks the nominal or the identified one of two errors.
-type Pick = fn(&(f64, f64)) -> f64;
-
-/// Draws the worst pairs as lines, and the errors of all pairs as a map.
-fn pairs(canvas: &mut Canvas, judged: &[Judged<'_>]) {
-    let trusted: Vec<&Judged<'_>> = judged.iter().filter(|one| !one.text.rejected).collect();
-    let step = trusted.len().div_ceil(MAP_SIZE).max(1);
-    let shown: Vec<&Judged<'_>> = trusted.into_iter().step_by(step).collect();
-    let mut all = Vec::new();
-    let count = shown.len();
-    let mut maps = (vec![0_u16; count * count], vec![0_u16; count * count]);
-    for (i, one) in shown.iter().enumerate() {
-        for (j, other) in shown.iter().enumerate().filter(|(j, _)| *j != i) {
-            let errors = pair(one, other);
-            // The map is symmetric: only one half is filled.
-            if j > i {
-                maps.0[i * count + j] = micrometres(errors.0);
-                maps.1[i * count + j] = micrometres(errors.1);
-                all.push((errors, one, other));
-            }
-        }
-    }
-    if all.is_empty() {
-        return;
-    }
-    let shape = || vec![count as u64, count as u64];
-    for (path, map) in [(names::MAP_NOMINAL, maps.0), (names::MAP_IDENTIFIED, maps.1)] {
-        let data = TensorData::new(shape(), rerun::TensorBuffer::U16(map.into()));
-        canvas.draw_static(path, &Tensor::new(data).with_dim_names(["sample", "with sample"]));
-    }
-    let picks: [(&str, Pick); 2] =
-        [(names::PAIRS_NOMINAL, |errors| errors.0), (names::PAIRS_IDENTIFIED, |errors| errors.1)];
-    for (path, pick) in picks {
-        all.sort_by(|(one, ..), (other, ..)| pick(other).abs().total_cmp(&pick(one).abs()));
-        let worst: Vec<_> = all.iter().take(WORST_PAIRS).collect();
-        let largest = worst.first().map_or(1.0, |(errors, ..)| pick(errors).abs());
-        let strips = worst.iter().map(|(_, one, other)| [style::at(&one.measured), style::at(&other.measured)]);
-        let labels = worst.iter().map(|(errors, ..)| format!("{:+.3} mm", to_mm(pick(errors))));
-        let lines = LineStrips3D::new(strips)
-            .with_colors(worst.iter().map(|(errors, ..)| style::two_sided(pick(errors) / largest)))
-            .with_radii([Radius::new_ui_points(1.5)])
-            .with_labels(labels);
-        canvas.draw_static(path, &lines);
-    }
-}
-
-/// Returns the size of an error (m) in whole micrometres, up to 65 mm.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-const fn micrometres(error: f64) -> u16 {
-    (error.abs() / MICROMETRE).round() as u16
-}
-
-/// Returns the covariance of a predicted position (m²).
-fn covariance(text: &PointErrorText) -> Option<Matrix3<f64>> {
-    let (xx, xy, xz, yy, yz, zz) = text.covariance_um2?;
-    Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * MICROMETRE.powi(2))
-}
-
-fn ellipsoids(canvas: &mut Canvas, judged: &[Judged<'_>], scale: f64) {
-    let known: Vec<_> =
-        judged.iter().filter_map(|one| Some((one.identified_at, style::ellipsoid(&covariance(one.text)?)))).collect();
-    let drawn = Ellipsoids3D::from_centers_and_half_sizes(
-        known.iter().map(|(at, _)| style::at(at)),
-        known.iter().map(|(_, (axes, _))| style::vector(&(axes * scale))),
-    )
-    .with_quaternions(known.iter().map(|(_, (_, rotation))| style::quaternion(rotation)))
-    .with_colors([style::VERIFICATION])
-    .with_line_radii([Radius::new_ui_points(0.4)])
-    .with_fill_mode(FillMode::MajorWireframe);
-    canvas.draw_static(names::UNCERTAINTY, &drawn);
-}
-
-/// Draws the steps of the solver: the arm bends from nominal to identified, and the errors shrink.
-fn solver(
-    canvas: &mut Canvas,
+/// Draws the errors in both views, chapter by chapter.
+fn chapters(
+    film: &mut Renderer,
     profile: &Profile,
     identified: &IdentifiedText,
-    calibration: &Calibration,
     judged: &[Judged<'_>],
-    scales: &Scales,
+    scale: Scale,
+    time: Timestamp,
 ) {
-    let middle = rest(profile);
-    let nothing = vec![0.0; calibration.parameters.len()];
-    canvas.draw_static(names::ERRORS_SOLVING, &arrow_style(style::NOMINAL_ERROR));
-    canvas.draw_static(names::COST_AND_STEP, &SeriesLines::new().with_names(["cost", "largest step"]));
-    let steps = identified.summary.iterations.iter().map(|step| (Some(step), &step.deviations));
-    for (index, (step, deviations)) in iter::once((None, &nothing)).chain(steps).enumerate() {
-        let moment = Moment::solver(index);
-        if let Some(step) = step {
-            let (cost, largest) = (step.cost.log10(), step.step.log10());
-            if cost.is_finite() && largest.is_finite() {
-                canvas.draw(moment, names::COST_AND_STEP, &Scalars::new([cost, largest]));
-            }
+    let all = |is_verification: bool| judged.iter().filter(|one| one.is_verification == is_verification).collect::<Vec<_>>();
+    let (fit, verification) = (shown(all(false)), shown(all(true)));
+    for path in [names::BEFORE_VERIFICATION, names::AFTER_VERIFICATION] {
+        film.canvas.draw_static(path, &arrow_looks());
+    }
+    let [start, end] = film.film.advance(APPEAR, time);
+    document::caption(&mut film.canvas, start, "Before", &document::errors_in_words(judged, false));
+    for path in [names::BEFORE, names::AFTER] {
+        let mut begin = arrow_looks();
+        begin.extend(origins(&fit));
+        film.canvas.draw(start, path, &begin);
+        for step in 1..=APPEARING {
+            let part = f64::from(step) / f64::from(APPEARING);
+            film.canvas.draw(start.towards(end, part), path, &scale.arrows(&fit, |one| one.nominal * part));
         }
-        let larger = deviations.iter().map(|deviation| deviation * scales.arm);
-        let Ok(bent) = calibration.identified_with(profile, larger) else { continue };
-        if let Some(target) = bent.targets.first() {
-            cell::enlarged(canvas, profile, &Posture::new(&bent.chain, target, &middle), moment);
+    }
+    film.film.advance(LOOK, time);
+    let [start, end] = film.film.advance(SHRINK, time);
+    document::caption(&mut film.canvas, start, "The identification", "from the nominal to the identified arm");
+    for step in 1..=SHRINKING {
+        let part = f64::from(step) / f64::from(SHRINKING);
+        // To first order in the deviations the errors change evenly, the registration included.
+        let arrows = scale.arrows(&fit, |one| one.nominal.lerp(&one.identified, part));
+        film.canvas.draw(start.towards(end, part), names::AFTER, &arrows);
+    }
+    let [_, mut moment] = film.film.advance(LOOK, time);
+    if !verification.is_empty() {
+        document::caption(&mut film.canvas, moment, "The verification", &document::errors_in_words(judged, true));
+    }
+    for group in verification.chunks(verification.len().div_ceil(GROUPS).max(1)) {
+        if let Some(first) = group.first() {
+            moment = film.drive(profile, &first.q, PACE, time);
         }
-        let Ok(arm) = calibration.identified_with(profile, deviations.iter().copied()) else { continue };
-        let predicted: Vec<Point3<f64>> = judged
-            .iter()
-            .filter_map(|one| {
-                Some(Posture::new(&arm.chain, arm.targets.get(one.sample.noted.target)?, &one.q).reflector)
-            })
-            .collect();
-        let pairs = judged.iter().map(|one| one.measured).zip(predicted.iter().copied());
-        let trusted = judged.iter().map(|one| if one.text.rejected { 0.0 } else { 1.0 });
-        let weighed = pairs.clone().zip(trusted).map(|((from, to), weight)| (weight, from, to));
-        let Some(found) = register(weighed.collect::<Vec<_>>().iter().copied()) else { continue };
-        let errors: Vec<Vector3<f64>> =
-            pairs.map(|(measured, predicted)| found.to_from_from * measured - predicted).collect();
-        let arrows = Arrows3D::update_fields()
-            .with_vectors(
-                judged
-                    .iter()
-                    .zip(&errors)
-                    .map(|(one, error)| style::vector(&drawn_error(profile, one, error, scales.nominal))),
-            )
-            .with_origins(predicted.iter().map(style::at));
-        canvas.draw(moment, names::ERRORS_SOLVING, &arrows);
-        let counted = judged.iter().zip(&errors).filter(|(one, _)| !one.text.rejected);
-        let (count, sum) = counted.fold((0_u32, 0.0), |(count, sum), (_, error)| (count + 1, sum + error.norm()));
-        let mean = sum / f64::from(count.max(1));
-        canvas.draw(moment, names::FIT, &Scalars::new([to_mm(mean)]));
+        let both = [scale.arrows(group, |one| one.nominal), scale.arrows(group, |one| one.identified)];
+        for (path, mut arrows) in [names::BEFORE_VERIFICATION, names::AFTER_VERIFICATION].into_iter().zip(both) {
+            arrows.extend(origins(group));
+            film.canvas.draw(moment, path, &arrows);
+        }
+    }
+    let [_, end] = film.film.advance(REST, time);
+    document::caption(&mut film.canvas, end, "The verdict", &document::verdict_in_words(identified));
+}
+
+/// Draws the identified arm at every picture of the nominal one so far.
+fn identified_arm(film: &mut Renderer, profile: &Profile, calibration: &Calibration) {
+    let Ok(arm) = calibration.identified(profile) else { return };
+    let Some(target) = arm.targets.first() else { return };
+    if let Some((beginning, _)) = film.pictures.first() {
+        cell::arm(&mut film.canvas, profile, names::IDENTIFIED, style::IDENTIFIED, *beginning);
+    }
+    for (moment, q) in &film.pictures {
+        let posture = Posture::new(&arm.chain, target, q);
+        film.canvas.draw(*moment, names::IDENTIFIED, &arm_and_beam(&film.station, profile, &posture));
     }
 }
 
-/// Draws the deviations of the constants as bars, in units of their standard deviation.
-fn parameters(canvas: &mut Canvas, identified: &IdentifiedText) {
-    let of_sigma: Vec<f64> = identified
-        .summary
-        .constants()
-        .map(|parameter| parameter.sigma.map_or(0.0, |sigma| finite(parameter.deviation / sigma)))
-        .collect();
-    let data = TensorData::new(vec![of_sigma.len() as u64], rerun::TensorBuffer::F64(of_sigma.into()));
-    canvas.draw_static(names::SIGNIFICANCE, &BarChart::new(data).with_color(style::IDENTIFIED));
+/// Returns the errors to draw of many: some that are evenly thinned out, and the worst.
+fn shown<'j, 'a>(all: Vec<&'j Judged<'a>>) -> Vec<&'j Judged<'a>> {
+    if all.len() <= ARROWS + WORST {
+        return all;
+    }
+    let mut by_size: Vec<usize> = (0..all.len()).collect();
+    by_size.sort_by(|one, other| all[*other].nominal.norm().total_cmp(&all[*one].nominal.norm()));
+    let mut kept: Vec<usize> = (0..ARROWS).map(|index| index * all.len() / ARROWS).collect();
+    kept.extend(by_size.into_iter().take(WORST));
+    kept.sort_unstable();
+    kept.dedup();
+    kept.into_iter().map(|index| all[index]).collect()
 }
 
-/// Returns zero for values that cannot be drawn.
-const fn finite(value: f64) -> f64 {
-    if value.is_finite() { value } else { 0.0 }
+/// How errors are drawn.
+#[derive(Clone, Copy)]
+struct Scale {
+    /// How many times longer than they are.
+    magnified: f64,
+    /// Error with the warmest colour (mm).
+    warmest: f64,
+    /// Drawn length at which the errors of rejected samples are cut (m): the scale is not made for them.
+    longest: f64,
 }
 
-/// Draws the factors of enlargement above the robot.
-fn note(canvas: &mut Canvas, profile: &Profile, scales: &Scales) {
-    let text = format!(
-        "drawn larger:\nred errors (nominal) {} x\ngreen errors (identified) {} x\ngreen arm's deviations {} x",
-        scales.nominal, scales.identified, scales.arm
-    );
-    // Points are rarely above the arm.
-    let at = Point3::new(0.0, 0.0, 0.85 * reach(profile));
-    let note = Points3D::new([style::at(&at)])
-        .with_radii([style::single(0.1 * MILLIMETRE)])
-        .with_colors([style::NOMINAL])
-        .with_labels([text])
-        .with_show_labels(true);
-    canvas.draw_static(names::SCALE_NOTE, &note);
+impl Scale {
+    fn arrows(self, errors: &[&Judged<'_>], of: impl Fn(&Judged<'_>) -> Vector3<f64>) -> Vec<Box<dyn AsComponents>> {
+        let drawn = |one: &Judged<'_>| {
+            let drawn = of(one) * self.magnified;
+            style::vector(&if one.text.rejected { drawn.cap_magnitude(self.longest) } else { drawn })
+        };
+        let colors: Vec<Color> = errors.iter().map(|one| style::error(to_mm(of(one).norm()) / self.warmest)).collect();
+        let arrows =
+            Arrows3D::update_fields().with_vectors(errors.iter().map(|one| drawn(one))).with_colors(colors.clone());
+        vec![Box::new(arrows), Box::new(Points3D::update_fields().with_colors(colors))]
+    }
+}
+
+/// Returns where arrows begin. An error that is too short for an arrow is still a point.
+fn origins(errors: &[&Judged<'_>]) -> Vec<Box<dyn AsComponents>> {
+    let origins: Vec<[f32; 3]> = errors.iter().map(|one| style::at(&one.identified_at)).collect();
+    let points = Points3D::update_fields().with_positions(origins.clone());
+    vec![Box::new(Arrows3D::update_fields().with_origins(origins)), Box::new(points)]
+}
+
+/// Returns the length (m) that most errors do not exceed.
+fn most(mut lengths: Vec<f64>) -> f64 {
+    lengths.sort_by(f64::total_cmp);
+    let place = (lengths.len() as f64 * USUAL).ceil() as usize;
+    lengths.get(place.saturating_sub(1)).copied().unwrap_or(0.0).max(1e-9)
+}
+
+fn arrow_looks() -> Vec<Box<dyn AsComponents>> {
+    let arrows = Arrows3D::update_fields().with_radii([style::points(1.4)]);
+    let points = Points3D::update_fields().with_radii([style::points(2.6)]);
+    vec![Box::new(arrows), Box::new(points)]
+}
+
+/// Draws the errors of the identified arm so large that their pattern is seen, and beside them what was predicted.
+fn magnified_errors(canvas: &mut Canvas, judged: &[Judged<'_>], scale: Scale) {
+    let errors = shown(judged.iter().collect());
+    let mut arrows = scale.arrows(&errors, |one| one.identified);
+    arrows.extend(arrow_looks());
+    arrows.extend(origins(&errors));
+    canvas.draw_static(names::RESIDUAL, &arrows);
+    let known: Vec<_> =
+        errors.iter().filter_map(|one| Some((one.identified_at, style::ellipsoid(&one.covariance()?)))).collect();
+    let ellipsoids = Ellipsoids3D::from_centers_and_half_sizes(
+        known.iter().map(|(at, _)| style::at(at)),
+        known.iter().map(|(_, (axes, _))| style::vector(&(axes * scale.magnified))),
+    )
+    .with_quaternions(known.iter().map(|(_, (_, rotation))| style::quaternion(rotation)))
+    .with_colors([style::LEFT])
+    .with_line_radii([style::points(0.3)])
+    .with_fill_mode(FillMode::MajorWireframe);
+    canvas.draw_static(names::UNCERTAINTY, &ellipsoids);
+}
+
+/// Draws the errors and the limits for tables, in full precision.
+fn data(film: &mut Renderer, judged: &[Judged<'_>], profile: &Profile) {
+    let um = |error: &Vector3<f64>| numbers(error.iter().map(|value| value / MICROMETRE));
+    let moment_of = |number: u64, moments: &[(u64, Moment)]| {
+        moments.iter().find(|(of, _)| *of == number).map(|(_, moment)| *moment)
+    };
+    for one in judged {
+        let Some(moment) = moment_of(one.sample.noted.number, &film.moments) else { continue };
+        let values = AnyValues::default()
+            .with_component_from_data("nominal_um", um(&one.nominal))
+            .with_component_from_data("identified_um", um(&one.identified))
+            .with_component_from_data("rejected", std::sync::Arc::new(BooleanArray::from(vec![one.text.rejected])))
+            .with_component_from_data("use", text(if one.is_verification { "verification" } else { "identification" }));
+        film.canvas.draw(moment, names::SAMPLE_ERRORS, &values);
+    }
+    let acceptance = profile.acceptance();
+    let limits = [
+        ("position_mean_mm", acceptance.position_mean),
+        ("position_rms_mm", acceptance.position_rms),
+        ("position_max_mm", acceptance.position_max),
+        ("distance_mean_mm", acceptance.distance_mean),
+        ("distance_rms_mm", acceptance.distance_rms),
+        ("distance_max_mm", acceptance.distance_max),
+    ];
+    let values = limits.into_iter().filter_map(|(name, limit)| Some((name, to_mm(limit?))));
+    let values = values.fold(AnyValues::default(), |values, (name, limit)| {
+        values.with_component_from_data(name, numbers([limit]))
+    });
+    film.canvas.draw_static(names::LIMITS, &values);
 }
