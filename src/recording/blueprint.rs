@@ -86,7 +86,9 @@ pub(super) fn eye(profile: &Profile, session: &Session, instrument: Option<Point
 }
 
 fn eye_of(places: &[Point3<f64>], near: Option<Point3<f64>>) -> Eye {
-    let (low, high) = places.iter().fold((Point3::origin(), Point3::origin()), |(low, high), place| (low.inf(place), high.sup(place)));
+    let (low, high) = places
+        .iter()
+        .fold((Point3::origin(), Point3::origin()), |(low, high), place| (low.inf(place), high.sup(place)));
     let centre = nalgebra::center(&low, &high);
     let radius = places.iter().map(|place| (place - centre).norm()).fold(0.1, f64::max);
     // The side from which most is seen: across the line to the instrument, or else to the middle of the poses.
@@ -179,7 +181,8 @@ impl Builder {
     fn finish(mut self, play: PlayState) -> Vec<Row> {
         // The container that was made last holds all others.
         let root = RootContainer(datatypes::Uuid { bytes: u128::from(self.items).to_be_bytes() });
-        let viewport = ViewportBlueprint::new().with_root_container(root).with_auto_layout(false).with_auto_views(false);
+        let viewport =
+            ViewportBlueprint::new().with_root_container(root).with_auto_layout(false).with_auto_views(false);
         self.put("viewport", &viewport);
         for panel in ["blueprint_panel", "selection_panel"] {
             self.put(panel, &PanelBlueprint::new().with_state(PanelState::Collapsed));
@@ -208,7 +211,8 @@ impl Builder {
     /// Adds a 3D view of the cell with these parts of the world besides.
     fn picture(&mut self, name: &str, eye: Eye, parts: &[&str]) -> String {
         let shared = ["cell", "tracker", "trail/plan", "trail/measured", "next", "unused"];
-        let contents: Vec<String> = shared.iter().chain(parts).map(|part| format!("+ /{}/{part}/**", names::WORLD)).collect();
+        let contents: Vec<String> =
+            shared.iter().chain(parts).map(|part| format!("+ /{}/{part}/**", names::WORLD)).collect();
         let path = self.view("3D", name, names::WORLD, &contents.iter().map(String::as_str).collect::<Vec<_>>());
         let controls = EyeControls3D::new()
             .with_kind(Eye3DKind::Orbital)
@@ -230,7 +234,8 @@ impl Builder {
 pub(super) fn rows_of_targets(eye: Eye, magnified: f64) -> Vec<Row> {
     let mut layout = Builder::default();
     let headline = layout.entity("TextDocument", "The result", names::HEADLINE);
-    let picture = layout.picture(&format!("Targets, corrections drawn {magnified} x"), eye, &["targets", "trail/targets"]);
+    let picture =
+        layout.picture(&format!("Targets, corrections drawn {magnified} x"), eye, &["targets", "trail/targets"]);
     let legend = layout.sheet("Scale", names::LEGEND, legend_region());
     let below = layout.shared(ContainerKind::Horizontal, "", &[1.0, 0.12], &[picture, legend]);
     layout.shared(ContainerKind::Vertical, "", &[0.17, 0.83], &[headline, below]);
@@ -238,16 +243,31 @@ pub(super) fn rows_of_targets(eye: Eye, magnified: f64) -> Vec<Row> {
 }
 
 /// Adds both arms beside each other, and a view of the errors that are left, magnified.
-fn before_and_after(contents: &Contents<'_>, result: &IdentifiedText, magnified: Magnified, layout: &mut Builder) -> String {
+fn before_and_after(
+    contents: &Contents<'_>,
+    result: &IdentifiedText,
+    magnified: Magnified,
+    layout: &mut Builder,
+) -> String {
     let figure = |of_nominal: bool| {
         let verification = result.summary.verification.as_ref()?;
         let model = if of_nominal { &verification.nominal } else { &verification.identified };
         Some(format!(", mean error {} mm", significant(model.position_mm?.mean)))
     };
-    let name = |arm: &str, of_nominal| format!("{arm} arm{}; drawn {} x", figure(of_nominal).unwrap_or_default(), magnified.both);
-    let before = layout.picture(&format!("BEFORE: {}", name("nominal", true)), contents.eye, &["nominal", "before", "trail/before"]);
+    let name = |arm: &str, of_nominal| {
+        format!("{arm} arm{}; drawn {} x", figure(of_nominal).unwrap_or_default(), magnified.both)
+    };
+    let before = layout.picture(
+        &format!("BEFORE: {}", name("nominal", true)),
+        contents.eye,
+        &["nominal", "before", "trail/before"],
+    );
     let legend = layout.sheet("Scale", names::LEGEND, legend_region());
-    let after = layout.picture(&format!("AFTER: {}", name("identified", false)), contents.eye, &["identified", "after", "trail/after"]);
+    let after = layout.picture(
+        &format!("AFTER: {}", name("identified", false)),
+        contents.eye,
+        &["identified", "after", "trail/after"],
+    );
     let pair = layout.shared(ContainerKind::Horizontal, "Before | after", &[1.0, 0.17, 1.0], &[before, legend, after]);
     let residual = format!("What is left, drawn {} x", magnified.residual);
     let residual = layout.picture(&residual, contents.eye, &["identified", "residual", "uncertainty"]);

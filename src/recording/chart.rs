@@ -45,7 +45,11 @@ impl Axis {
     fn ticks(self) -> Vec<f64> {
         if self.is_logarithmic {
             let decades = (self.high / self.low).log10().round();
-            return (0..).map(f64::from).take_while(|step| *step <= decades).map(|step| self.low * 10_f64.powf(step)).collect();
+            return (0..)
+                .map(f64::from)
+                .take_while(|step| *step <= decades)
+                .map(|step| self.low * 10_f64.powf(step))
+                .collect();
         }
         let step = whole_step((self.high - self.low) / TICKS);
         let first = (self.low / step).ceil() * step;
@@ -56,13 +60,21 @@ impl Axis {
 /// Returns the next larger of 1, 2 or 5 times a power of ten.
 fn whole_step(value: f64) -> f64 {
     let power = 10_f64.powf(value.max(1e-12).log10().floor());
-    [1.0, 2.0, 5.0].into_iter().map(|step| step * power).find(|step| *step >= value * (1.0 - 1e-9)).unwrap_or(10.0 * power)
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|step| step * power)
+        .find(|step| *step >= value * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power)
 }
 
 /// Returns the next larger of 1, 1.5, 2, 3, 5 or 7.5 times a power of ten.
 pub(super) fn round_up(value: f64) -> f64 {
     let power = 10_f64.powf(value.max(1e-12).log10().floor());
-    [1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0].into_iter().map(|step| step * power).find(|step| *step >= value * (1.0 - 1e-9)).unwrap_or(power)
+    [1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0]
+        .into_iter()
+        .map(|step| step * power)
+        .find(|step| *step >= value * (1.0 - 1e-9))
+        .unwrap_or(power)
 }
 
 /// Returns a number for a tick.
@@ -181,7 +193,10 @@ mod tests {
     #[test]
     fn axes_have_round_ticks_and_hold_their_values() {
         let axis = Axis::linear(0.0, 0.93);
-        assert_eq!(axis.ticks().iter().map(|tick| number(*tick)).collect::<Vec<_>>(), ["0", "0.2", "0.4", "0.6", "0.8"]);
+        assert_eq!(
+            axis.ticks().iter().map(|tick| number(*tick)).collect::<Vec<_>>(),
+            ["0", "0.2", "0.4", "0.6", "0.8"]
+        );
         let axis = Axis::decades([0.02, 3.0, 0.0, f64::NAN].into_iter());
         assert_eq!(axis.ticks().iter().map(|tick| number(*tick)).collect::<Vec<_>>(), ["0.01", "0.1", "1", "10"]);
         assert!((axis.part(1.0) - 2.0 / 3.0).abs() < 1e-12);

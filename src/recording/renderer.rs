@@ -185,7 +185,11 @@ impl Renderer {
     fn corrected(&mut self, number: u64, moment: Moment) {
         if let (Some(profile), Some(sample)) = (self.session.mounted_profile(), self.session.sample(number)) {
             let q = self.session.configuration_of(sample);
-            self.canvas.draw(moment, names::NOMINAL, &arm_and_beam(&self.station, &profile, &Posture::nominal(&profile, &q)));
+            self.canvas.draw(
+                moment,
+                names::NOMINAL,
+                &arm_and_beam(&self.station, &profile, &Posture::nominal(&profile, &q)),
+            );
             self.pictures.retain(|(of, _)| *of != moment);
             self.pictures.push((moment, q));
         }

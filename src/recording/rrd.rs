@@ -52,7 +52,9 @@ fn encoded(messages: Vec<ChunkResult<LogMsg>>) -> Result<Vec<u8>, RecordingError
     // The index at the end is for files that are read in parts. It would take a third of the file, in an order drawn at random.
     encoder.do_not_emit_footer();
     for message in messages {
-        encoder.append(&message.map_err(|error| RecordingError::library("drawing the recording", error))?).map_err(failed)?;
+        encoder
+            .append(&message.map_err(|error| RecordingError::library("drawing the recording", error))?)
+            .map_err(failed)?;
     }
     encoder.finish().map_err(failed)?;
     encoder.into_inner().map_err(failed)

@@ -68,7 +68,8 @@ fn an_identification_from_files_is_recorded() {
     assert_eq!(bad_scales.len(), 3);
     let ratios = bad_scales.iter().zip(&good_scales).map(|(bad, good)| bad / good);
     assert!(ratios.into_iter().all(|ratio| (0.3..3.0).contains(&ratio)), "{bad_scales:?} instead of {good_scales:?}");
-    let is_rejected = |(entity, _, values): &super::reading::Row| entity == "/data/error" && values["rejected"] == "[true]";
+    let is_rejected =
+        |(entity, _, values): &super::reading::Row| entity == "/data/error" && values["rejected"] == "[true]";
     assert_eq!(rows(&bad, false).iter().filter(|row| is_rejected(row)).count(), 1);
     assert_eq!(rows(&good, false).iter().filter(|row| is_rejected(row)).count(), 0);
 }
@@ -82,8 +83,10 @@ fn a_plan_is_recorded_as_a_film() {
     assert!(views(&path).contains("[Search for poses]"));
     let table = fs::read_to_string(place.path("p.csv")).unwrap();
     let planned = table.lines().filter(|line| !line.starts_with('#')).count() - 1;
-    let points: usize =
-        numbers(&path, "/world/trail/plan", "story", "Points3D:positions").iter().map(|(_, points)| points.len() / 3).sum();
+    let points: usize = numbers(&path, "/world/trail/plan", "story", "Points3D:positions")
+        .iter()
+        .map(|(_, points)| points.len() / 3)
+        .sum();
     assert_eq!(points, planned);
     // The arm drives through all of them.
     assert_eq!(numbers(&path, "/world/trail/path", "story", "LineStrips3D:strips").len(), planned);

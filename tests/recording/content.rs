@@ -135,11 +135,17 @@ fn nothing_is_missing_on_any_timeline(path: &Path) {
     }
     // Every view has something to show.
     let is_known = |path: &str| drawn.iter().any(|(entity, ..)| entity.starts_with(path));
-    for (view, _, values) in rows(path, true).iter().filter(|(.., values)| values.contains_key("ViewBlueprint:space_origin")) {
-        let contents = rows(path, true).into_iter().find(|(entity, ..)| *entity == format!("{view}/ViewContents")).unwrap();
+    for (view, _, values) in
+        rows(path, true).iter().filter(|(.., values)| values.contains_key("ViewBlueprint:space_origin"))
+    {
+        let contents =
+            rows(path, true).into_iter().find(|(entity, ..)| *entity == format!("{view}/ViewContents")).unwrap();
         let origin = values["ViewBlueprint:space_origin"].trim_matches(['[', ']']);
         let query = contents.2["ViewContents:query"].replace("$origin", origin);
-        let mut paths = query.trim_matches(['[', ']']).split(", ").map(|part| part.trim_start_matches("+ ").trim_end_matches("/**"));
+        let mut paths = query
+            .trim_matches(['[', ']'])
+            .split(", ")
+            .map(|part| part.trim_start_matches("+ ").trim_end_matches("/**"));
         assert!(paths.any(is_known), "{view} is empty: {query}");
     }
 }

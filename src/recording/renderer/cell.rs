@@ -66,5 +66,9 @@ fn boxes(profile: &Profile) -> Boxes3D {
         .with_colors(all.iter().map(|(.., name)| if name.is_empty() { style::CELL } else { style::OUT }))
         .with_radii([style::points(1.0)]);
     // Solid boxes to keep out of would hide the arm.
-    if all.len() > 1 { boxes.with_labels(all.iter().map(|(.., name)| name.as_str())) } else { boxes.with_fill_mode(FillMode::Solid) }
+    if all.len() > 1 {
+        boxes.with_labels(all.iter().map(|(.., name)| name.as_str()))
+    } else {
+        boxes.with_fill_mode(FillMode::Solid)
+    }
 }

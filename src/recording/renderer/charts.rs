@@ -55,7 +55,8 @@ pub(in crate::recording) fn legend(canvas: &mut Canvas, title: &str, largest: f6
 /// Draws the position errors of both arms at every pose, and the limits. Verification poses are large.
 pub(super) fn errors(canvas: &mut Canvas, judged: &[Judged<'_>], acceptance: &Acceptance) {
     let both = |one: &Judged<'_>| [to_mm(one.nominal.norm()), to_mm(one.identified.norm())];
-    let limits = [("mean", acceptance.position_mean), ("rms", acceptance.position_rms), ("max", acceptance.position_max)];
+    let limits =
+        [("mean", acceptance.position_mean), ("rms", acceptance.position_rms), ("max", acceptance.position_max)];
     let limits = limits.into_iter().filter_map(|(name, limit)| Some((name, to_mm(limit?)))).collect::<Vec<_>>();
     let values = judged.iter().flat_map(both).chain(limits.iter().map(|(_, limit)| *limit));
     let frame = Frame {
@@ -180,7 +181,11 @@ fn column_of_bars(chart: &mut Chart, frame: &Frame, column: &[&ParameterSummary]
         chart.line([at(0.0), at(parameter.deviation)], style::IDENTIFIED, 3.0);
         let known = parameter.sigma.filter(|sigma| sigma.is_finite());
         if let Some(sigma) = known {
-            chart.line([at(parameter.deviation - 2.0 * sigma), at(parameter.deviation + 2.0 * sigma)], style::LIMIT, 1.0);
+            chart.line(
+                [at(parameter.deviation - 2.0 * sigma), at(parameter.deviation + 2.0 * sigma)],
+                style::LIMIT,
+                1.0,
+            );
         }
         let color = if parameter.identifiable { style::TEXT } else { style::OUT };
         chart.label([frame.left - 12.0, y], parameter.id.to_string(), color);

@@ -120,8 +120,10 @@ pub(in crate::recording) fn significant(value: f64) -> String {
 
 /// Returns the mean errors of both arms at some of the poses.
 pub(super) fn errors_in_words(judged: &[Judged<'_>], of_verification: bool) -> String {
-    let counts: Vec<_> = judged.iter().filter(|one| one.is_verification == of_verification && !one.text.rejected).collect();
-    let mean = |of: fn(&Judged<'_>) -> f64| to_mm(counts.iter().map(|one| of(one)).sum::<f64>() / counts.len().max(1) as f64);
+    let counts: Vec<_> =
+        judged.iter().filter(|one| one.is_verification == of_verification && !one.text.rejected).collect();
+    let mean =
+        |of: fn(&Judged<'_>) -> f64| to_mm(counts.iter().map(|one| of(one)).sum::<f64>() / counts.len().max(1) as f64);
     let nominal = significant(mean(|one| one.nominal.norm()));
     let poses = counted(counts.len(), "pose");
     if of_verification {
@@ -143,7 +145,8 @@ const fn verdict(status: VerdictStatus) -> &'static str {
 /// Draws the report on a plan: which rules rejected how many candidates.
 pub(super) fn plan_report(canvas: &mut Canvas, plan: &PlanSummary) {
     let found = &plan.candidates;
-    let mut page = format!("# What was rejected\n\nOf {} configurations {} can be measured.\n\n", found.tried, found.kept);
+    let mut page =
+        format!("# What was rejected\n\nOf {} configurations {} can be measured.\n\n", found.tried, found.kept);
     page.push_str("| rule | rejected | that no other rule rejected |\n|---|---|---|\n");
     for rejection in &found.rejections {
         page.push_str(&format!("| {} | {} | {} |\n", rejection.rule, rejection.rejected, rejection.alone));
@@ -166,7 +169,8 @@ fn result_headline(session: &Session, identified: &IdentifiedText) -> String {
     let summary = &identified.summary;
     let verdict = verdict(summary.verdict.status);
     let figures = summary.verification.as_ref().and_then(|verification| {
-        let mean = |model: &ModelSummary| model.errors().into_iter().find_map(|(name, found)| Some((name, found?.mean)));
+        let mean =
+            |model: &ModelSummary| model.errors().into_iter().find_map(|(name, found)| Some((name, found?.mean)));
         Some((mean(&verification.nominal)?, mean(&verification.identified)?.1, verification))
     });
     let Some(((name, before), after, verification)) = figures else {

@@ -120,10 +120,8 @@ pub(super) fn draw(film: &mut Renderer, identified: &IdentifiedText, time: Times
     let judged = judged(&session, &profile, identified, calibration);
     let usual = |of: fn(&Judged<'_>) -> f64| most(judged.iter().filter(|one| !one.text.rejected).map(of).collect());
     let drawn = |largest: f64| enlargement(largest, SHOWN * reach(&profile));
-    let magnified = Magnified {
-        both: drawn(usual(|one| one.nominal.norm())),
-        residual: drawn(usual(|one| one.identified.norm())),
-    };
+    let magnified =
+        Magnified { both: drawn(usual(|one| one.nominal.norm())), residual: drawn(usual(|one| one.identified.norm())) };
     film.magnified = Some(magnified);
     let scale = Scale {
         magnified: magnified.both,
@@ -153,7 +151,8 @@ fn chapters(
     scale: Scale,
     time: Timestamp,
 ) {
-    let all = |is_verification: bool| judged.iter().filter(|one| one.is_verification == is_verification).collect::<Vec<_>>();
+    let all =
+        |is_verification: bool| judged.iter().filter(|one| one.is_verification == is_verification).collect::<Vec<_>>();
     let (fit, verification) = (shown(all(false)), shown(all(true)));
     for path in [names::BEFORE_VERIFICATION, names::AFTER_VERIFICATION] {
         film.canvas.draw_static(path, &arrow_looks());
@@ -312,8 +311,7 @@ fn data(film: &mut Renderer, judged: &[Judged<'_>], profile: &Profile) {
         ("distance_max_mm", acceptance.distance_max),
     ];
     let values = limits.into_iter().filter_map(|(name, limit)| Some((name, to_mm(limit?))));
-    let values = values.fold(AnyValues::default(), |values, (name, limit)| {
-        values.with_component_from_data(name, numbers([limit]))
-    });
+    let values = values
+        .fold(AnyValues::default(), |values, (name, limit)| values.with_component_from_data(name, numbers([limit])));
     film.canvas.draw_static(names::LIMITS, &values);
 }

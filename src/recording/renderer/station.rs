@@ -95,7 +95,10 @@ impl Station {
             let floor = profile.floor().unwrap_or(0.0).min(place.z - SHORTEST);
             heads.push(place - Vector3::z() * (0.4 * length));
             legs.extend([0.0_f64, 120.0, 240.0].map(f64::to_radians).map(|angle| {
-                [style::at(&neck), style::at(&Point3::new(place.x + FOOT * angle.cos(), place.y + FOOT * angle.sin(), floor))]
+                [
+                    style::at(&neck),
+                    style::at(&Point3::new(place.x + FOOT * angle.cos(), place.y + FOOT * angle.sin(), floor)),
+                ]
             }));
             if self.found.is_some() { "tracker" } else { "tracker (as planned)" }
         } else {
