@@ -20,6 +20,7 @@ pub mod configuration;
 mod error;
 mod fanuc;
 mod findings;
+pub mod gzip;
 mod inform;
 pub mod insert;
 mod krl;
@@ -33,6 +34,7 @@ pub mod rewrite;
 mod ros;
 mod urscript;
 mod val3;
+mod xml;
 
 use jiff::civil::DateTime;
 

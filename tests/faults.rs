@@ -454,3 +454,31 @@ fn limits_that_cannot_be_meant_are_named() {
     );
     assert!(profile("distance_max_mm: 400000.0").contains("which every arm meets"));
 }
+
+/// Exit code 70 is for defects of the program, and a limit of the system is none.
+#[test]
+fn limits_of_the_system_are_no_defect_of_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = calibrated(folder.path());
+    let targets = "pose,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,1,2,3,4,5,6\n";
+    fs::write(folder.path().join("targets.csv"), targets).unwrap();
+    let table = root().join("sessions/soochow-example/measurements.csv");
+    let (calibration, table) = (calibration.to_str().unwrap(), table.to_str().unwrap());
+    let commands = [
+        format!("compensate --calibration {calibration} --targets targets.csv --out out.csv --record out.rrd"),
+        format!("export --calibration {calibration} --format urdf --out out.urdf"),
+        format!("identify --profile soochow --measurements {table} --out again"),
+        "demo --no-recording --sessions demo".to_owned(),
+    ];
+    for limit in ["ulimit -f 0", "ulimit -f 1", "ulimit -f 20", "ulimit -n 3", "ulimit -n 5", "ulimit -n 8"] {
+        for command in &commands {
+            drop(fs::remove_dir_all(folder.path().join("demo")));
+            let limited = format!("trap '' XFSZ; {limit}; exec '{}' {command}", crate::support::PROGRAM);
+            let output =
+                std::process::Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
+            let code = output.status.code();
+            // With few files the program itself may not start (127).
+            assert!(matches!(code, Some(0..=5 | 126 | 127)), "{limit}: {command}: {code:?} {}", errors(&output));
+        }
+    }
+}

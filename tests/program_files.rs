@@ -8,7 +8,7 @@ use trupose::kinematics::ForwardKinematics;
 use trupose::profile::{Profile, builtin};
 use trupose::program::motion::{Command, Companion, Goal, Hint, MoveKind, ReadOptions, Reason, Scan, Setting};
 use trupose::program::rewrite::{rewrite, scan};
-use trupose::program::{Dialect, Robot};
+use trupose::program::{Dialect, Robot, gzip};
 
 use crate::support::{invented, text, trupose};
 
@@ -591,4 +591,182 @@ fn flanges_of_shipped_profiles_are_those_of_the_controllers() {
         assert!((world_from_flange.rotation * Vector3::x() - Vector3::from(x)).norm() < 1e-9, "{arm}");
         assert!((world_from_flange.rotation * Vector3::z() - Vector3::from(z)).norm() < 1e-9, "{arm}");
     }
+}
+
+#[test]
+fn a_compressed_program_of_polyscope_is_corrected_inside() {
+    let place = tempfile::tempdir().unwrap();
+    let path = |name: &str| place.path().join(name).to_str().unwrap().to_owned();
+    let packed = fs::read(folder().join("urp/pick.urp")).unwrap();
+    let before = gzip::unpacked(&packed).unwrap();
+    let scan = found(Dialect::Urscript, "ur5e", &before, Vec::new());
+    let names: Vec<_> = scan.targets.iter().filter_map(|target| target.name.clone()).collect();
+    assert_eq!(names, ["Waypoint_1", "Waypoint_2", "Waypoint_3", "Waypoint_4"]);
+    assert_eq!(scan.left.iter().map(|left| left.reason.clone()).collect::<Vec<_>>(), [Reason::Relative]);
+    fs::write(path("pick.urp"), &packed).unwrap();
+    fs::write(path("cal.ron"), invented::calibration("ur5e").to_text().unwrap()).unwrap();
+    let (program, calibration, out) = (path("pick.urp"), path("cal.ron"), path("out.urp"));
+    let output = trupose(&[
+        "compensate",
+        "--calibration",
+        &calibration,
+        "--program",
+        &program,
+        "--dialect",
+        "urscript",
+        "--points",
+        "computed",
+        "--partial",
+        "--out",
+        &out,
+    ]);
+    assert!(text(&output.stderr).contains("4 of 4 joint targets"), "{}", text(&output.stderr));
+    let after = gzip::unpacked(&fs::read(out).unwrap()).unwrap();
+    assert_ne!(after, before);
+    assert_eq!(skeleton(&after), skeleton(&before));
+    let damaged = packed.iter().map(|byte| byte ^ 1).collect::<Vec<u8>>();
+    fs::write(path("pick.urp"), [&[0x1f, 0x8b], &damaged[2..]].concat()).unwrap();
+    let output = trupose(&[
+        "compensate",
+        "--calibration",
+        &calibration,
+        "--program",
+        &program,
+        "--dialect",
+        "urscript",
+        "--points",
+        "computed",
+    ]);
+    assert!(
+        output.status.code() == Some(2) && text(&output.stderr).contains("cannot be unpacked"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
+/// Names of the tools of all Cartesian targets; with a question mark where the program does not state them.
+fn tools(dialect: Dialect, arm: &str, text: &str, companions: Vec<Companion>) -> Vec<String> {
+    let scan = found(dialect, arm, text.as_bytes(), companions);
+    let tool = |goal: &Goal| match goal {
+        Goal::Joints(_) => None,
+        Goal::Pose(pose) => Some(match &pose.tool {
+            Setting::Identity => "none".to_owned(),
+            Setting::Known { name, .. } => name.clone(),
+            Setting::Named(name) => format!("{name}?"),
+        }),
+    };
+    scan.targets.iter().filter_map(|target| tool(&target.goal)).collect()
+}
+
+#[test]
+fn tools_that_change_while_the_program_runs_are_not_taken_as_known() {
+    let tool = |z: usize| format!("{{X 0,Y 0,Z {z},A 0,B 0,C 0}}");
+    let target = |x: usize| format!("LIN {{X {x},Y 0,Z 500,A 0,B 90,C 0}}\n");
+    let krl = |text: &str, companions| tools(Dialect::Krl, KUKA, text, companions);
+    let program = |body: &str| format!("DEF a()\n$BASE=$NULLFRAME\n$TOOL={}\n{body}END\n", tool(100));
+    // The second round begins with the tool of the end of the first.
+    let turn = |kind: &str, z: usize| {
+        let (head, end) = kind.split_once(' ').unwrap();
+        program(&format!("{head}\n{}$TOOL={}\n{}{end}\n", target(1), tool(z), target(2)))
+    };
+    for kind in ["LOOP ENDLOOP", "REPEAT UNTIL", "WHILE ENDWHILE", "FOR ENDFOR"] {
+        assert_eq!(krl(&turn(kind, 200), Vec::new()), ["$TOOL?", "$TOOL"], "{kind}");
+        assert_eq!(krl(&turn(kind, 100), Vec::new()), ["$TOOL", "$TOOL"], "{kind}");
+    }
+    let nested = format!("LOOP\n{}LOOP\n{}$TOOL={}\nENDLOOP\nENDLOOP\n", target(1), target(2), tool(5));
+    assert_eq!(krl(&program(&nested), Vec::new()), ["$TOOL?", "$TOOL?"]);
+    // A numbered tool that the program changes is not that of the data list.
+    let list = Companion { name: "$config.dat".to_owned(), text: format!("TOOL_DATA[1]={}\n", tool(100)).into_bytes() };
+    for (change, known) in [
+        ("", true),
+        ("TOOL_DATA[1].Z=150\n", false),
+        ("TOOL_DATA[I].Z=150\n", false),
+        ("TOOL_DATA[2].Z=150\n", true),
+        ("TOOL_DATA[1]=MEASURED\n", false),
+        ("MEASURE(TOOL_DATA[1])\n", false),
+        ("TOOL_DATA[1]={X 0,Y 0,Z 7,A 0,B 0,C 0}\n", false),
+        ("TOOL_DATA[1]={Z 7}\n", false),
+    ] {
+        let text = format!("DEF a()\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\n{}{change}END\n", target(1));
+        let expected = if known { "TOOL_DATA[1]" } else { "TOOL_DATA[1]?" };
+        assert_eq!(krl(&text, vec![list.clone()]), [expected], "{change}");
+    }
+}
+
+#[test]
+fn shifts_hold_through_loops_calls_and_jumps() {
+    let rapid = |body: &str| {
+        let target = "[[400,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+        let text = format!("MODULE M\nPROC main()\n{body}ENDPROC\nENDMODULE\n").replace('@', target);
+        let scan = found(Dialect::Rapid, ABB, text.as_bytes(), Vec::new());
+        (scan.targets.len(), scan.left.len())
+    };
+    let go = "MoveL @,v1,fine,tool0;\n";
+    assert_eq!(rapid(&format!("{go}PDispOn p,tool0;\n{go}PDispOff;\n{go}")), (2, 1));
+    // The second call begins displaced.
+    assert_eq!(rapid(&format!("{go}PDispOn p,tool0;\n{go}")), (0, 2));
+    let turn = format!("WHILE TRUE DO\n{go}PDispOn p,tool0;\n{go}ENDWHILE\nPDispOff;\n{go}");
+    assert_eq!(rapid(&turn), (1, 2));
+    let job = |name: &str, body: &str| {
+        let head = "//POS\n///TOOL 1\n///POSTYPE ROBOT\n///RECTAN\n///RCONF 0,0,0,0,0,0\n";
+        let points: String = (0..3).map(|index| format!("C0000{index}=40{index},0,500,180,0,0\n")).collect();
+        format!("/JOB\n//NAME {name}\n{head}{points}//INST\nNOP\n{body}END\n")
+    };
+    let inform = |text: String, other: Option<String>| {
+        let companions = other.map(|text| Companion { name: "other.jbi".to_owned(), text: text.into_bytes() });
+        let scan = found(Dialect::Inform, "soochow", text.as_bytes(), companions.into_iter().collect());
+        let left = scan.left.iter().filter(|left| left.reason == Reason::Offset).count();
+        (scan.targets.len(), left)
+    };
+    let moves = "MOVL C00000 V=1\nMOVL C00001 V=1\nMOVL C00002 V=1\n";
+    assert_eq!(inform(job("A", moves), None), (3, 0));
+    let caller = |around: &str| job("MAIN", &around.replace('@', "CALL JOB:A\n"));
+    assert_eq!(inform(job("A", moves), Some(caller("SFTON P001\n@SFTOF\n"))), (0, 3));
+    assert_eq!(inform(job("A", moves), Some(caller("SFTON P001\nSFTOF\n@"))), (3, 0));
+    // The job that is called leaves the shift on.
+    let first = "MOVL C00000 V=1\nCALL JOB:B\nMOVL C00001 V=1\nSFTOF\nMOVL C00002 V=1\n";
+    assert_eq!(inform(job("A", first), Some(job("B", "SFTON P001\n"))), (2, 1));
+    let jump = "*LOOP\nMOVL C00000 V=1\nSFTON P001\nMOVL C00001 V=1\nJUMP *LOOP IF IN#(1)=ON\nSFTOF\nMOVL C00002 V=1\n";
+    assert_eq!(inform(job("A", jump), None), (1, 2));
+}
+
+#[test]
+fn positions_in_calls_of_unknown_routines_are_named() {
+    for (dialect, arm, text) in [
+        (
+            Dialect::Rapid,
+            ABB,
+            "MODULE M\nPROC main()\nmyMove [[400,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100;\nENDPROC\nENDMODULE\n",
+        ),
+        (
+            Dialect::Rapid,
+            ABB,
+            "MODULE M\nPROC main()\nmyMove [[0,0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nENDPROC\nENDMODULE\n",
+        ),
+        (Dialect::Urscript, "ur5e", "def p():\n  pick(p[0.1,0.2,0.3,0,3.14,0], 5)\nend\n"),
+        (Dialect::Urscript, "ur5e", "def p():\n  where = p[0.1,0.2,0.3,0,3.14,0]\n  pick(where)\nend\n"),
+        (Dialect::Urscript, "ur5e", "def p():\n  x = pick(at=[0,-1.5,1.5,-1.5,-1.5,0])\nend\n"),
+    ] {
+        let scan = found(dialect, arm, text.as_bytes(), Vec::new());
+        let reasons: Vec<&Reason> = scan.left.iter().map(|left| &left.reason).collect();
+        assert!(scan.targets.is_empty() && matches!(reasons[..], [Reason::PassedTo(_)]), "{text}: {scan:?}");
+    }
+    let harmless = "def p():\n  force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,-10,0,0,0], 2, [1,1,1,1,1,1])\n  speedl([0,0,0.1,0,0,0], 1)\nend\n";
+    assert_eq!(found(Dialect::Urscript, "ur5e", harmless.as_bytes(), Vec::new()).left, []);
+}
+
+#[test]
+fn a_byte_order_mark_hides_nothing() {
+    for program in typical().into_iter().chain(difficult()) {
+        let plain = found(program.dialect, &program.arm, program.text.as_bytes(), program.companions.clone());
+        let marked = [b"\xef\xbb\xbf", program.text.as_bytes()].concat();
+        let marked = found(program.dialect, &program.arm, &marked, program.companions.clone());
+        let goals =
+            |scan: &Scan| scan.targets.iter().map(|target| (target.line, target.goal.clone())).collect::<Vec<_>>();
+        assert_eq!((goals(&marked), &marked.left), (goals(&plain), &plain.left), "{}", program.title);
+    }
+    let short = "\u{feff}/MN\n   1:L PR[1] 100mm/sec FINE ;\n/END\n";
+    assert_eq!(found(Dialect::Fanuc, FANUC, short.as_bytes(), Vec::new()).left.len(), 1);
+    let short = "\u{feff}//POS\n///TOOL 1\n///POSTYPE PULSE\n///PULSE\nC0=1,2,3,4,5,6\n//INST\nMOVJ C0 VJ=1\n";
+    assert_eq!(found(Dialect::Inform, "soochow", short.as_bytes(), Vec::new()).targets.len(), 1);
 }

@@ -465,6 +465,35 @@ fn a_journal_that_cannot_grow_stops_the_run_and_goes_on_later() {
     assert!(stopped > 5);
 }
 
+/// The report does not fit any more, the journal does.
+#[test]
+fn a_delivery_that_does_not_fit_leaves_no_part_of_itself_and_can_be_repeated() {
+    let whole_run = finished();
+    let size = |name: &str| fs::metadata(whole_run.session().join(name)).unwrap().len();
+    let blocks = (size("report.html") - 1) / 512;
+    assert!(512 * blocks > size("journal.ron") + 4096, "the report is the largest file");
+    let place = Place::new();
+    let before: Vec<String> = whole().into_iter().filter(|step| !step.contains("eliver")).collect();
+    assert_eq!(place.run_steps(&before).status.code(), Some(0));
+    let files = || {
+        let names =
+            fs::read_dir(place.session()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name != ".lock").collect::<BTreeSet<_>>()
+    };
+    let without = files();
+    let script = place.write_script("rest.script.ron", "Do(Deliver)");
+    let limited = format!(
+        "trap '' XFSZ; ulimit -f {blocks}; exec '{PROGRAM}' resume sessions/s --script {script} --json --no-recording"
+    );
+    let output = Command::new("sh").args(["-c", &limited]).current_dir(place.0.path()).output().unwrap();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(5), "{said}");
+    assert!(said.contains("report.html") && said.contains("File too large"), "{said}");
+    assert_eq!(files(), without, "a part of the result is there");
+    assert_eq!(place.resume("sessions/s", &["Do(Deliver)".to_owned()]).status.code(), Some(0));
+    assert!(files().contains("report.html") && files().contains("calibration.ron"));
+}
+
 #[test]
 fn a_reader_that_goes_away_costs_nothing_that_was_saved() {
     let expected = finished().measurements("sessions/s");

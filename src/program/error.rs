@@ -80,7 +80,7 @@ pub enum ProgramError {
     #[error("the program contains zero bytes, so it is binary or UTF-16; export it as plain text")]
     NotText,
     /// The program is compressed.
-    #[error("the program is compressed; a .urp file is one: export the program as .script, or unpack it with gzip")]
+    #[error("the program is compressed, and its content cannot be unpacked: it is damaged or no gzip file")]
     Compressed,
     /// The trajectory is for other joints.
     #[error("the trajectory has the joints {}; the arm has {}; name the joints of the trajectory in the order from base to flange", found.join(", "), expected.join(", "))]

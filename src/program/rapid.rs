@@ -5,6 +5,7 @@
 
 mod instruction;
 mod reader;
+mod statement;
 
 use super::names::{MAX_NAME, identifier};
 use super::remark::Remark;

@@ -10,7 +10,7 @@ use super::findings::Source;
 pub use super::motion::{Command, Companion, ReadOptions};
 use super::motion::{Form, Goal, Hint, JointUnit, Scan, Slot, Target};
 use super::orientation::Orientation;
-use super::{Dialect, Digits, ProgramError, Robot};
+use super::{Dialect, Digits, ProgramError, Robot, gzip};
 use crate::text::decimal;
 use crate::units::{from_deg, to_deg};
 
@@ -19,7 +19,7 @@ use crate::units::{from_deg, to_deg};
 /// # Errors
 /// The program is not text, or the arm's values in this dialect are unknown.
 pub fn scan(dialect: Dialect, robot: &Robot<'_>, options: &ReadOptions, program: &[u8]) -> Result<Scan, ProgramError> {
-    if program.starts_with(&GZIP) {
+    if gzip::is_packed(program) {
         return Err(ProgramError::Compressed);
     }
     if program.contains(&0) {
@@ -31,9 +31,6 @@ pub fn scan(dialect: Dialect, robot: &Robot<'_>, options: &ReadOptions, program:
     scan.hints.extend(round_numbers(program, &scan.targets));
     Ok(scan)
 }
-
-/// First bytes of a gzip file, such as the `.urp` files of Universal Robots.
-const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// Replaces the values of targets. `commands` has one entry per target of the scan; `None` keeps the target, and so does a
 /// command of the other kind.

@@ -2,6 +2,7 @@
 //!
 //! The file defines one function without calling it. Sent to a controller directly it runs; in a Script node it must be called.
 
+mod polyscope;
 mod reader;
 
 use super::names::{MAX_NAME, identifier};
@@ -17,7 +18,8 @@ pub(super) const LANGUAGE: Language = Language {
     write,
     read: reader::read,
     digits: Digits { joint: 8, length: 8, turn: 8, are_fixed: false },
-    remark: Remark::new("# ", &[]),
+    // A program tree of PolyScope has no remarks.
+    remark: Remark { never_in: b"<", ..Remark::new("# ", &[]) },
 };
 
 const DECIMALS: usize = 8;

@@ -12,7 +12,7 @@ use crate::cli::compensate::{CompensateArgs, Points};
 use crate::compensation::Status;
 use crate::error::{ExitStatus, Failure};
 use crate::program::motion::{Companion, Goal, Hint, ReadOptions, Reason, Scan};
-use crate::program::{Dialect, ProgramError, Robot, insert, rewrite, with_remark};
+use crate::program::{Dialect, ProgramError, Robot, gzip, insert, rewrite, with_remark};
 use crate::store;
 use crate::text::{counted, printable};
 use crate::units::from_mm;
@@ -60,14 +60,16 @@ pub(super) fn run<O: Write, E: Write>(
     };
     let texts = args.program.iter().chain(&args.companion).map(|path| {
         let text = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-        Ok((path.as_path(), text))
+        // What cannot be unpacked is refused by the reader.
+        let unpacked = gzip::unpacked(&text);
+        Ok((path.as_path(), unpacked.is_some(), unpacked.unwrap_or(text)))
     });
-    let texts: Vec<(&Path, Vec<u8>)> = texts.collect::<Result<_, Failure>>()?;
+    let texts: Vec<(&Path, bool, Vec<u8>)> = texts.collect::<Result<_, Failure>>()?;
     let mut parts = Vec::new();
-    for (path, text) in texts.iter().take(args.program.len()) {
+    for (path, is_packed, text) in texts.iter().take(args.program.len()) {
         let unusable = |error: ProgramError| Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()));
-        let others = texts.iter().filter(|(other, _)| other != path);
-        let companions = others.map(|(path, text)| Companion { name: file_name(path), text: text.clone() });
+        let others = texts.iter().filter(|(other, ..)| other != path);
+        let companions = others.map(|(path, _, text)| Companion { name: file_name(path), text: text.clone() });
         let options = ReadOptions {
             joint_names: (!args.joint_names.is_empty()).then(|| args.joint_names.clone()),
             companions: companions.collect(),
@@ -106,6 +108,9 @@ pub(super) fn run<O: Write, E: Write>(
                     path.display()
                 )),
             }
+        }
+        if *is_packed {
+            corrected = gzip::packed(&corrected);
         }
         parts.push(Part { path, scan, results, corrected, is_changed, paths, undivided });
     }

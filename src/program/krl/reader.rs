@@ -229,48 +229,6 @@ impl<'a> Module<'a> {
         findings
     }
 
-    /// Drops the frames whose value depends on how the program runs.
-    fn forget(&mut self) {
-        let all_tools = self.changing.contains(ANY_TOOL);
-        let all_bases = self.changing.contains(ANY_BASE);
-        self.frames.retain(|name, _| {
-            let is_numbered = all_tools && name.starts_with(ANY_TOOL) || all_bases && name.starts_with(ANY_BASE);
-            !is_numbered && !self.changing.contains(name)
-        });
-    }
-
-    /// Notes a frame whose value changes: `TOOL_DATA[1].X=…`, a second value, one that is computed, or one that a routine gets.
-    fn note_change(&mut self, line: &Line<'_, 'a>, first: usize) {
-        let tokens = line.tokens;
-        let mut change = |variable: &Variable| {
-            let name = variable.name.to_lowercase();
-            let is_constant = !variable.key.element.is_empty();
-            let all = [ANY_TOOL, ANY_BASE].into_iter().find(|all| name.starts_with(all) && !is_constant);
-            self.changing.insert(all.map_or(name, str::to_owned));
-        };
-        let Some(variable) = Variable::read(line, first) else { return };
-        let assign = match tokens.get(variable.end).map(|token| token.kind) {
-            Some(Kind::Symbol(b'=')) => Some(variable.end),
-            Some(Kind::Symbol(b'.')) if tokens.is(variable.end + 2, b'=') => {
-                change(&variable);
-                None
-            }
-            _ => None,
-        };
-        if assign.is_some() && !tokens.is(variable.end + 1, b'{') {
-            change(&variable);
-        }
-        // The parameters of a routine are its caller's variables.
-        let is_harmless = ["BAS", "INV_POS"].iter().any(|word| tokens.is_word(first, word));
-        if assign.is_none() && tokens.is(first + 1, b'(') && !is_harmless {
-            line.range
-                .clone()
-                .skip_while(|at| *at <= first)
-                .filter_map(|at| Variable::read(line, at))
-                .for_each(|variable| change(&variable));
-        }
-    }
-
     /// Notes types, frames and the data of inline forms.
     fn declare(&mut self, line: &Line<'_, 'a>) {
         self.note_routine(line);
@@ -480,29 +438,6 @@ impl<'a> Module<'a> {
                 self.offset_uses(line, findings, value);
             }
             _ => {}
-        }
-    }
-
-    fn use_frame_data(&mut self, name: Option<&str>) {
-        let data = name.and_then(|name| self.frame_data.get(name)).cloned();
-        let shown = name.unwrap_or_default().to_uppercase();
-        let data = data.unwrap_or_default();
-        self.set_tool(data.tool.map_or_else(|| Frame::Variable(format!("{shown}.TOOL_NO")), Frame::Number));
-        self.set_base(data.base.map_or_else(|| Frame::Variable(format!("{shown}.BASE_NO")), Frame::Number));
-        self.state.is_stationary = data.is_stationary;
-    }
-
-    /// A routine that sets no tool or base gets that of its file, if there is only one.
-    fn inherit(&self, findings: &mut Findings) {
-        for (range, [tool, base]) in &self.heirs {
-            for motion in findings.motions.get_mut(range.clone()).into_iter().flatten().flatten() {
-                if *tool && self.set.tool.is_some() && motion.tool.is_ok() {
-                    motion.tool = Ok(self.setting(self.set.tool.as_ref(), "TOOL"));
-                }
-                if *base && self.set.base.is_some() && motion.frame.is_ok() {
-                    motion.frame = Ok(self.setting(self.set.base.as_ref(), "BASE"));
-                }
-            }
         }
     }
 

@@ -12,10 +12,8 @@ use super::super::insert::Spot;
 use super::super::lexer::{Kind, Rules, Tokens, Value};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
-use super::instruction::{Arguments, Instruction, assigned, behind_label, displaces, frame, tool};
-
-/// More routines than a file can have: their numbers differ between files.
-const ROUTINES: usize = 1 << 24;
+use super::instruction::{Arguments, Instruction, assigned, displaces, frame, tool};
+use super::statement::{Statement, StatementKind, each_statement, line_ends};
 
 const RULES: Rules = Rules { comment: b"!", quotes: b"\"", in_words: b"" };
 
@@ -23,14 +21,14 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
     let files: Vec<Tokens<'_>> = source.files().map(|(_, text)| Tokens::new(text, RULES)).collect();
     let mut module = Module::new(source);
     for (file, tokens) in files.iter().enumerate() {
-        module.each_statement(tokens, file, Module::declare);
+        each_statement(tokens, file, |statement| module.declare(statement));
     }
     for name in files.iter().flat_map(assigned) {
         module.forget(&name);
     }
     let mut findings = Findings::default();
     for (file, tokens) in files.iter().enumerate() {
-        module.each_statement(tokens, file, |module, statement| module.find(statement, &mut findings));
+        each_statement(tokens, file, |statement| module.find(statement, &mut findings));
         findings.motions.push(None);
     }
     findings.resolve(source)
@@ -72,60 +70,19 @@ struct Module<'a> {
     parameters: BTreeSet<(usize, String)>,
     tools: BTreeMap<String, Result<Isometry3<f64>, Reason>>,
     frames: BTreeMap<String, Result<Isometry3<f64>, Reason>>,
-    scopes: usize,
     /// A program displacement moves all targets.
     is_displaced: bool,
     /// An offset of the external axes, which may carry the arm or the workpiece.
     has_axis_offset: bool,
     /// Routines that set a displacement: it stays in force when they call or return to another.
     displacing: BTreeSet<usize>,
+    /// Places of the routine that is noted and of its open loops.
+    open_starts: Vec<(usize, usize)>,
+    /// Places of the routines and loops that end with a displacement.
+    displaced_starts: BTreeSet<(usize, usize)>,
     /// File and end of the last motion instruction, if nothing but moves can follow it directly.
     behind_motion: Option<(usize, usize)>,
 }
-
-/// One instruction or declaration, without the block keywords in front of it.
-struct Statement<'t, 'a> {
-    tokens: &'t Tokens<'a>,
-    file: usize,
-    /// The routine; 0: the module.
-    scope: usize,
-    range: Range<usize>,
-    /// The header of a routine, with its parameters.
-    is_routine: bool,
-    /// The instruction of an `IF` without `THEN`.
-    is_conditional: bool,
-}
-
-impl Statement<'_, '_> {
-    fn line(&self) -> usize {
-        self.tokens.line(self.range.start)
-    }
-
-    fn key(&self, at: usize) -> Option<Key> {
-        let name = self.tokens.name(at)?.to_lowercase();
-        Some(Key { scope: self.scope, name, element: String::new() })
-    }
-}
-
-/// Keywords that stand alone in front of an instruction.
-const BLOCKS: &[&str] = &[
-    "endproc",
-    "endmodule",
-    "endif",
-    "endfor",
-    "endwhile",
-    "endtest",
-    "else",
-    "endfunc",
-    "endtrap",
-    "default",
-    "undo",
-    "error",
-    "backward",
-    "endrecord",
-    "local",
-    "task",
-];
 
 impl<'a> Module<'a> {
     fn new(source: &'a Source<'a>) -> Self {
@@ -136,81 +93,20 @@ impl<'a> Module<'a> {
             parameters: BTreeSet::new(),
             tools: BTreeMap::new(),
             frames: BTreeMap::new(),
-            scopes: 0,
             is_displaced: false,
             has_axis_offset: false,
             displacing: BTreeSet::new(),
+            open_starts: Vec::new(),
+            displaced_starts: BTreeSet::new(),
             behind_motion: None,
-        }
-    }
-
-    /// Calls `work` with every instruction, declaration and routine header.
-    fn each_statement(
-        &mut self,
-        tokens: &Tokens<'a>,
-        file: usize,
-        mut work: impl FnMut(&mut Self, &Statement<'_, 'a>),
-    ) {
-        let mut at = 0;
-        let mut scope = 0;
-        let mut is_behind_if = false;
-        // Routines have the same numbers in both passes.
-        self.scopes = file.saturating_mul(ROUTINES);
-        while at < tokens.len() {
-            at = tokens.skip_line_ends(at);
-            if let Some(behind) = behind_label(tokens, at) {
-                at = behind;
-                continue;
-            }
-            let Some(word) = tokens.word(at).map(str::to_ascii_lowercase) else {
-                at += 1;
-                continue;
-            };
-            let is_conditional = std::mem::take(&mut is_behind_if);
-            match word.as_str() {
-                "module" | "test" => at = end_of_line(tokens, at),
-                "record" => {
-                    while at < tokens.len() && !tokens.is_word(at, "endrecord") {
-                        at += 1;
-                    }
-                }
-                "proc" | "func" | "trap" => {
-                    let end = (at..tokens.len())
-                        .find(|place| tokens.is(*place, b'(') || line_ends(tokens, *place))
-                        .unwrap_or(tokens.len());
-                    let end = if tokens.is(end, b'(') { tokens.behind(end, tokens.len()) } else { end };
-                    self.scopes += 1;
-                    scope = self.scopes;
-                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: true, is_conditional });
-                    at = end;
-                }
-                "if" | "elseif" | "while" | "for" => {
-                    at = behind_condition(tokens, at);
-                    is_behind_if = !tokens.is_word(at - 1, "THEN") && !tokens.is_word(at - 1, "DO");
-                }
-                "case" => {
-                    let colon = (at..tokens.len()).find(|place| tokens.is(*place, b':') || line_ends(tokens, *place));
-                    at = colon.unwrap_or(tokens.len()) + 1;
-                }
-                _ if BLOCKS.contains(&word.as_str()) => {
-                    if matches!(word.as_str(), "endproc" | "endfunc" | "endtrap") {
-                        scope = 0;
-                    }
-                    at += 1;
-                }
-                _ => {
-                    let end = (at..tokens.len()).find(|place| tokens.is(*place, b';')).unwrap_or(tokens.len());
-                    work(self, &Statement { tokens, file, scope, range: at..end, is_routine: false, is_conditional });
-                    at = end + 1;
-                }
-            }
         }
     }
 
     /// Notes the type of a variable, and the value of tools and work objects.
     fn declare(&mut self, statement: &Statement<'_, 'a>) {
         let (tokens, range) = (statement.tokens, statement.range.clone());
-        if statement.is_routine {
+        self.note_displacement(statement);
+        if statement.kind == StatementKind::Routine {
             for at in range {
                 let (Some(word), Some(name)) = (tokens.word(at), tokens.name(at + 1)) else { continue };
                 let kind = Type::named(word);
@@ -242,6 +138,35 @@ impl<'a> Module<'a> {
         }
     }
 
+    /// Follows displacements through loops and routines: the second round of a loop, and the second call of a routine, begin as the first
+    /// one ends.
+    fn note_displacement(&mut self, statement: &Statement<'_, 'a>) {
+        match statement.kind {
+            StatementKind::Routine => {
+                self.open_starts = vec![statement.place()];
+                self.is_displaced = false;
+            }
+            StatementKind::LoopStart => self.open_starts.push(statement.place()),
+            StatementKind::LoopEnd => {
+                let start = if self.open_starts.len() > 1 { self.open_starts.pop() } else { None };
+                self.displaced_starts.extend(start.filter(|_| self.is_displaced));
+            }
+            StatementKind::Plain => {
+                let word = statement.tokens.word(statement.range.start).unwrap_or_default();
+                if displaces(word) {
+                    self.is_displaced = true;
+                    // Until it is switched off, that is how the routine ends.
+                    self.displaced_starts.extend(self.open_starts.first().copied());
+                } else if ["PDispOff", "EOffsOff"].iter().any(|off| word.eq_ignore_ascii_case(off)) {
+                    self.is_displaced = false;
+                    if let Some(routine) = self.open_starts.first() {
+                        self.displaced_starts.remove(routine);
+                    }
+                }
+            }
+        }
+    }
+
     /// Drops the declared value of a tool or work object that the program changes: which one holds at a move is unknown. One
     /// that cannot be used at all keeps its reason.
     fn forget(&mut self, name: &str) {
@@ -254,11 +179,20 @@ impl<'a> Module<'a> {
 
     /// Notes values of positions, and motions.
     fn find(&mut self, statement: &Statement<'_, 'a>, findings: &mut Findings) {
-        if statement.is_routine {
-            self.is_displaced = false;
-            self.has_axis_offset = false;
-            findings.motions.push(None);
-            return;
+        match statement.kind {
+            StatementKind::Plain => {}
+            StatementKind::Routine => {
+                let is_displaced_at_end = self.displaced_starts.contains(&statement.place());
+                self.is_displaced = is_displaced_at_end;
+                self.has_axis_offset = is_displaced_at_end;
+                findings.motions.push(None);
+                return;
+            }
+            StatementKind::LoopStart => {
+                self.is_displaced |= self.displaced_starts.contains(&statement.place());
+                return;
+            }
+            StatementKind::LoopEnd => return,
         }
         let (tokens, range) = (statement.tokens, statement.range.clone());
         if let Some(declaration) = Declaration::of(statement) {
@@ -707,42 +641,4 @@ fn line_of(tokens: &Tokens<'_>, range: Range<usize>, byte: Option<usize>) -> Opt
         if tokens.get(middle)?.start < byte { low = middle + 1 } else { high = middle }
     }
     tokens.get(low).map(|token| token.line)
-}
-
-fn line_ends(tokens: &Tokens<'_>, at: usize) -> bool {
-    tokens.get(at).is_none_or(|token| token.kind == Kind::LineEnd)
-}
-
-fn end_of_line(tokens: &Tokens<'_>, at: usize) -> usize {
-    (at..tokens.len()).find(|place| line_ends(tokens, *place)).unwrap_or(tokens.len())
-}
-
-/// The place behind `IF … THEN`, `WHILE … DO` and `FOR … DO`, or behind the condition of an `IF` with one instruction.
-fn behind_condition(tokens: &Tokens<'_>, start: usize) -> usize {
-    let mut depth = 0_usize;
-    for at in start + 1..tokens.len() {
-        let Some(token) = tokens.get(at) else { break };
-        match token.kind {
-            Kind::Symbol(b'(' | b'[') => depth += 1,
-            Kind::Symbol(b')' | b']') => depth = depth.saturating_sub(1),
-            Kind::Symbol(b';') => return at + 1,
-            Kind::Word if tokens.is_word(at, "THEN") || tokens.is_word(at, "DO") => return at + 1,
-            Kind::Word if depth == 0 => {
-                let word = tokens.str(at).to_ascii_lowercase();
-                let is_behind_operand = tokens
-                    .get(at - 1)
-                    .is_some_and(|before| matches!(before.kind, Kind::Word | Kind::Number | Kind::Symbol(b')' | b'}')));
-                let is_argument = tokens.is(at + 1, b':') || tokens.is(at + 1, b'(');
-                if at > start + 1
-                    && is_behind_operand
-                    && !is_argument
-                    && (Instruction::named(&word).is_some() || displaces(&word))
-                {
-                    return at;
-                }
-            }
-            _ => {}
-        }
-    }
-    tokens.len()
 }

@@ -15,6 +15,7 @@ use super::super::insert::Spot;
 use super::super::lexer::{Kind, Number, Rules, Tokens, Value};
 use super::super::motion::{Form, JointUnit, Reason, Scan, Setting, Slot};
 use super::super::orientation::Orientation;
+use super::polyscope;
 use crate::units::DEGREE;
 
 const RULES: Rules = Rules { comment: b"#", quotes: b"\"'", in_words: b"" };
@@ -23,8 +24,12 @@ const RULES: Rules = Rules { comment: b"#", quotes: b"\"'", in_words: b"" };
 const TCP: &str = "tcp";
 
 pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
-    let files: Vec<Tokens<'_>> = source.files().map(|(_, text)| Tokens::new(text, RULES)).collect();
     let mut findings = Findings::default();
+    polyscope::read(source, &mut findings);
+    // A program tree has no script; its file has no tokens, so that the others keep their numbers.
+    let script_of = |text: &'_ [u8]| if polyscope::is_polyscope(text) { 0..0 } else { 0..text.len() };
+    let files: Vec<Tokens<'_>> =
+        source.files().map(|(_, text)| Tokens::part(text, script_of(text), 1, RULES)).collect();
     let mut script = Script {
         joints: source.robot.chain.dof(),
         constants: BTreeMap::new(),
@@ -502,7 +507,11 @@ impl Reader<'_, '_> {
     fn bare(&self, range: Range<usize>) -> Range<usize> {
         let tokens = self.tokens;
         let mut range = tokens.trimmed(range);
-        while range.len() > 2 && tokens.is(range.start, b'(') && tokens.behind(range.start, range.end) == range.end {
+        for _ in 0..DEEPEST {
+            let is_open = range.len() > 2 && tokens.is(range.start, b'(') && tokens.is(range.end - 1, b')');
+            if !is_open || tokens.behind(range.start, range.end) != range.end {
+                break;
+            }
             range = tokens.trimmed(range.start + 1..range.end - 1);
         }
         range

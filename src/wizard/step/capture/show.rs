@@ -180,8 +180,31 @@ fn prediction(step: &CaptureStep, cx: &Cx<'_>) -> Option<PredictionView> {
 /// Minutes for the remaining rows at the pace so far, the median time from sample to sample.
 fn minutes_left(session: &Session, open: usize) -> Option<f64> {
     let times: Vec<f64> = session.samples.iter().map(|sample| sample.time.as_millisecond() as f64 / 60_000.0).collect();
+    pace(&times).map(|minutes| minutes * open as f64)
+}
+
+/// Longest time from sample to sample that is no pause (min).
+const LONGEST_STEP: f64 = 5.0;
+
+/// The usual time from sample to sample, from their times in minutes.
+fn pace(times: &[f64]) -> Option<f64> {
     // A clock that was set back, or a lunch break, says nothing about the pace.
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0 && *step <= LONGEST_STEP).collect();
     steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).map(|step| step * open as f64)
+    steps.get(steps.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_do_not_count_for_the_pace() {
+        assert_eq!(pace(&[0.0, 1.0, 61.0]), Some(1.0));
+        assert_eq!(pace(&[0.0, 1.0, 61.0, 121.0, 122.0]), Some(1.0));
+        assert_eq!(pace(&[0.0, 60.0, 59.0]), None);
+        assert_eq!(pace(&[0.0, 4.0]), Some(4.0));
+        assert_eq!(pace(&[0.0]), None);
+    }
 }
