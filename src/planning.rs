@@ -25,6 +25,32 @@
 //!
 //! A bound from approximate design ([`DesignBound`]) says how much a better set could still gain.
 //!
+//! ```
+//! use trupose::kinematics::Place;
+//! use trupose::planning::{Information, Score, Search, SearchSettings};
+//! use trupose::profile::{Level, Profile, builtin};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "soochow")?;
+//! let (arm, parameters) = (profile.arm(), profile.parameters(Level::Geometric));
+//!
+//! // 200 candidates that spread over the joint ranges, the last 50 only to judge by.
+//! let value = |pose: usize, joint: usize| 3.0 * ((pose as f64 * (joint as f64 + 2.0).sqrt()).fract() - 0.5);
+//! let place = |pose| Place { configuration: (0..6).map(|joint| value(pose, joint)).collect(), target: 0 };
+//! let places: Vec<Place> = (1..=200).map(place).collect();
+//! let (candidates, fresh) = places.split_at(150);
+//! let information = Information::new(&arm, &parameters, candidates, fresh)?;
+//!
+//! let settings = SearchSettings { poses: 20, starts: 1, ..SearchSettings::default() };
+//! let chosen = Search::new(&information, settings)?.run(&|| true, &|_| {})?;
+//! let first: Vec<usize> = (0..20).collect();
+//! let (score, unchosen) = (Score::new(&information, &chosen.set)?, Score::new(&information, &first)?);
+//! assert!(score.condition_number < unchosen.condition_number);
+//! assert!(score.predicted_error < unchosen.predicted_error);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! Lengths in metres, angles in radians, configurations in pendant values. Nothing here reads a file or a clock or starts a
 //! thread; randomness comes only from a passed seed, time limits only as a callback. [`crate::search`] runs the
 //! starts of a search in parallel.
