@@ -1,5 +1,7 @@
 //! Instruments on a wire, through the program itself: rehearsals over every wire, `simulate` against `link test`, a flood.
 
+mod clients;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};

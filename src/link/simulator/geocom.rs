@@ -141,7 +141,7 @@ impl GeocomSimulator {
                 return self.send(now, ended(&encode_reply(transport, 0, 0, "", false)));
             }
         };
-        if matches!(request.rpc, 17017 | 2108) {
+        if matches!(request.rpc, 17017 | 2108 | 2082 | 2116) {
             return self.measure(&request, with_crc, source, now);
         }
         let (transport, code, parameters) = self.ordinary(&request);
@@ -194,7 +194,7 @@ impl GeocomSimulator {
             5039 => "90,0,1".to_owned(),
             2007 | 9030 => "1".to_owned(),
             2014 => "1,1,1,1".to_owned(),
-            2082 | 2107 | 2116 => self.angles_or_coordinates(request.rpc),
+            2107 => self.angles(),
             0 | 2008 | 9037 | 18005 => String::new(),
             110 => "1,50,3".to_owned(),
             2020 => {
@@ -208,6 +208,8 @@ impl GeocomSimulator {
                 String::new()
             }
             2026 => "0".to_owned(),
+            // Carrier wavelength (m), pressure (mbar), dry and wet temperature (°C).
+            2029 => "6.58E-7,1013.25,12,12".to_owned(),
             5003 => "362541".to_owned(),
             5004 => "\"TS30 SIMULATED\"".to_owned(),
             _ => return (3080, 0, String::new()),
@@ -228,7 +230,7 @@ impl GeocomSimulator {
             self.last_polar = polar(shot);
             self.last_polar[2] *= 1.0 + self.scale() * 1e-6;
         }
-        let current = self.polar_text();
+        let current = if matches!(request.rpc, 2082 | 2116) { self.coordinates() } else { self.polar_text() };
         let mode = if request.rpc == 17017 && fault != Some(GeocomFault::EmptyAnswer) { ",2" } else { "" };
         let (transport, code, numbers) = match fault {
             Some(GeocomFault::TransportTimeout) => (3077, 0, String::new()),
@@ -278,12 +280,15 @@ impl GeocomSimulator {
         self.last_polar.map(|value| self.number_text(value)).join(",")
     }
 
-    /// Both angles, or the coordinates, of the latest measurement.
-    fn angles_or_coordinates(&self, rpc: u32) -> String {
+    /// Both angles of the latest measurement.
+    fn angles(&self) -> String {
+        let [horizontal, zenith, _] = self.last_polar;
+        [horizontal, zenith].map(|value| self.number_text(value)).join(",")
+    }
+
+    /// East, north and height of the latest measurement.
+    fn coordinates(&self) -> String {
         let [horizontal, zenith, distance] = self.last_polar;
-        if rpc == 2107 {
-            return [horizontal, zenith].map(|value| self.number_text(value)).join(",");
-        }
         let level = distance * zenith.sin();
         let coordinates = [level * horizontal.sin(), level * horizontal.cos(), distance * zenith.cos()];
         coordinates.map(|value| self.number_text(value)).join(",")

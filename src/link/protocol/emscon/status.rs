@@ -78,6 +78,8 @@ numbers! {
         13 GetStationOrientationParams "reading the station orientation",
         14 SetTransformationParams "setting the transformation",
         15 GetTransformationParams "reading the transformation",
+        20 SetEnvironmentParams "setting the weather",
+        21 GetEnvironmentParams "reading the weather",
         24 SetMeasurementMode "setting the measurement mode",
         25 GetMeasurementMode "reading the measurement mode",
         26 SetCoordinateSystemType "setting the coordinate type",
@@ -91,6 +93,8 @@ numbers! {
         48 GetSystemSettings "reading the system settings",
         49 StartMeasurement "measuring",
         52 StopMeasurement "stopping the measurement",
+        80 SetStatisticMode "setting the kind of statistics",
+        81 GetStatisticMode "reading the kind of statistics",
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::wire::PacketWriter;
-use crate::link::protocol::emscon::{CommandId, CoordinateType, LengthUnit, ResultStatus, i32_at};
+use crate::link::protocol::emscon::{CommandId, CoordinateType, LengthUnit, ResultStatus, f64_at, i32_at};
 
 /// A reflector in the tracker's list.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +38,10 @@ pub(super) struct Tracker {
     pub(super) orientation: [f64; 6],
     /// Translation (m), rotation, scale. The rotation is reported but not applied.
     pub(super) transformation: [f64; 7],
+    /// Temperature (°C), pressure (mbar) and humidity (%): nothing is computed from them.
+    weather: [f64; 3],
+    /// Kind of the statistics of stationary and of continuous measurements.
+    statistics: [i32; 2],
     pub(super) is_initialized: bool,
 }
 
@@ -52,6 +56,8 @@ impl Default for Tracker {
             settings: [1, 0, 0, 1, 0, 0, 1, 0, 1],
             orientation: [0.0; 6],
             transformation: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            weather: [20.0, 1013.25, 50.0],
+            statistics: [0, 0],
             is_initialized: true,
         }
     }
@@ -80,12 +86,16 @@ impl Tracker {
             CommandId::GetSystemSettings => ok().integers(&self.settings),
             CommandId::GetStationOrientationParams => ok().numbers(&self.orientation),
             CommandId::GetTransformationParams => ok().numbers(&self.reported_transformation()),
+            CommandId::GetEnvironmentParams => ok().numbers(&self.weather),
+            CommandId::GetStatisticMode => ok().integers(&self.statistics),
             CommandId::GetReflectors => return Some(self.list(command)),
             CommandId::SetUnits
             | CommandId::SetCoordinateSystemType
             | CommandId::SetMeasurementMode
             | CommandId::SetStationaryModeParams
             | CommandId::SetReflector
+            | CommandId::SetEnvironmentParams
+            | CommandId::SetStatisticMode
             | CommandId::SetSystemSettings => {
                 let status = self.set(command, request).unwrap_or(ResultStatus::InvalidInputData);
                 PacketWriter::reply(command, status)
@@ -103,6 +113,8 @@ impl Tracker {
             CommandId::SetMeasurementMode => self.mode = first,
             CommandId::SetStationaryModeParams => self.stationary = integers(request)?,
             CommandId::SetSystemSettings => self.settings = integers(request)?,
+            CommandId::SetStatisticMode => self.statistics = integers(request)?,
+            CommandId::SetEnvironmentParams => self.weather = numbers(request)?,
             CommandId::SetReflector if REFLECTORS.iter().any(|reflector| reflector.id == first) => {
                 self.reflector = first;
             }
@@ -174,4 +186,9 @@ fn integers<const N: usize>(request: &[u8]) -> Option<[i32; N]> {
         *value = i32_at(request, 12 + 4 * index)?;
     }
     Some(values)
+}
+
+fn numbers<const N: usize>(request: &[u8]) -> Option<[f64; N]> {
+    let content = request.get(12..12 + 8 * N)?;
+    Some(std::array::from_fn(|index| f64_at(content, 8 * index)))
 }
