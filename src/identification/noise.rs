@@ -14,7 +14,10 @@ use crate::kinematics::Place;
 use crate::units::MICROMETRE;
 
 /// An estimate from no data counts as much as this many values.
-const PRIOR_VALUES: f64 = 6.0;
+const PRIOR_VALUES: f64 = 3.0;
+/// The mean of a variance's posterior has this many values fewer in its denominator than there are. Error bars divided by it are
+/// right on average although the variance itself is estimated (Student's t), where its most likely value would make them too small.
+const OF_MEAN: f64 = 2.0;
 /// Expected scatter of an arm and an instrument about which nothing is stated (m).
 const EXPECTED: f64 = 20.0 * MICROMETRE;
 /// No arm repeats better than this (m), however good the instrument is.
@@ -208,7 +211,7 @@ impl Scatter {
         let total: f64 = residuals.iter().map(|residual| residual.variance).sum();
         let reading = means.mean_reading.max(total / residuals.len().max(1) as f64);
         let is_stated = noise.stated > 0.0 || problem.observations.points.iter().any(|sample| sample.sigma.is_some());
-        let expected = if is_stated { reading.max(REPEATABILITY.powi(2)) } else { EXPECTED.powi(2) };
+        let expected = if is_stated { reading + REPEATABILITY.powi(2) } else { EXPECTED.powi(2) };
         Self { residuals, values, reading, expected }
     }
 
@@ -236,7 +239,7 @@ impl Scatter {
     /// a few values of the expected size beside them so that it cannot collapse: more than promised is the variance of poses (m²),
     /// and if there is less, only a part of the promised one is confirmed.
     pub(crate) fn noise(&self, at: &Noise, determined: f64, estimation: Estimation) -> Noise {
-        let target = (self.values - determined).max(0.0) + PRIOR_VALUES;
+        let target = (self.values - determined).max(0.0) + PRIOR_VALUES - OF_MEAN;
         let sum = |pose: f64| self.chi_square(pose, estimation) + self.prior(pose);
         let as_promised = sum(NEGLIGIBLE);
         if as_promised <= target {
@@ -353,7 +356,7 @@ pub(crate) fn shot_variance(problem: &Problem<'_>, groups: &Groups, stated: f64,
     let expected = own.max(REPEATABILITY.powi(2));
     let excess = |shot: f64| {
         let chi: f64 = squares.iter().map(|(square, own)| square / (own + shot)).sum();
-        chi + PRIOR_VALUES * expected / (own + shot) - values - PRIOR_VALUES
+        chi + PRIOR_VALUES * expected / (own + shot) - (values + PRIOR_VALUES - OF_MEAN)
     };
     if excess(NEGLIGIBLE) <= 0.0 {
         return 0.0;
