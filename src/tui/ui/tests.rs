@@ -5,7 +5,6 @@ use proptest::prelude::*;
 use super::*;
 use crate::runtime::{Clock, Engine, Options};
 use crate::tui::glyphs::Glyphs;
-use crate::tui::paint;
 use crate::wizard::view::{BusyView, ProfileCard};
 use crate::wizard::{Notice, Wizard};
 

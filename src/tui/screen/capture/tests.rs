@@ -8,7 +8,7 @@ use crate::tui::dialog::DialogOutcome;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
     DriftView, FindingView, JointShown, LivePoint, LiveView, MeasuredRow, MoveCheck, PairView, PredictionView,
-    RowState, RowView, SampleView,
+    SampleView,
 };
 use crate::wizard::{IntentInfo, Notice};
 
