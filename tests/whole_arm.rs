@@ -205,10 +205,8 @@ fn rows_that_do_not_move_one_joint_at_a_time_are_refused() {
 /// The rows of a case as a table.
 fn table(case: &Case) -> String {
     let types: Vec<JointType> = case.template.chain.joints().iter().map(|joint| joint.joint_type).collect();
-    let mut text = String::new();
-    for (index, kind) in types.iter().enumerate() {
-        text += &format!("q{}_{},", index + 1, if *kind == JointType::Revolute { "deg" } else { "mm" });
-    }
+    let title = |(index, kind): (usize, &JointType)| format!("q{}_{},", index + 1, kind.quantity().unit());
+    let mut text: String = types.iter().enumerate().map(title).collect();
     text += "x_mm,y_mm,z_mm\n";
     for (row, point) in case.rows.iter().zip(&case.measured) {
         let joints = row.iter().zip(&types).map(|(value, kind)| kind.quantity().to_edge(*value));

@@ -293,7 +293,7 @@ pub fn boxes_from_text(text: &str) -> Result<Vec<BoxText>, String> {
         let words: Vec<&str> = part.split([' ', ',']).filter(|word| !word.is_empty()).collect();
         let (name, numbers) = words.split_first().ok_or_else(|| wrong(part))?;
         let numbers: Vec<f64> = numbers.iter().filter_map(|word| word.parse().ok()).collect();
-        let [x1, y1, z1, x2, y2, z2] = <[f64; CORNERS]>::try_from(numbers).map_err(|_| wrong(part))?;
+        let [x1, y1, z1, x2, y2, z2] = <[f64; CORNERS]>::try_from(numbers).ok().ok_or_else(|| wrong(part))?;
         Ok(BoxText {
             name: (*name).to_owned(),
             min_mm: (x1.min(x2), y1.min(y2), z1.min(z2)),

@@ -63,7 +63,7 @@ fn data_sheet<O: Write, E: Write>(
             Some(value) => value,
             None if dimension == Dimension::Side => 0.0,
             None => asked(&format!("{} (mm), {}", dimension.label(), dimension.about()), console, |answer| {
-                answer.replace(',', ".").parse().map_err(|_| format!("'{answer}' is not a number"))
+                answer.replace(',', ".").parse().ok().ok_or_else(|| format!("'{answer}' is not a number"))
             })?,
         };
     }

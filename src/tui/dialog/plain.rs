@@ -89,7 +89,7 @@ impl Dialog {
 fn planned(values: &[String]) -> Result<Intent, String> {
     let numbers: Vec<u64> = values
         .iter()
-        .map(|value| value.parse().map_err(|_| format!("'{value}' is not a whole number")))
+        .map(|value| value.parse().ok().ok_or_else(|| format!("'{value}' is not a whole number")))
         .collect::<Result<_, _>>()?;
     let [poses, verification, candidates, seed, drift_every] = numbers[..] else {
         return Err("five numbers are needed".to_owned());
