@@ -25,7 +25,7 @@ fn profile_begins_with_nothing_chosen() {
     let effects = bench.intend(Intent::ChooseProfile(text("soochow")));
     assert_eq!(texts(&effects), ["start reading the profile"]);
     bench.settle(effects);
-    assert_eq!(offers(&bench.wizard), ["Next*", "ChooseProfile", "NameSession", "Quit"]);
+    assert_eq!(offers(&bench.wizard), ["Next*", "ChooseProfile", "DescribeRobot", "NameSession", "Quit"]);
     let Content::Profile(view) = bench.wizard.view().content else { panic!() };
     assert_eq!(view.session, "soochow-20260301-0915");
     assert_eq!(view.chosen.map(|card| (card.name, card.joints.len())), Some((text("soochow"), 6)));
@@ -105,6 +105,7 @@ fn instrument_connects_as_soon_as_it_is_chosen() {
             "ChooseInstrument -- connecting is still running",
             "Retry -- connecting is still running",
             "Back -- connecting is still running",
+            "DescribeCell -- connecting is still running",
             "Quit"
         ]
     );
