@@ -1,14 +1,19 @@
-//! The pictures of the screens in `docs/technician.md`: the program in a real terminal of 80×24, resumed from the first entries of the
-//! journal in `sessions/example`, shows exactly what is printed there.
+//! The pictures of the documents. The screens in `docs/technician.md`: the program in a real terminal of 80×24, resumed from the first
+//! entries of the journal in `sessions/example`, shows exactly what is printed there. `docs/pictures/*.svg`: wider screens with their
+//! colours. `docs/pictures/report.png`: the first page of the example's report.
 //!
-//! To write them again: `TRUPOSE_WRITE_PICTURES=1 cargo test --test main pictures`.
+//! To write them again: `TRUPOSE_WRITE_PICTURES=1 cargo test --test main pictures`; the page needs Chromium on the path.
+
+mod svg;
 
 use std::fs;
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use crate::support::pty::{PATIENCE, Shown, Terminal};
 use crate::support::root;
+use trupose::session::sha256;
 
 const SIZE: (u16, u16) = (80, 24);
 
@@ -53,28 +58,28 @@ fn drawn(shown: &Shown) -> String {
 }
 
 /// A folder with the session as it was after some entries, and the program there.
-fn show(picture: &Picture) -> (tempfile::TempDir, Terminal) {
+fn show(picture: &Picture, size: (u16, u16)) -> (tempfile::TempDir, Terminal) {
     let folder = tempfile::tempdir().unwrap();
     if picture.entries == 0 {
-        let terminal = Terminal::start(folder.path(), &["wizard", "--no-recording"], SIZE);
+        let terminal = Terminal::start(folder.path(), &["wizard", "--no-recording"], size);
         return (folder, terminal);
     }
     let journal = fs::read_to_string(root().join("sessions/example/journal.ron")).unwrap();
     let kept: String = journal.split_inclusive('\n').take(picture.entries).collect();
     fs::create_dir_all(folder.path().join("sessions/example")).unwrap();
     fs::write(folder.path().join("sessions/example/journal.ron"), kept).unwrap();
-    let terminal = Terminal::start(folder.path(), &["resume", "sessions/example", "--no-recording"], SIZE);
+    let terminal = Terminal::start(folder.path(), &["resume", "sessions/example", "--no-recording"], size);
     (folder, terminal)
 }
 
 #[test]
 fn the_screens_are_those_of_the_document() {
-    let is_written = std::env::var_os("TRUPOSE_WRITE_PICTURES").is_some();
+    let is_written = is_written();
     let mut text = fs::read_to_string(document()).unwrap();
     assert_eq!(text.matches("<!-- picture: ").count(), PICTURES.len());
     for picture in &PICTURES {
         let (begin, end) = place(&text, picture.name);
-        let (_folder, mut terminal) = show(picture);
+        let (_folder, mut terminal) = show(picture, SIZE);
         if !picture.keys.is_empty() {
             terminal.wait_for("the session", |shown| shown.step().is_some() && shown.has("saved"));
             terminal.send(picture.keys);
@@ -95,5 +100,79 @@ fn the_screens_are_those_of_the_document() {
     }
     if is_written {
         fs::write(document(), text).unwrap();
+    }
+}
+
+const WIDE: (u16, u16) = (120, 34);
+
+/// Screens of `docs/pictures`, with their size.
+const SCREENS: [Picture; 2] = [
+    Picture { name: "capture", entries: 32, keys: "", has: "step 5 of 8" },
+    Picture { name: "before-after", entries: 47, keys: "4", has: "AFTER: identified" },
+];
+
+fn is_written() -> bool {
+    std::env::var_os("TRUPOSE_WRITE_PICTURES").is_some()
+}
+
+#[test]
+fn the_wide_screens_are_those_of_the_program() {
+    for picture in &SCREENS {
+        let path = root().join(format!("docs/pictures/{}.svg", picture.name));
+        let (_folder, mut terminal) = show(picture, WIDE);
+        if !picture.keys.is_empty() {
+            terminal.wait_for("the session", |shown| shown.step().is_some() && shown.has("saved"));
+            terminal.send(picture.keys);
+        }
+        terminal.wait_for_text(picture.has);
+        let drawn = |shown: &Shown| svg::of_screen(shown.screen(), WIDE);
+        if is_written() {
+            while terminal.comes(Duration::from_secs(1), {
+                let seen = terminal.written();
+                move |shown| shown.raw.len() > seen
+            }) {}
+            fs::write(&path, terminal.look(drawn)).unwrap();
+        }
+        let expected = fs::read_to_string(&path).unwrap();
+        assert!(expected.matches("<text").count() > 20 && expected.matches('M').count() > 200, "{} is blank", picture.name);
+        let is_same = terminal.comes(PATIENCE, |shown| drawn(shown) == expected);
+        assert!(is_same, "docs/pictures/{}.svg is stale; the screen:\n{}", picture.name, terminal.look(Shown::text));
+    }
+}
+
+/// Least size of a picture of a page (bytes): one that is blank has a tenth of it.
+const NOT_BLANK: u64 = 60_000;
+
+/// The page is made from the committed report, whose SHA-256 is beside the picture.
+#[test]
+fn the_picture_of_the_report_is_of_the_example() {
+    let (page, picture) = (root().join("sessions/example/report.html"), root().join("docs/pictures/report.png"));
+    let sum = sha256(&fs::read(&page).unwrap());
+    let beside = root().join("docs/pictures/report.sha256");
+    if is_written() {
+        let status = Command::new("chromium")
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--force-device-scale-factor=1.5"])
+            .args(["--window-size=860,1216".to_owned(), format!("--screenshot={}", picture.display())])
+            .arg(format!("file://{}", page.display()))
+            .stderr(Stdio::null())
+            .status()
+            .expect("Chromium is on the path");
+        assert!(status.success());
+        fs::write(&beside, format!("{sum}\n")).unwrap();
+    }
+    assert_eq!(fs::read_to_string(&beside).unwrap().trim(), sum, "docs/pictures/report.png is stale");
+    let bytes = fs::read(&picture).unwrap();
+    assert!(bytes.starts_with(b"\x89PNG") && bytes.len() as u64 > NOT_BLANK, "{} bytes: it is blank", bytes.len());
+}
+
+#[test]
+fn the_readme_shows_pictures_that_exist_and_are_small() {
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    assert!(readme.lines().count() <= 100, "{} lines", readme.lines().count());
+    let shown: Vec<&str> = readme.split("](docs/pictures/").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    assert!(shown.len() >= 2, "{shown:?}");
+    for name in shown {
+        let size = fs::metadata(root().join("docs/pictures").join(name)).unwrap().len();
+        assert!(size < 2_000_000, "{name}: {size} bytes");
     }
 }

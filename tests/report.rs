@@ -268,9 +268,17 @@ fn the_page_shows_the_numbers_of_the_journal() {
         }
         assert!(cells[6].starts_with("only combined") != parameter.identifiable, "{}: {cells:?}", parameter.id);
     }
-    for check in &summary.verdict.checks {
-        let value = format!(" | {:.4} | {:.4} | ", check.value_mm.unwrap(), check.limit_mm);
-        assert!(shown.contains(&value), "{value}");
+    let (json, _) = report(&session);
+    let decision = &json["report"]["decision"];
+    assert_eq!(decision["limits"].as_array().unwrap().len(), summary.verdict.checks.len());
+    for (check, limit) in summary.verdict.checks.iter().zip(decision["limits"].as_array().unwrap()) {
+        assert!((limit["value_mm"].as_f64().unwrap() - check.value_mm.unwrap()).abs() < 1e-12);
+        // As many digits as the uncertainty has, which is below the limit by far.
+        let found = limit["uncertainty_mm"].as_f64().map_or_else(
+            || format!(" | {:.4} | – | {:.3} | ", check.value_mm.unwrap(), check.limit_mm),
+            |_| format!(" | {:.3} | ✓ pass", check.limit_mm),
+        );
+        assert!(shown.contains(&found), "{found} in\n{shown}");
     }
 }
 
@@ -329,15 +337,83 @@ fn of_many_samples_the_worst_are_listed_and_some_are_drawn() {
     let tested = json["report"]["points"].as_array().unwrap().iter().filter(|point| point["verification"] == true);
     let count = tested.count();
     let shown = text(&page);
-    assert!(shown.contains(&format!("The 500 worst of {count}; all are in report.json")), "{count}");
+    assert!(shown.contains(&format!("The 20 worst of {count} verification poses; all are in report.json")), "{count}");
     assert!(shown.contains(&format!("of {count} samples one in ")) && shown.contains("the 100 worst"));
-    assert!(shown.contains(&format!("{count} verification poses; largest")), "all are counted");
+    assert!(shown.contains(&format!("{count} poses: measured less predicted")), "all are counted");
     assert!(shown.contains("Rejected by the identification: 700 of"));
     assert!(shown.contains("the 500 that are farthest off are listed") && shown.contains("987.654"));
-    assert_eq!(shown.matches("a remark of a row").count(), 499);
-    assert!(shown.contains("what blocks") && shown.contains("And 201 more; all are in report.json."));
+    assert_eq!(shown.matches("a remark of a row").count(), 500);
+    assert!(shown.contains("what blocks") && shown.contains("And 200 more; all are in report.json."));
     assert!(page.len() < 1_500_000, "{} bytes, of a small one {}", page.len(), small_page.len());
     assert!(!small_page.contains("all are in report.json") && !small_page.contains("one in"));
+}
+
+#[test]
+fn the_first_page_says_whose_verdict_it_is_and_by_which_rule() {
+    let mut session = calibrated();
+    let (json, html) = report(&session);
+    let number = json["report"]["number"].as_str().unwrap().to_owned();
+    assert!(number.len() == 10 && number.chars().all(|c| c.is_ascii_hexdigit()), "{number}");
+    // In the head of every printed page and in the title.
+    assert!(html.contains(&format!("document {number}")) && html.contains("@top-left"));
+    let first = &html[html.find("<div class=\"first\">").unwrap()..html.find("<h2>").unwrap()];
+    let shown = text(&format!("<body>{first}"));
+    for words in [
+        "NOT ACCEPTED",
+        "Position error: ",
+        "For the arm with serial number R-17",
+        "Before: nominal arm",
+        "After: identified arm",
+        "ISO 14253-1, JCGM 106",
+        "Undecided:",
+        "Measured by: name, date, signature",
+    ] {
+        assert!(shown.contains(words), "no '{words}' in\n{shown}");
+    }
+    session.about.serial.clear();
+    let (other, html) = report(&session);
+    assert!(text(&html).contains("No serial number was given: this verdict belongs to no arm."));
+    assert_ne!(other["report"]["number"], json["report"]["number"]);
+    // The same content has the same number.
+    assert_eq!(report(&session).0["report"]["number"], other["report"]["number"]);
+}
+
+#[test]
+fn papers_of_the_instrument_and_its_remarks_are_shown() {
+    let mut session = calibrated();
+    session.about.controller = "IRC5 7.1".to_owned();
+    session.about.field_check = "two-face: 12 µm".to_owned();
+    session.about.certificate_due = "2020-01-31".parse().ok();
+    for sample in &mut session.samples {
+        sample.noted.remarks = vec!["weather station is off".to_owned()];
+    }
+    let (json, html) = report(&session);
+    let shown = text(&html);
+    for words in ["IRC5 7.1", "two-face: 12 µm", "The certificate of the instrument expired on 2020-01-31", "weather station is off"] {
+        assert!(shown.contains(words), "no '{words}' in\n{shown}");
+    }
+    let counted = session.counted().count();
+    assert_eq!(json["report"]["remarks"][0]["samples"], counted);
+    assert_eq!(json["report"]["certificate_expired"], "2020-01-31");
+    session.about.certificate_due = "2026-01-05".parse().ok();
+    assert!(report(&session).0["report"].get("certificate_expired").is_none(), "it is valid on its last day");
+}
+
+#[test]
+fn both_arms_are_drawn_on_one_scale() {
+    let (_, html) = report(&calibrated());
+    let picture = |name: &str| {
+        let from = html.find(&format!("aria-label=\"{name}\"")).unwrap();
+        &html[from..from + html[from..].find("</svg>").unwrap()]
+    };
+    let (before, after) = (picture("Before: nominal arm"), picture("After: identified arm"));
+    // The errors of the nominal arm are arrows; those of the identified one are a thousandth of them, and dots on the same scale.
+    assert!(before.matches("<path class=\"a").count() == 4, "{before}");
+    assert_eq!(after.matches("<path class=\"a").count(), 0, "{after}");
+    assert_eq!(after.matches("<circle class=\"k0\"").count(), 4);
+    // The castings of the arm are the same.
+    let arm = |svg: &str| svg.lines().filter(|line| line.contains("class=\"cast\"")).map(str::to_owned).collect::<Vec<_>>();
+    assert!(!arm(before).is_empty() && arm(before) == arm(after));
 }
 
 #[test]
@@ -370,7 +446,7 @@ fn what_happened_is_told_with_how_it_was_decided() {
 fn the_page_of_a_small_session_stays_as_it_is() {
     let shown = text(&report(&calibrated()).1);
     // Sums of files stand and fall with the last digits of their numbers.
-    let is_sum = |word: &str| word.len() == 64 && word.chars().all(|c| c.is_ascii_hexdigit());
+    let is_sum = |word: &str| matches!(word.len(), 10 | 64) && word.chars().all(|c| c.is_ascii_hexdigit());
     let words = shown.split_inclusive([' ', '\n']).map(|word| match word.trim_end() {
         sum if is_sum(sum) => word.replace(sum, "<sha256>"),
         _ => word.to_owned(),
@@ -460,7 +536,17 @@ fn every_part_of_a_session_has_a_report() {
 
 #[test]
 fn a_result_that_does_not_hold_is_not_shown_as_accepted() {
-    let mut session = with_result(|result| result.summary.verdict.status = VerdictStatus::Accepted);
+    // Four poses are too few for an uncertainty: nothing is decided about a limit.
+    let undecided = with_result(|result| result.summary.verdict.status = VerdictStatus::Accepted);
+    let (json, html) = report(&undecided);
+    assert_eq!(json["report"]["decision"]["outcome"], "undecided");
+    assert!(html.contains("? UNDECIDED") && !html.contains("✓ ACCEPTED"));
+    let mut session = with_result(|result| {
+        result.summary.verdict.status = VerdictStatus::Accepted;
+        for check in &mut result.summary.verdict.checks {
+            check.interval_mm = check.value_mm.map(|value| [0.9 * value, 1.1 * value]);
+        }
+    });
     assert!(report(&session).1.contains("✓ ACCEPTED"));
     let last = session.samples.iter().rposition(|sample| session.kind_of(sample).is_measured()).unwrap();
     session.samples[last].state = trupose::session::state::SampleState::LeftOut;
@@ -481,8 +567,10 @@ fn little_or_nothing_to_show_is_said() {
         result.summary.verdict.checks.clear();
     });
     let shown = text(&report(&unverified).1);
-    assert!(shown.contains("nothing can be said about the accuracy") && shown.contains("states no acceptance limits"));
+    assert!(shown.contains("nothing can be said about the accuracy") && shown.contains("no acceptance limit was compared"));
     assert!(!shown.contains("Accuracy on poses"));
+    let unlimited = with_result(|result| result.summary.verdict.checks.clear());
+    assert!(text(&report(&unlimited).1).contains("states no acceptance limits"));
 
     let all_rejected = with_result(|result| {
         for point in &mut result.points {
@@ -654,6 +742,8 @@ fn the_command_makes_the_same_report_again() {
         for later in ["journal_entries", "worked_min"] {
             value["report"]["session"][later] = Value::Null;
         }
+        // The number is that of the content.
+        assert!(value["report"]["number"].take().is_string());
         // The check sum covers those as well.
         assert!(value["check"].take().is_string());
         value

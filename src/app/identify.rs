@@ -188,6 +188,7 @@ fn save(
     summary.written = names.map(|name| folder.join(name).display().to_string()).collect();
     let mut document = report::Document::of_tables(session, &files);
     document.result = Some(summary.clone());
+    let document = document.numbered();
     files.push((REPORT_JSON.to_owned(), checksum::with_sum(&to_json(&document)?, Syntax::Json)));
     files.push((REPORT_HTML.to_owned(), checksum::with_sum(&report::report_html(&document), Syntax::Html)));
     let files = files.iter().map(|(name, text)| (folder.join(name), text.as_bytes()));

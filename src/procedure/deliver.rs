@@ -54,6 +54,7 @@ pub fn reports(session: &Session, files: &[(String, String)]) -> Result<Vec<(Str
         let names = files.iter().map(|(name, _)| name.as_str()).chain([REPORT_JSON, REPORT_HTML]);
         result.written = names.map(str::to_owned).collect();
     }
+    let document = document.numbered();
     let json = serde_json::to_string_pretty(&document).map_err(|error| error.to_string())?;
     Ok(vec![
         (REPORT_JSON.to_owned(), checksum::with_sum(&(json + "\n"), Syntax::Json)),

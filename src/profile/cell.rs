@@ -24,7 +24,7 @@ impl Instrument {
 
     /// Both parts as manufacturers state them.
     pub fn sigma_text(&self) -> String {
-        format!("{:.1} um + {:.1} um/m", self.sigma / MICROMETRE, self.sigma_per_metre / MICROMETRE)
+        format!("{:.1} µm + {:.1} µm/m", self.sigma / MICROMETRE, self.sigma_per_metre / MICROMETRE)
     }
 }
 

@@ -5,12 +5,15 @@
 //! version. `docs/report-schema.md` describes them.
 
 mod build;
+mod decision;
 mod decisions;
 
+pub(super) use decision::{DecisionPart, LimitDecision, Outcome};
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
-use crate::session::about::About;
+use crate::session::about::{About, Day};
+use crate::session::sha256;
 use crate::session::journal::{FindingCause, PlanText};
 use crate::session::state::{Note, Refused};
 use crate::session::summary::IdentificationSummary;
@@ -60,6 +63,8 @@ pub enum PointOrigin {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Details {
     pub schema: u32,
+    /// Number of the document, see [`Document::numbered`]; empty before it has one.
+    pub number: String,
     /// Whether the result can be used.
     pub state: ResultState,
     pub points_from: PointOrigin,
@@ -75,6 +80,11 @@ pub struct Details {
     /// What the flange carried, in words; none if neither the session nor the profile states it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub payload: Option<String>,
+    /// The decision about the acceptance limits with the uncertainty of the figures; none before the first identification.
+    pub decision: Option<DecisionPart>,
+    /// The day by which the certificate of the instrument had expired when it was used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certificate_expired: Option<Day>,
     /// Temperature over the samples that count.
     pub temperature: Option<TemperaturePart>,
     /// Numbers of samples by kind.
@@ -85,6 +95,8 @@ pub struct Details {
     pub points: Vec<PointPart>,
     /// Links of the nominal arm at the pose that the views show, base to SMR, in the base (mm).
     pub arm_mm: Vec<[f64; 3]>,
+    /// The castings of the arm at that pose, as the profile describes them.
+    pub bodies: Vec<BodyPart>,
     /// The plan without its rows; none before one was accepted.
     #[serde(serialize_with = "plan")]
     pub plan: Option<PlanText>,
@@ -101,8 +113,25 @@ pub struct Details {
     /// Corrections in words, oldest first.
     pub corrections: Vec<String>,
     pub notes: Vec<Note>,
+    /// Remarks that instrument and robot made about samples that count, each once.
+    pub remarks: Vec<RemarkPart>,
     /// Files beside the report.
     pub files: Vec<FilePart>,
+}
+
+/// Hex digits of a document's number.
+const NUMBER: usize = 10;
+
+impl Document {
+    /// The document with its number: the first digits of the SHA-256 of its content with an empty number.
+    #[must_use]
+    pub fn numbered(mut self) -> Self {
+        self.report.number.clear();
+        // A document that cannot be written gets no number, and is refused when it is written.
+        let sum = serde_json::to_string(&self).map(|text| sha256(text.as_bytes())).unwrap_or_default();
+        self.report.number = sum.chars().take(NUMBER).collect();
+        self
+    }
 }
 
 /// Writes a plan without its rows, but with its search even if that is empty.
@@ -161,6 +190,24 @@ pub struct TemperaturePart {
     pub lowest_degc: f64,
     pub highest_degc: f64,
     /// Number of samples with a temperature.
+    pub samples: usize,
+}
+
+/// A part of the arm: all points within a distance of a line, in the base.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BodyPart {
+    pub from_mm: [f64; 3],
+    pub to_mm: [f64; 3],
+    pub radius_mm: f64,
+}
+
+/// A remark of the instrument or the robot.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct RemarkPart {
+    pub text: String,
+    /// Number of the first measurement that has it.
+    pub first: u64,
+    /// Number of measurements that have it.
     pub samples: usize,
 }
 

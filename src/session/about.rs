@@ -38,7 +38,7 @@ pub struct About {
     #[serde(skip_serializing_if = "String::is_empty")]
     pub certificate: String,
     /// Last day on which the certificate is valid.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", with = "day_or_nothing")]
     pub certificate_due: Option<Day>,
     /// Check of the instrument on the day: what was measured, and the result.
     #[serde(skip_serializing_if = "String::is_empty")]
@@ -214,6 +214,26 @@ impl FromStr for Day {
 
 written_as_text!(Day);
 
+/// A day as the text that people write, without the `Some` of the file format; an empty text is none.
+mod day_or_nothing {
+    use std::borrow::Cow;
+
+    use serde::de::{Deserialize as _, Deserializer, Error as _};
+    use serde::{Serialize as _, Serializer};
+
+    use super::Day;
+
+    #[expect(clippy::ref_option, reason = "the signature that serde asks for")]
+    pub(super) fn serialize<S: Serializer>(day: &Option<Day>, serializer: S) -> Result<S::Ok, S::Error> {
+        day.map_or_else(String::new, |day| day.to_string()).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Day>, D::Error> {
+        let text = Cow::<str>::deserialize(deserializer)?;
+        if text.trim().is_empty() { Ok(None) } else { text.parse().map(Some).map_err(D::Error::custom) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -240,6 +260,9 @@ mod tests {
         let about: About = ron::from_str(text).unwrap();
         assert_eq!((about.serial.as_str(), about.certificate_due), ("R-17", None));
         assert_eq!(ron::to_string(&about).unwrap(), text);
+        let with_day: About = ron::from_str(r#"(certificate_due: "2027-03-31")"#).unwrap();
+        assert_eq!(with_day.certificate_due.unwrap().to_string(), "2027-03-31");
+        assert_eq!(ron::from_str::<About>(r#"(certificate_due: "")"#), Ok(About::default()));
     }
 
     #[test]

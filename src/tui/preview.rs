@@ -18,7 +18,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::Widget;
 
 pub use camera::{Camera, Framing, Projection};
-pub use scene::{ArmStyle, Beam, Body, DrawnArm, ErrorVector, Mark, MarkKind, Scene, VerifiedPoint};
+pub use scene::{ArmStyle, Beam, Body, DrawnArm, ErrorVector, ErrorsOf, Mark, MarkKind, Scene, VerifiedPoint};
 
 use super::keymap::Key;
 use super::paint;
@@ -143,8 +143,9 @@ const fn role(material: Material) -> Role {
         Material::Empty | Material::Nominal => Role::Plain,
         Material::Floor | Material::KeepOut | Material::Open => Role::Dim,
         Material::Tracker => Role::Title,
-        Material::Identified => Role::Hint,
-        Material::Beam | Material::Error => Role::Warn,
+        Material::Identified | Material::IdentifiedError => Role::Identified,
+        Material::NominalError => Role::Nominal,
+        Material::Beam => Role::Warn,
         Material::Done => Role::Ok,
     }
 }

@@ -27,6 +27,10 @@ pub enum Role {
     Focus,
     /// Heading.
     Title,
+    /// The nominal arm and its errors.
+    Nominal,
+    /// The identified arm and its errors.
+    Identified,
 }
 
 /// Styles and glyphs. Decided once, from command line and environment.
@@ -49,10 +53,14 @@ impl Theme {
             Role::Dim => (None, Modifier::DIM),
             Role::Focus => (None, Modifier::REVERSED),
             Role::Title => (None, Modifier::BOLD),
+            // The yellow of most palettes is the nearest to orange.
+            Role::Nominal => (Some(Color::Yellow), Modifier::empty()),
+            Role::Identified => (Some(Color::LightBlue), Modifier::empty()),
         };
         let modifier = match role {
             // Without colour the underline marks a hint.
             Role::Hint if !self.has_colour => Modifier::UNDERLINED,
+            Role::Nominal if !self.has_colour => Modifier::DIM,
             _ => modifier,
         };
         match colour {
@@ -66,8 +74,18 @@ impl Theme {
 mod tests {
     use super::*;
 
-    const ROLES: [Role; 8] =
-        [Role::Plain, Role::Ok, Role::Warn, Role::Alarm, Role::Hint, Role::Dim, Role::Focus, Role::Title];
+    const ROLES: [Role; 10] = [
+        Role::Plain,
+        Role::Ok,
+        Role::Warn,
+        Role::Alarm,
+        Role::Hint,
+        Role::Dim,
+        Role::Focus,
+        Role::Title,
+        Role::Nominal,
+        Role::Identified,
+    ];
 
     #[test]
     fn without_colour_no_style_has_one() {

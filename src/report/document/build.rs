@@ -6,11 +6,13 @@ use nalgebra::Point3;
 
 use super::decisions::{corrections, findings, not_counted};
 use super::{
-    Counts, Details, Document, DriftPart, FilePart, Found, ParameterNote, PointOrigin, PointPart, PredictionPart,
-    ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
+    BodyPart, Counts, DecisionPart, Details, Document, DriftPart, FilePart, Found, ParameterNote, PointOrigin, PointPart, PredictionPart,
+    ResultState, RemarkPart, RobotPart, SCHEMA, SessionPart, TemperaturePart,
 };
 use crate::kinematics::ForwardKinematics;
 use crate::report::text::found;
+use crate::profile::Capsule;
+use crate::session::about::Day;
 use crate::session::journal::{instrument_text, target_text};
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, PayloadText, TargetChoice};
@@ -32,9 +34,13 @@ impl Document {
     pub fn new(session: &Session, files: &[(String, String)]) -> Self {
         let result = session.identified.as_deref().map(|result| result.summary.clone());
         let parameters = result.as_ref().map_or(&[][..], |result| &result.parameters);
+        let drawn = drawn_arm(session);
         let report = Details {
             schema: SCHEMA,
+            number: String::new(),
             state: state(session),
+            decision: result.as_ref().map(|result| DecisionPart::new(result, state(session))),
+            certificate_expired: certificate_expired(session),
             points_from: match &session.instrument {
                 None if says_simulated(result.as_ref()) => PointOrigin::Simulated,
                 None => PointOrigin::Tables,
@@ -57,7 +63,8 @@ impl Document {
             counts: counts(session),
             parameter_notes: parameters.iter().map(|parameter| note(parameter, session)).collect(),
             points: points(session),
-            arm_mm: arm(session),
+            arm_mm: drawn.line,
+            bodies: drawn.bodies,
             plan: session.plan.clone(),
             prediction: prediction(session),
             drift: drift(session),
@@ -66,6 +73,7 @@ impl Document {
             findings: findings(session),
             corrections: corrections(session),
             notes: session.notes.clone(),
+            remarks: remarks(session),
             files: files
                 .iter()
                 .map(|(name, text)| FilePart { name: name.clone(), sha256: sha256(text.as_bytes()) })
@@ -203,9 +211,37 @@ fn points(session: &Session) -> Vec<PointPart> {
     result.samples.iter().zip(&result.points).filter_map(part).collect()
 }
 
+/// The day on which the certificate of the instrument expired, if it was measured with later.
+fn certificate_expired(session: &Session) -> Option<Day> {
+    let due = session.about.certificate_due?;
+    let last = session.counted().map(|sample| sample.time).max()?;
+    (Day::of(last) > due).then_some(due)
+}
+
+/// Remarks of samples that count, in the order in which they were first made.
+fn remarks(session: &Session) -> Vec<RemarkPart> {
+    let mut remarks: Vec<RemarkPart> = Vec::new();
+    for sample in session.counted() {
+        for text in &sample.noted.remarks {
+            match remarks.iter_mut().find(|remark| remark.text == *text) {
+                Some(remark) => remark.samples += 1,
+                None => remarks.push(RemarkPart { text: text.clone(), first: sample.noted.number, samples: 1 }),
+            }
+        }
+    }
+    remarks
+}
+
+/// An arm as it is drawn, in mm.
+#[derive(Default)]
+struct DrawnArm {
+    line: Vec<[f64; 3]>,
+    bodies: Vec<BodyPart>,
+}
+
 /// The nominal arm at the first sample that counts, or in the middle of its ranges.
-fn arm(session: &Session) -> Vec<[f64; 3]> {
-    let Some(profile) = session.mounted_profile() else { return Vec::new() };
+fn drawn_arm(session: &Session) -> DrawnArm {
+    let Some(profile) = session.mounted_profile() else { return DrawnArm::default() };
     let middle = || {
         let ranges = profile.joints().iter();
         let middle = |(low, high)| f64::midpoint(low, high);
@@ -214,12 +250,19 @@ fn arm(session: &Session) -> Vec<[f64; 3]> {
     let first = session.counted_of(PoseKind::Identification).next();
     let q = first.map_or_else(middle, |sample| session.configuration_of(sample));
     let forward = ForwardKinematics::new(profile.chain());
+    let links = forward.base_from_links(&q);
     let mut line = vec![Point3::origin()];
-    line.extend(forward.base_from_links(&q).iter().map(|frame| Point3::from(frame.translation.vector)));
+    line.extend(links.iter().map(|frame| Point3::from(frame.translation.vector)));
     line.extend(profile.targets().first().map(|target| forward.point_in_base(&q, &target.position_in_flange)));
-    let mut line: Vec<[f64; 3]> = line.iter().map(|point| [to_mm(point.x), to_mm(point.y), to_mm(point.z)]).collect();
+    let mm = |point: &Point3<f64>| [to_mm(point.x), to_mm(point.y), to_mm(point.z)];
+    let mut line: Vec<[f64; 3]> = line.iter().map(mm).collect();
     line.dedup_by(|one, other| one.iter().zip(other.iter()).all(|(a, b)| (a - b).abs() < SAME_POINT));
-    line
+    let body = |body: &Capsule| {
+        let frame = links.get(body.link)?;
+        let [from_mm, to_mm] = [body.from, body.to].map(|end| mm(&(frame * end)));
+        Some(BodyPart { from_mm, to_mm, radius_mm: crate::units::to_mm(body.radius) })
+    };
+    DrawnArm { bodies: profile.bodies().iter().filter_map(body).collect(), line }
 }
 
 fn prediction(session: &Session) -> Vec<PredictionPart> {

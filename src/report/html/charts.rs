@@ -9,12 +9,18 @@ use crate::report::document::{Details, DriftPart, PointPart, PredictionPart, Rob
 use crate::text::counted;
 
 /// Bars of a histogram.
-const BINS: usize = 12;
+const BINS: usize = 48;
+/// Room above the bars for the name of a limit, as a part of the highest bar.
+const ROOM: f64 = 0.22;
+/// Size of a drawing over both columns.
+const WIDE: (f64, f64) = (2.0 * WIDTH, 112.0);
 /// Size of a drawing in one of three columns.
 const SMALL: (f64, f64) = (236.0, 150.0);
 
 /// Most points of a drawing and rows of a table; with more a page could not be opened.
 pub(super) const MOST: usize = 500;
+/// Most poses that are listed one by one.
+pub(super) const LISTED: usize = 20;
 /// Number of worst points in a thinned drawing.
 const WORST: usize = 100;
 
@@ -73,33 +79,49 @@ pub(super) fn per_pose(points: &[&PointPart], title: &str, caption: &str) -> Str
     plot.figure(title, &format!("{caption}{}", thinned(points.len())))
 }
 
-/// Histogram of the errors of one model.
-pub(super) fn histogram(errors: &[f64], is_identified: bool) -> String {
-    let finite: Vec<f64> = errors.iter().copied().filter(|error| error.is_finite()).collect();
-    let largest = finite.iter().copied().fold(0.0, f64::max);
-    let width = if largest > 0.0 { largest / BINS as f64 } else { 1.0 };
-    let mut bins = [0_u32; BINS];
-    for error in &finite {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a small whole number, not negative"
-        )]
-        let index = ((error / width) as usize).min(BINS - 1);
-        if let Some(bin) = bins.get_mut(index) {
-            *bin += 1;
+/// How often errors of either model are how large, in one frame with the limits: name and mm.
+pub(super) fn spread(points: &[&PointPart], limits: &[(String, f64)]) -> String {
+    let lengths = |pick: fn(&PointPart) -> [f64; 3]| -> Vec<f64> {
+        points.iter().map(|point| norm(pick(point))).filter(|error| error.is_finite() && *error > 0.0).collect()
+    };
+    let (before, after) = (lengths(|point| point.nominal_mm), lengths(|point| point.identified_mm));
+    let all = before.iter().chain(&after).copied();
+    let marked = limits.iter().map(|(_, limit)| *limit);
+    let x = Scale::log(all.clone().chain(marked));
+    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| (low.min(value), high.max(value)));
+    if low >= high {
+        return String::new();
+    }
+    let (low, width) = (low.ln(), (high / low).ln() / BINS as f64);
+    let counts = |lengths: &[f64]| {
+        let mut bins = [0_u32; BINS];
+        for error in lengths {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
+            let index = (((error.ln() - low) / width).max(0.0) as usize).min(BINS - 1);
+            if let Some(bin) = bins.get_mut(index) {
+                *bin += 1;
+            }
+        }
+        bins
+    };
+    let bins = [("nom", counts(&before)), ("idn", counts(&after))];
+    let most = bins.iter().flat_map(|(_, bins)| bins).map(|count| f64::from(*count)).fold(0.0, f64::max);
+    // Room for the names of the limits above the bars.
+    let y = Scale::from_zero(std::iter::once(most * (1.0 + ROOM * limits.len() as f64)));
+    let mut plot = Plot::new(WIDE, (x, "position error (mm), logarithmic"), (y, "poses"));
+    for (class, bins) in &bins {
+        for (index, count) in bins.iter().enumerate().filter(|(_, count)| **count > 0) {
+            let from = width.mul_add(index as f64, low);
+            plot.bar(class, (from.exp(), (from + width).exp()), f64::from(*count));
         }
     }
-    let x = Scale::linear(0.0, width * BINS as f64);
-    let y = Scale::from_zero(bins.iter().map(|count| f64::from(*count)));
-    let mut plot = Plot::new((WIDTH, 130.0), (x, "position error (mm)"), (y, "poses"));
-    for (index, count) in bins.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let from = width * index as f64;
-        plot.bar(if is_identified { "idn" } else { "nom" }, (from, from + width), f64::from(*count));
+    let mut rows = 0.0;
+    for (name, limit) in limits {
+        plot.limit(*limit, rows, &format!("limit of the {name}: {} mm", number(*limit, 3)));
+        rows += 1.0;
     }
-    let title = if is_identified { "Spread, identified arm" } else { "Spread, nominal arm" };
-    let poses = counted(finite.len(), "verification pose");
-    plot.figure(title, &format!("{poses}; largest {} mm", number(largest, 3)))
+    plot.legend(&[(Mark::Nominal, "before"), (Mark::Identified, "after")]);
+    format!("<div class=\"wide\">{}</div>\n", plot.figure("How large the errors are", &counted(points.len(), "pose")))
 }
 
 /// Errors of the identified arm against every joint.
@@ -133,7 +155,7 @@ pub(super) fn against_joints(robot: &RobotPart, points: &[PointPart]) -> String 
 pub(super) fn search(steps: &[Figures]) -> String {
     let drawn = |title: &str, label: &str, pick: fn(&Figures) -> f64| {
         let x = Scale::linear(0.0, steps.len().saturating_sub(1).max(1) as f64);
-        let y = Scale::around(steps.iter().map(pick));
+        let y = Scale::from_zero(steps.iter().map(pick));
         let mut plot = Plot::new((WIDTH, 160.0), (x, "sweep of the search"), (y, label));
         let values = || steps.iter().enumerate().map(|(index, step)| (index as f64, pick(step)));
         plot.curve("il", values());

@@ -2,6 +2,7 @@
 
 use super::markup::{NONE, add, escape, facts, number, paragraph, time};
 use crate::report::document::{Counts, Details, Document, PointOrigin, ResultState, TemperaturePart};
+use crate::session::about::Detail;
 use crate::text::counted;
 
 /// Banners at the top of the report.
@@ -43,38 +44,63 @@ pub(super) fn banners(document: &Document) -> String {
     html
 }
 
-/// Robot, instrument, people, time, conditions.
+/// Robot and instrument side by side, each with its papers.
 pub(super) fn section(document: &Document) -> String {
     let report = &document.report;
-    let given =
-        |text: &str| if text.is_empty() { "<span class=\"soft\">not given</span>".to_owned() } else { escape(text) };
-    let robot = report.robot.as_ref();
-    let instrument = match (&report.instrument, robot.and_then(|robot| robot.instrument.as_ref())) {
+    let said = |detail: Detail| match report.about.text(detail) {
+        text if text.is_empty() => "<span class=\"soft\">not given</span>".to_owned(),
+        text => escape(&text),
+    };
+    let row = |detail: Detail, name: &'static str| (name, said(detail));
+    let robot = [
+        ("Robot", report.robot.as_ref().map_or_else(|| NONE.to_owned(), |robot| escape(&robot.title))),
+        row(Detail::Serial, "Serial number"),
+        row(Detail::Controller, "Controller, software"),
+        row(Detail::Options, "Accuracy options"),
+        ("Payload", report.payload.as_deref().map_or_else(|| "not stated".to_owned(), escape)),
+        row(Detail::Speed, "Speed"),
+        row(Detail::WarmUp, "Warm-up"),
+        row(Detail::Site, "Place and conditions"),
+        row(Detail::Operator, "Operator"),
+    ];
+    let smr = match (&report.target, report.about.smr.is_empty()) {
+        (None, true) => "as the profile says".to_owned(),
+        (None, false) => said(Detail::Smr),
+        (Some(place), true) => escape(place),
+        (Some(place), false) => format!("{}; {}", said(Detail::Smr), escape(place)),
+    };
+    let instrument = [
+        ("Instrument", instrument(report)),
+        row(Detail::InstrumentSerial, "Serial number"),
+        row(Detail::Certificate, "Certificate"),
+        row(Detail::CertificateDue, "Valid until"),
+        row(Detail::FieldCheck, "Field check"),
+        ("Reflector (SMR)", smr),
+        row(Detail::Weather, "Weather"),
+        ("Temperature", temperature(report.temperature)),
+        ("Measured", measured(report)),
+    ];
+    let expired = report.certificate_expired.map_or_else(String::new, |due| {
+        format!(
+            "<div class=\"warn\"><b>The certificate of the instrument expired on {due}</b>, before the last measurement.</div>\n"
+        )
+    });
+    format!("<div class=\"two\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{expired}", facts(&robot), facts(&instrument))
+}
+
+fn instrument(report: &Details) -> String {
+    let of_profile = report.robot.as_ref().and_then(|robot| robot.instrument.as_ref());
+    match (&report.instrument, of_profile) {
         (Some(how), Some(name)) => format!("{} (as the profile says); {}", escape(name), escape(how)),
         (Some(how), None) => escape(how),
         (None, Some(name)) => format!("{} (as the profile says)", escape(name)),
         (None, None) => NONE.to_owned(),
-    };
-    let result = document.result.as_ref();
-    let rows = [
-        ("Robot", robot.map_or_else(|| NONE.to_owned(), |robot| escape(&robot.title))),
-        ("Serial number", given(&report.about.serial)),
-        ("Operator", given(&report.about.operator)),
-        ("Place and conditions", given(&report.about.site)),
-        ("Instrument", instrument),
-        ("Reflector (SMR)", report.target.as_deref().map_or_else(|| "as the profile says".to_owned(), escape)),
-        ("Payload", report.payload.as_deref().map_or_else(|| "not stated".to_owned(), escape)),
-        ("Measured", measured(report)),
-        ("Identified", result.map_or_else(|| "not yet".to_owned(), |result| time(&result.provenance.created))),
-        ("Temperature", temperature(report.temperature)),
-        ("Samples that count", samples(&report.counts)),
-        ("Session", escape(&report.session.name)),
-        (
-            "Program",
-            result.map_or_else(|| escape(&report.session.program), |result| escape(&result.provenance.program)),
-        ),
-    ];
-    format!("<h2>Robot and conditions</h2>\n{}", facts(&rows))
+    }
+}
+
+/// Lines to sign on.
+pub(super) const fn signatures() -> &'static str {
+    "<div class=\"sign\"><div>Measured by: name, date, signature</div><div>Released by: name, date, signature</div></div>\n"
 }
 
 fn measured(report: &Details) -> String {
@@ -113,7 +139,16 @@ fn samples(counts: &Counts) -> String {
 /// Where the numbers come from, with hashes to check it.
 pub(super) fn origins(document: &Document) -> String {
     let report = &document.report;
-    let mut rows = Vec::new();
+    let result = document.result.as_ref();
+    let mut rows = vec![
+        ("Identified".to_owned(), result.map_or_else(|| "not yet".to_owned(), |result| time(&result.provenance.created))),
+        ("Samples that count".to_owned(), samples(&report.counts)),
+        ("Session".to_owned(), escape(&report.session.name)),
+        (
+            "Program".to_owned(),
+            result.map_or_else(|| escape(&report.session.program), |result| escape(&result.provenance.program)),
+        ),
+    ];
     let hash = |text: &str| format!("<code class=\"hash\">{}</code>", escape(text));
     if let Some(robot) = &report.robot {
         rows.push(("Profile".to_owned(), format!("{}<br>{}", escape(&robot.profile), hash(&robot.profile_sha256))));
@@ -136,6 +171,5 @@ pub(super) fn origins(document: &Document) -> String {
     }
     let rows: Vec<(&str, String)> = rows.iter().map(|(name, value)| (name.as_str(), value.clone())).collect();
     let intro = "The codes are SHA-256 sums: <code>sha256sum FILE</code> shows the same for an unchanged file. All numbers of this report are in report.json as well, with all their digits.";
-    let signatures = "<div class=\"sign\"><div>Measured by: name, date, signature</div><div>Released by: name, date, signature</div></div>\n";
-    format!("<h2>Where the numbers come from</h2>\n{}{}{signatures}", paragraph(intro), facts(&rows))
+    format!("<h2>Where the numbers come from</h2>\n{}{}", paragraph(intro), facts(&rows))
 }

@@ -1,13 +1,13 @@
 //! The errors of the joints: what explains the error of the nominal arm, the models that were tried, and the curve of each joint.
 
 use super::markup::{Column, NONE, add, escape, number, optional, paragraph, table};
-use super::plot::{Plot, Scale, WIDTH};
+use super::plot::{Plot, Scale};
 use crate::report::document::Document;
 use crate::session::joint_errors::shares_sentence;
 use crate::session::summary::{JointErrorSummary, SelectionSummary};
 
-/// Height of the drawing of a curve.
-const HEIGHT: f64 = 150.0;
+/// Size of the drawing of a curve.
+const SIZE: (f64, f64) = (236.0, 130.0);
 
 /// The section; empty if only geometry was asked for.
 pub(super) fn section(document: &Document) -> String {
@@ -23,7 +23,7 @@ pub(super) fn section(document: &Document) -> String {
     html.push_str(&sizes(&result.joint_errors));
     let largest = result.joint_errors.iter().flat_map(ends).map(f64::abs).fold(1.0, f64::max);
     let drawn: String = result.joint_errors.iter().map(|joint| curve(joint, largest)).collect();
-    add(&mut html, &format!("<div class=\"grid\">\n{drawn}</div>\n"));
+    add(&mut html, &format!("<div class=\"grid three\">\n{drawn}</div>\n"));
     html
 }
 
@@ -104,7 +104,7 @@ fn curve(joint: &JointErrorSummary, largest: f64) -> String {
         return String::new();
     };
     let y = Scale::linear(-1.05 * largest, 1.05 * largest);
-    let mut plot = Plot::new((WIDTH, HEIGHT), (Scale::linear(*first, *last), "deg"), (y, "µrad"));
+    let mut plot = Plot::new(SIZE, (Scale::linear(*first, *last), "deg"), (y, "µrad"));
     plot.band("bnd", joint.curve.iter().map(|(value, error, sigma)| (*value, error - sigma, error + sigma)));
     plot.curve("ax", [(*first, 0.0), (*last, 0.0)].into_iter());
     let (from, to) = joint.measured_deg;

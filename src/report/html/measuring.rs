@@ -172,6 +172,17 @@ pub(super) fn samples(document: &Document) -> String {
             "The operator excluded nothing, no reading was refused, and the checks found nothing while measuring.",
         ));
     }
+    if !report.remarks.is_empty() {
+        let columns =
+            [("remark of the instrument or the robot", Column::Text), ("first at No.", Column::Number), ("samples", Column::Number)];
+        let rows: Vec<Vec<String>> = report
+            .remarks
+            .iter()
+            .take(MOST)
+            .map(|remark| vec![escape(&remark.text), remark.first.to_string(), remark.samples.to_string()])
+            .collect();
+        html.push_str(&table("", &columns, &rows, false));
+    }
     if !report.notes.is_empty() {
         let columns = [("time", Column::Word), ("pose", Column::Text), ("remark of the operator", Column::Text)];
         let rows: Vec<Vec<String>> = report

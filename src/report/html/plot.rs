@@ -122,7 +122,7 @@ pub(super) fn nice_above(value: f64) -> f64 {
 }
 
 /// Decimals that a round number needs.
-fn decimals_of(value: f64) -> usize {
+pub(super) fn decimals_of(value: f64) -> usize {
     (0..=6).find(|&decimals| value.abs() * 10.0_f64.powi(decimals) >= 1.0 - 1e-9).map_or(6, i32::unsigned_abs) as usize
 }
 
@@ -199,6 +199,19 @@ impl Plot {
                     "<rect class=\"{class}\" x=\"{:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"></rect>\n",
                     left + 0.5
                 ),
+            );
+        }
+    }
+
+    /// A limit of x with its name, the names below each other by `row`.
+    pub(super) fn limit(&mut self, x: f64, row: f64, name: &str) {
+        if let Some((at, _)) = self.at(x, 0.0) {
+            self.line("lim", &[(at, TOP), (at, self.height - BOTTOM)]);
+            let (beside, anchor) = if at > 0.4 * self.width { (at - 4.0, "end") } else { (at + 4.0, "start") };
+            let y = row.mul_add(11.0, TOP + 8.0);
+            add(
+                &mut self.body,
+                &format!("<text class=\"lbl\" x=\"{beside:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>\n", escape(name)),
             );
         }
     }

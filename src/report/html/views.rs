@@ -29,24 +29,17 @@ const VIEWS: [View; 2] = [
     View { name: "from above", axes: (0, 1), labels: ("x", "y") },
 ];
 
-/// Picks the error against one of the models.
-type Pick = fn(&PointPart) -> [f64; 3];
-
-/// Both models in both views.
+/// What the identification left, from two sides.
 pub(super) fn views(report: &Details) -> String {
-    let errors: [(&str, bool, Pick); 2] =
-        [("Nominal arm", false, |point| point.nominal_mm), ("Identified arm", true, |point| point.identified_mm)];
-    let drawn = errors.iter().flat_map(|(name, is_identified, error)| {
-        VIEWS.iter().map(move |view| draw(report, *view, name, *is_identified, *error))
-    });
-    drawn.collect()
+    VIEWS.iter().map(|view| draw(report, *view)).collect()
 }
 
-fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pick) -> String {
+fn draw(report: &Details, view: View) -> String {
+    let error = |point: &PointPart| point.identified_mm;
     let points: Vec<&PointPart> = report
         .points
         .iter()
-        .filter(|point| !point.rejected && point.at_mm.iter().chain(&error(point)).all(|value| value.is_finite()))
+        .filter(|point| !point.rejected && point.at_mm.iter().chain(&point.identified_mm).all(|value| value.is_finite()))
         .collect();
     let all = points.len();
     let points: Vec<&PointPart> = shown(&points).into_iter().map(|(_, point)| point).collect();
@@ -89,14 +82,14 @@ fn draw(report: &Details, view: View, name: &str, is_identified: bool, error: Pi
         let from = pick(point.at_mm);
         let by = pick(error(point));
         let to = (by.0.mul_add(exaggeration, from.0), by.1.mul_add(exaggeration, from.1));
-        body.push_str(&line(if is_identified { "il" } else { "nl" }, &[at(from), at(to)]));
+        body.push_str(&line("il", &[at(from), at(to)]));
         body.push_str(&if point.verification { Mark::Identified } else { Mark::Residual }.svg(at(from)));
     }
     body.push_str(&bar(wide, scale));
     body.push_str(&cross(view.labels));
     let caption =
         format!("{}: errors drawn {exaggeration:.0} times as long as they are{}", counted(all, "pose"), thinned(all));
-    figure(&format!("{name}, {}", view.name), &caption, (WIDTH, HEIGHT), &body)
+    figure(&format!("Identified arm, {}", view.name), &caption, (WIDTH, HEIGHT), &body)
 }
 
 /// Size of all that is drawn (mm), the same for every view.

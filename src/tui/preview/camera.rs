@@ -19,6 +19,8 @@ const FARTHEST_PAN: f64 = 10.0;
 const OPENING: f64 = 30.0 * DEGREE;
 /// Used part of the area.
 const USED: f64 = 0.88;
+/// Part of the area that nothing shown may leave.
+const FITS: f64 = 0.97;
 /// Nearest depth that is drawn (m).
 const NEAREST: f64 = 1e-3;
 
@@ -123,9 +125,8 @@ impl Camera {
         // The whole scene is in front of the eye.
         let distance = (visible.max(extent_x * height / width) / (2.0 * (OPENING / 2.0).tan())).max(1.5 * depth);
         let pan = -right * (self.pan.0 * visible) - up * (self.pan.1 * visible);
-        let scale = scale * self.zoom;
-        View {
-            eye: centre + pan - forward * distance,
+        let mut view = View {
+            eye: centre - forward * distance,
             right,
             up,
             forward,
@@ -134,7 +135,10 @@ impl Camera {
             distance,
             projection: self.projection,
             depths: (distance - depth, distance + depth),
-        }
+        };
+        view.scale *= view.fitting(shown) * self.zoom;
+        view.eye += pan;
+        view
     }
 }
 
@@ -142,19 +146,21 @@ fn finite(value: f64, otherwise: f64) -> f64 {
     if value.is_finite() { value } else { otherwise }
 }
 
+/// Whether a point with a radius can be framed.
+fn is_usable((point, radius): &(Point3<f64>, f64)) -> bool {
+    radius.is_finite() && *radius >= 0.0 && *radius < 1e6 && point.iter().all(|x| x.is_finite() && x.abs() < 1e6)
+}
+
 /// Centre of points with radii, and their extents along three directions.
 fn bounds(shown: &[(Point3<f64>, f64)], along: &[Vector3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
-    let is_usable = |(point, radius): &&(Point3<f64>, f64)| {
-        radius.is_finite() && *radius >= 0.0 && *radius < 1e6 && point.iter().all(|x| x.is_finite() && x.abs() < 1e6)
-    };
-    if !shown.iter().any(|point| is_usable(&point)) {
+    if !shown.iter().any(is_usable) {
         return (Point3::origin(), [2.0; 3]);
     }
     let mut centre = Point3::origin();
     let extents = along.map(|direction| {
         let mut low = f64::INFINITY;
         let mut high = f64::NEG_INFINITY;
-        for (point, radius) in shown.iter().filter(is_usable) {
+        for (point, radius) in shown.iter().filter(|shown| is_usable(shown)) {
             let at = point.coords.dot(&direction);
             low = low.min(at - radius);
             high = high.max(at + radius);
@@ -202,6 +208,20 @@ pub struct Ray {
 }
 
 impl View {
+    /// The factor, at most 1, by which the picture must shrink to contain what is shown: what is nearer than the middle is larger
+    /// than its size alone says.
+    fn fitting(&self, shown: &[(Point3<f64>, f64)]) -> f64 {
+        let reach = |(point, radius): &(Point3<f64>, f64)| {
+            let seen = self.project(point)?;
+            let radius = radius.max(0.0) * self.scale_at(seen.depth);
+            let aside = ((seen.x - self.middle.0).abs() + radius) / self.middle.0;
+            let above = ((seen.y - self.middle.1).abs() + radius) / self.middle.1;
+            Some(aside.max(above)).filter(|reach| reach.is_finite())
+        };
+        let farthest = shown.iter().filter(|shown| is_usable(shown)).filter_map(reach).fold(FITS, f64::max);
+        FITS / farthest
+    }
+
     /// Projects a point; `None` behind the eye or if it is not finite.
     pub fn project(&self, point: &Point3<f64>) -> Option<Projected> {
         let seen = point - self.eye;
@@ -278,6 +298,23 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn what_is_shown_is_inside(
+            yaw in -7.0_f64..7.0, pitch in -1.5_f64..1.5, perspective: bool,
+            points in prop::collection::vec((-2.0_f64..2.0, -2.0_f64..2.0, 0.0_f64..2.0, 0.0_f64..0.2), 2..12),
+            width in 20_usize..400, height in 20_usize..300,
+        ) {
+            let mut camera = Camera::from_direction(yaw, pitch);
+            camera.projection = if perspective { Projection::Perspective } else { Projection::Orthographic };
+            let shown: Vec<_> = points.iter().map(|&(x, y, z, r)| (Point3::new(x, y, z), r)).collect();
+            let view = camera.view(width, height, &shown);
+            for (point, _) in &shown {
+                let seen = view.project(point).unwrap();
+                prop_assert!((0.0..=width as f64).contains(&seen.x), "{seen:?} of {width}");
+                prop_assert!((0.0..=height as f64).contains(&seen.y), "{seen:?} of {height}");
+            }
+        }
+
         #[test]
         fn rays_go_where_points_are_seen(
             yaw in -7.0_f64..7.0, pitch in -3.0_f64..3.0, zoom in 0.1_f64..10.0, x in 0_usize..300, y in 0_usize..200,

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::camera::{Camera, Framing, View};
 use super::raster::{Material, Raster, Solid, Stroke};
-use super::scene::{ArmStyle, DrawnArm, MarkKind, Scene};
+use super::scene::{ErrorsOf, ArmStyle, DrawnArm, MarkKind, Scene};
 use crate::tui::glyphs::Glyphs;
 use crate::tui::theme::Role;
 
@@ -79,10 +79,14 @@ pub(super) fn scene(scene: &Scene, camera: &Camera, raster: &mut Raster) -> Vec<
     if let Some(beam) = &scene.beam {
         raster.line(&view, &beam.from, &beam.to, Material::Beam, Stroke::Dashed);
     }
+    let material = match scene.errors_of {
+        ErrorsOf::Nominal => Material::NominalError,
+        ErrorsOf::Identified => Material::IdentifiedError,
+    };
     for error in &scene.errors {
         let tip = error.at + error.error * scene.exaggeration;
-        raster.line(&view, &error.at, &tip, Material::Error, Stroke::ByDepth);
-        draw_spot(&view, &tip, Material::Error, raster);
+        raster.line(&view, &error.at, &tip, material, Stroke::ByDepth);
+        draw_spot(&view, &tip, material, raster);
     }
     for mark in &scene.marks {
         match mark.kind {

@@ -38,8 +38,10 @@ pub(super) enum Material {
     Open,
     /// A measured point.
     Done,
-    /// An error vector.
-    Error,
+    /// An error of the nominal arm.
+    NominalError,
+    /// An error of the identified arm.
+    IdentifiedError,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -132,6 +132,14 @@ pub struct ErrorVector {
     pub error: Vector3<f64>,
 }
 
+/// The arm whose errors are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ErrorsOf {
+    Nominal,
+    #[default]
+    Identified,
+}
+
 /// The beam from tracker to reflector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
@@ -156,6 +164,8 @@ pub struct Scene {
     pub marks: Vec<Mark>,
     /// Errors of points.
     pub errors: Vec<ErrorVector>,
+    /// The arm whose errors they are.
+    pub errors_of: ErrorsOf,
     /// Enlargement of the errors.
     pub exaggeration: f64,
     /// Enlargement of the difference between the second arm and the first; up to 1: none.
@@ -175,6 +185,16 @@ pub struct VerifiedPoint {
     pub nominal: Vector3<f64>,
     /// Measured minus predicted by the identified arm (m).
     pub identified: Vector3<f64>,
+}
+
+impl VerifiedPoint {
+    /// The error of an arm (m).
+    const fn error(&self, of: ErrorsOf) -> Vector3<f64> {
+        match of {
+            ErrorsOf::Nominal => self.nominal,
+            ErrorsOf::Identified => self.identified,
+        }
+    }
 }
 
 impl Scene {
@@ -251,7 +271,7 @@ impl Scene {
                     });
                 }
             }
-            scene.show_errors(true);
+            scene.show_errors(ErrorsOf::Identified);
         }
         Some(scene)
     }
@@ -266,12 +286,26 @@ impl Scene {
         }
     }
 
-    /// Shows the errors of the identified or of the nominal arm, enlarged so that the largest is clearly visible.
-    pub fn show_errors(&mut self, of_identified: bool) {
-        let pick = |one: &VerifiedPoint| if of_identified { one.identified } else { one.nominal };
-        self.errors = self.verified.iter().map(|one| ErrorVector { at: one.at, error: pick(one) }).collect();
-        let largest = self.errors.iter().map(|vector| vector.error.norm()).fold(0.0, f64::max);
-        self.exaggeration = enlargement(largest, LONGEST_ERROR * self.radius());
+    /// Shows the errors of an arm, enlarged so that the largest is clearly visible.
+    pub fn show_errors(&mut self, of: ErrorsOf) {
+        self.put_errors(of);
+        self.exaggeration = self.enlargement_of(&[of]);
+    }
+
+    /// Shows the errors of an arm as much enlarged as those of the other, so that what is longer is worse.
+    pub fn show_errors_alike(&mut self, of: ErrorsOf) {
+        self.put_errors(of);
+        self.exaggeration = self.enlargement_of(&[ErrorsOf::Nominal, ErrorsOf::Identified]);
+    }
+
+    fn put_errors(&mut self, of: ErrorsOf) {
+        self.errors = self.verified.iter().map(|one| ErrorVector { at: one.at, error: one.error(of) }).collect();
+        self.errors_of = of;
+    }
+
+    fn enlargement_of(&self, arms: &[ErrorsOf]) -> f64 {
+        let lengths = arms.iter().flat_map(|of| self.verified.iter().map(|one| one.error(*of).norm()));
+        enlargement(lengths.fold(0.0, f64::max), LONGEST_ERROR * self.radius())
     }
 
     /// Enlarges the difference of the second arm from the first until it is visible.

@@ -13,12 +13,16 @@ use super::page::{Page, Parts, Scroll, Tabs, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
-use crate::tui::preview::Scene;
+use crate::text::fixed;
+use crate::tui::preview::{ErrorsOf, Scene};
 use crate::tui::theme::Role;
+use crate::units::to_mm;
 use crate::wizard::view::{Content, VerifyView};
 
 /// Columns of the text beside the picture.
 const TEXT: u16 = 66;
+/// Least columns for both pictures beside each other.
+const PAIR: u16 = 116;
 /// Tab with the picture alone.
 const PICTURE: usize = 3;
 
@@ -56,20 +60,53 @@ impl VerifyScreen {
         page
     }
 
-    /// Draws the picture and whose errors it shows.
+    /// Draws the picture and whose errors it shows; where there is room, both arms beside each other on one scale.
     fn picture(self, cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Buffer) {
+        if area.width >= PAIR && !scene.verified.is_empty() {
+            let half = area.width / 2;
+            let left = Rect { width: half.saturating_sub(1), ..area };
+            let right = Rect { x: area.x + half, width: area.width - half, ..area };
+            for (of, area) in [(ErrorsOf::Nominal, left), (ErrorsOf::Identified, right)] {
+                let mut shown = scene.clone();
+                shown.show_errors_alike(of);
+                let said = format!("{}, {}", title(of), largest(&shown));
+                paint::text(buf, area, (0, 0), &said, cx.theme.style(role(of)));
+                picture(cx, &shown, paint::band(area, 1, area.height), buf);
+            }
+            return;
+        }
+        let of = if self.is_nominal { ErrorsOf::Nominal } else { ErrorsOf::Identified };
         let mut shown = scene.clone();
-        shown.show_errors(!self.is_nominal);
-        let (whose, other) =
-            if self.is_nominal { ("BEFORE: nominal", "identified") } else { ("AFTER: identified", "nominal") };
+        shown.show_errors(of);
+        let other = if self.is_nominal { "identified" } else { "nominal" };
         let said = if shown.verified.is_empty() {
             "no verification samples to draw".to_owned()
         } else {
-            format!("{whose} arm's errors (m: {other})")
+            format!("{} arm's errors (m: {other})", title(of))
         };
         paint::text(buf, area, (0, 0), &said, cx.theme.style(Role::Title));
         picture(cx, &shown, paint::band(area, 1, area.height), buf);
     }
+}
+
+const fn title(of: ErrorsOf) -> &'static str {
+    match of {
+        ErrorsOf::Nominal => "BEFORE: nominal",
+        ErrorsOf::Identified => "AFTER: identified",
+    }
+}
+
+const fn role(of: ErrorsOf) -> Role {
+    match of {
+        ErrorsOf::Nominal => Role::Nominal,
+        ErrorsOf::Identified => Role::Identified,
+    }
+}
+
+/// The largest error that is drawn, in words.
+fn largest(scene: &Scene) -> String {
+    let largest = scene.errors.iter().map(|vector| vector.error.norm()).fold(0.0, f64::max);
+    format!("largest {} mm", fixed(to_mm(largest), 3))
 }
 
 impl Screen for VerifyScreen {

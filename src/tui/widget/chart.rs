@@ -20,6 +20,10 @@ pub struct Chart<'a> {
     pub points: &'a [(f64, f64)],
     /// The best possible level, drawn dotted.
     pub level: Option<f64>,
+    /// A value of y that must not be exceeded, drawn dashed; the axis then begins at zero.
+    pub limit: Option<f64>,
+    /// The x at which the axis ends, if not with the last point.
+    pub end: Option<f64>,
     /// The x at which the line is marked.
     pub mark: Option<f64>,
     /// Title of the y axis, with its unit.
@@ -53,6 +57,19 @@ fn place(value: f64, (low, high): (f64, f64), dots: usize) -> usize {
     dot.min(last)
 }
 
+/// Rows with their values: both ends, and between them at most every third row.
+fn ticks((low, high): (f64, f64), rows: u16) -> Vec<(u16, f64)> {
+    let last = rows.saturating_sub(1);
+    let parts = (last / 3).clamp(1, 4);
+    let tick = |part: u16| {
+        let row = (f64::from(last) * f64::from(part) / f64::from(parts)).round();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a row of the chart")]
+        let row = row as u16;
+        (row, high - (high - low) * f64::from(row) / f64::from(last.max(1)))
+    };
+    (0..=parts).map(tick).collect()
+}
+
 /// Smallest and largest value.
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
@@ -64,11 +81,12 @@ impl Chart<'_> {
         let points: Vec<(f64, f64)> =
             self.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
         let level = self.level.filter(|level| level.is_finite());
-        let x = range(points.iter().map(|point| point.0));
-        let y = range(points.iter().map(|point| point.1).chain(level));
+        let limit = self.limit.filter(|limit| limit.is_finite());
+        let end = self.end.filter(|end| end.is_finite());
+        let x = range(points.iter().map(|point| point.0).chain(end));
+        let y = range(points.iter().map(|point| point.1).chain(level).chain(limit).chain(limit.map(|_| 0.0)));
         let label = |value: f64| format!("{value:.*}", self.digits);
-        let labels = [label(y.1), label(y.0)];
-        let left = labels.iter().map(|label| text::columns(label)).max().unwrap_or(0) + 1;
+        let left = [y.0, y.1].into_iter().chain(limit).map(|value| text::columns(&label(value))).max().unwrap_or(0) + 1;
         let left = u16::try_from(left).unwrap_or(u16::MAX);
         let plot = paint::band(area, 1, area.height.saturating_sub(2));
         let plot = Rect { x: plot.x.saturating_add(left), width: plot.width.saturating_sub(left), ..plot };
@@ -79,8 +97,10 @@ impl Chart<'_> {
         paint::text(buf, area, (0, 0), &theme.glyphs.show(self.y_title), dim);
         let right =
             |label: &str| u16::try_from(usize::from(left - 1).saturating_sub(text::columns(label))).unwrap_or(0);
-        paint::text(buf, area, (right(&labels[0]), 1), &labels[0], dim);
-        paint::text(buf, area, (right(&labels[1]), plot.height), &labels[1], dim);
+        for (row, value) in ticks(y, plot.height) {
+            let tick = label(value);
+            paint::text(buf, area, (right(&tick), 1 + row), &tick, dim);
+        }
         self.x_axis(theme, x, (area, left), buf);
 
         let (columns, rows) = (usize::from(plot.width), usize::from(plot.height));
@@ -89,6 +109,11 @@ impl Chart<'_> {
         if let Some(level) = level {
             let (_, down) = scale.at(x.0, level);
             (0..scale.dots.0).step_by(4).for_each(|across| set_dot(&mut cells, columns, (across, down)));
+        }
+        if let Some(limit) = limit {
+            let (_, down) = scale.at(x.0, limit);
+            let dashes = (0..scale.dots.0).filter(|across| across % 8 < 5);
+            dashes.for_each(|across| set_dot(&mut cells, columns, (across, down)));
         }
         draw_line(&points, &scale, columns, &mut cells);
         paint_cells(&cells, theme, plot, buf);

@@ -27,7 +27,7 @@ fn curve() -> Vec<(f64, f64)> {
 
 fn chart(points: &[(f64, f64)]) -> Chart<'_> {
     let (y_title, x_title) = ("predicted error (mm)", "poses");
-    Chart { points, level: Some(0.5), mark: Some(30.0), y_title, x_title, digits: 3 }
+    Chart { points, level: Some(0.5), limit: None, end: None, mark: Some(30.0), y_title, x_title, digits: 3 }
 }
 
 fn rows() -> Vec<(Role, Vec<String>)> {
@@ -63,7 +63,7 @@ fn numbers_that_are_none_do_no_harm() {
     let mut buf = Buffer::empty(Rect::new(0, 0, 40, 8));
     let area = buf.area;
     let points = [(f64::NAN, 1.0), (1.0, f64::INFINITY), (1.0, 2.0)];
-    Chart { level: Some(f64::NAN), mark: Some(f64::NAN), ..chart(&points) }.draw(
+    Chart { level: Some(f64::NAN), limit: Some(f64::NAN), end: Some(f64::NAN), mark: Some(f64::NAN), ..chart(&points) }.draw(
         theme(Glyphs::Unicode),
         area,
         &mut buf,
@@ -88,4 +88,19 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn a_limit_brings_zero_ticks_and_the_end_of_the_plan() {
+    let mut buf = Buffer::empty(Rect::new(0, 0, 50, 12));
+    let area = buf.area;
+    let points = curve();
+    let chart = Chart { limit: Some(0.8), end: Some(80.0), ..chart(&points) };
+    chart.draw(theme(Glyphs::Unicode), area, &mut buf);
+    let shown = paint::snapshot(&buf);
+    for label in [" 0.000 ", "1.265", " 80"] {
+        assert!(shown.contains(label), "no '{label}' in\n{shown}");
+    }
+    assert!(shown.lines().filter(|line| line.contains("0.")).count() >= 3, "no ticks in\n{shown}");
+    insta::assert_snapshot!("limit", shown);
 }

@@ -34,6 +34,8 @@ pub(super) fn draw(cx: &ScreenCx<'_>, content: &CaptureView, area: Rect, buf: &m
     let chart = Chart {
         points: &points,
         level: None,
+        limit: None,
+        end: None,
         mark: None,
         y_title: "distance from where it is now (mm)",
         x_title: "seconds ago",

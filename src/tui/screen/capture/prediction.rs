@@ -78,8 +78,14 @@ pub(super) fn draw(theme: Theme, content: &CaptureView, area: Rect, buf: &mut Bu
     let chart = Chart {
         points: &points,
         level: prediction.with_all_mm,
+        limit: prediction.limit_mm,
+        end: Some((content.identification + prediction.open) as f64),
         mark: points.last().map(|point| point.0),
-        y_title: "predicted error (mm); dotted: with all poses",
+        y_title: if prediction.limit_mm.is_some() {
+            "predicted error (mm); dashed: limit; dotted: with all poses"
+        } else {
+            "predicted error (mm); dotted: with all poses"
+        },
         x_title: "identification poses",
         digits: 3,
     };

@@ -63,6 +63,8 @@ impl Search {
         let chart = Chart {
             points: &self.conditions,
             level: None,
+            limit: None,
+            end: None,
             mark: self.conditions.last().map(|point| point.0),
             y_title: "condition number (smaller is better)",
             x_title: "pose sets examined",

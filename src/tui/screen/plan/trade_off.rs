@@ -43,6 +43,8 @@ fn chart(theme: Theme, options: &[TradeOffSummary], poses: usize, area: Rect, bu
     let chart = Chart {
         points: &points,
         level: None,
+        limit: None,
+        end: None,
         mark: Some(poses as f64),
         y_title: if has_mm { "predicted error (mm)" } else { "predicted error (sigma)" },
         x_title: "poses to identify",
