@@ -108,7 +108,7 @@ const WIDE: (u16, u16) = (120, 34);
 /// Screens of `docs/pictures`, with their size.
 const SCREENS: [Picture; 2] = [
     Picture { name: "capture", entries: 32, keys: "", has: "step 5 of 8" },
-    Picture { name: "before-after", entries: 47, keys: "4", has: "AFTER: identified" },
+    Picture { name: "before-after", entries: 47, keys: "4", has: "BEFORE: nominal, largest" },
 ];
 
 fn is_written() -> bool {
@@ -152,7 +152,7 @@ fn the_picture_of_the_report_is_of_the_example() {
     if is_written() {
         let status = Command::new("chromium")
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--force-device-scale-factor=1.5"])
-            .args(["--window-size=860,1216".to_owned(), format!("--screenshot={}", picture.display())])
+            .args(["--window-size=860,1500".to_owned(), format!("--screenshot={}", picture.display())])
             .arg(format!("file://{}", page.display()))
             .stderr(Stdio::null())
             .status()

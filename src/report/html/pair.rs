@@ -77,7 +77,7 @@ impl Map {
         lengths.sort_by(f64::total_cmp);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
         let most = lengths.get((lengths.len().saturating_sub(1) as f64 * WITHIN) as usize).copied().unwrap_or(1.0);
-        Self { step: nice_above(most / STEPS as f64) }
+        Self { step: round_above(most / STEPS as f64) }
     }
 
     /// The step of an error.
@@ -107,6 +107,12 @@ impl Map {
             2.0 * WIDTH
         )
     }
+}
+
+/// The smallest whole number of up to one digit, times a power of ten, that is not below `step`.
+fn round_above(step: f64) -> f64 {
+    let power = nice_above(step) / 10.0;
+    (1..=10_u8).map(|times| f64::from(times) * power).find(|round| *round >= step * (1.0 - 1e-9)).unwrap_or(10.0 * power)
 }
 
 /// Something to draw, far things first.

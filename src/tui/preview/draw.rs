@@ -49,7 +49,7 @@ pub(super) fn scene(scene: &Scene, camera: &Camera, raster: &mut Raster) -> Vec<
     let shown = match (camera.framing, scene.reflector()) {
         (Framing::Reflector, Some(reflector)) => vec![(reflector, AROUND_REFLECTOR)],
         (Framing::All, _) => scene.around_all(),
-        (Framing::Arm | Framing::Reflector, _) => scene.around_arms(),
+        (Framing::Arm | Framing::Reflector, _) => scene.around_errors(),
     };
     let view = camera.view(raster.width(), raster.height(), &shown);
     let floor = scene.floor.unwrap_or(f64::NEG_INFINITY);

@@ -168,6 +168,8 @@ pub struct Scene {
     pub errors_of: ErrorsOf,
     /// Enlargement of the errors.
     pub exaggeration: f64,
+    /// Ends of errors that the picture has to contain.
+    pub tips: Vec<Point3<f64>>,
     /// Enlargement of the difference between the second arm and the first; up to 1: none.
     pub magnified: f64,
     /// Verification samples with the errors of both arms.
@@ -288,24 +290,23 @@ impl Scene {
 
     /// Shows the errors of an arm, enlarged so that the largest is clearly visible.
     pub fn show_errors(&mut self, of: ErrorsOf) {
-        self.put_errors(of);
-        self.exaggeration = self.enlargement_of(&[of]);
+        self.put_errors(of, &[of]);
     }
 
     /// Shows the errors of an arm as much enlarged as those of the other, so that what is longer is worse.
     pub fn show_errors_alike(&mut self, of: ErrorsOf) {
-        self.put_errors(of);
-        self.exaggeration = self.enlargement_of(&[ErrorsOf::Nominal, ErrorsOf::Identified]);
+        self.put_errors(of, &[ErrorsOf::Nominal, ErrorsOf::Identified]);
     }
 
-    fn put_errors(&mut self, of: ErrorsOf) {
+    /// Shows the errors of an arm, with enlargement and framing for those of `together`.
+    fn put_errors(&mut self, of: ErrorsOf, together: &[ErrorsOf]) {
         self.errors = self.verified.iter().map(|one| ErrorVector { at: one.at, error: one.error(of) }).collect();
         self.errors_of = of;
-    }
-
-    fn enlargement_of(&self, arms: &[ErrorsOf]) -> f64 {
-        let lengths = arms.iter().flat_map(|of| self.verified.iter().map(|one| one.error(*of).norm()));
-        enlargement(lengths.fold(0.0, f64::max), LONGEST_ERROR * self.radius())
+        let lengths = together.iter().flat_map(|of| self.verified.iter().map(|one| one.error(*of).norm()));
+        let times = enlargement(lengths.fold(0.0, f64::max), LONGEST_ERROR * self.radius());
+        let tips = together.iter().flat_map(|of| self.verified.iter().map(move |one| one.at + one.error(*of) * times));
+        self.tips = self.verified.iter().map(|one| one.at).chain(tips).collect();
+        self.exaggeration = times;
     }
 
     /// Enlarges the difference of the second arm from the first until it is visible.
@@ -355,9 +356,16 @@ impl Scene {
             .collect()
     }
 
+    /// Points with radii around the arms and the errors that are drawn.
+    pub(super) fn around_errors(&self) -> Vec<(Point3<f64>, f64)> {
+        let mut shown = self.around_arms();
+        shown.extend(self.tips.iter().map(|tip| (*tip, 0.0)));
+        shown
+    }
+
     /// Points with radii around everything.
     pub(super) fn around_all(&self) -> Vec<(Point3<f64>, f64)> {
-        let mut shown = self.around_arms();
+        let mut shown = self.around_errors();
         shown.extend(self.marks.iter().map(|mark| (mark.at, 0.0)));
         shown.extend(self.tracker.map(|tracker| (tracker, 0.2)));
         shown

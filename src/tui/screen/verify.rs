@@ -60,6 +60,13 @@ impl VerifyScreen {
         page
     }
 
+    /// Text and picture. The tab of the picture has no text where there is room for both arms beside each other.
+    const fn parts(self, cx: &ScreenCx<'_>, area: Rect) -> Parts {
+        let is_picture = self.tabs.at == PICTURE;
+        let text = if is_picture && area.width >= PAIR { area.width } else { TEXT };
+        Parts::of(cx, area, text, is_picture)
+    }
+
     /// Draws the picture and whose errors it shows; where there is room, both arms beside each other on one scale.
     fn picture(self, cx: &ScreenCx<'_>, scene: &Scene, area: Rect, buf: &mut Buffer) {
         if area.width >= PAIR && !scene.verified.is_empty() {
@@ -132,13 +139,13 @@ impl Screen for VerifyScreen {
     }
 
     fn picture_place(&self, cx: &ScreenCx<'_>, area: Rect) -> PicturePlace {
-        Parts::of(cx, area, TEXT, self.tabs.at == PICTURE).picture_place()
+        self.parts(cx, area).picture_place()
     }
 
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let area = self.tabs.draw(cx.theme, area, buf);
         let page = |columns| self.page(cx, columns);
         let picture = |scene: &Scene, area, buf: &mut Buffer| self.picture(cx, scene, area, buf);
-        Parts::of(cx, area, TEXT, self.tabs.at == PICTURE).draw(cx, buf, (page, self.scroll), picture);
+        self.parts(cx, area).draw(cx, buf, (page, self.scroll), picture);
     }
 }
