@@ -106,10 +106,7 @@ fn the_screens_are_those_of_the_document() {
 const WIDE: (u16, u16) = (120, 34);
 
 /// Screens of `docs/pictures`, with their size.
-const SCREENS: [Picture; 2] = [
-    Picture { name: "capture", entries: 32, keys: "", has: "step 5 of 8" },
-    Picture { name: "before-after", entries: 47, keys: "4", has: "BEFORE: nominal, largest" },
-];
+const SCREENS: [Picture; 1] = [Picture { name: "capture", entries: 32, keys: "", has: "step 5 of 8" }];
 
 fn is_written() -> bool {
     std::env::var_os("TRUPOSE_WRITE_PICTURES").is_some()
