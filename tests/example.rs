@@ -89,7 +89,8 @@ fn compare(made: &Value, committed: &Value, place: &str) {
             assert_eq!(made.keys().collect::<Vec<_>>(), committed.keys().collect::<Vec<_>>(), "{place}");
             for (name, value) in made {
                 let is_number_of_document = name == "number" && value.is_string();
-                let depends = ["program", "check", "sha256", "singular_value_gap", "iterations"].contains(&name.as_str());
+                let depends =
+                    ["program", "check", "sha256", "singular_value_gap", "iterations"].contains(&name.as_str());
                 if !depends && !is_number_of_document {
                     compare(value, &committed[name], &format!("{place}.{name}"));
                 }

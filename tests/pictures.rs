@@ -131,7 +131,11 @@ fn the_wide_screens_are_those_of_the_program() {
             fs::write(&path, terminal.look(drawn)).unwrap();
         }
         let expected = fs::read_to_string(&path).unwrap();
-        assert!(expected.matches("<text").count() > 20 && expected.matches('M').count() > 200, "{} is blank", picture.name);
+        assert!(
+            expected.matches("<text").count() > 20 && expected.matches('M').count() > 200,
+            "{} is blank",
+            picture.name
+        );
         let is_same = terminal.comes(PATIENCE, |shown| drawn(shown) == expected);
         assert!(is_same, "docs/pictures/{}.svg is stale; the screen:\n{}", picture.name, terminal.look(Shown::text));
     }
@@ -148,7 +152,13 @@ fn the_picture_of_the_report_is_of_the_example() {
     let beside = root().join("docs/pictures/report.sha256");
     if is_written() {
         let status = Command::new("chromium")
-            .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--force-device-scale-factor=1.5"])
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--hide-scrollbars",
+                "--force-device-scale-factor=1.5",
+            ])
             .args(["--window-size=860,1500".to_owned(), format!("--screenshot={}", picture.display())])
             .arg(format!("file://{}", page.display()))
             .stderr(Stdio::null())

@@ -389,7 +389,12 @@ fn papers_of_the_instrument_and_its_remarks_are_shown() {
     }
     let (json, html) = report(&session);
     let shown = text(&html);
-    for words in ["IRC5 7.1", "two-face: 12 µm", "The certificate of the instrument expired on 2020-01-31", "weather station is off"] {
+    for words in [
+        "IRC5 7.1",
+        "two-face: 12 µm",
+        "The certificate of the instrument expired on 2020-01-31",
+        "weather station is off",
+    ] {
         assert!(shown.contains(words), "no '{words}' in\n{shown}");
     }
     let counted = session.counted().count();
@@ -412,7 +417,8 @@ fn both_arms_are_drawn_on_one_scale() {
     assert_eq!(after.matches("<path class=\"a").count(), 0, "{after}");
     assert_eq!(after.matches("<circle class=\"k0\"").count(), 4);
     // The castings of the arm are the same.
-    let arm = |svg: &str| svg.lines().filter(|line| line.contains("class=\"cast\"")).map(str::to_owned).collect::<Vec<_>>();
+    let arm =
+        |svg: &str| svg.lines().filter(|line| line.contains("class=\"cast\"")).map(str::to_owned).collect::<Vec<_>>();
     assert!(!arm(before).is_empty() && arm(before) == arm(after));
 }
 
@@ -567,7 +573,9 @@ fn little_or_nothing_to_show_is_said() {
         result.summary.verdict.checks.clear();
     });
     let shown = text(&report(&unverified).1);
-    assert!(shown.contains("nothing can be said about the accuracy") && shown.contains("no acceptance limit was compared"));
+    assert!(
+        shown.contains("nothing can be said about the accuracy") && shown.contains("no acceptance limit was compared")
+    );
     assert!(!shown.contains("Accuracy on poses"));
     let unlimited = with_result(|result| result.summary.verdict.checks.clear());
     assert!(text(&report(&unlimited).1).contains("states no acceptance limits"));

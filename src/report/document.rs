@@ -13,8 +13,8 @@ use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
 use crate::session::about::{About, Day};
-use crate::session::sha256;
 use crate::session::journal::{FindingCause, PlanText};
+use crate::session::sha256;
 use crate::session::state::{Note, Refused};
 use crate::session::summary::IdentificationSummary;
 

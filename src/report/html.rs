@@ -36,7 +36,10 @@ pub fn report_html(document: &Document) -> String {
     add(&mut html, &format!("<style>\n{STYLE}{}</style>\n</head>\n<body>\n", page_rules(document)));
     html.push_str("<div class=\"first\">\n");
     html.push_str(&identity::banners(document));
-    add(&mut html, &format!("<h1>Calibration report</h1>\n<p class=\"lead\">{}{}</p>\n", escape(title), numbered(report)));
+    add(
+        &mut html,
+        &format!("<h1>Calibration report</h1>\n<p class=\"lead\">{}{}</p>\n", escape(title), numbered(report)),
+    );
     html.push_str(&verdict::section(document));
     html.push_str(&verdict::before_and_after(document));
     html.push_str(&verdict::limits(document));

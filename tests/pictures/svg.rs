@@ -78,7 +78,11 @@ pub(super) fn of_screen(screen: &Screen, (columns, rows): (u16, u16)) -> String 
             let left = WIDTH.mul_add(column.into(), EDGE);
             let (ink, paper) = if cell.inverse() { (PAPER, Some(colour(cell))) } else { (colour(cell), None) };
             if let Some(paper) = paper {
-                writeln!(svg, "<rect x=\"{left}\" y=\"{top}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"{paper}\"/>").unwrap();
+                writeln!(
+                    svg,
+                    "<rect x=\"{left}\" y=\"{top}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"{paper}\"/>"
+                )
+                .unwrap();
             }
             let text = if cell.contents().is_empty() { " " } else { cell.contents() };
             let drawn = text.chars().next().and_then(shape);
@@ -116,7 +120,8 @@ pub(super) fn of_screen(screen: &Screen, (columns, rows): (u16, u16)) -> String 
     }
     for ((ink, is_dim), path) in dots {
         let opacity = if is_dim { " opacity=\"0.6\"" } else { "" };
-        writeln!(svg, "<path d=\"{path}\" stroke=\"{ink}\"{opacity} stroke-width=\"2.6\" stroke-linecap=\"round\"/>").unwrap();
+        writeln!(svg, "<path d=\"{path}\" stroke=\"{ink}\"{opacity} stroke-width=\"2.6\" stroke-linecap=\"round\"/>")
+            .unwrap();
     }
     svg + "</svg>\n"
 }

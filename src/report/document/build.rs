@@ -6,12 +6,12 @@ use nalgebra::Point3;
 
 use super::decisions::{corrections, findings, not_counted};
 use super::{
-    BodyPart, Counts, DecisionPart, Details, Document, DriftPart, FilePart, Found, ParameterNote, PointOrigin, PointPart, PredictionPart,
-    ResultState, RemarkPart, RobotPart, SCHEMA, SessionPart, TemperaturePart,
+    BodyPart, Counts, DecisionPart, Details, Document, DriftPart, FilePart, Found, ParameterNote, PointOrigin,
+    PointPart, PredictionPart, RemarkPart, ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
 };
 use crate::kinematics::ForwardKinematics;
-use crate::report::text::found;
 use crate::profile::Capsule;
+use crate::report::text::found;
 use crate::session::about::Day;
 use crate::session::journal::{instrument_text, target_text};
 use crate::session::plan::PoseKind;

@@ -12,7 +12,10 @@ const NOT_MEASURED: [(&str, &str); 7] = [
     ("Multi-directional pose accuracy variation, vAP", "needs approaches from three directions"),
     ("Distance repeatability, RD", "needs the same two poses 30 times"),
     ("Orientation accuracy (a, b, c of AP)", "a reflector is a point: it says nothing about orientation"),
-    ("Drift of pose characteristics, dAP and dRP", "needs 8 hours of cycles; the repeated pose above shows the set-up only"),
+    (
+        "Drift of pose characteristics, dAP and dRP",
+        "needs 8 hours of cycles; the repeated pose above shows the set-up only",
+    ),
     ("Path accuracy and repeatability, AT and RT", "nothing was measured in motion"),
     ("Pose stabilization time, overshoot, static compliance", "not measured"),
 ];
@@ -28,7 +31,8 @@ pub(super) fn section(document: &Document) -> String {
     };
     let nearest = |name: &str, statistics: Option<StatisticsSummary>, what: &str| {
         let statistics = statistics?;
-        let over = format!("nearest figure here: {what} of the identified arm over {}", counted(statistics.count, "value"));
+        let over =
+            format!("nearest figure here: {what} of the identified arm over {}", counted(statistics.count, "value"));
         Some(vec![name.to_owned(), format!("{}; {over}", figures(statistics))])
     };
     let found = &verification.identified;

@@ -88,7 +88,8 @@ pub(super) fn spread(points: &[&PointPart], limits: &[(String, f64)]) -> String 
     let all = before.iter().chain(&after).copied();
     let marked = limits.iter().map(|(_, limit)| *limit);
     let x = Scale::log(all.clone().chain(marked));
-    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| (low.min(value), high.max(value)));
+    let (low, high) =
+        all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| (low.min(value), high.max(value)));
     if low >= high {
         return String::new();
     }

@@ -141,7 +141,10 @@ pub(super) fn origins(document: &Document) -> String {
     let report = &document.report;
     let result = document.result.as_ref();
     let mut rows = vec![
-        ("Identified".to_owned(), result.map_or_else(|| "not yet".to_owned(), |result| time(&result.provenance.created))),
+        (
+            "Identified".to_owned(),
+            result.map_or_else(|| "not yet".to_owned(), |result| time(&result.provenance.created)),
+        ),
         ("Samples that count".to_owned(), samples(&report.counts)),
         ("Session".to_owned(), escape(&report.session.name)),
         (

@@ -173,8 +173,11 @@ pub(super) fn samples(document: &Document) -> String {
         ));
     }
     if !report.remarks.is_empty() {
-        let columns =
-            [("remark of the instrument or the robot", Column::Text), ("first at No.", Column::Number), ("samples", Column::Number)];
+        let columns = [
+            ("remark of the instrument or the robot", Column::Text),
+            ("first at No.", Column::Number),
+            ("samples", Column::Number),
+        ];
         let rows: Vec<Vec<String>> = report
             .remarks
             .iter()

@@ -92,7 +92,10 @@ impl Map {
         let mut body = String::new();
         for step in 0..STEPS {
             let x = width * step as f64 + left;
-            add(&mut body, &format!("<rect class=\"k{step}\" x=\"{x:.1}\" y=\"3\" width=\"{width}\" height=\"9\"></rect>\n"));
+            add(
+                &mut body,
+                &format!("<rect class=\"k{step}\" x=\"{x:.1}\" y=\"3\" width=\"{width}\" height=\"9\"></rect>\n"),
+            );
         }
         for step in 0..STEPS {
             let x = width * step as f64 + left;
@@ -112,7 +115,10 @@ impl Map {
 /// The smallest whole number of up to one digit, times a power of ten, that is not below `step`.
 fn round_above(step: f64) -> f64 {
     let power = nice_above(step) / 10.0;
-    (1..=10_u8).map(|times| f64::from(times) * power).find(|round| *round >= step * (1.0 - 1e-9)).unwrap_or(10.0 * power)
+    (1..=10_u8)
+        .map(|times| f64::from(times) * power)
+        .find(|round| *round >= step * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power)
 }
 
 /// Something to draw, far things first.
@@ -148,7 +154,10 @@ pub(super) fn pair(report: &Details, verification: Option<&VerificationSummary>)
         means(|verification| Some(figures(verification.identified.position_mm?))),
     );
     let caption = |figures: Option<(Figure, Figure)>| {
-        figures.map_or_else(|| note.to_owned(), |(mean, max)| format!("mean {}, largest {} mm", shown_figure(mean), shown_figure(max)))
+        figures.map_or_else(
+            || note.to_owned(),
+            |(mean, max)| format!("mean {}, largest {} mm", shown_figure(mean), shown_figure(max)),
+        )
     };
     let draw = |name: &str, figures, error: fn(&PointPart) -> [f64; 3]| {
         let body = frame.body(&camera, report, &points, map, times, error);
@@ -171,7 +180,8 @@ const fn figures(statistics: crate::session::summary::StatisticsSummary) -> (Fig
 }
 
 fn span(values: impl Iterator<Item = f64>) -> f64 {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if high >= low { high - low } else { 0.0 }
 }
 
@@ -196,7 +206,8 @@ impl Frame {
         let ends = points.iter().flat_map(|point| {
             [point.at_mm, tip(point, point.nominal_mm, times), tip(point, point.identified_mm, times)]
         });
-        let bodies = report.bodies.iter().flat_map(|body| [(body.from_mm, body.radius_mm), (body.to_mm, body.radius_mm)]);
+        let bodies =
+            report.bodies.iter().flat_map(|body| [(body.from_mm, body.radius_mm), (body.to_mm, body.radius_mm)]);
         let places = ends.chain(report.arm_mm.iter().copied()).map(|place| (place, 0.0)).chain(bodies);
         let mut low = (f64::INFINITY, f64::INFINITY);
         let mut high = (f64::NEG_INFINITY, f64::NEG_INFINITY);
@@ -248,7 +259,9 @@ impl Frame {
         }
         let width = 2.0 * body.radius_mm * self.scale;
         let line = |class: &str, width: f64| {
-            format!("<path class=\"{class}\" stroke-width=\"{width:.1}\" d=\"M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}\"></path>\n")
+            format!(
+                "<path class=\"{class}\" stroke-width=\"{width:.1}\" d=\"M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}\"></path>\n"
+            )
         };
         let svg = line("rim", width) + &line("cast", (width - 1.6).max(0.4));
         Drawn { near: f64::midpoint(from.near, to.near), svg }

@@ -211,7 +211,10 @@ impl Plot {
             let y = row.mul_add(11.0, TOP + 8.0);
             add(
                 &mut self.body,
-                &format!("<text class=\"lbl\" x=\"{beside:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>\n", escape(name)),
+                &format!(
+                    "<text class=\"lbl\" x=\"{beside:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>\n",
+                    escape(name)
+                ),
             );
         }
     }

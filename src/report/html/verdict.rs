@@ -9,7 +9,8 @@ use crate::report::document::{
 };
 use crate::session::joint_errors::workspace_sentence;
 use crate::session::summary::{
-    Figure, IdentificationSummary, LimitedQuantity, ModelSummary, StatisticsSummary, VerificationMode, VerificationSummary, Warning, WorkspaceSummary,
+    Figure, IdentificationSummary, LimitedQuantity, ModelSummary, StatisticsSummary, VerificationMode,
+    VerificationSummary, Warning, WorkspaceSummary,
 };
 use crate::text::{counted, counted_as, decimals_for};
 
@@ -208,7 +209,9 @@ pub(super) fn before_and_after(document: &Document) -> String {
                 LimitedQuantity::PositionMean => "mean",
                 LimitedQuantity::PositionRms => "root mean square",
                 LimitedQuantity::PositionMax => "largest",
-                LimitedQuantity::DistanceMean | LimitedQuantity::DistanceRms | LimitedQuantity::DistanceMax => return None,
+                LimitedQuantity::DistanceMean | LimitedQuantity::DistanceRms | LimitedQuantity::DistanceMax => {
+                    return None;
+                }
             };
             Some((name.to_owned(), check.limit_mm))
         });
@@ -315,7 +318,9 @@ fn statistics(before: &StatisticsSummary, after: &StatisticsSummary) -> Vec<Vec<
     };
     let mut rows: Vec<Vec<String>> = FIGURES.iter().zip(figures).map(row).collect();
     // Of the 95 % no interval is known: they have the digits of the root mean square.
-    if let (Some(row), (before, after)) = (rows.get_mut(2), (like(before.p95, before.rms_interval), like(after.p95, after.rms_interval))) {
+    if let (Some(row), (before, after)) =
+        (rows.get_mut(2), (like(before.p95, before.rms_interval), like(after.p95, after.rms_interval)))
+    {
         row.splice(1..3, [before, after]);
     }
     // The largest comes first, as in table III of the method paper.
@@ -439,7 +444,8 @@ fn poses(points: &[&PointPart]) -> String {
         .filter_map(|index| points.get(*index))
         .map(|point| {
             let pose = if point.pose.is_empty() { NONE.to_owned() } else { escape(&point.pose) };
-            let lengths = [norm(point.nominal_mm), norm(point.identified_mm)].map(|value| number(value * 1000.0, decimals));
+            let lengths =
+                [norm(point.nominal_mm), norm(point.identified_mm)].map(|value| number(value * 1000.0, decimals));
             let axes = point.identified_mm.map(|value| number(value * 1000.0, decimals));
             [point.number.to_string(), pose].into_iter().chain(lengths).chain(axes).collect()
         })

@@ -39,7 +39,9 @@ fn draw(report: &Details, view: View) -> String {
     let points: Vec<&PointPart> = report
         .points
         .iter()
-        .filter(|point| !point.rejected && point.at_mm.iter().chain(&point.identified_mm).all(|value| value.is_finite()))
+        .filter(|point| {
+            !point.rejected && point.at_mm.iter().chain(&point.identified_mm).all(|value| value.is_finite())
+        })
         .collect();
     let all = points.len();
     let points: Vec<&PointPart> = shown(&points).into_iter().map(|(_, point)| point).collect();

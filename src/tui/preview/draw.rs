@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::camera::{Camera, Framing, View};
 use super::raster::{Material, Raster, Solid, Stroke};
-use super::scene::{ErrorsOf, ArmStyle, DrawnArm, MarkKind, Scene};
+use super::scene::{ArmStyle, DrawnArm, ErrorsOf, MarkKind, Scene};
 use crate::tui::glyphs::Glyphs;
 use crate::tui::theme::Role;
 

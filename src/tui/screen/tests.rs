@@ -560,8 +560,7 @@ fn where_there_is_room_both_arms_have_one_scale() {
     let scene = checked();
     let shown = paint::snapshot(&drawn(&accepted, Some(&scene), &tabs(3), theme(false), (118, 24)));
     assert!(shown.contains("BEFORE: nominal, largest ") && shown.contains("AFTER: identified, largest "), "{shown}");
-    let times: Vec<&str> =
-        shown.split("errors enlarged ").skip(1).filter_map(|rest| rest.split(' ').next()).collect();
+    let times: Vec<&str> = shown.split("errors enlarged ").skip(1).filter_map(|rest| rest.split(' ').next()).collect();
     assert!(matches!(times[..], [one, other] if one == other), "{times:?} in\n{shown}");
     insta::assert_snapshot!("verify_pair", shown);
 }

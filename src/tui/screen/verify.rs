@@ -11,9 +11,9 @@ use ratatui::layout::Rect;
 
 use super::page::{Page, Parts, Scroll, Tabs, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
+use crate::text::fixed;
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
-use crate::text::fixed;
 use crate::tui::preview::{ErrorsOf, Scene};
 use crate::tui::theme::Role;
 use crate::units::to_mm;

@@ -63,11 +63,8 @@ fn numbers_that_are_none_do_no_harm() {
     let mut buf = Buffer::empty(Rect::new(0, 0, 40, 8));
     let area = buf.area;
     let points = [(f64::NAN, 1.0), (1.0, f64::INFINITY), (1.0, 2.0)];
-    Chart { level: Some(f64::NAN), limit: Some(f64::NAN), end: Some(f64::NAN), mark: Some(f64::NAN), ..chart(&points) }.draw(
-        theme(Glyphs::Unicode),
-        area,
-        &mut buf,
-    );
+    Chart { level: Some(f64::NAN), limit: Some(f64::NAN), end: Some(f64::NAN), mark: Some(f64::NAN), ..chart(&points) }
+        .draw(theme(Glyphs::Unicode), area, &mut buf);
     bar(theme(Glyphs::Unicode), f64::NAN, area, &mut buf);
     assert_eq!(digits::columns("-1.5"), 13);
 }

@@ -51,7 +51,8 @@ pub(super) fn poses(content: &VerifyView, scene: Option<&Scene>, glyphs: Glyphs,
 fn histogram(errors: &[(&str, f64, f64)], limit: Option<f64>, room: usize, glyphs: Glyphs, page: &mut Page) {
     page.title(&format!("Errors of both arms, {} poses", errors.len()));
     let all = errors.iter().flat_map(|(_, before, after)| [*before, *after]).filter(|error| *error > 0.0);
-    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), error| (low.min(error), high.max(error)));
+    let (low, high) =
+        all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), error| (low.min(error), high.max(error)));
     let bounds = classes(low, high);
     let within = |pick: fn(&(&str, f64, f64)) -> f64, (from, to): (f64, f64)| {
         errors.iter().map(pick).filter(|error| *error >= from && *error < to).count()
@@ -73,9 +74,9 @@ fn histogram(errors: &[(&str, f64, f64)], limit: Option<f64>, room: usize, glyph
     ]);
     let bar = |count: usize| glyphs.bar_done().repeat(part(count as f64 / most as f64, side));
     for ((from, to), before, after) in counted {
-        let mark = limit.filter(|limit| (from..to).contains(limit)).map_or_else(String::new, |limit| {
-            format!(" limit {}", fixed(limit, decimals(limit)))
-        });
+        let mark = limit
+            .filter(|limit| (from..to).contains(limit))
+            .map_or_else(String::new, |limit| format!(" limit {}", fixed(limit, decimals(limit))));
         let range = format!("{} .. {}", fixed(from, decimals(from)), fixed(to, decimals(to)));
         page.line(vec![
             (format!("{range:<20}"), Role::Plain),
