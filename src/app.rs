@@ -1,6 +1,8 @@
 //! Runs a command: loads its files, calls the procedure, writes the results.
 
 mod advice;
+mod check;
+mod compare;
 mod compensate;
 mod constraints;
 mod export;
@@ -114,6 +116,8 @@ pub fn run<O: Write, E: Write>(cli: Cli, console: &mut Console<O, E>) -> Result<
         Command::Constraints(args) => constraints::run(&args, console),
         Command::Plan(args) => plan::run(&args, console),
         Command::Iso9283(command) => iso9283::run(&command, console),
+        Command::Check(command) => check::run(&command, console),
+        Command::Compare(args) => compare::run(&args, console),
         Command::Program(args) => program::run(&args, console),
         Command::Record(command) => record::run(&command, console),
         Command::Compensate(args) => compensate::run(&args, console),

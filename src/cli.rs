@@ -9,6 +9,8 @@ mod recording;
 mod session;
 mod terminal;
 
+pub mod check;
+pub mod compare;
 pub mod compensate;
 pub mod iso9283;
 
@@ -62,6 +64,8 @@ Step by step:
   constraints  The same from direct distances, without coordinates
   verify       Verify a calibration on other measured points
   iso9283      Accuracy and repeatability with the definitions of ISO 9283
+  check        Say in ten minutes whether a calibration still holds
+  compare      Compare calibrations of one arm, or of sister arms
 
 Apply the result:
   compensate   Correct targets or programs so that the real arm reaches them
@@ -259,6 +263,12 @@ pub enum Command {
     /// Test the arm with the definitions of ISO 9283: plan the poses, evaluate the points
     #[command(subcommand)]
     Iso9283(iso9283::Iso9283Command),
+    /// Check with a few poses whether a calibration still holds: plan the poses, evaluate the points
+    #[command(subcommand)]
+    Check(check::CheckCommand),
+    /// Compare calibrations of one arm, or of sister arms: what has changed, over the workspace
+    #[command(after_help = "Example:\n  trupose compare 2025/calibration.ron 2026/calibration.ron")]
+    Compare(compare::CompareArgs),
     /// Correct targets so that the real arm reaches them
     #[command(
         after_help = "Example:\n  trupose compensate --calibration calibration.ron --program part.src --dialect krl --out corrected.src"
@@ -410,6 +420,15 @@ pub struct IdentifyArgs {
     /// Weighting of the distances: with their true covariance, or all pairs alike as in the paper
     #[arg(long, value_enum, default_value_t)]
     pub weighting: Weighting,
+    /// Begin with what an earlier calibration of this arm knows (calibration.ron): a few new poses are enough
+    #[arg(long, value_name = "RON", conflicts_with_all = ["level", "terms", "weighting"])]
+    pub from_calibration: Option<PathBuf>,
+    /// The SMR is still where it was at that calibration
+    #[arg(long, requires = "from_calibration")]
+    pub same_smr: bool,
+    /// How far every length and every angle may have drifted since, such as '0.01mm,0.001deg' [default: 0.002mm,0.0002deg]
+    #[arg(long, value_name = "LENGTH,ANGLE", requires = "from_calibration")]
+    pub drift: Option<ExpectedDeviation>,
 }
 
 /// Arguments of `verify`.

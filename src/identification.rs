@@ -49,6 +49,7 @@
 #![warn(missing_docs)]
 #![warn(clippy::wildcard_enum_match_arm)]
 
+pub mod change;
 pub mod circle_point;
 mod error;
 mod factor;
@@ -130,7 +131,42 @@ pub fn identify_while(
     settings: &Settings,
     progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Identification, IdentificationError> {
-    let prepared = Prepared::new(problem, settings)?;
+    identify_prepared(&Prepared::new(problem, settings)?, settings, progress)
+}
+
+/// What is known of the parameters before the data: their deviations with a covariance ((m) and (rad)).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Belief {
+    /// Expected deviations from nominal, in the order of [`Problem::parameters`].
+    pub mean: DVector<f64>,
+    /// Their covariance, positive definite.
+    pub covariance: DMatrix<f64>,
+}
+
+/// As [`identify_while`], with what is known before the data instead of the prior of the settings.
+///
+/// # Errors
+/// As [`identify_while`]; [`IdentificationError::Belief`] if its sizes do not fit or its covariance is none.
+pub fn identify_with_belief(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    belief: &Belief,
+    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+) -> Result<Identification, IdentificationError> {
+    let n = problem.parameters.len();
+    if belief.mean.len() != n || belief.covariance.shape() != (n, n) {
+        return Err(IdentificationError::Belief);
+    }
+    let basis = Basis::about(belief)?;
+    identify_prepared(&Prepared { basis, ..Prepared::new(problem, settings)? }, settings, progress)
+}
+
+fn identify_prepared(
+    prepared: &Prepared<'_, '_>,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+) -> Result<Identification, IdentificationError> {
+    let problem = prepared.problem;
     let everything = Trust::full(problem);
     let solve = prepared.solve(&everything);
     let zero = DVector::zeros(prepared.basis.transform.ncols());

@@ -4,7 +4,9 @@
 //! Knows the plain summaries of `session` and nothing of how they were made. [`Document`] is everything a report says:
 //! `report.json` is that object, `report.html` ([`report_html`]) shows it.
 
+mod comparison;
 mod document;
+mod health;
 mod html;
 mod iso9283;
 mod plan;
@@ -12,11 +14,13 @@ mod tables;
 mod text;
 
 pub use crate::text::fixed as number;
+pub use comparison::comparison_text;
 pub use document::{
     Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, ParameterNote, PointOrigin, PointPart,
     PredictionPart, ResultState, RobotPart, SessionPart, TemperaturePart,
 };
-pub use html::report_html;
+pub use health::{forecast_text, health_text};
+pub use html::{comparison_html, report_html};
 pub use iso9283::test_text;
 pub use plan::plan_text;
 pub use text::{identification_text, verification_text};

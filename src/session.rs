@@ -11,9 +11,11 @@
 pub mod about;
 pub mod advice;
 pub mod calibration;
+pub mod comparison;
 pub mod constraints;
 pub mod export;
 pub mod filter;
+pub mod health;
 pub mod iso9283;
 pub mod joint_errors;
 pub mod journal;

@@ -87,6 +87,7 @@ fn identified(profile: &Profile, identification: Vec<NamedSample>, verification:
         verification_mode: VerificationMode::Rest,
         layout: None,
         socket_distance_mm: None,
+        previous: None,
     };
     identify(&request, &mut |_| ControlFlow::Continue(())).unwrap()
 }

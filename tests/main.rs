@@ -24,6 +24,7 @@ mod example;
 #[cfg(unix)]
 mod faults;
 mod gravity;
+mod health;
 mod inverse;
 mod iso9283;
 mod joint_errors;

@@ -93,6 +93,7 @@ impl Bench {
             verification_mode,
             layout: None,
             socket_distance_mm: None,
+            previous: None,
         };
         identify(&request, &mut |_| ControlFlow::Continue(()))
     }

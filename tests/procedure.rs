@@ -62,6 +62,7 @@ fn request() -> IdentifyRequest {
         verification_mode: VerificationMode::Rest,
         layout: None,
         socket_distance_mm: None,
+        previous: None,
     }
 }
 

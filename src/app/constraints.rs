@@ -85,6 +85,7 @@ pub(super) fn run<O: Write, E: Write>(
             (false, None) => VerificationMode::None,
         },
         layout: None,
+        previous: None,
         socket_distance_mm: args.socket_distance_mm.map(|distance| (distance, args.socket_distance_sigma_mm)),
     };
     run_request(&request, estimation, None, console)

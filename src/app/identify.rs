@@ -12,8 +12,10 @@ use crate::cli::{EstimationArgs, IdentifyArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::procedure::checks;
 use crate::procedure::deliver::{REPORT_HTML, REPORT_JSON};
+use crate::procedure::health::Mounting;
 use crate::procedure::identify::{IdentifyRequest, NamedSample, SampleSet, identify};
-use crate::profile::Profile;
+use crate::procedure::recalibrate::Previous;
+use crate::profile::{Level, Profile};
 use crate::report;
 use crate::session::TableProblem;
 use crate::session::about::About;
@@ -25,7 +27,8 @@ use crate::store::{self, Links};
 
 pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let estimation = &args.estimation;
-    let loaded = load::profile(&estimation.profile)?;
+    let mut loaded = load::profile(&estimation.profile)?;
+    let previous = previous(args, &mut loaded, console)?;
     let profile = &loaded.profile;
     for diagnostic in &loaded.warnings {
         console.remark(&diagnostic.to_string());
@@ -67,14 +70,21 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     load::settle_changes(&mut verification_set.warnings, estimation.edited);
     let inputs = [Some(identification.input), verification.map(|loaded| loaded.input)].into_iter().flatten().collect();
     let payload = payload_of(&estimation.payload, &loaded.profile)?;
+    let mut settings = estimation_settings(estimation, args.weighting);
+    let mut mounted = None;
+    if let Some(previous) = &previous {
+        settings.level = Level::Geometric;
+        mounted = previous.calibration.mounted.filter(|_| previous.mounting == Mounting::Same);
+    }
     let request = IdentifyRequest {
-        mounted: None,
+        previous,
+        mounted,
         payload,
         profile: loaded.profile,
         profile_text: loaded.text,
         created: now(),
         inputs,
-        settings: estimation_settings(estimation, args.weighting),
+        settings,
         identification: set,
         verification: verification_set,
         basis,
@@ -83,6 +93,31 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
         socket_distance_mm: None,
     };
     run_request(&request, estimation, args.record.record.as_deref(), console)
+}
+
+/// The earlier calibration to begin with. Its own profile is used, because its deviations belong to that.
+fn previous<O: Write, E: Write>(
+    args: &IdentifyArgs,
+    loaded: &mut load::LoadedProfile,
+    console: &mut Console<O, E>,
+) -> Result<Option<Previous>, Failure> {
+    let Some(path) = &args.from_calibration else { return Ok(None) };
+    let file = path.display().to_string();
+    let earlier = load::calibration(path, args.estimation.edited, console)?;
+    if earlier.profile.name() != loaded.profile.name() {
+        let (own, other) = (earlier.profile.name(), loaded.profile.name());
+        return Err(Failure::new(ExitStatus::Usage, format!("'{file}' is of the robot '{own}', not of '{other}'"))
+            .hint("give the profile of the robot that was calibrated"));
+    }
+    if earlier.calibration.profile != loaded.text {
+        console.remark(&format!("note: the profile inside '{file}' is used; the one that was given differs from it"));
+        *loaded = load::parse_profile(earlier.calibration.profile.clone(), &format!("{file} (profile)"))?;
+    }
+    Ok(Some(Previous {
+        calibration: earlier.calibration,
+        mounting: if args.same_smr { Mounting::Same } else { Mounting::New },
+        drift: args.drift.unwrap_or_else(Previous::usual_drift),
+    }))
 }
 
 /// Identifies as requested, writes a recording if there is a path for it, and delivers the result.

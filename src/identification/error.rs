@@ -72,6 +72,9 @@ pub enum IdentificationError {
         /// The largest ratio of neighbouring singular values that could have been the gap.
         gap: f64,
     },
+    /// A covariance of what is known before the data that is none, or that does not fit the parameters.
+    #[error("what is known before the data has no usable covariance")]
+    Belief,
     /// The points fit only when mirrored.
     #[error(
         "the measured points are a mirror image of the robot's: residual {:.3} mm mirrored, {:.3} mm as given",

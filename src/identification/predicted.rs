@@ -201,8 +201,25 @@ fn motion(arm: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
     motion
 }
 
+/// Derivatives of positions by a shift (m) and a turn (rad) of all places about their middle, three rows per place.
+pub(crate) fn motions(arm: &Arm, places: &[&Place]) -> DMatrix<f64> {
+    let points = arm.points_in_base(places.iter().copied());
+    let count = points.len().max(1) as f64;
+    let centre = points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / count;
+    let mut motions = DMatrix::zeros(3 * points.len(), MOTIONS);
+    for (index, point) in points.iter().enumerate() {
+        motions.fixed_view_mut::<3, MOTIONS>(3 * index, 0).copy_from(&motion(&(point.coords - centre)));
+    }
+    motions
+}
+
+/// Derivatives of all positions by the parameters, freed from rigid motions of all places.
+pub(crate) fn free_jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
+    without_motions(jacobian(arm, ids, places), arm, places)
+}
+
 /// Derivatives of all positions by the parameters, three rows per place.
-fn jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
+pub(crate) fn jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
     let arm = arm.prepared();
     let mut evaluated = IdentificationJacobian::new(ids);
     let mut rows = vec![0.0; 3 * ids.len() * places.len()];
@@ -217,13 +234,7 @@ fn jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
 
 /// The part of `jacobian` that no rigid motion of all places explains.
 fn without_motions(jacobian: DMatrix<f64>, arm: &Arm, places: &[&Place]) -> DMatrix<f64> {
-    let points = arm.points_in_base(places.iter().copied());
-    let count = points.len().max(1) as f64;
-    let centre = points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / count;
-    let mut motions = DMatrix::zeros(3 * points.len(), MOTIONS);
-    for (index, point) in points.iter().enumerate() {
-        motions.fixed_view_mut::<3, MOTIONS>(3 * index, 0).copy_from(&motion(&(point.coords - centre)));
-    }
+    let motions = motions(arm, places);
     if motions.nrows() < MOTIONS {
         // One point: every error of it is a motion.
         return DMatrix::zeros(jacobian.nrows(), jacobian.ncols());

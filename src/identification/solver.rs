@@ -6,7 +6,7 @@
 
 use std::ops::ControlFlow;
 
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Point3, SymmetricEigen};
 
 use super::factor::Factor;
 use super::lengths::feature_covariances;
@@ -17,7 +17,7 @@ use super::noise::{Estimation, Groups, Noise, Scatter, shot_variance};
 use super::observability::Observability;
 use super::pairs::{PairPoint, pair_sums};
 use super::problem::Problem;
-use super::{IdentificationError, Iteration, Prior, TerminationReason, Weighting};
+use super::{Belief, IdentificationError, Iteration, Prior, TerminationReason, Weighting};
 use crate::kinematics::Arm;
 
 /// Converged: what is left of a step moves no prediction by more than this many of its standard deviations, wherever it is. That is
@@ -38,6 +38,10 @@ const NOISE_TOLERANCE: f64 = 1e-5;
 pub(crate) struct Basis {
     /// n × m.
     pub(crate) transform: DMatrix<f64>,
+    /// Whether the transform is diagonal, which makes products with it cheap.
+    is_diagonal: bool,
+    /// Deviations at `z = 0` ((m) and (rad)).
+    mean: DVector<f64>,
     /// Weight of `z` in the cost: 1 with the prior, 0 without.
     pub(crate) prior_weight: f64,
 }
@@ -46,8 +50,7 @@ impl Basis {
     /// `Tᵀ M T`.
     pub(crate) fn reduce(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let t = &self.transform;
-        if self.prior_weight > 0.0 {
-            // T is diagonal with the prior.
+        if self.is_diagonal {
             return DMatrix::from_fn(t.nrows(), t.ncols(), |i, j| t[(i, i)] * matrix[(i, j)] * t[(j, j)]);
         }
         t.transpose() * (matrix * t)
@@ -56,10 +59,16 @@ impl Basis {
     /// `T M Tᵀ`.
     pub(crate) fn spread(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let t = &self.transform;
-        if self.prior_weight > 0.0 {
+        if self.is_diagonal {
             return DMatrix::from_fn(t.nrows(), t.nrows(), |i, j| t[(i, i)] * matrix[(i, j)] * t[(j, j)]);
         }
         t * matrix * t.transpose()
+    }
+
+    /// With what is known before the data.
+    pub(crate) fn about(belief: &Belief) -> Result<Self, IdentificationError> {
+        let transform = Cholesky::new(belief.covariance.clone()).ok_or(IdentificationError::Belief)?.unpack();
+        Ok(Self { transform, is_diagonal: false, mean: belief.mean.clone(), prior_weight: 1.0 })
     }
 
     pub(crate) fn new(
@@ -71,7 +80,12 @@ impl Basis {
         match prior {
             Prior::Expected => {
                 let expected = DVector::from_iterator(n, problem.parameters.iter().map(|parameter| parameter.expected));
-                Ok(Self { transform: DMatrix::from_diagonal(&expected), prior_weight: 1.0 })
+                Ok(Self {
+                    transform: DMatrix::from_diagonal(&expected),
+                    is_diagonal: true,
+                    mean: DVector::zeros(n),
+                    prior_weight: 1.0,
+                })
             }
             Prior::None => {
                 if observability.rank.is_none() {
@@ -89,7 +103,7 @@ impl Basis {
                     .map(|index| DVector::from_fn(n, |i, _| visible.eigenvectors[(i, index)] * unit(i)))
                     .collect();
                 let transform = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
-                Ok(Self { transform, prior_weight: 0.0 })
+                Ok(Self { transform, is_diagonal: false, mean: DVector::zeros(n), prior_weight: 0.0 })
             }
         }
     }
@@ -145,7 +159,7 @@ impl Solve<'_, '_> {
     pub(crate) fn linearise(&self, z: DVector<f64>, noise: Noise) -> Linearised {
         let problem = self.problem;
         let weights = Weights::new(problem, self.groups, &noise, self.trust);
-        let x = &self.basis.transform * &z;
+        let x = &self.basis.mean + &self.basis.transform * &z;
         let arm = problem.arm_with(&x);
         let evaluation = Evaluation::new(problem, &arm);
         let predicted = evaluation.points.clone();
@@ -269,8 +283,14 @@ impl Solve<'_, '_> {
     fn newton_by_rows(&self, at: &Linearised) -> Option<Newton> {
         let ProjectedRows { n, rows, residuals, weights, .. } = &at.rows;
         let transform = &self.basis.transform;
-        let weighted =
-            DMatrix::from_fn(*n, residuals.len(), |i, j| rows[n * j + i] * transform[(i, i)] * weights[j].sqrt());
+        let mut weighted = if self.basis.is_diagonal {
+            DMatrix::from_fn(*n, residuals.len(), |i, j| rows[n * j + i] * transform[(i, i)])
+        } else {
+            transform.tr_mul(&DMatrix::from_column_slice(*n, residuals.len(), rows))
+        };
+        for (mut column, weight) in weighted.column_iter_mut().zip(weights) {
+            column *= weight.sqrt();
+        }
         let residuals = DVector::from_fn(residuals.len(), |j, _| residuals[j] * weights[j].sqrt());
         let mut kernel = weighted.transpose() * &weighted;
         for index in 0..kernel.nrows() {

@@ -29,6 +29,12 @@ pub enum ProcedureError {
     /// No set of poses can be chosen or scored.
     #[error(transparent)]
     Planning(#[from] PlanningError),
+    /// An earlier calibration that does not tell enough.
+    #[error(transparent)]
+    Earlier(#[from] super::known::KnownError),
+    /// New points that cannot be compared with an earlier calibration.
+    #[error(transparent)]
+    Compared(#[from] super::health::HealthError),
     /// No order of the poses can be followed.
     #[error(transparent)]
     Order(#[from] OrderError),
@@ -121,6 +127,8 @@ impl ProcedureError {
             | Self::Order(_)
             | Self::NoHome
             | Self::Mistaken { .. }
+            | Self::Earlier(_)
+            | Self::Compared(_)
             | Self::OnePosition => &[],
         }
     }

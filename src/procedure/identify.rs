@@ -4,14 +4,15 @@ use std::ops::ControlFlow;
 
 use super::assess::{direct_verification, point_verification};
 use super::checks::Unseen;
+use super::recalibrate::{self, Beginning, Previous};
 use super::result::{self, Context};
 use super::summary::{Finished, SampleName};
 use super::workspace::Workspace;
 use super::{EstimationSettings, ProcedureError, checks, joint_errors, target_parameters};
 use crate::identification::verification::{DirectErrors, FittedSetup, ModelErrors, fit_setup};
 use crate::identification::{
-    Identification, LengthEnd, Observations, PointSample, Problem, SampleIndex, Settings, Shape, Stage, Terms,
-    WithTerms, identify_with_terms,
+    Identification, Iteration, LengthEnd, Observations, PointSample, Problem, SampleIndex, Selection, Settings, Shape,
+    Stage, Terms, WithTerms, identify_with_belief, identify_with_terms,
 };
 use crate::kinematics::Place;
 use crate::profile::{Level, Profile};
@@ -111,6 +112,8 @@ pub struct IdentifyRequest {
     pub layout: Option<Layout>,
     /// Known distance between the two sockets of one position (mm) and its standard deviation, for the record only.
     pub socket_distance_mm: Option<(f64, f64)>,
+    /// An earlier calibration to begin with.
+    pub previous: Option<Previous>,
 }
 
 /// An identified arm.
@@ -150,9 +153,16 @@ pub fn identify(
 ) -> Result<Identified, ProcedureError> {
     let IdentifyRequest { identification, mounted, payload, .. } = request;
     let profile = &calibration::mounted_on(&request.profile, mounted.as_ref(), payload.as_ref());
-    let parameters = request.settings.parameters(profile);
-    let arm = profile.arm();
     let observations = identification.observations();
+    let beginning = request
+        .previous
+        .as_ref()
+        .map(|previous| Beginning::new(previous, profile, &identification.samples, request.settings.sigma))
+        .transpose()?;
+    let (arm, parameters) = match &beginning {
+        Some(beginning) => (beginning.arm.clone(), beginning.parameters.clone()),
+        None => (profile.arm(), request.settings.parameters(profile)),
+    };
     let problem = Problem { arm: &arm, parameters: &parameters, observations: &observations };
     let all_constants = request.settings.parameters_of(Level::Geometric, profile);
     let plausible = Problem { parameters: &all_constants, ..problem };
@@ -171,8 +181,16 @@ pub fn identify(
         warnings.push(Warning::new(WarningCode::NoScale, message, true).with_advice(Advice::StateSocketDistance));
     }
     let settings = request.settings.solver(profile, typical_distance(&observations));
-    let candidates = request.settings.candidates();
-    let with_terms = identify_with_terms(&problem, &settings, &candidates, progress)?;
+    let candidates = if beginning.is_some() { Vec::new() } else { request.settings.candidates() };
+    let with_terms = match &beginning {
+        Some(beginning) => {
+            warnings.extend(beginning.warning());
+            let mut told = |step: &Iteration| progress(Stage::Step(*step));
+            let found = identify_with_belief(&problem, &settings, &beginning.belief, &mut told)?;
+            WithTerms { geometric: found.clone(), found, selection: Selection::default() }
+        }
+        None => identify_with_terms(&problem, &settings, &candidates, progress)?,
+    };
     let found = &with_terms.found;
     let nominal = nominal_setup(&problem, found)?;
     let nominal_rms = joint_errors::nominal_rms(&problem, found, &nominal);
@@ -208,11 +226,21 @@ pub fn identify(
     }
     summary.joint_errors = joint_errors::summaries(profile, &problem, found);
     summary.features = features(identification, found);
+    let begun = request.previous.as_ref().zip(beginning.as_ref());
+    if let Some((previous, beginning)) = begun {
+        summary.earlier = Some(beginning.summary(previous, found));
+        summary.parameters.extend(recalibrate::kept_errors(previous).cloned());
+        summary.joint_errors.clone_from(&previous.calibration.joint_errors);
+    }
     summary.workspace = workspace.map(|workspace| workspace.summary);
     let calibration = is_usable.then(|| Calibration {
         mounted: *mounted,
         payload: *payload,
-        geometric: joint_errors::geometric(&with_terms, &settings),
+        geometric: match &request.previous {
+            Some(previous) => recalibrate::geometric(previous, &summary.parameters),
+            None => joint_errors::geometric(&with_terms, &settings),
+        },
+        earlier: begun.map_or_else(Vec::new, |(previous, beginning)| beginning.earlier(previous)),
         ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, found)
     });
     Ok(Identified { summary, calibration, found: with_terms.found, nominal })
@@ -446,6 +474,7 @@ fn calibration(
         selection: summary.selection.clone(),
         joint_errors: summary.joint_errors.clone(),
         workspace: summary.workspace.clone(),
+        earlier: Vec::new(),
         profile: profile_text.to_owned(),
     }
 }

@@ -194,6 +194,7 @@ impl Finished<'_> {
             joint_errors: Vec::new(),
             workspace: None,
             features: Vec::new(),
+            earlier: None,
         }
     }
 }

@@ -6,6 +6,7 @@
 
 mod annex;
 mod charts;
+mod comparison;
 mod identity;
 mod joints;
 mod markup;
@@ -19,6 +20,7 @@ mod views;
 
 use crate::report::document::{Details, Document, PointOrigin};
 use crate::text::shortened;
+pub use comparison::comparison_html;
 use markup::{add, css_string, escape};
 
 /// The rules of the page.

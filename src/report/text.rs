@@ -25,6 +25,10 @@ pub fn identification_text(summary: &IdentificationSummary) -> String {
         text.push_str(&paragraph("  ", &workspace_sentence(workspace)));
         text.push('\n');
     }
+    if let Some(earlier) = &summary.earlier {
+        text.push_str(&paragraph("", &format!("{}.", earlier.sentence())));
+        text.push('\n');
+    }
     text.push_str(&fit_lines(summary));
     if let Some(selection) = &summary.selection {
         text.push_str(&selection_lines(selection));

@@ -183,11 +183,37 @@ pub struct Calibration {
     /// What the coefficients of compliance and tilt are relative to; none if there are no such terms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub loads: Option<LoadsText>,
+    /// Data of earlier calibrations that this one began with, the oldest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub earlier: Vec<EarlierText>,
     /// The profile, as it was read.
     pub profile: String,
     /// Whether the file was as this program wrote it.
     #[serde(skip)]
     pub integrity: Integrity,
+}
+
+/// The data of an earlier calibration, and how far parameters may have changed after it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EarlierText {
+    /// When that calibration was made.
+    pub created: String,
+    /// Its samples.
+    pub samples: Vec<SampleText>,
+    /// Standard deviation of a coordinate of a reading, and the part that all readings of a pose share.
+    pub used_mm: f64,
+    pub poses_mm: Option<f64>,
+    /// Standard deviations, in the unit of each parameter, of what may have changed since. Parameters that are missing may not have.
+    pub widened: Vec<(ParameterId, f64)>,
+}
+
+impl EarlierText {
+    /// How far a parameter may have changed after it ((m) or (rad)).
+    pub fn widened(&self, id: ParameterId) -> f64 {
+        let own = self.widened.iter().find(|(known, _)| *known == id);
+        own.map_or(0.0, |(id, width)| id.unit().from_edge(*width))
+    }
 }
 
 /// The largest loads over the joint ranges at the payload of the identification: a coefficient of compliance or tilt is the angle at

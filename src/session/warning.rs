@@ -65,6 +65,8 @@ codes! {
     JointLimits => "joint_limits",
     /// A parameter is far from nominal in spite of the prior.
     LargeDeviation => "large_deviation",
+    /// New points contradict the calibration that an identification began with.
+    EarlierDoesNotFit => "earlier_does_not_fit",
     /// Points that the operator excluded.
     LeftOut => "left_out",
     /// Acceptance limits that were set when a result had been seen.

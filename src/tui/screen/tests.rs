@@ -312,6 +312,7 @@ fn summary(is_good: bool) -> IdentificationSummary {
         joint_errors: Vec::new(),
         workspace: None,
         features: Vec::new(),
+        earlier: None,
         written: Vec::new(),
     }
 }

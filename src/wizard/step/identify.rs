@@ -85,6 +85,7 @@ fn request(cx: &Cx<'_>) -> Option<Request> {
         verification_mode: mode,
         layout: None,
         socket_distance_mm: None,
+        previous: None,
     })))
 }
 
