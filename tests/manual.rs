@@ -86,5 +86,5 @@ fn the_completions_of_bash_are_a_script() {
         file.display()
     );
     let output = Command::new("/bin/bash").args(["--norc", "-c", &ask]).output().unwrap();
-    assert_eq!(text(&output.stdout).trim(), "compensate completions", "{}", text(&output.stderr));
+    assert_eq!(text(&output.stdout).trim(), "compare compensate completions", "{}", text(&output.stderr));
 }
