@@ -15,7 +15,6 @@ use crate::procedure::known::Known;
 use crate::procedure::{checks, input_file, joint_types, plan as planner, provenance};
 use crate::report;
 use crate::session::health::{ForecastSummary, HealthVerdict};
-use crate::session::measurements::Layout;
 use crate::session::plan;
 use crate::session::summary::{InputRole, Warning, WarningCode};
 use crate::store;
@@ -95,7 +94,8 @@ fn write_plan<O: Write, E: Write>(args: &CheckPlanArgs, console: &mut Console<O,
 fn evaluate<O: Write, E: Write>(args: &CheckArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let (loaded, known) = known(&args.calibration, args.edited, console)?;
     let profile = &known.profile;
-    let measured = load::measurements(&args.measurements, Layout::default(), profile, InputRole::Verification)?;
+    let file = args.calibration.display().to_string();
+    let measured = load::measurements(&args.measurements, "named", (profile, &file), InputRole::Verification)?;
     let rows: Vec<_> = measured.table.distinct_rows().collect();
     let samples = rows.iter().zip(load::samples(&rows, profile)?).map(|(row, sample)| NamedSample {
         pose: row.pose.clone(),
@@ -108,7 +108,6 @@ fn evaluate<O: Write, E: Write>(args: &CheckArgs, console: &mut Console<O, E>) -
     warnings.extend(checks::limit_warning(profile, None, configurations));
     warnings.extend(measured.simulated.clone());
     load::settle_changes(&mut warnings, args.edited);
-    let file = args.calibration.display().to_string();
     let inputs = vec![input_file(InputRole::Calibration, file, loaded.text.as_bytes()), measured.input.clone()];
     let request = HealthRequest {
         known: &known,

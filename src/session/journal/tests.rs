@@ -169,6 +169,7 @@ fn identified() -> IdentifiedText {
             verification_mode: VerificationMode::Rest,
             layout: None,
             socket_distance_mm: None,
+            previous: None,
         },
         &mut |_| ControlFlow::Continue(()),
     )
