@@ -130,6 +130,7 @@ fn furnish(folder: &Path) {
     put("sessions/example/calibration.ron", "calibration.ron");
     put("sessions/soochow-example/verification.csv", "later.csv");
     put("tests/urdf/ur5.urdf", "arm.urdf");
+    put_foreign_tables(folder);
     // A session as it was earlier.
     let journal = fs::read_to_string(root().join("sessions/example/journal.ron")).unwrap();
     fs::create_dir(folder.join("then")).unwrap();
@@ -139,6 +140,28 @@ fn furnish(folder: &Path) {
     let program =
         "DEF part()\nPTP {A1 10,A2 20,A3 -30,A4 40,A5 50,A6 60}\nPTP {A1 -40,A2 10,A3 5,A4 30,A5 -60,A6 0}\nEND\n";
     fs::write(folder.join("part.src"), program).unwrap();
+}
+
+/// The measurements as other programs would write them, and the factory calibration of an arm.
+fn put_foreign_tables(folder: &Path) {
+    let text = fs::read_to_string(root().join("sessions/example/measurements.csv")).unwrap();
+    let rows: Vec<Vec<&str>> =
+        text.lines().filter(|line| !line.starts_with(['#', 'p'])).map(|line| line.split(',').collect()).collect();
+    let columns =
+        |from: usize, to: usize| -> String { rows.iter().map(|row| row[from..to].join("  ") + "\n").collect() };
+    let put = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
+    put("points.txt", &format!("q1_deg q2_deg q3_deg q4_deg q5_deg q6_deg X [mm] Y [mm] Z [mm]\n{}", columns(1, 10)));
+    put("kuka.txt", &format!("A1 A2 A3 A4 A5 A6 X Y Z\n{}", columns(1, 10)));
+    put("headless.txt", &columns(1, 10));
+    put("joints.txt", &columns(1, 7));
+    put("smr.txt", &columns(7, 10));
+    let zero = "[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]";
+    put(
+        "calibration.conf",
+        &format!(
+            "[mounting]\ndelta_theta = [1e-4, 2e-4, -1e-4, 0.0, 1e-4, 0.0]\ndelta_a = {zero}\ndelta_d = {zero}\ndelta_alpha = {zero}\ncalibration_status = 2 # linearised\n"
+        ),
+    );
 }
 
 /// Runs the commands of a document; gives back what went wrong and how many ran.
@@ -202,6 +225,28 @@ fn every_command_shown_does_what_is_said() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
     let ran: usize = ran.iter().sum();
     assert!(ran >= 20, "only {ran} commands were found");
+}
+
+/// The recipe for Python reads the result files of a session as they are.
+#[test]
+fn the_recipe_for_python_runs() {
+    let text = fs::read_to_string(root().join("docs/integrator.md")).unwrap();
+    let recipe = text.split("```python\n").find(|block| block.contains("report.json")).unwrap();
+    let recipe = recipe.split("```").next().unwrap();
+    let ran = std::process::Command::new("python3")
+        .args(["-c", recipe])
+        .current_dir(root().join("sessions/example"))
+        .output();
+    let Ok(output) = ran else {
+        println!("skipped: there is no python3");
+        return;
+    };
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        said.starts_with("accepted 0.010953435566123743\nalpha1 ") && said.ends_with("30 44.786000000 1141.302414\n"),
+        "{said}"
+    );
 }
 
 #[test]

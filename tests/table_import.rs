@@ -381,6 +381,28 @@ fn a_layout_is_saved_beside_the_profile_and_used_again() {
     assert!(!said(&read).contains("has no unit") && !said(&read).contains("joint columns"), "{}", said(&read));
 }
 
+/// What a table says about itself is not lost: that it is simulated, that it was changed, and the columns for filters.
+#[test]
+fn marks_and_other_columns_survive() {
+    let folder = tempfile::tempdir().unwrap();
+    let example = fs::read_to_string(crate::support::root().join("sessions/example/measurements.csv")).unwrap();
+    fs::write(folder.path().join("points.csv"), &example).unwrap();
+    let arguments = ["import", "points.csv", "--profile", "soochow", "--out", "again.csv"];
+    let done = run(folder.path(), &arguments);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert!(said(&done).contains("WARNING: SIMULATED"), "{}", said(&done));
+    let again = fs::read_to_string(folder.path().join("again.csv")).unwrap();
+    assert!(
+        again.starts_with("# SIMULATED: ") && again.contains("sigma_mm,kind\n") && again.contains(",identification\n"),
+        "{again}"
+    );
+    let changed = example.replacen("44.786", "44.787", 1);
+    fs::write(folder.path().join("points.csv"), changed).unwrap();
+    let refused = run(folder.path(), &arguments);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("the table has changed since the program wrote it"), "{}", said(&refused));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 

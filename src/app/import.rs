@@ -11,8 +11,9 @@ use crate::error::{ExitStatus, Failure};
 use crate::identification::{Observations, Problem};
 use crate::procedure::{checks, joint_types};
 use crate::profile::{Level, Profile};
+use crate::session::export::{marked_as_simulated, simulation_of_table};
 use crate::session::measurements::{
-    Expected, Layout, Measurements, PointFile, Reading, Row, SavedLayout, Understood, joined, read_for, write,
+    Expected, Layout, Measurements, PointFile, Reading, Row, SavedLayout, Understood, joined, read_for, write_with_text,
 };
 use crate::session::{TableErrors, workbook};
 use crate::store;
@@ -51,6 +52,15 @@ pub(super) fn run<O: Write, E: Write>(args: &ImportArgs, console: &mut Console<O
             return Err(refused(&errors, args));
         }
     };
+    // A new check sum would hide the change for good.
+    if let Some(change) = table.warnings.iter().find(|warning| warning.is_change()) {
+        return Err(Failure::new(ExitStatus::Usage, change.to_string())
+            .hint("take an intact copy; if the change was made on purpose, 'trupose identify --edited' reads the table as it is"));
+    }
+    let simulated = simulated(args)?;
+    if let Some(said) = &simulated {
+        console.remark(&format!("WARNING: SIMULATED: {said}"));
+    }
     for warning in table.warnings.iter().take(SHOWN_WARNINGS) {
         console.remark(&format!("note: {warning}"));
     }
@@ -70,8 +80,9 @@ pub(super) fn run<O: Write, E: Write>(args: &ImportArgs, console: &mut Console<O
         console.say_written(&path)?;
     }
     if let Some(path) = &args.out {
-        let rows: Vec<Row> = table.distinct_rows().cloned().collect();
-        let text = checksum::with_sum(&write(&rows, &joints), Syntax::Csv);
+        let text = write_with_text(&table, &joints);
+        let text = simulated.as_deref().map_or_else(|| text.clone(), |said| marked_as_simulated(said, &text));
+        let text = checksum::with_sum(&text, Syntax::Csv);
         store::replace(path, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         console.say_written(path)?;
     }
@@ -106,6 +117,19 @@ fn content(path: &Path, sheet: Option<&str>) -> Result<Vec<u8>, Refusal> {
     Ok(bytes)
 }
 
+/// What the tables say about a simulation that their points come from.
+fn simulated(args: &ImportArgs) -> Result<Option<String>, Failure> {
+    let points = args.points.iter().map(|named| named.split_once('=').map_or(named.as_str(), |(_, path)| path));
+    let paths = args.files.iter().cloned().chain(points.map(PathBuf::from));
+    for path in paths.filter(|path| path.is_file()) {
+        let bytes = store::read(&path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        if let Some(said) = simulation_of_table(&bytes) {
+            return Ok(Some(said));
+        }
+    }
+    Ok(None)
+}
+
 /// The tables one behind the other. Where two have poses of the same name, the name of the file is put before them.
 fn read_files(
     args: &ImportArgs,
@@ -129,6 +153,10 @@ fn read_files(
             None => whole = Some(table),
             Some(whole) => {
                 let before = whole.rows.len();
+                if whole.columns != table.columns {
+                    // Their other columns do not belong together.
+                    whole.columns.clear();
+                }
                 whole.duplicates.extend(table.duplicates.iter().map(|index| index + before));
                 whole.rows.extend(table.rows);
                 whole.warnings.extend(table.warnings);

@@ -40,6 +40,11 @@ pub fn drift_csv(session: &Session, robot: &Robot) -> Option<String> {
     Some(table(session, robot, &[PoseKind::Drift]))
 }
 
+/// A table of simulated points with the comment that says so.
+pub fn marked_as_simulated(said: &str, table: &str) -> String {
+    format!("{SIMULATED_MARK}{said}\n{table}")
+}
+
 fn table(session: &Session, robot: &Robot, of: &[PoseKind]) -> String {
     let mut kinds = vec!["kind"];
     let mut rows = Vec::new();

@@ -37,8 +37,8 @@ pub use foreign::{ColumnRead, Expected, Reading, Understood};
 pub use join::{JoinBy, PointFile, joined};
 pub use layout::Layout;
 pub use saved::SavedLayout;
-pub use writer::write;
 pub(super) use writer::{joint_cells, quoted};
+pub use writer::{write, write_with_text};
 
 use super::table::{
     self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,

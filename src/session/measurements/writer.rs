@@ -1,6 +1,7 @@
 //! Measurement tables as text.
 
-use super::{Row, joint_names};
+use super::names::{Name, Place};
+use super::{Measurements, Row, joint_names};
 use crate::kinematics::JointType;
 use crate::text::{decimal, printable};
 use crate::units::{Quantity, to_mm};
@@ -44,6 +45,37 @@ pub fn write(rows: &[Row], joints: &[JointType]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The rows of a table without copies, as [`write`] does, with the columns that are text for filters.
+pub fn write_with_text(table: &Measurements, joints: &[JointType]) -> String {
+    let rows: Vec<Row> = table.distinct_rows().cloned().collect();
+    // A name that could be taken for a joint, a point or a tool would be a second one in the written table.
+    let is_text = |name: &&String| {
+        let name = Name::new(name, false);
+        !name.is_of_tool() && matches!(name.place(), None | Some(Place::Time))
+    };
+    let is_ours = |name: &&String| name.starts_with("sigma") || name.starts_with("temperature");
+    let kept: Vec<usize> = (0..table.columns.len())
+        .filter(|index| table.columns.get(*index).is_some_and(|name| is_text(&name) && !is_ours(&name)))
+        .collect();
+    if kept.is_empty() {
+        return write(&rows, joints);
+    }
+    let picked = |cells: &[String]| -> String {
+        kept.iter()
+            .map(|index| format!(",{}", cells.get(*index).map_or_else(String::new, |cell| quoted(cell))))
+            .collect()
+    };
+    let text = write(&rows, joints);
+    let mut lines = text.lines();
+    let mut whole = format!("{}{}\n", lines.next().unwrap_or_default(), picked(&table.columns));
+    for (line, row) in lines.zip(&rows) {
+        whole.push_str(line);
+        whole.push_str(&picked(&row.fields));
+        whole.push('\n');
+    }
+    whole
 }
 
 /// Joint values in degrees, sliding joints in mm.
