@@ -123,7 +123,7 @@ pub struct RecordedSet {
     /// Which rows, such as `pose % 17 == 0`; none: all.
     #[serde(default)]
     pub rows: Option<String>,
-    /// Layout of the table: `named`, `robodk` or `delmia`.
+    /// Layout of the table: `named`, `robodk`, `delmia`, or one that was saved beside the table or in the current folder.
     #[serde(default = "named")]
     pub layout: String,
 }
