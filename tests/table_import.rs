@@ -245,8 +245,8 @@ fn workbook(sheets: &[(&str, &str)], shared: &str) -> Vec<u8> {
     let mut parts = vec![("xl/sharedStrings.xml".to_owned(), format!("<sst>{shared}</sst>"))];
     let (mut names, mut links) = (String::new(), String::new());
     for (index, (name, cells)) in sheets.iter().enumerate() {
-        names += &format!("<sheet name=\"{name}\" r:id=\"r{index}\"/>");
-        links += &format!("<Relationship Id=\"r{index}\" Target=\"worksheets/sheet{index}.xml\"/>");
+        names.extend([format!("<sheet name=\"{name}\" r:id=\"r{index}\"/>")]);
+        links.extend([format!("<Relationship Id=\"r{index}\" Target=\"worksheets/sheet{index}.xml\"/>")]);
         parts.push((
             format!("xl/worksheets/sheet{index}.xml"),
             format!("<worksheet><sheetData>{cells}</sheetData></worksheet>"),
@@ -287,12 +287,12 @@ fn sheet() -> (String, String) {
     let shared: String = names.iter().map(|name| format!("<si><r><t>{name}</t></r></si>")).collect();
     let mut rows = String::from("<row r=\"2\">");
     for (index, letter) in ["A", "B", "C", "D", "E", "F"].iter().enumerate() {
-        rows += &format!("<c r=\"{letter}2\" t=\"s\"><v>{index}</v></c>");
+        rows.extend([format!("<c r=\"{letter}2\" t=\"s\"><v>{index}</v></c>")]);
     }
     rows += "</row>";
     for (index, row) in ROWS.iter().enumerate() {
         let cells: String = row.iter().map(|value| format!("<c><v>{value:e}</v></c>")).collect();
-        rows += &format!("<row r=\"{}\">{cells}</row>", index + 4);
+        rows.extend([format!("<row r=\"{}\">{cells}</row>", index + 4)]);
     }
     (rows, shared)
 }
@@ -335,7 +335,7 @@ fn a_layout_is_saved_beside_the_profile_and_used_again() {
     fs::write(path.join("cell/arm.ron"), profile).unwrap();
     let mut text = "Nr;A1;A2;A3;A4;A5;A6;X;Y;Z\n".to_owned();
     for (index, point) in ["600,1;10,5;900,25", "500,1;210,5;800,25", "400,1;310,5;700,25"].iter().enumerate() {
-        text += &format!("{index};{index},5;12,5;20,5;30;40;50;{point}\n");
+        text.extend([format!("{index};{index},5;12,5;20,5;30;40;50;{point}\n")]);
     }
     fs::write(path.join("kuka.csv"), &text).unwrap();
     let refused = run(path, &["import", "kuka.csv", "--profile", "cell/arm.ron"]);

@@ -257,7 +257,7 @@ fn summary(table: &Measurements, profile: &Profile) -> String {
     let Understood { separator, notes, .. } = &table.understood;
     let mut text = if table.understood.columns.is_empty() { String::new() } else { listing(&table.understood) };
     if !separator.is_empty() {
-        text.push_str(&format!("cells are separated by {separator}\n"));
+        text.extend([format!("cells are separated by {separator}\n")]);
     }
     text.extend(notes.iter().map(|note| format!("{note}\n")));
     let distinct: Vec<&Row> = table.distinct_rows().collect();
@@ -269,7 +269,7 @@ fn summary(table: &Measurements, profile: &Profile) -> String {
     } else {
         counted(targets.len(), "target")
     };
-    text.push_str(&format!("{}, {}, {of_targets}\n", counted(distinct.len(), "reading"), counted(poses.len(), "pose")));
+    text.extend([format!("{}, {}, {of_targets}\n", counted(distinct.len(), "reading"), counted(poses.len(), "pose"))]);
     text
 }
 
@@ -283,7 +283,7 @@ fn rows(table: &Measurements, profile: &Profile) -> String {
             values.map(|(value, joint)| format!("{:.4}", joint.joint_type.quantity().to_edge(*value))).collect();
         let point: Vec<String> = row.point.iter().map(|value| format!("{:.4}", to_mm(*value))).collect();
         let target = row.target.as_deref().unwrap_or("-");
-        text.push_str(&format!("{:>4}  {}  {target}  {}  {}\n", row.line, row.pose, values.join(" "), point.join(" ")));
+        text.extend([format!("{:>4}  {}  {target}  {}  {}\n", row.line, row.pose, values.join(" "), point.join(" "))]);
     }
     text
 }

@@ -147,17 +147,17 @@ fn of_origins(origins: &[Isometry3<f64>], nominal: &KinematicChain, profile: &Pr
         let limit = range.map_or_else(String::new, |(low, high)| {
             format!("<limit lower=\"{}\" upper=\"{}\"/>", number(low), number(high))
         });
-        text.push_str(&format!(
+        text.extend([format!(
             "<link name=\"{child}\"/>\n<joint name=\"{}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"{}\" rpy=\"{}\"/><axis xyz=\"0 0 1\"/>{limit}</joint>\n",
             urdf_write::escaped(&joint.name),
             <[f64; 3]>::from(origin.translation.vector).map(number).join(" "),
             roll_pitch_yaw(&origin.rotation).map(number).join(" "),
-        ));
+        )]);
         parent = child;
     }
-    text.push_str(&format!(
+    text.extend([format!(
         "<link name=\"{flange}\"/>\n<joint name=\"end\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"{flange}\"/></joint>\n</robot>\n",
         flange = urdf_write::FLANGE
-    ));
+    )]);
     text
 }

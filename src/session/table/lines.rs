@@ -82,7 +82,7 @@ pub(super) fn prepared(text: &str) -> Prepared {
     for line in text.lines() {
         let start = line.trim();
         if comment(start).is_some() || is_rule(start) {
-            prepared.push_str(&format!("#{start}"));
+            prepared.extend([format!("#{start}")]);
         } else {
             match separator {
                 Separator::Blanks => prepared.push_str(&blanks_as_tabs(start).join("\t")),
@@ -189,7 +189,7 @@ fn blanks_as_tabs(line: &str) -> Vec<String> {
     let mut joined: Vec<String> = Vec::new();
     for word in words {
         match joined.last_mut() {
-            Some(name) if is_bracketed(&word) && !is_bracketed(name) => name.push_str(&format!(" {word}")),
+            Some(name) if is_bracketed(&word) && !is_bracketed(name) => name.extend([format!(" {word}")]),
             _ => joined.push(word),
         }
     }

@@ -16,7 +16,7 @@ impl Study<'_> {
     /// Proposes what the columns with names may be.
     pub(super) fn propose(&mut self, wanted: Wanted) {
         let joints = self.proposed_joints();
-        let points = self.proposed_points(&joints);
+        let points = self.proposed_points(joints.as_deref());
         let mut mapped = Vec::new();
         if let Some(pose) = self.canonical.iter().position(|name| name.as_deref() == Some("pose")) {
             mapped.push(("pose".to_owned(), self.source(pose)));
@@ -92,7 +92,7 @@ impl Study<'_> {
     }
 
     /// The columns that are known to be the points, or may be them.
-    fn proposed_points(&self, joints: &Option<Vec<usize>>) -> Option<Vec<(String, usize)>> {
+    fn proposed_points(&self, joints: Option<&[usize]>) -> Option<Vec<(String, usize)>> {
         let is_point = |name: &str| {
             let base = name.split('_').next().unwrap_or_default();
             let mut letters = base.chars();
@@ -110,7 +110,7 @@ impl Study<'_> {
         if known.len() >= 3 {
             return Some(known);
         }
-        let taken = joints.as_deref().unwrap_or_default();
+        let taken = joints.unwrap_or_default();
         let free: Vec<usize> = (0..self.shown.len())
             .filter(|index| !taken.contains(index) && self.is_free(*index) && self.is_of_numbers(*index))
             .collect();
