@@ -516,6 +516,8 @@ fn a_technician_without_a_profile_calibrates_by_keys() {
         "part.mod",
         "--dialect",
         "rapid",
+        "--points",
+        "computed",
         "--out",
         "corrected.mod",
     ];
