@@ -115,7 +115,7 @@ fn judged(known: &Known, samples: Vec<NamedSample>) -> HealthSummary {
         provenance: provenance(),
         warnings: Vec::new(),
     };
-    evaluate(request).unwrap()
+    evaluate(&request).unwrap()
 }
 
 fn provenance() -> Provenance {
@@ -243,9 +243,9 @@ fn the_first_and_the_last_zero_cannot_be_seen_with_another_mounting() {
 
 #[test]
 fn unchanged_arms_are_not_changed_and_planted_changes_are_located() {
+    const ARMS: usize = 20;
     let mut changed = 0;
     let mut located = 0;
-    const ARMS: usize = 20;
     for seed in 0..ARMS {
         let mut rng = seeded(2000 + seed as u64);
         let arm = real_arm(&mut rng);

@@ -119,7 +119,7 @@ fn evaluate<O: Write, E: Write>(args: &CheckArgs, console: &mut Console<O, E>) -
         provenance: provenance(profile, &loaded.calibration.profile, load::now(), inputs),
         warnings,
     };
-    let summary = health::evaluate(request).map_err(|error| failure(&error))?;
+    let summary = health::evaluate(&request).map_err(|error| failure(&error))?;
     console.print(&if args.json { to_json(&summary)? } else { report::health_text(&summary) })?;
     Ok(match summary.verdict {
         HealthVerdict::StillValid => ExitStatus::Accepted,

@@ -311,7 +311,7 @@ fn linear_start(shape: Shape, centre: &Point3<f64>, points: &[(Point3<f64>, f64)
     let (size, height) = match shape {
         Shape::Wire => (solution[4], (solution[3] + solution[4].powi(2) - off.norm_squared()).max(0.0).sqrt()),
         Shape::Point => (0.0, (-rest).max(0.0).sqrt()),
-        _ => (rest.max(0.0).sqrt(), 0.0),
+        Shape::Sphere | Shape::Plane | Shape::Line | Shape::Circle | Shape::KnownCircle => (rest.max(0.0).sqrt(), 0.0),
     };
     Some((off, size, height))
 }
@@ -351,7 +351,7 @@ mod tests {
                     let on = |angle: f64| at + (first * angle.cos() + second * angle.sin()) * 0.4;
                     (0..9).map(|index| on(0.5 * f64::from(index))).collect()
                 }
-                _ => points(),
+                Shape::Point | Shape::Wire | Shape::Plane | Shape::KnownCircle => points(),
             };
             let found = Feature::fit(shape, &contacts(shape, &truth, &places)).unwrap();
             let off = found.at - at;

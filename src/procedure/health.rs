@@ -364,7 +364,7 @@ impl Effects {
 ///
 /// # Errors
 /// Too few points, or a calibration that does not tell enough.
-pub fn evaluate(request: HealthRequest<'_>) -> Result<HealthSummary, HealthError> {
+pub fn evaluate(request: &HealthRequest<'_>) -> Result<HealthSummary, HealthError> {
     let known = request.known;
     let joints = known.arm.chain.joints();
     let poses = poses(&request.samples, joints);

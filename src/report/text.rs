@@ -338,11 +338,11 @@ fn feature_lines(features: &[FeatureSummary]) -> String {
             format!("  {:<14}{shape:<9}{:>9}{x:>10}{y:>10}{z:>10}{sigma:>8}", feature.name, feature.contacts);
         if let Some(axis) = feature.axis {
             let [x, y, z] = axis.map(|value| fixed(value, 4));
-            line.push_str(&format!("  axis {x} {y} {z}"));
+            line = format!("{line}  axis {x} {y} {z}");
         }
         if let Some(size) = feature.size_mm {
             let what = if feature.shape == Shape::Wire { "reads less by" } else { "radius" };
-            line.push_str(&format!("  {what} {}", fixed(size, 3)));
+            line = format!("{line}  {what} {}", fixed(size, 3));
         }
         push_line(&mut text, line.trim_end());
     }
