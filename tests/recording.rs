@@ -7,3 +7,4 @@ mod damage;
 mod live;
 mod reading;
 mod running;
+mod viewer;
