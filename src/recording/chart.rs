@@ -12,6 +12,8 @@ const HANGING: f64 = 5.2;
 const LETTER: f64 = 2.0;
 /// Steps between the ticks of a linear axis.
 const TICKS: f64 = 5.0;
+/// Most ticks of any axis.
+const MOST_TICKS: u32 = 40;
 
 /// A range of values, spread evenly or by their logarithms.
 #[derive(Clone, Copy, Debug)]
@@ -45,15 +47,13 @@ impl Axis {
     fn ticks(self) -> Vec<f64> {
         if self.is_logarithmic {
             let decades = (self.high / self.low).log10().round();
-            return (0..)
-                .map(f64::from)
-                .take_while(|step| *step <= decades)
-                .map(|step| self.low * 10_f64.powf(step))
-                .collect();
+            let steps = (0_u32..MOST_TICKS).map(f64::from).take_while(|step| *step <= decades);
+            return steps.map(|step| self.low * 10_f64.powf(step)).collect();
         }
         let step = whole_step((self.high - self.low) / TICKS);
         let first = (self.low / step).ceil() * step;
-        (0..).map(|index| first + f64::from(index) * step).take_while(|tick| *tick <= self.high + step * 1e-6).collect()
+        let ticks = (0_u32..MOST_TICKS).map(|index| first + f64::from(index) * step);
+        ticks.take_while(|tick| *tick <= self.high + step * 1e-6).collect()
     }
 }
 

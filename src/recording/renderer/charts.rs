@@ -245,10 +245,13 @@ pub(super) fn joints(canvas: &mut Canvas, joints: &[JointErrorSummary]) {
     chart.draw(canvas, names::JOINTS, None);
 }
 
+/// Picks a figure of a sweep.
+type Pick = fn(&Figures) -> f64;
+
 /// Draws what the search for poses has changed, sweep by sweep, each figure as a part of its first value.
 pub(super) fn search(canvas: &mut Canvas, steps: &[Figures]) {
     let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return };
-    let series: [(&str, rerun::Color, fn(&Figures) -> f64); 3] = [
+    let series: [(&str, rerun::Color, Pick); 3] = [
         ("condition number", style::DONE, |step| step.condition_number),
         ("predicted error, sigma", style::IDENTIFIED, |step| step.predicted_error),
         ("observability O1, µm", style::VERIFICATION, |step| step.o1 / MICROMETRE),

@@ -148,12 +148,9 @@ pub(super) fn plan_report(canvas: &mut Canvas, plan: &PlanSummary) {
     let mut page =
         format!("# What was rejected\n\nOf {} configurations {} can be measured.\n\n", found.tried, found.kept);
     page.push_str("| rule | rejected | that no other rule rejected |\n|---|---|---|\n");
-    for rejection in &found.rejections {
-        page.push_str(&format!("| {} | {} | {} |\n", rejection.rule, rejection.rejected, rejection.alone));
-    }
-    for warning in &plan.warnings {
-        page.push_str(&format!("\n* **{}**", warning.message));
-    }
+    let rejections = found.rejections.iter().map(|one| format!("| {} | {} | {} |\n", one.rule, one.rejected, one.alone));
+    let warnings = plan.warnings.iter().map(|warning| format!("\n* **{}**", warning.message));
+    page.extend(rejections.chain(warnings));
     canvas.draw_static(names::REPORT, &TextDocument::from_markdown(plain(&page)));
 }
 

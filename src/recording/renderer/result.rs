@@ -19,8 +19,8 @@ use crate::session::plan::PoseKind;
 use crate::session::state::{Sample, Session};
 use crate::units::{MICROMETRE, to_mm};
 
-/// Part of the errors that the scale is made for. The colour of the others is the warmest, too.
-const USUAL: f64 = 0.95;
+/// Percentage of the errors that the scale is made for. The colour of the others is the warmest, too.
+const USUAL: usize = 95;
 /// Their largest drawn length, as a fraction of the arm's reach.
 const SHOWN: f64 = 0.15;
 /// Errors that are drawn of many, evenly thinned out, and the worst that are drawn besides.
@@ -256,8 +256,7 @@ fn origins(errors: &[&Judged<'_>]) -> Vec<Box<dyn AsComponents>> {
 /// Returns the length (m) that most errors do not exceed.
 fn most(mut lengths: Vec<f64>) -> f64 {
     lengths.sort_by(f64::total_cmp);
-    let place = (lengths.len() as f64 * USUAL).ceil() as usize;
-    lengths.get(place.saturating_sub(1)).copied().unwrap_or(0.0).max(1e-9)
+    lengths.get((lengths.len() * USUAL).div_ceil(100).saturating_sub(1)).copied().unwrap_or(0.0).max(1e-9)
 }
 
 fn arrow_looks() -> Vec<Box<dyn AsComponents>> {

@@ -76,7 +76,7 @@ impl Station {
     }
 
     fn place(&self, profile: &Profile) -> Point3<f64> {
-        self.found.map_or(profile.tracker().position_in_base, |found| Point3::from(found.translation.vector))
+        self.found.map_or_else(|| profile.tracker().position_in_base, |found| Point3::from(found.translation.vector))
     }
 
     /// Returns the position of the instrument. Within the reach of the arm there is none: the measured coordinates are not its own.
@@ -102,7 +102,7 @@ impl Station {
             }));
             if self.found.is_some() { "tracker" } else { "tracker (as planned)" }
         } else {
-            let turned = self.found.map_or_else(Isometry3::identity, |found| found);
+            let turned = self.found.unwrap_or_else(Isometry3::identity);
             let unit = 0.12 * reach(profile);
             axes.extend([Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| style::vector(&(turned * axis * unit))));
             "origin of coordinates"
