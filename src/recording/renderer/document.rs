@@ -148,7 +148,8 @@ pub(super) fn plan_report(canvas: &mut Canvas, plan: &PlanSummary) {
     let mut page =
         format!("# What was rejected\n\nOf {} configurations {} can be measured.\n\n", found.tried, found.kept);
     page.push_str("| rule | rejected | that no other rule rejected |\n|---|---|---|\n");
-    let rejections = found.rejections.iter().map(|one| format!("| {} | {} | {} |\n", one.rule, one.rejected, one.alone));
+    let rejections =
+        found.rejections.iter().map(|one| format!("| {} | {} | {} |\n", one.rule, one.rejected, one.alone));
     let warnings = plan.warnings.iter().map(|warning| format!("\n* **{}**", warning.message));
     page.extend(rejections.chain(warnings));
     canvas.draw_static(names::REPORT, &TextDocument::from_markdown(plain(&page)));
