@@ -482,7 +482,7 @@ fn a_technician_without_a_profile_calibrates_by_keys() {
             break;
         }
         let before = technician.terminal.look(Shown::text);
-        let has_remedy = technician.terminal.look(|shown| shown.has("c ") && shown.has("correct"));
+        let has_remedy = technician.terminal.look(|shown| shown.has("c apply the correction"));
         technician.press(if has_remedy { "c" } else { ENTER });
         technician.terminal.comes(Duration::from_secs(3), |shown| shown.text() != before && shown.has("· saved ·"));
     }
