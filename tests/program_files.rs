@@ -624,6 +624,24 @@ fn a_compressed_program_of_polyscope_is_corrected_inside() {
     let after = gzip::unpacked(&fs::read(out).unwrap()).unwrap();
     assert_ne!(after, before);
     assert_eq!(skeleton(&after), skeleton(&before));
+    // Where nothing is corrected, the copy is the file itself.
+    let soochow = "sessions/example/calibration.ron";
+    let out = path("same.urp");
+    let output = trupose(&[
+        "compensate",
+        "--calibration",
+        soochow,
+        "--program",
+        &program,
+        "--dialect",
+        "krl",
+        "--points",
+        "computed",
+        "--out",
+        &out,
+    ]);
+    assert!(text(&output.stdout).starts_with("unchanged: "), "{}", text(&output.stdout));
+    assert_eq!(fs::read(out).unwrap(), packed);
     let damaged = packed.iter().map(|byte| byte ^ 1).collect::<Vec<u8>>();
     fs::write(path("pick.urp"), [&[0x1f, 0x8b], &damaged[2..]].concat()).unwrap();
     let output = trupose(&[

@@ -268,21 +268,18 @@ pub(super) fn between(
         let is_linear = step.kind == MoveKind::Linear && has_spot(scan, index + 1);
         let divided =
             is_linear.then(|| divided(step.line, &job.compensator, &tool, ends, &from.meant, limit)).flatten();
-        match divided {
-            Some((points, report)) => {
-                let frame_from_base = to.base_from_frame.inverse();
-                let points = points.into_iter().map(|point| InsertedPoint {
-                    frame_from_tool: frame_from_base * point.base_from_tool,
-                    posture: job.compensator.inverse().posture(&point.commanded),
-                    joints: point.commanded,
-                });
-                insertions.push(Insertion { step: index + 1, points: points.collect() });
-                reports.push(report);
-            }
-            None => {
-                whole.push(step.line);
-                reports.push(report);
-            }
+        if let Some((points, report)) = divided {
+            let frame_from_base = to.base_from_frame.inverse();
+            let points = points.into_iter().map(|point| InsertedPoint {
+                frame_from_tool: frame_from_base * point.base_from_tool,
+                posture: job.compensator.inverse().posture(&point.commanded),
+                joints: point.commanded,
+            });
+            insertions.push(Insertion { step: index + 1, points: points.collect() });
+            reports.push(report);
+        } else {
+            whole.push(step.line);
+            reports.push(report);
         }
     }
     (reports, insertions, whole)

@@ -24,6 +24,9 @@ const TAUGHT: &str = "taught points are not corrected: they were recorded where 
 /// What a program says that was corrected with an edited calibration; it fits the 32 characters of the shortest remarks.
 const EDITED: &str = "WARNING: EDITED CALIBRATION";
 
+/// A file with its text, and its bytes if they are compressed.
+type Input<'p> = (&'p Path, Option<Vec<u8>>, Vec<u8>);
+
 /// A program and what becomes of it.
 struct Part<'p> {
     path: &'p Path,
@@ -61,12 +64,14 @@ pub(super) fn run<O: Write, E: Write>(
     let texts = args.program.iter().chain(&args.companion).map(|path| {
         let text = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
         // What cannot be unpacked is refused by the reader.
-        let unpacked = gzip::unpacked(&text);
-        Ok((path.as_path(), unpacked.is_some(), unpacked.unwrap_or(text)))
+        Ok(match gzip::unpacked(&text) {
+            Some(unpacked) => (path.as_path(), Some(text), unpacked),
+            None => (path.as_path(), None, text),
+        })
     });
-    let texts: Vec<(&Path, bool, Vec<u8>)> = texts.collect::<Result<_, Failure>>()?;
+    let texts: Vec<Input<'_>> = texts.collect::<Result<_, Failure>>()?;
     let mut parts = Vec::new();
-    for (path, is_packed, text) in texts.iter().take(args.program.len()) {
+    for (path, packed, text) in texts.iter().take(args.program.len()) {
         let unusable = |error: ProgramError| Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()));
         let others = texts.iter().filter(|(other, ..)| other != path);
         let companions = others.map(|(path, _, text)| Companion { name: file_name(path), text: text.clone() });
@@ -109,8 +114,8 @@ pub(super) fn run<O: Write, E: Write>(
                 )),
             }
         }
-        if *is_packed {
-            corrected = gzip::packed(&corrected);
+        if let Some(original) = packed {
+            corrected = if is_changed { gzip::packed(&corrected) } else { original.clone() };
         }
         parts.push(Part { path, scan, results, corrected, is_changed, paths, undivided });
     }
