@@ -844,3 +844,41 @@ fn a_joint_with_its_correction_added_turns_as_if_it_had_no_error() {
         }
     }
 }
+
+/// Damaged files of others: refused or read, never a panic.
+#[test]
+fn mutated_urdfs_and_factory_calibrations_never_panic() {
+    let profile = profile("ur5");
+    let conf = "[mounting]\ndelta_theta = [1e-4, 0.0, 0.0, 0.0, 0.0, 0.0]\ndelta_a = [0, 0, 0, 0, 0, 0]\ndelta_d = [0, 0, 0, 0, 0, 0]\n\
+        delta_alpha = [0, 0, 0, 0, 0, 0]\ncalibration_status = 2 # x\n";
+    assert!(read_factory(conf, &profile).is_ok());
+    let urdf = format!(
+        "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?><!DOCTYPE robot [<!ENTITY h '0.3'>]>{}",
+        fixture("scara.urdf").trim_start_matches("<?xml version=\"1.0\"?>")
+    );
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    for round in 0..400 {
+        for text in [conf, urdf.as_str()] {
+            let mut bytes = text.as_bytes().to_vec();
+            for _ in 0..random.random_range(1..6) {
+                let at = random.random_range(0..bytes.len());
+                match random.random_range(0..3) {
+                    0 => bytes[at] = random.random_range(0..=255),
+                    1 => drop(bytes.remove(at)),
+                    _ => bytes.insert(at, random.random_range(0..=255)),
+                }
+            }
+            if round % 50 == 0 {
+                bytes.truncate(bytes.len() / 2);
+            }
+            drop(read_factory(&String::from_utf8_lossy(&bytes), &profile));
+            let Ok(text) = trupose::model::decode_xml(&bytes) else { continue };
+            let Ok(urdf) = Urdf::parse(&text) else { continue };
+            if let (Some(first), Some(last)) = (urdf.links.first(), urdf.links.last())
+                && let Ok(chain) = urdf.chain(first, last)
+            {
+                drop(import(&chain, Convention::Standard));
+            }
+        }
+    }
+}

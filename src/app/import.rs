@@ -15,7 +15,7 @@ use crate::session::export::{marked_as_simulated, simulation_of_table};
 use crate::session::measurements::{
     Expected, Layout, Measurements, PointFile, Reading, Row, SavedLayout, Understood, joined, read_for, write_with_text,
 };
-use crate::session::{TableErrors, workbook};
+use crate::session::{TableErrors, TableProblem, workbook};
 use crate::store;
 use crate::text::{columns, counted, listed, shortened};
 use crate::units::to_mm;
@@ -199,15 +199,15 @@ fn read_joined(
 fn refused(errors: &TableErrors, args: &ImportArgs) -> Failure {
     let mut failure = Failure::new(ExitStatus::Usage, errors.to_string());
     let proposal = errors.understood.as_ref().and_then(|understood| understood.proposal.as_deref());
-    let missing = errors.problems.iter().any(|problem| problem.is_without_point());
+    let missing = errors.problems.iter().any(TableProblem::is_without_point);
     if missing && !args.skip_missing {
         failure = failure.hint("'--skip-missing' leaves out the readings without a point");
     }
-    if errors.problems.iter().any(|problem| problem.is_about_sheets()) {
+    if errors.problems.iter().any(TableProblem::is_about_sheets) {
         failure = failure.hint("'--sheet NAME' chooses one");
     }
     let of_robodk = errors.understood.as_ref().is_some_and(|understood| understood.columns.len() == ROBODK_COLUMNS);
-    if of_robodk && errors.problems.iter().any(|problem| problem.is_of_columns()) {
+    if of_robodk && errors.problems.iter().any(TableProblem::is_of_columns) {
         failure =
             failure.hint("a table of RoboDK (six joints, point, target on the flange) is read with '--layout robodk'");
     }
@@ -220,7 +220,7 @@ fn refused(errors: &TableErrors, args: &ImportArgs) -> Failure {
             let option = if args.joints.is_some() && proposal.contains("x_") { "--point-columns" } else { "--columns" };
             failure.hint(format!("if this is what they mean, units included, give {option} '{proposal}'"))
         }
-        None if errors.problems.iter().any(|problem| problem.is_of_columns()) => {
+        None if errors.problems.iter().any(TableProblem::is_of_columns) => {
             failure.hint("name the columns with --columns 'q1_deg=NAME, …, x_mm=NAME, …'; '#3' is the third")
         }
         _ => failure,
@@ -249,7 +249,8 @@ fn listing(understood: &Understood) -> String {
             shortened(&column.example, WIDEST)
         ));
     }
-    lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
+    let trimmed: Vec<&str> = lines.iter().map(|line| line.trim_end()).collect();
+    trimmed.join("\n") + "\n"
 }
 
 /// What was read, in words.
@@ -338,6 +339,6 @@ pub(super) fn layout_path(name: &str, profile: &str) -> Result<PathBuf, Failure>
         return Err(Failure::new(ExitStatus::Usage, message).hint("use letters, digits, '-' and '_'"));
     }
     let profile = Path::new(profile);
-    let folder = profile.parent().filter(|_| profile.is_file()).unwrap_or(Path::new(""));
+    let folder = profile.parent().filter(|_| profile.is_file()).unwrap_or_else(|| Path::new(""));
     Ok(folder.join(SavedLayout::file_name(name)))
 }

@@ -183,7 +183,7 @@ pub fn import_coupled(
     notes.extend(coupled.map(|joint| {
         format!("joint '{}' counts with another: its limits are those of the URDF; check them", printable(&joint.name))
     }));
-    Ok(ImportedArm { notes, chain, ranges, beta_joints, masses, agreement })
+    Ok(ImportedArm { chain, ranges, beta_joints, masses, notes, agreement })
 }
 
 /// The masses of the links, in the frames at the ends of the links of `chain`.

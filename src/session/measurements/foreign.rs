@@ -100,6 +100,12 @@ pub(super) struct Foreign {
     pub(super) understood: Understood,
 }
 
+/// A column of a point: its place, the axis, and the number of the point in the row.
+type PointColumn = (usize, usize, Option<usize>);
+
+/// The words beside the letters of coordinates that belong together, and the number of their point.
+type PointSet = (String, Option<usize>);
+
 /// A table while its columns are found out.
 struct Study<'a> {
     expected: &'a Expected<'a>,
@@ -209,7 +215,7 @@ impl Study<'_> {
     ) -> bool {
         let width = header.cells.len();
         let listed = self.reading.columns.as_ref().and_then(|columns| columns.listed);
-        let names = if !is_of_numbers(&header.cells) && !(wanted == Wanted::Points && is_point_row(&header.cells)) {
+        let names = if !(is_of_numbers(&header.cells) || (wanted == Wanted::Points && is_point_row(&header.cells))) {
             header.cells
         } else {
             let in_comment = heading.filter(|heading| {
@@ -494,8 +500,8 @@ impl Study<'_> {
     }
 
     /// The columns of the points with axis and group, and the sets that they could be if there are several.
-    fn points(&self) -> (Vec<(usize, usize, Option<usize>)>, Vec<String>) {
-        let mut sets: BTreeMap<(String, Option<usize>), Vec<(usize, usize)>> = BTreeMap::new();
+    fn points(&self) -> (Vec<PointColumn>, Vec<String>) {
+        let mut sets: BTreeMap<PointSet, Vec<(usize, usize)>> = BTreeMap::new();
         for (index, name) in self.parsed.iter().enumerate() {
             if let Some(Place::Coordinate { set, axis, group }) = name.place() {
                 sets.entry((set, group)).or_default().push((index, axis));
@@ -505,7 +511,7 @@ impl Study<'_> {
             columns.len() == 3 && (0..3).all(|axis| columns.iter().any(|(_, known)| *known == axis))
         };
         let full: Vec<_> = sets.iter().filter(|(_, columns)| complete(columns)).collect();
-        let taken = |(set, columns): &(&(String, Option<usize>), &Vec<(usize, usize)>), group: bool| {
+        let taken = |(set, columns): &(&PointSet, &Vec<(usize, usize)>), group: bool| {
             let group = set.1.filter(|_| group);
             columns.iter().map(|(index, axis)| (*index, *axis, group)).collect::<Vec<_>>()
         };

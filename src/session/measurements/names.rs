@@ -245,7 +245,7 @@ impl Name {
             .collect();
         let is_known = |word: &&str| JOINT_WORDS.contains(word) || JOINT_LETTERS.contains(word);
         let is_joint = beside.iter().any(|word| JOINT_WORDS.contains(word))
-            || (!beside.is_empty() && beside.iter().all(|word| is_known(&word)));
+            || (!beside.is_empty() && beside.iter().all(|word| is_known(word)));
         is_joint.then(|| Place::Joint { set: beside.join(" "), number })
     }
 

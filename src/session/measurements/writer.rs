@@ -63,9 +63,9 @@ pub fn write_with_text(table: &Measurements, joints: &[JointType]) -> String {
         return write(&rows, joints);
     }
     let picked = |cells: &[String]| -> String {
-        kept.iter()
-            .map(|index| format!(",{}", cells.get(*index).map_or_else(String::new, |cell| quoted(cell))))
-            .collect()
+        let cells: Vec<String> =
+            kept.iter().map(|index| cells.get(*index).map_or_else(String::new, |cell| quoted(cell))).collect();
+        format!(",{}", cells.join(","))
     };
     let text = write(&rows, joints);
     let mut lines = text.lines();

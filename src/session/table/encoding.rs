@@ -38,8 +38,11 @@ pub(in crate::session) fn decode(bytes: &[u8], file: &str) -> Result<(String, Ve
     Ok((text, Vec::new()))
 }
 
+/// How two bytes make a unit, and the length of the mark in front of the text.
+type WideOrder = (fn([u8; 2]) -> u16, usize);
+
 /// How the bytes of UTF-16 text make its units, and the length of the mark in front of it.
-fn utf16_order(bytes: &[u8]) -> Option<(fn([u8; 2]) -> u16, usize)> {
+fn utf16_order(bytes: &[u8]) -> Option<WideOrder> {
     match bytes {
         [0xff, 0xfe, ..] => Some((u16::from_le_bytes, 2)),
         [0xfe, 0xff, ..] => Some((u16::from_be_bytes, 2)),

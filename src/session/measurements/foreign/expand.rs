@@ -7,6 +7,9 @@ use crate::session::measurements::names::Place;
 use crate::session::table::{Defect, Record, TableProblem, is_number};
 use crate::text::counted;
 
+/// The number of a point in a row, and per coordinate its column, letter and unit with its underscore.
+type Group = (usize, Vec<(usize, char, String)>);
+
 /// Targets named in a message.
 const SHOWN_TARGETS: usize = 5;
 
@@ -182,7 +185,7 @@ impl Study<'_> {
     }
 
     /// The numbered points of a row: number, and per coordinate the column, the letter and the unit with its underscore.
-    fn groups(&self) -> Vec<(usize, Vec<(usize, char, String)>)> {
+    fn groups(&self) -> Vec<Group> {
         let mut groups: std::collections::BTreeMap<usize, Vec<(usize, char, String)>> =
             std::collections::BTreeMap::new();
         for (index, name) in self.canonical.iter().enumerate() {
@@ -199,7 +202,7 @@ impl Study<'_> {
         groups.into_iter().collect()
     }
 
-    fn split_groups(&mut self, groups: &[(usize, Vec<(usize, char, String)>)], problems: &mut Vec<TableProblem>) {
+    fn split_groups(&mut self, groups: &[Group], problems: &mut Vec<TableProblem>) {
         let known = &self.expected.targets;
         if !known.is_empty() && known.len() < groups.len() {
             let source_name = format!("every row has {}", counted(groups.len(), "point"));
@@ -239,8 +242,7 @@ impl Study<'_> {
             }
         }
         self.records = records;
-        let keep = |list: &[String]| kept.iter().filter_map(|index| list.get(*index).cloned()).collect::<Vec<_>>();
-        self.shown = keep(&self.shown);
+        self.shown = kept.iter().filter_map(|index| self.shown.get(*index).cloned()).collect();
         self.canonical = kept.iter().filter_map(|index| self.canonical.get(*index).cloned()).collect();
         if numbered {
             self.shown.push("pose".to_owned());

@@ -27,7 +27,7 @@ impl Study<'_> {
                 let unit = self.stated(column).unwrap_or_else(|| self.guessed_unit(&[column], *joint));
                 mapped.push((format!("q{}_{unit}", index + 1), self.source(column)));
             }
-            self.agree_on_angles(&mut mapped);
+            agree_on_angles(&mut mapped);
         }
         if wanted != Wanted::Joints {
             let Some(points) = points else { return };
@@ -167,13 +167,13 @@ impl Study<'_> {
     fn guessed_length(&self, columns: &[usize]) -> &'static str {
         if self.largest(columns) > LARGEST_METRE { "mm" } else { "m" }
     }
+}
 
-    /// A joint that hardly moves looks like radians: all turning joints without a stated unit share one.
-    fn agree_on_angles(&self, mapped: &mut [(String, Source)]) {
-        if mapped.iter().any(|(name, _)| name.starts_with('q') && name.ends_with("_deg")) {
-            for (name, _) in mapped.iter_mut().filter(|(name, _)| name.starts_with('q') && name.ends_with("_rad")) {
-                *name = name.replace("_rad", "_deg");
-            }
+/// A joint that hardly moves looks like radians: all turning joints without a stated unit share one.
+fn agree_on_angles(mapped: &mut [(String, Source)]) {
+    if mapped.iter().any(|(name, _)| name.starts_with('q') && name.ends_with("_deg")) {
+        for (name, _) in mapped.iter_mut().filter(|(name, _)| name.starts_with('q') && name.ends_with("_rad")) {
+            *name = name.replace("_rad", "_deg");
         }
     }
 }
