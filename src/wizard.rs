@@ -382,7 +382,7 @@ impl Wizard {
             return self.end(cause);
         }
         if let Intent::DescribeCell(cell) = intent {
-            let actions = self.cells.state(cell, &self.session);
+            let actions = self.cells.state(*cell, &self.session);
             self.actions.extend(actions);
             return self.run();
         }

@@ -680,29 +680,26 @@ fn the_arm_that_hides_in_the_simulated_cell_goes_where_it_is_meant_to() {
 }
 
 /// A Cartesian target in a program: its line.
-fn line_of_target(dialect: Dialect, pose: &Isometry3<f64>, q: &[f64], posture: &Posture) -> String {
+fn line_of_target(dialect: Dialect, pose: &Isometry3<f64>, q: &[f64], posture: Posture) -> String {
     let (p, r) = (pose.translation.vector, pose.rotation);
     let numbers = |values: &[f64]| values.iter().map(|value| format!("{value:.9}")).collect::<Vec<_>>().join(",");
-    match dialect {
-        Dialect::Rapid => {
-            let quarter = |joint: usize| (to_deg(q[joint]) / 90.0).floor();
-            let form = 4 * i32::from(posture.wrist_is_behind)
-                + 2 * i32::from(posture.wrist_is_behind_lower_arm)
-                + i32::from(posture.wrist_is_negative);
-            format!(
-                "MoveJ [[{}],[{}],[{},{},{},{form}],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,gun;",
-                numbers(p.map(to_mm).as_slice()),
-                numbers(&[r.w, r.i, r.j, r.k]),
-                quarter(0),
-                quarter(3),
-                quarter(5)
-            )
-        }
-        _ => {
-            let turn = r.scaled_axis();
-            let pose = numbers(&[p.x, p.y, p.z, turn.x, turn.y, turn.z]);
-            format!("movej(get_inverse_kin(p[{pose}], qnear=[{}]))", numbers(q))
-        }
+    if dialect == Dialect::Rapid {
+        let quarter = |joint: usize| (to_deg(q[joint]) / 90.0).floor();
+        let form = 4 * i32::from(posture.wrist_is_behind)
+            + 2 * i32::from(posture.wrist_is_behind_lower_arm)
+            + i32::from(posture.wrist_is_negative);
+        format!(
+            "MoveJ [[{}],[{}],[{},{},{},{form}],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,gun;",
+            numbers(p.map(to_mm).as_slice()),
+            numbers(&[r.w, r.i, r.j, r.k]),
+            quarter(0),
+            quarter(3),
+            quarter(5)
+        )
+    } else {
+        let turn = r.scaled_axis();
+        let pose = numbers(&[p.x, p.y, p.z, turn.x, turn.y, turn.z]);
+        format!("movej(get_inverse_kin(p[{pose}], qnear=[{}]))", numbers(q))
     }
 }
 
@@ -726,7 +723,7 @@ fn program_in_the_cell(dialect: Dialect, robot: &str, simulation: &Simulation) -
     let tool_of = |chain: &KinematicChain, q: &[f64]| ForwardKinematics::new(chain).base_from_flange(q) * tool;
     let lines = goals.iter().map(|q| {
         let pose = tool_of(nominal.chain(), q);
-        line_of_target(dialect, &pose, q, &inverse.posture(q).unwrap()) + "\n"
+        line_of_target(dialect, &pose, q, inverse.posture(q).unwrap()) + "\n"
     });
     let body: String = lines.collect();
     let text = match dialect {

@@ -1,5 +1,7 @@
 //! Lengths to fixed points, planes, lines and circles of unknown place: the same arm as with a tracker.
 
+#![expect(clippy::print_stdout, reason = "the figures of the documents")]
+
 use crate::support::paper_case::{PaperCase, measure, normal, paper_deviations, random_configurations, seeded};
 use crate::support::{text, trupose};
 use nalgebra::{Point3, UnitVector3, Vector3};

@@ -1,5 +1,7 @@
 //! Health checks, comparisons and recalibrations on simulated arms: what is planted is found, and nothing else.
 
+#![expect(clippy::print_stdout, reason = "the figures of the documents")]
+
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 

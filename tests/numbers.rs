@@ -346,7 +346,9 @@ fn exchanged_coordinates_are_named_before_a_mirrored_frame() {
     let samples = bench.random(40);
     for (one, other) in [(0, 1), (1, 2), (0, 2)] {
         let mut exchanged = samples.clone();
-        exchanged.iter_mut().for_each(|named| named.sample.point.coords.swap_rows(one, other));
+        for named in &mut exchanged {
+            named.sample.point.coords.swap_rows(one, other);
+        }
         let found = mistakes(&bench, &exchanged);
         let place = |mistake: &Mistake| found.iter().position(|found| found == mistake);
         assert!(

@@ -727,7 +727,8 @@ fn shifts_hold_through_loops_calls_and_jumps() {
     assert_eq!(rapid(&turn), (1, 2));
     let job = |name: &str, body: &str| {
         let head = "//POS\n///TOOL 1\n///POSTYPE ROBOT\n///RECTAN\n///RCONF 0,0,0,0,0,0\n";
-        let points: String = (0..3).map(|index| format!("C0000{index}=40{index},0,500,180,0,0\n")).collect();
+        let points =
+            (0..3).map(|index| format!("C0000{index}=40{index},0,500,180,0,0\n")).collect::<Vec<String>>().concat();
         format!("/JOB\n//NAME {name}\n{head}{points}//INST\nNOP\n{body}END\n")
     };
     let inform = |text: String, other: Option<String>| {

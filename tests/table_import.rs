@@ -99,8 +99,8 @@ fn every_way_to_write_the_same_table_gives_the_same_readings() {
 fn glued_exports_lose_their_repeated_names() {
     let once = written("q1,q2,q3,x,y,z\ndeg,deg,deg,mm,mm,mm", ",", plain);
     let (head, rows) = once.split_at(once.find("10.5").unwrap());
-    let first: String = rows.lines().take(1).map(|line| format!("{line}\n")).collect();
-    let rest: String = rows.lines().skip(1).map(|line| format!("{line}\n")).collect();
+    let first = rows.lines().take(1).map(|line| format!("{line}\n")).collect::<Vec<String>>().concat();
+    let rest = rows.lines().skip(1).map(|line| format!("{line}\n")).collect::<Vec<String>>().concat();
     let table = read(format!("{head}{first}{head}{rest}"), &Reading::default()).unwrap();
     assert_same(&table, "glued");
     assert!(table.understood.notes.iter().any(|note| note.contains("1 line repeats")), "{:?}", table.understood.notes);
@@ -223,7 +223,7 @@ fn joints_and_points_of_two_files_are_joined() {
     assert!(errors.contains("no joints were read within 0.5 s"), "{errors}");
 
     // A row that is missing would shift all that follow.
-    let short: String = points.lines().take(2).map(|line| format!("{line}\n")).collect();
+    let short = points.lines().take(2).map(|line| format!("{line}\n")).collect::<Vec<String>>().concat();
     let errors = join(joints, &[point_file(&short, None)], None, &["smr"]).unwrap_err().to_string();
     assert!(errors.contains("it has 2 rows, but 'joints' has 3: rows are missing somewhere"), "{errors}");
     let errors = join(named, &[point_file(&points.replace("P2", "P9"), None)], None, &["smr"]).unwrap_err().to_string();
@@ -284,14 +284,14 @@ fn workbook(sheets: &[(&str, &str)], shared: &str) -> Vec<u8> {
 
 fn sheet() -> (String, String) {
     let names = ["J1 [deg]", "J2 [deg]", "J3 [deg]", "X [mm]", "Y [mm]", "Z [mm]"];
-    let shared: String = names.iter().map(|name| format!("<si><r><t>{name}</t></r></si>")).collect();
+    let shared = names.iter().map(|name| format!("<si><r><t>{name}</t></r></si>")).collect::<Vec<String>>().concat();
     let mut rows = String::from("<row r=\"2\">");
     for (index, letter) in ["A", "B", "C", "D", "E", "F"].iter().enumerate() {
         rows.extend([format!("<c r=\"{letter}2\" t=\"s\"><v>{index}</v></c>")]);
     }
     rows += "</row>";
     for (index, row) in ROWS.iter().enumerate() {
-        let cells: String = row.iter().map(|value| format!("<c><v>{value:e}</v></c>")).collect();
+        let cells = row.iter().map(|value| format!("<c><v>{value:e}</v></c>")).collect::<Vec<String>>().concat();
         rows.extend([format!("<row r=\"{}\">{cells}</row>", index + 4)]);
     }
     (rows, shared)

@@ -22,7 +22,7 @@ const CLOSING: f64 = 0.3;
 const SIZE: (u16, u16) = (80, 24);
 const POSES: usize = 18;
 /// A search for poses on a busy machine.
-const PLANNING: Duration = Duration::from_secs(240);
+const PLANNING: Duration = Duration::from_mins(4);
 
 /// Steps of a script that end in each step of the wizard.
 const SCRIPT: [&str; 7] = [

@@ -183,7 +183,8 @@ fn an_unknown_arm_is_measured_from_the_kinds_of_its_joints() {
 #[test]
 fn rows_that_do_not_move_one_joint_at_a_time_are_refused() {
     let case = case("ur10e", 1);
-    let error = |change: &dyn Fn(&mut Vec<Vec<f64>>, &mut Vec<Point3<f64>>)| {
+    type Change<'a> = &'a dyn Fn(&mut Vec<Vec<f64>>, &mut Vec<Point3<f64>>);
+    let error = |change: Change<'_>| {
         let (mut rows, mut points) = (case.rows.clone(), case.measured.clone());
         change(&mut rows, &mut points);
         measure_arm(&case.template, &rows, &points, None).unwrap_err().to_string()

@@ -188,12 +188,12 @@ impl Cell {
             Intent::GoToPose(_) if self.chance(80) => Intent::GoToPose(self.rng.random_range(0..40).to_string()),
             Intent::GoToPose(_) => Intent::GoToPose(self.text()),
             Intent::Note(_) => Intent::Note(self.text()),
-            Intent::About(_) => Intent::About(About {
+            Intent::About(_) => Intent::About(Box::new(About {
                 serial: self.text(),
                 operator: self.text(),
                 smr: self.text(),
                 ..About::default()
-            }),
+            })),
             Intent::SuggestPoses(_) => Intent::SuggestPoses([0, 1, 3, usize::MAX][self.pick(4)]),
             other => other,
         }
@@ -467,7 +467,7 @@ fn every_intent() -> Vec<Intent> {
         Note(String::new()),
         SuggestPoses(1),
         Identify,
-        About(trupose::session::about::About::default()),
+        About(Box::default()),
         Deliver,
     ]
 }

@@ -224,7 +224,7 @@ fn edit(ast: &Ast, name: &str, value: &str) -> Edit {
     match (field(ast, name), &ast.node) {
         (Some(there), _) => Edit { at: there.span.start, until: there.span.end, text: value.to_owned() },
         (None, Node::Struct(fields)) => {
-            let at = fields.first().map_or(ast.span.end.saturating_sub(1), |field| field.name_span.start);
+            let at = fields.first().map_or_else(|| ast.span.end.saturating_sub(1), |field| field.name_span.start);
             Edit { at, until: at, text: format!("{name}: {value}, ") }
         }
         (None, _) => Edit { at: ast.span.start, until: ast.span.start, text: String::new() },

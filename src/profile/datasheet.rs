@@ -180,7 +180,7 @@ impl FromStr for Limits {
     fn from_str(text: &str) -> Result<Self, DatasheetError> {
         let ranges = ranges(text)?;
         let given = ranges.len();
-        <[(f64, f64); JOINTS]>::try_from(ranges).map(Self).ok().ok_or_else(|| DatasheetError::Count { given })
+        <[(f64, f64); JOINTS]>::try_from(ranges).map(Self).ok().ok_or(DatasheetError::Count { given })
     }
 }
 
@@ -217,7 +217,7 @@ impl std::fmt::Display for Limits {
 /// A range of a joint (degree).
 fn range(text: &str) -> Result<(f64, f64), DatasheetError> {
     let wrong = || DatasheetError::Limit { text: printable(text) };
-    let number = |text: &str| text.trim_start_matches(['±', '+']).parse::<f64>().ok().ok_or_else(|| wrong());
+    let number = |text: &str| text.trim_start_matches(['±', '+']).parse::<f64>().ok().ok_or_else(wrong);
     let (low, high) = match text.split_once("..").or_else(|| text.split_once('/')) {
         Some((low, high)) => (number(low)?, number(high)?),
         None => number(text).map(|both| (-both, both))?,

@@ -195,6 +195,7 @@ pub struct TemperaturePart {
 
 /// A part of the arm: all points within a distance of a line, in the base.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[expect(clippy::struct_field_names, reason = "the unit is in the name of every field")]
 pub struct BodyPart {
     pub from_mm: [f64; 3],
     pub to_mm: [f64; 3],

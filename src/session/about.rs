@@ -223,7 +223,7 @@ mod day_or_nothing {
 
     use super::Day;
 
-    #[expect(clippy::ref_option, reason = "the signature that serde asks for")]
+    #[expect(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
     pub(super) fn serialize<S: Serializer>(day: &Option<Day>, serializer: S) -> Result<S::Ok, S::Error> {
         day.map_or_else(String::new, |day| day.to_string()).serialize(serializer)
     }

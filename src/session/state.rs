@@ -332,9 +332,7 @@ impl Session {
                 self.rows.get_mut(*row).ok_or_else(|| misfit("a row that is in no plan"))?.skipped = *skipped;
                 self.shown = Some(*row);
             }
-            Entry::Note { pose, text } => {
-                self.notes.push(Note { time: line.time, pose: pose.clone(), text: text.clone() });
-            }
+            Entry::Note { pose, text } => self.note(line.time, pose.clone(), text.clone()),
             Entry::About(about) => {
                 self.about = about.clone();
                 // The report on disk says something else.
@@ -361,6 +359,10 @@ impl Session {
         }
         self.advance(line);
         Ok(())
+    }
+
+    fn note(&mut self, time: Timestamp, pose: Option<String>, text: String) {
+        self.notes.push(Note { time, pose, text });
     }
 
     /// Starts again with another robot, for which nothing is planned yet.

@@ -33,7 +33,7 @@ impl KnownCells {
             None if session.cell.is_empty() => self.earlier.or(&CellText::of(&robot.profile), &joints),
             None => session.cell.or(&CellText::of(&robot.profile), &joints),
         };
-        Some(IntentInfo::new(Intent::DescribeCell(cell), label))
+        Some(IntentInfo::new(Intent::DescribeCell(Box::new(cell)), label))
     }
 
     /// Takes a cell over, or says why it cannot be meant.

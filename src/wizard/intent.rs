@@ -35,7 +35,7 @@ pub enum Intent {
     /// State what the flange carries besides the SMR.
     StatePayload(PayloadText),
     /// State instrument, tracker, limits, boxes and acceptance of this cell.
-    DescribeCell(CellText),
+    DescribeCell(Box<CellText>),
     /// Locate the SMR by circle-point analysis.
     StartCircles,
     /// Use the result of the circle-point analysis.
@@ -83,7 +83,7 @@ pub enum Intent {
     /// Identify the arm from the samples.
     Identify,
     /// Set serial number, operator and place for the report.
-    About(About),
+    About(Box<About>),
     /// Write the result files.
     Deliver,
 }

@@ -61,6 +61,7 @@ pub(super) fn compare_with_journal(folder: &Path) {
 /// Every sample with its pose, joints and point; returns when each is in the story.
 fn samples(path: &Path, session: &Session) -> BTreeMap<u64, i64> {
     let of = |component: &str| numbers(path, "/data/sample", "story", component);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "numbers of samples")]
     let moments: BTreeMap<u64, i64> =
         of("number").into_iter().map(|(story, number)| (number[0] as u64, story)).collect();
     let expected: BTreeSet<u64> = session.samples.iter().map(|sample| sample.noted.number).collect();

@@ -34,7 +34,7 @@ pub(crate) fn calibration(arm: &str) -> Calibration {
     let example = fs::read_to_string(root().join("sessions/example/calibration.ron")).unwrap();
     let mut calibration = Calibration::parse(&example).unwrap();
     calibration.parameters = parameters.collect();
-    calibration.provenance.profile = arm.to_owned();
+    arm.clone_into(&mut calibration.provenance.profile);
     calibration.provenance.profile_sha256 = sha256(text.as_bytes());
     calibration.profile = text;
     calibration.samples.clear();

@@ -217,8 +217,8 @@ fn written(profile: &Profile, arm: &MeasuredArm, name: Option<&str>, file: &str)
     ];
     let heading = Heading {
         comments: &comments,
-        name: name.unwrap_or(profile.name()),
-        title: name.unwrap_or(profile.title()),
+        name: name.unwrap_or_else(|| profile.name()),
+        title: name.unwrap_or_else(|| profile.title()),
         source: &format!("{}, link constants measured with circles ({file})", profile.source()),
     };
     complete(&heading, &placed, &arm.chain, &targets)

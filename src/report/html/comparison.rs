@@ -78,7 +78,7 @@ fn verdict(pair: &PairSummary) -> String {
     if !pair.is_explained {
         lines.push("Beside that there is something that no single parameter explains.".to_owned());
     }
-    let lines: String = lines.iter().map(|line| format!("<p>{line}</p>\n")).collect();
+    let lines = lines.iter().fold(String::new(), |text, line| text + "<p>" + line + "</p>\n");
     format!("<div class=\"verdict{class}\"><span class=\"word\">{}: {word}</span>\n{lines}</div>\n", names(pair))
 }
 

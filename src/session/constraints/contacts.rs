@@ -108,7 +108,7 @@ fn assembled(rows: Vec<Cells>, columns: Vec<String>, problems: &mut Vec<TablePro
     for row in &rows {
         let next = names.len();
         let (_, line, shape, has_length) =
-            first.entry(&row.name).or_insert((next, row.line, row.shape, row.length.is_some()));
+            first.entry(&row.name).or_insert_with(|| (next, row.line, row.shape, row.length.is_some()));
         if names.len() == next && *line == row.line {
             names.push(&row.name);
         }
@@ -120,10 +120,8 @@ fn assembled(rows: Vec<Cells>, columns: Vec<String>, problems: &mut Vec<TablePro
     let mut features = Vec::with_capacity(names.len());
     for name in &names {
         let Some((_, line, shape, has_length)) = first.get(name) else { continue };
-        let shape = match shape.unwrap_or(Shape::Point) {
-            Shape::Circle if *has_length => Shape::KnownCircle,
-            shape => shape,
-        };
+        let stated = shape.unwrap_or(Shape::Point);
+        let shape = if stated == Shape::Circle && *has_length { Shape::KnownCircle } else { stated };
         let needs_length = matches!(shape, Shape::Point | Shape::Wire);
         let takes_length = needs_length || matches!(shape, Shape::Plane | Shape::KnownCircle);
         if (needs_length && !has_length) || (*has_length && !takes_length) {

@@ -215,7 +215,7 @@ impl Study<'_> {
     ) -> bool {
         let width = header.cells.len();
         let listed = self.reading.columns.as_ref().and_then(|columns| columns.listed);
-        let names = if !(is_of_numbers(&header.cells) || (wanted == Wanted::Points && is_point_row(&header.cells))) {
+        let names = if !is_of_numbers(&header.cells) && (wanted != Wanted::Points || !is_point_row(&header.cells)) {
             header.cells
         } else {
             let in_comment = heading.filter(|heading| {

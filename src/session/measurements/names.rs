@@ -244,8 +244,8 @@ impl Name {
             .map(|(_, word)| word.as_str())
             .collect();
         let is_known = |word: &&str| JOINT_WORDS.contains(word) || JOINT_LETTERS.contains(word);
-        let is_joint = beside.iter().any(|word| JOINT_WORDS.contains(word))
-            || (!beside.is_empty() && beside.iter().all(|word| is_known(word)));
+        let is_joint =
+            beside.iter().any(|word| JOINT_WORDS.contains(word)) || (!beside.is_empty() && beside.iter().all(is_known));
         is_joint.then(|| Place::Joint { set: beside.join(" "), number })
     }
 

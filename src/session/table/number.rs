@@ -115,7 +115,7 @@ fn is_grouped(text: &str) -> bool {
     match parts.as_slice() {
         [first, groups @ .., _last] => {
             !groups.is_empty()
-                && parts.iter().all(|part| is_digits(part))
+                && parts.iter().all(is_digits)
                 && first.len() <= 3
                 && groups.iter().all(|group| group.len() == 3)
         }

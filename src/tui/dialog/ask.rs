@@ -276,7 +276,7 @@ fn said(values: &[String]) -> Result<Intent, String> {
     for ((detail, _), text) in ASKED.iter().zip(values) {
         about.set(*detail, text).map_err(|error| error.to_string())?;
     }
-    Ok(Intent::About(about))
+    Ok(Intent::About(Box::new(about)))
 }
 
 /// Parses a number, with a decimal point or comma.
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn what_the_report_is_about_may_be_empty_but_not_endless() {
         let given = About { serial: "R-17".to_owned(), ..About::default() };
-        assert_eq!(said(&values(&["R-17", "", ""])), Ok(Intent::About(given)));
+        assert_eq!(said(&values(&["R-17", "", ""])), Ok(Intent::About(Box::new(given))));
         let long = "x".repeat(201);
         let refused = Err("place and conditions: at most 200 characters".to_owned());
         assert_eq!(said(&values(&["", "", &long])), refused);
@@ -371,7 +371,8 @@ mod tests {
     fn every_detail_is_asked_once() {
         let mut details: Vec<&str> = ASKED.iter().map(|(detail, _)| detail.name()).collect();
         let mut known = Detail::NAMES.to_vec();
-        (details.sort_unstable(), known.sort_unstable());
+        details.sort_unstable();
+        known.sort_unstable();
         assert_eq!(details, known);
         let widest = ASKED.iter().map(|(detail, _)| detail.label().chars().count()).max();
         assert!(widest < Some(24), "a label runs into its field");

@@ -51,7 +51,7 @@ fn stated(values: &[String]) -> Result<Intent, String> {
         planning_limits: limits_from_text(limits)?,
         keep_out: boxes_from_text(boxes)?,
     };
-    Ok(Intent::DescribeCell(cell))
+    Ok(Intent::DescribeCell(Box::new(cell)))
 }
 
 fn instrument(pick: &str, name: &str, sigma: &str, per_metre: &str) -> Result<Option<InstrumentText>, String> {
@@ -130,9 +130,9 @@ mod tests {
             keep_out: boxes_from_text("table 300 -500 0 900 500 400").unwrap(),
         };
         let Dialog::Form(form) = cell(&known) else { panic!() };
-        assert_eq!(form.value(), Ok(Intent::DescribeCell(known)));
+        assert_eq!(form.value(), Ok(Intent::DescribeCell(Box::new(known))));
         let Dialog::Form(form) = cell(&CellText::default()) else { panic!() };
-        assert_eq!(form.value(), Ok(Intent::DescribeCell(CellText::default())));
+        assert_eq!(form.value(), Ok(Intent::DescribeCell(Box::default())));
     }
 
     #[test]

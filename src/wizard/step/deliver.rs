@@ -24,7 +24,8 @@ impl StepMachine for DeliverStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let is_current = require(cx.session.is_current(), "the samples have changed since then: identify again");
         let deliver = offer(Intent::Deliver, "write the files", [is_current]);
-        let about = IntentInfo::new(Intent::About(cx.session.about.clone()), "serial number, operator, place");
+        let about =
+            IntentInfo::new(Intent::About(Box::new(cx.session.about.clone())), "serial number, operator, place");
         vec![if cx.session.delivered.is_empty() { deliver.default_action() } else { deliver }, about]
     }
 

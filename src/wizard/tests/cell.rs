@@ -11,15 +11,14 @@ use crate::wizard::{Event, Intent, Request};
 
 /// The cell on offer.
 fn offered(bench: &Bench) -> CellText {
-    let cells = bench.wizard.intents().into_iter().filter_map(|info| match info.intent {
-        Intent::DescribeCell(cell) => Some(cell),
-        _ => None,
-    });
-    cells.last().unwrap()
+    let is_cell = |intent: &Intent| matches!(intent, Intent::DescribeCell(_));
+    let offer = bench.wizard.intents().into_iter().rfind(|info| is_cell(&info.intent)).unwrap();
+    let Intent::DescribeCell(cell) = offer.intent else { panic!("another offer") };
+    *cell
 }
 
-fn accepted(rms: f64) -> Option<AcceptanceText> {
-    Some(AcceptanceText { position_rms_mm: Some(rms), position_max_mm: None })
+const fn accepted(rms: f64) -> AcceptanceText {
+    AcceptanceText { position_rms_mm: Some(rms), position_max_mm: None }
 }
 
 #[test]
@@ -32,7 +31,7 @@ fn a_cell_becomes_part_of_the_profile_and_is_offered_filled_in() {
         planning_limits: limits_from_text("J1 -20..30").unwrap(),
         ..first
     };
-    let effects = bench.intend(Intent::DescribeCell(cell.clone()));
+    let effects = bench.intend(Intent::DescribeCell(Box::new(cell.clone())));
     bench.settle(effects);
     assert!(bench.journal.iter().any(|line| matches!(line.entry, Entry::Cell(_))));
     let robot = bench.wizard.session().robot.as_ref().unwrap();
@@ -64,7 +63,7 @@ fn the_cell_of_an_earlier_session_is_offered_again() {
 fn a_cell_that_cannot_be_used_is_kept_for_correction() {
     let mut bench = Bench::at(Step::Plan);
     let wrong = CellText { planning_limits: limits_from_text("J9 -20..30").unwrap(), ..CellText::default() };
-    assert!(bench.intend(Intent::DescribeCell(wrong.clone())).is_empty());
+    assert!(bench.intend(Intent::DescribeCell(Box::new(wrong.clone()))).is_empty());
     assert!(bench.told().starts_with("this cell cannot be used: the arm has no joint 'J9'"), "{}", bench.told());
     assert_eq!(offered(&bench), wrong);
     let before = bench.wizard.session().clone();
@@ -77,8 +76,9 @@ fn limits_set_after_the_result_are_evaluated_at_once_and_said() {
     assert!(bench.wizard.session().limits_set.is_none());
     let samples = bench.wizard.session().samples.clone();
     let place = bench.wizard.session().robot.as_ref().unwrap().profile.tracker().position_in_base;
-    let moved = CellText { acceptance: accepted(0.000_1), tracker_mm: Some((9.0, 9.0, 9.0)), ..CellText::default() };
-    let effects = bench.intend(Intent::DescribeCell(moved));
+    let moved =
+        CellText { acceptance: Some(accepted(0.000_1)), tracker_mm: Some((9.0, 9.0, 9.0)), ..CellText::default() };
+    let effects = bench.intend(Intent::DescribeCell(Box::new(moved)));
     let (id, lines) = appended(&effects);
     let effects = bench.written(id, lines);
     assert_eq!(texts(&effects), ["start identifying"]);
@@ -102,7 +102,7 @@ fn limits_set_after_the_result_are_evaluated_at_once_and_said() {
 #[test]
 fn limits_set_before_measuring_need_no_remark() {
     let mut bench = Bench::at(Step::Instrument);
-    bench.does(Intent::DescribeCell(CellText { acceptance: accepted(0.2), ..CellText::default() }));
+    bench.does(Intent::DescribeCell(Box::new(CellText { acceptance: Some(accepted(0.2)), ..CellText::default() })));
     let set = bench.wizard.session().limits_set.unwrap();
     assert!(!set.after_result);
     assert!(offers(&bench.wizard).contains(&"DescribeCell".to_owned()));
