@@ -180,10 +180,12 @@ fn an_unknown_arm_is_measured_from_the_kinds_of_its_joints() {
     assert_eq!(unknown.unwrap().beta_joints, [1]);
 }
 
+/// A change of rows and points.
+type Change<'a> = &'a dyn Fn(&mut Vec<Vec<f64>>, &mut Vec<Point3<f64>>);
+
 #[test]
 fn rows_that_do_not_move_one_joint_at_a_time_are_refused() {
     let case = case("ur10e", 1);
-    type Change<'a> = &'a dyn Fn(&mut Vec<Vec<f64>>, &mut Vec<Point3<f64>>);
     let error = |change: Change<'_>| {
         let (mut rows, mut points) = (case.rows.clone(), case.measured.clone());
         change(&mut rows, &mut points);
