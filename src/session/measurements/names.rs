@@ -335,7 +335,7 @@ mod tests {
     use super::*;
 
     fn joint(name: &str) -> Option<(String, usize)> {
-        match Name::new(name, false).place() {
+        match Name::new(name, name.contains("Achse")).place() {
             Some(Place::Joint { set, number }) => Some((set, number)),
             _ => None,
         }
