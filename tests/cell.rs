@@ -59,6 +59,9 @@ fn measured(route: &Route) -> Vec<usize> {
     route.steps.iter().filter(|step| step.kind == StepKind::Measure).map(|step| step.pose.unwrap()).collect()
 }
 
+/// Poses on offer as stops on the way.
+const VIAS: usize = 60;
+
 #[test]
 fn every_pose_and_move_of_every_shipped_profile_is_free_and_seen() {
     let mut report = String::new();
@@ -75,7 +78,9 @@ fn every_pose_and_move_of_every_shipped_profile_is_free_and_seen() {
         let chosen = verification_set::choose(&found.kept, &[], &cell.limits, 30);
         let poses: Vec<Vec<f64>> = chosen.iter().map(|&place| found.kept[place].configuration.clone()).collect();
         let home = home_pose(shape, found.kept.iter().map(|candidate| candidate.configuration.as_slice())).unwrap();
-        let stops = Stops { home: &home, poses: &poses, vias: &[], drift_every: Some(10) };
+        let vias: Vec<Vec<f64>> =
+            found.kept.iter().take(VIAS).map(|candidate| candidate.configuration.clone()).collect();
+        let stops = Stops { home: &home, poses: &poses, vias: &vias, drift_every: Some(10) };
         let route = order(shape, &stops, &pace(&profile)).unwrap_or_else(|error| panic!("{name}: {error}"));
         let mut visited = measured(&route);
         let vias = route.steps.iter().filter(|step| step.kind == StepKind::Via).count();
