@@ -47,7 +47,7 @@ pub fn write(rows: &[Row], joints: &[JointType]) -> String {
     text
 }
 
-/// The rows of a table without copies, as [`write`] does, with the columns that are text for filters.
+/// The rows of a table without copies, as [`write()`] does, with the columns that are text for filters.
 pub fn write_with_text(table: &Measurements, joints: &[JointType]) -> String {
     let rows: Vec<Row> = table.distinct_rows().cloned().collect();
     // A name that could be taken for a joint, a point or a tool would be a second one in the written table.
