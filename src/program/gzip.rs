@@ -7,8 +7,6 @@ const MARK: [u8; 2] = [0x1f, 0x8b];
 const LARGEST: usize = 256 << 20;
 /// Longest stored block (bytes).
 const BLOCK: usize = 0xffff;
-/// Longest code of an alphabet (bits).
-const LONGEST_CODE: usize = 15;
 
 /// Whether these bytes are a gzip file.
 pub fn is_packed(bytes: &[u8]) -> bool {
@@ -17,13 +15,9 @@ pub fn is_packed(bytes: &[u8]) -> bool {
 
 /// The content of a gzip file; `None` if it is damaged or too large.
 pub fn unpacked(bytes: &[u8]) -> Option<Vec<u8>> {
-    let start = behind_header(bytes)?;
-    let mut bits = Bits { bytes, at: start, buffer: 0, count: 0 };
-    let content = inflated(&mut bits)?;
-    let trailer = bytes.get(bits.at.saturating_sub(bits.count / 8)..)?;
-    let number = |at: usize| Some(u32::from_le_bytes(trailer.get(at..at + 4)?.try_into().ok()?));
-    let is_intact = number(0)? == checksum(&content) && number(4)? as usize == content.len() & 0xffff_ffff;
-    is_intact.then_some(content)
+    let (stream, trailer) = bytes.get(behind_header(bytes)?..)?.split_last_chunk::<8>()?;
+    let content = miniz_oxide::inflate::decompress_to_vec_with_limit(stream, LARGEST).ok()?;
+    trailer_of(&content).eq(trailer).then_some(content)
 }
 
 /// A gzip file with this content.
@@ -40,10 +34,18 @@ pub fn packed(content: &[u8]) -> Vec<u8> {
         bytes.extend_from_slice(&(!length).to_le_bytes());
         bytes.extend_from_slice(block);
     }
-    bytes.extend_from_slice(&checksum(content).to_le_bytes());
-    #[expect(clippy::cast_possible_truncation, reason = "the format states the length modulo 2^32")]
-    bytes.extend_from_slice(&(content.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(&trailer_of(content));
     bytes
+}
+
+/// What stands behind a content: its checksum and its length.
+fn trailer_of(content: &[u8]) -> [u8; 8] {
+    #[expect(clippy::cast_possible_truncation, reason = "the format states the length modulo 2^32")]
+    let length = content.len() as u32;
+    let mut trailer = [0; 8];
+    trailer[..4].copy_from_slice(&checksum(content).to_le_bytes());
+    trailer[4..].copy_from_slice(&length.to_le_bytes());
+    trailer
 }
 
 /// CRC-32 of RFC 1952.
@@ -67,173 +69,6 @@ fn behind_header(bytes: &[u8]) -> Option<usize> {
         }
     }
     Some(at + if flags & 2 != 0 { 2 } else { 0 })
-}
-
-struct Bits<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    buffer: u32,
-    count: usize,
-}
-
-impl Bits<'_> {
-    fn take(&mut self, count: usize) -> Option<usize> {
-        while self.count < count {
-            self.buffer |= u32::from(*self.bytes.get(self.at)?) << self.count;
-            self.at += 1;
-            self.count += 8;
-        }
-        let value = self.buffer & ((1 << count) - 1);
-        self.buffer >>= count;
-        self.count -= count;
-        Some(value as usize)
-    }
-
-    /// Drops the rest of a byte.
-    fn align(&mut self) {
-        let rest = self.count % 8;
-        self.buffer >>= rest;
-        self.count -= rest;
-    }
-}
-
-/// A Huffman code by the number of codes of each length, and its symbols in order.
-struct Code {
-    counts: [usize; LONGEST_CODE + 1],
-    symbols: Vec<usize>,
-}
-
-impl Code {
-    fn new(lengths: &[usize]) -> Self {
-        let mut counts = [0; LONGEST_CODE + 1];
-        for length in lengths {
-            counts[(*length).min(LONGEST_CODE)] += 1;
-        }
-        counts[0] = 0;
-        let of_length = |wanted: usize| (0..lengths.len()).filter(move |symbol| lengths[*symbol] == wanted);
-        Self { counts, symbols: (1..=LONGEST_CODE).flat_map(of_length).collect() }
-    }
-
-    fn symbol(&self, bits: &mut Bits<'_>) -> Option<usize> {
-        let (mut code, mut first, mut index) = (0, 0, 0);
-        for count in &self.counts[1..] {
-            code |= bits.take(1)?;
-            if code < first + count {
-                return self.symbols.get(index + code - first).copied();
-            }
-            index += count;
-            first = (first + count) << 1;
-            code <<= 1;
-        }
-        None
-    }
-}
-
-fn inflated(bits: &mut Bits<'_>) -> Option<Vec<u8>> {
-    let mut content = Vec::new();
-    loop {
-        let is_last = bits.take(1)? == 1;
-        match bits.take(2)? {
-            0 => stored(bits, &mut content)?,
-            1 => compressed(bits, &mut content, &fixed())?,
-            2 => {
-                let codes = dynamic(bits)?;
-                compressed(bits, &mut content, &codes)?;
-            }
-            _ => return None,
-        }
-        if content.len() > LARGEST {
-            return None;
-        }
-        if is_last {
-            return Some(content);
-        }
-    }
-}
-
-fn stored(bits: &mut Bits<'_>, content: &mut Vec<u8>) -> Option<()> {
-    bits.align();
-    let (length, inverse) = (bits.take(16)?, bits.take(16)?);
-    if length != !inverse & BLOCK {
-        return None;
-    }
-    // Whole bytes that are already in the buffer come first.
-    let start = bits.at - bits.count / 8;
-    content.extend_from_slice(bits.bytes.get(start..start + length)?);
-    (bits.at, bits.buffer, bits.count) = (start + length, 0, 0);
-    Some(())
-}
-
-/// The codes of literals and distances that a fixed block has.
-fn fixed() -> [Code; 2] {
-    let lengths: Vec<usize> =
-        [(8, 144), (9, 112), (7, 24), (8, 8)].into_iter().flat_map(|(length, count)| vec![length; count]).collect();
-    [Code::new(&lengths), Code::new(&[5; 30])]
-}
-
-fn dynamic(bits: &mut Bits<'_>) -> Option<[Code; 2]> {
-    const ORDER: [usize; 19] = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
-    let (literals, distances, given) = (257 + bits.take(5)?, 1 + bits.take(5)?, 4 + bits.take(4)?);
-    let mut lengths = [0; 19];
-    for place in ORDER.iter().take(given) {
-        lengths[*place] = bits.take(3)?;
-    }
-    let code = Code::new(&lengths);
-    let mut all: Vec<usize> = Vec::new();
-    while all.len() < literals + distances {
-        let (value, count) = match code.symbol(bits)? {
-            16 => (*all.last()?, 3 + bits.take(2)?),
-            17 => (0, 3 + bits.take(3)?),
-            18 => (0, 11 + bits.take(7)?),
-            length => (length, 1),
-        };
-        all.resize(all.len() + count, value);
-    }
-    let (first, second) = all.get(..literals + distances)?.split_at(literals);
-    Some([Code::new(first), Code::new(second)])
-}
-
-fn compressed(bits: &mut Bits<'_>, content: &mut Vec<u8>, [literals, distances]: &[Code; 2]) -> Option<()> {
-    while content.len() <= LARGEST {
-        match literals.symbol(bits)? {
-            literal @ 0..=255 => content.push(u8::try_from(literal).ok()?),
-            256 => return Some(()),
-            symbol => {
-                let length = length_of(symbol - 257, bits)?;
-                let distance = distance_of(distances.symbol(bits)?, bits)?;
-                let start = content.len().checked_sub(distance)?;
-                for at in start..start + length {
-                    content.push(*content.get(at)?);
-                }
-            }
-        }
-    }
-    None
-}
-
-/// Lengths grow by groups of four, with one more bit in each.
-fn length_of(index: usize, bits: &mut Bits<'_>) -> Option<usize> {
-    match index {
-        0..=7 => Some(3 + index),
-        8..=27 => {
-            let extra = index / 4 - 1;
-            Some(3 + ((4 + index % 4) << extra) + bits.take(extra)?)
-        }
-        28 => Some(258),
-        _ => None,
-    }
-}
-
-/// Distances grow by groups of two.
-fn distance_of(index: usize, bits: &mut Bits<'_>) -> Option<usize> {
-    match index {
-        0..=3 => Some(1 + index),
-        4..=29 => {
-            let extra = index / 2 - 1;
-            Some(1 + ((2 + index % 2) << extra) + bits.take(extra)?)
-        }
-        _ => None,
-    }
 }
 
 #[cfg(test)]
