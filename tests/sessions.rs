@@ -183,7 +183,7 @@ impl Paused {
     }
 
     fn kill(mut self) -> Output {
-        // It may have ended by itself already.
+        // It may already have ended.
         self.child.kill().unwrap();
         self.end()
     }

@@ -2,7 +2,7 @@
 //! description.
 //!
 //! The controller keeps deviations that it adds to its DH constants. Axes 2, 3 and 4 are nearly parallel, so that plain DH constants of
-//! such an arm have a `d` of metres to hundreds of metres; the arm is therefore built anew from its axes, with β where they are parallel.
+//! such an arm have a `d` of metres to hundreds of metres; the arm is therefore derived from its axes, with β where they are parallel.
 
 use nalgebra::Isometry3;
 

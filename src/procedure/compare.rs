@@ -288,7 +288,7 @@ impl Judged {
     }
 }
 
-/// Whether a parameter can change by itself: a link, a zero, an elasticity, but no wave of a curve and no target.
+/// Whether a parameter can change on its own: a link, a zero, an elasticity, but no wave of a curve and no target.
 const fn is_cause(id: ParameterId) -> bool {
     match id {
         ParameterId::Link { .. } => true,

@@ -154,7 +154,7 @@ impl Beginning {
         (total > 0.0).then(|| ((&products * after * before * after).trace() / total).clamp(0.0, 1.0))
     }
 
-    /// The data that the next calibration is told about.
+    /// The data of the next calibration.
     pub(super) fn earlier(&self, previous: &Previous) -> Vec<EarlierText> {
         let Calibration { earlier, provenance, samples, sigma, .. } = &previous.calibration;
         let last = EarlierText {

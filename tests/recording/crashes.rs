@@ -28,7 +28,7 @@ impl Running {
         Self { child, out }
     }
 
-    /// Kills the program a moment after it has said so many long things; `false` if it had ended by itself.
+    /// Kills the program a moment after it has said so many long things; `false` if it had already ended.
     pub(super) fn kill_after(mut self, said: usize, spin: u32) -> bool {
         self.hear(said);
         for _ in 0..spin {
@@ -49,7 +49,7 @@ impl Running {
         }
     }
 
-    /// `false` if it had ended by itself.
+    /// `false` if it had already ended.
     pub(super) fn kill(mut self) -> bool {
         self.child.kill().unwrap();
         drop(self.out);
