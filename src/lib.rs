@@ -25,20 +25,11 @@
 //! called *the method paper* throughout.
 
 pub mod app;
-pub mod checksum;
 pub mod cli;
-pub mod compensation;
 pub mod error;
-pub mod geometry;
-pub mod identification;
-pub mod inverse;
-pub mod iso9283;
-pub mod kinematics;
 pub mod link;
 pub mod model;
-pub mod planning;
 pub mod procedure;
-pub mod profile;
 pub mod program;
 pub mod recording;
 pub mod report;
@@ -47,7 +38,9 @@ pub mod script;
 pub mod search;
 pub mod session;
 pub mod store;
-pub mod text;
 pub mod tui;
-pub mod units;
 pub mod wizard;
+
+pub use trupose_core::{
+    checksum, compensation, geometry, identification, inverse, iso9283, kinematics, planning, profile, text, units,
+};

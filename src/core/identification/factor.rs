@@ -7,13 +7,13 @@ const BLOCK: usize = 48;
 
 /// `L⁻¹` of a symmetric positive definite matrix `L Lᵀ`.
 #[derive(Clone, Debug)]
-pub(crate) struct Factor {
+pub struct Factor {
     inverse: DMatrix<f64>,
 }
 
 impl Factor {
     /// `None` if the matrix is not positive definite.
-    pub(crate) fn new(mut matrix: DMatrix<f64>) -> Option<Self> {
+    pub fn new(mut matrix: DMatrix<f64>) -> Option<Self> {
         let n = matrix.nrows();
         let mut diagonal = Vec::with_capacity(n.div_ceil(BLOCK));
         for start in (0..n).step_by(BLOCK) {
@@ -48,27 +48,27 @@ impl Factor {
     }
 
     /// `M⁻¹ b`.
-    pub(crate) fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         self.inverse.tr_mul(&(&self.inverse * right))
     }
 
     /// Rows of `M`.
-    pub(crate) fn size(&self) -> usize {
+    pub fn size(&self) -> usize {
         self.inverse.nrows()
     }
 
     /// Trace of `M⁻¹`.
-    pub(crate) fn inverse_trace(&self) -> f64 {
+    pub fn inverse_trace(&self) -> f64 {
         self.inverse.norm_squared()
     }
 
     /// `L⁻¹ B`: the square sum of a column `b` is `bᵀ M⁻¹ b`.
-    pub(crate) fn whiten(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn whiten(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         &self.inverse * right
     }
 
     /// `M⁻¹`.
-    pub(crate) fn inverse(&self) -> DMatrix<f64> {
+    pub fn inverse(&self) -> DMatrix<f64> {
         self.inverse.transpose() * &self.inverse
     }
 }

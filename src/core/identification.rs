@@ -15,9 +15,9 @@
 //!
 //! ```
 //! use nalgebra::Isometry3;
-//! use trupose::identification::{Observations, PointSample, Problem, Settings, identify};
-//! use trupose::kinematics::{LinkParameter, ParameterId, Place};
-//! use trupose::profile::{Level, Profile, builtin};
+//! use trupose_core::identification::{Observations, PointSample, Problem, Settings, identify};
+//! use trupose_core::kinematics::{LinkParameter, ParameterId, Place};
+//! use trupose_core::profile::{Level, Profile, builtin};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "soochow")?;
@@ -79,7 +79,7 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, DVector, Point3};
 
 pub use error::IdentificationError;
-pub(crate) use factor::Factor;
+pub use factor::Factor;
 pub use feature::{Feature, Shape};
 pub use observability::{BlindGroup, Observability};
 pub(crate) use pairs::SAME_POINT;

@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use nalgebra::{Isometry3, Point3};
-//! use trupose::kinematics::{Arm, Convention, Joint, JointType, KinematicChain, Link, Place};
+//! use trupose_core::kinematics::{Arm, Convention, Joint, JointType, KinematicChain, Link, Place};
 //!
 //! let joint = |name: &str| Joint {
 //!     name: name.to_owned(),
@@ -25,7 +25,7 @@
 //! let real = nominal.with([("a2".parse()?, 1e-3)])?;
 //! let place = Place { configuration: vec![0.0, 0.0], target: 0 };
 //! assert!((real.point_in_base(&place).x - 1.001).abs() < 1e-12);
-//! # Ok::<(), trupose::kinematics::KinematicsError>(())
+//! # Ok::<(), trupose_core::kinematics::KinematicsError>(())
 //! ```
 
 #![warn(missing_docs)]

@@ -11,8 +11,8 @@ use std::error::Error;
 
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 
+pub use crate::{names, names_of_option, written_as_text};
 pub use names::UnknownName;
-pub(crate) use names::{names, names_of_option, written_as_text};
 
 /// Marks a place where text was cut off.
 pub const ELLIPSIS: char = '…';

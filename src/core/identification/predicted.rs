@@ -202,7 +202,7 @@ fn motion(arm: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
 }
 
 /// Derivatives of positions by a shift (m) and a turn (rad) of all places about their middle, three rows per place.
-pub(crate) fn motions(arm: &Arm, places: &[&Place]) -> DMatrix<f64> {
+pub fn motions(arm: &Arm, places: &[&Place]) -> DMatrix<f64> {
     let points = arm.points_in_base(places.iter().copied());
     let count = points.len().max(1) as f64;
     let centre = points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / count;
@@ -214,12 +214,12 @@ pub(crate) fn motions(arm: &Arm, places: &[&Place]) -> DMatrix<f64> {
 }
 
 /// Derivatives of all positions by the parameters, freed from rigid motions of all places.
-pub(crate) fn free_jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
+pub fn free_jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
     without_motions(jacobian(arm, ids, places), arm, places)
 }
 
 /// Derivatives of all positions by the parameters, three rows per place.
-pub(crate) fn jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
+pub fn jacobian(arm: &Arm, ids: &[ParameterId], places: &[&Place]) -> DMatrix<f64> {
     let arm = arm.prepared();
     let mut evaluated = IdentificationJacobian::new(ids);
     let mut rows = vec![0.0; 3 * ids.len() * places.len()];

@@ -26,9 +26,9 @@
 //! A bound from approximate design ([`DesignBound`]) says how much a better set could still gain.
 //!
 //! ```
-//! use trupose::kinematics::Place;
-//! use trupose::planning::{Information, Score, Search, SearchSettings};
-//! use trupose::profile::{Level, Profile, builtin};
+//! use trupose_core::kinematics::Place;
+//! use trupose_core::planning::{Information, Score, Search, SearchSettings};
+//! use trupose_core::profile::{Level, Profile, builtin};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let (profile, _) = Profile::parse(builtin("soochow").unwrap(), "soochow")?;
@@ -52,7 +52,7 @@
 //! ```
 //!
 //! Lengths in metres, angles in radians, configurations in pendant values. Nothing here reads a file or a clock or starts a
-//! thread; randomness comes only from a passed seed, time limits only as a callback. [`crate::search`] runs the
+//! thread; randomness comes only from a passed seed, time limits only as a callback. `trupose::search` runs the
 //! starts of a search in parallel.
 //!
 //! Literature: Sun & Hollerbach, "Observability index selection for robot calibration", ICRA 2008 (O1–O5); Fedorov, "Theory of

@@ -15,13 +15,15 @@ pub struct UnknownName {
 }
 
 impl UnknownName {
-    pub(crate) fn new(given: &str, known: &[&str]) -> Self {
+    /// The name that was given, and the known names: the one that it resembles is proposed.
+    pub fn new(given: &str, known: &[&str]) -> Self {
         let known: Vec<String> = known.iter().map(|name| format!("'{name}'")).collect();
         Self { given: printable(given), known: alternatives(&known) }
     }
 }
 
 /// Names the values of an enum, for `Display` and `FromStr`, which takes upper and lower case alike.
+#[macro_export]
 macro_rules! names {
     ($type:ident { $($variant:ident = $name:literal,)* }) => {
         impl $type {
@@ -57,6 +59,7 @@ macro_rules! names {
 }
 
 /// Gives an enum that is a value of an option the names of that option, for `Display` and `FromStr`.
+#[macro_export]
 macro_rules! names_of_option {
     ($($type:ty),*) => {$(
         impl std::fmt::Display for $type {
@@ -83,6 +86,7 @@ macro_rules! names_of_option {
 }
 
 /// Lets serde write and read a type as its text.
+#[macro_export]
 macro_rules! written_as_text {
     ($($type:ty),*) => {$(
         impl serde::Serialize for $type {
@@ -99,8 +103,6 @@ macro_rules! written_as_text {
         }
     )*};
 }
-
-pub(crate) use {names, names_of_option, written_as_text};
 
 #[cfg(test)]
 #[expect(unreachable_pub, reason = "the macros make what they add public")]
