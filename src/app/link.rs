@@ -56,6 +56,7 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
         address: args.address.clone(),
         options: args.options.clone(),
         robot: args.robot.clone(),
+        robot_options: args.robot_options.clone(),
         is_automatic: false,
     };
     let mut wired = Wired::new(&choice, log.as_ref()).map_err(|error| usage(error.to_string()))?;

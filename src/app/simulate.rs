@@ -76,8 +76,11 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
         console.say(&format!("options: {options}\n"))?;
     }
     if let Some(listen) = &args.robot {
-        let address = served.listen_for_robot(profile, listen).map_err(|error| usage(&error))?;
+        let (address, options) = served.listen_for_robot(profile, listen).map_err(|error| usage(&error))?;
         console.say(&format!("robot: {address}\n"))?;
+        if let Some(options) = options {
+            console.say(&format!("robot options: {options}\n"))?;
+        }
     }
     console.remark(served.title());
     console.remark(&format!("the robot is at {}", route.text()));

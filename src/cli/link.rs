@@ -27,6 +27,9 @@ pub struct LinkTestArgs {
     /// Address of the robot's controller, such as 'rtde:192.168.0.10', 'kuka:192.168.0.10' or 'ascii:listen:0.0.0.0:5001'
     #[arg(long, value_name = "ADDRESS")]
     pub robot: Option<String>,
+    /// Options of the controller's protocol, such as '(pulses_per_degree: [1000.0, ...])' of a Yaskawa
+    #[arg(long, value_name = "TEXT", requires = "robot")]
+    pub robot_options: Option<String>,
     /// Number of shots; 0 for none
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub shots: u32,

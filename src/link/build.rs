@@ -11,20 +11,24 @@ use super::protocol::Protocol;
 use super::protocol::abb::{Abb, AbbOptions};
 use super::protocol::ascii::{AsciiOptions, AsciiProtocol, Checksum, Column, Layout, Mode, Preset};
 use super::protocol::emscon::{Emscon, EmsconOptions};
+use super::protocol::fanuc::{Fanuc, FanucOptions};
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
 use super::protocol::joints::JointLines;
 use super::protocol::kuka::Kuka;
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::{Rtde, RtdeOptions};
+use super::protocol::yaskawa::{Yaskawa, YaskawaOptions};
 use super::simulator::Simulator;
 use super::simulator::abb::AbbSimulator;
 use super::simulator::ascii::AsciiSimulator;
 use super::simulator::emscon::EmsconSimulator;
+use super::simulator::fanuc::FanucSimulator;
 use super::simulator::geocom::GeocomSimulator;
 use super::simulator::joints::JointsSimulator;
 use super::simulator::kuka::KukaSimulator;
 use super::simulator::ndi::NdiSimulator;
 use super::simulator::rtde::RtdeSimulator;
+use super::simulator::yaskawa::{PULSES_PER_DEGREE, YaskawaSimulator};
 use crate::session::wire::{Route, WireAddress, WireProtocol};
 
 /// Allowed duration of a stationary measurement (ms).
@@ -107,6 +111,14 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
             Ok(Box::new(Abb::new(options)?))
         }
         WireProtocol::Kuka => without_options(address, options).map(|()| Box::<Kuka>::default() as _),
+        WireProtocol::Fanuc => {
+            let options: FanucOptions = read(options)?;
+            Ok(Box::new(Fanuc::new(options)))
+        }
+        WireProtocol::Yaskawa => {
+            let options: YaskawaOptions = read(options)?;
+            Ok(Box::new(Yaskawa::new(options)?))
+        }
         WireProtocol::Ascii => {
             let preset = options.and_then(|name| name.parse::<Preset>().ok());
             let mut options: AsciiOptions = match preset {
@@ -125,10 +137,15 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
             let protocol = NdiProtocol::new(options)?;
             Ok(Box::new(match address.route {
                 Route::Serial { speed, .. } => protocol.on_serial_line(speed),
-                Route::Tcp { .. } | Route::Listen { .. } | Route::Udp { .. } => protocol,
+                Route::Tcp { .. } | Route::Listen { .. } | Route::Udp { .. } | Route::Ask { .. } => protocol,
             }))
         }
     }
+}
+
+/// The options of a Yaskawa controller as text.
+pub(super) fn yaskawa_options(pulses_per_degree: &[f64]) -> String {
+    format!("(pulses_per_degree: {pulses_per_degree:?})")
 }
 
 /// Refuses options of a protocol that has none.
@@ -147,6 +164,8 @@ pub(super) fn simulator(protocol: WireProtocol, faults: &[String]) -> Result<Box
         WireProtocol::Joints => Box::new(JointsSimulator::new(parsed(faults)?)),
         WireProtocol::Abb => Box::new(AbbSimulator::new(parsed(faults)?)),
         WireProtocol::Kuka => Box::new(KukaSimulator::new(parsed(faults)?)),
+        WireProtocol::Fanuc => Box::new(FanucSimulator::new(parsed(faults)?)),
+        WireProtocol::Yaskawa => Box::new(YaskawaSimulator::new(parsed(faults)?)),
         WireProtocol::Ascii => Box::new(AsciiSimulator::new(rehearsal_ascii(), parsed(faults)?)?),
         WireProtocol::Geocom => Box::new(GeocomSimulator::new(parsed(faults)?)),
         WireProtocol::Ndi => Box::new(NdiSimulator::new([0.0; 3], parsed(faults)?)),
@@ -179,7 +198,9 @@ pub(super) fn rehearsal_options(protocol: WireProtocol) -> Option<String> {
     match protocol {
         WireProtocol::Ascii => Some(REHEARSAL_ASCII.to_owned()),
         WireProtocol::Emscon => Some(format!("(measure_ms: {})", MEASURE_MS.start())),
-        WireProtocol::Geocom
+        WireProtocol::Yaskawa => Some(yaskawa_options(&PULSES_PER_DEGREE)),
+        WireProtocol::Fanuc
+        | WireProtocol::Geocom
         | WireProtocol::Ndi
         | WireProtocol::Rtde
         | WireProtocol::Joints
@@ -204,6 +225,13 @@ mod tests {
                 let options: Result<AsciiOptions, _> = read(Some(&format!("({option}: {value})")));
                 assert!(options.is_ok(), "{option}: {value}: {options:?}");
             }
+        }
+    }
+
+    #[test]
+    fn every_form_of_text_that_is_offered_is_a_preset() {
+        for form in crate::session::wire::TEXT_FORMS {
+            assert!(form.parse::<Preset>().is_ok(), "{form}");
         }
     }
 

@@ -5,17 +5,10 @@ use std::path::Path;
 
 use serialport::SerialPortType;
 
+pub use crate::session::wire::SerialPortName;
+
 /// Folder in which the system names serial ports by their adapters; these names survive replugging.
 const BY_ID: &str = "/dev/serial/by-id";
-
-/// A serial port.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct SerialPortName {
-    /// Path of the device for an address, persistent where the system provides one.
-    pub device: String,
-    /// Maker and product of the adapter, if it states them.
-    pub description: String,
-}
 
 /// The serial ports that an instrument can be on, those of adapters first. Empty if the system cannot list them.
 pub fn serial_ports() -> Vec<SerialPortName> {

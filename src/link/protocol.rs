@@ -18,6 +18,7 @@ pub mod crc;
 pub mod emscon;
 pub mod error_streak;
 mod excerpt;
+pub mod fanuc;
 pub mod geocom;
 pub mod http;
 pub mod joints;
@@ -29,6 +30,7 @@ pub mod outbox;
 pub mod receive_buffer;
 pub mod rest;
 pub mod rtde;
+pub mod yaskawa;
 
 use std::fmt::Debug;
 use std::time::Duration;
@@ -57,6 +59,12 @@ pub trait Protocol: Send + Debug {
 
     /// The next bytes to send.
     fn next_output(&mut self) -> Option<Vec<u8>>;
+
+    /// The TCP port at which the conversation continues: the connection is closed, and another one opened there, before anything
+    /// more is sent.
+    fn next_redirect(&mut self) -> Option<u16> {
+        None
+    }
 
     /// The next change of the serial line, due once everything to send has been sent. Only protocols of serial lines have any.
     fn next_line_change(&mut self) -> Option<LineChange> {

@@ -59,6 +59,7 @@ impl Rehearsal {
             }
             if protocol.is_robot() {
                 choice.robot = Some(address);
+                choice.robot_options = build::rehearsal_options(protocol);
             } else {
                 choice.address = address;
                 choice.options = build::rehearsal_options(protocol);

@@ -1,7 +1,7 @@
 //! Servers for simulated instruments, on a TCP port of this machine or behind a pseudo-terminal.
 
 use std::io::{self, Read as _, Write as _};
-use std::net::{TcpListener, TcpStream};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -73,9 +73,32 @@ pub(super) fn serve(
     stop: &Arc<AtomicBool>,
 ) -> Result<String, LinkError> {
     let simulator = build::simulator(protocol, faults).map_err(LinkError::SetUp)?;
+    if protocol == WireProtocol::Yaskawa {
+        let answered = answer(endpoint, simulator, source, speedup, Arc::clone(stop));
+        return answered
+            .map(|address| format!("{protocol}:udp:{address}"))
+            .map_err(|error| LinkError::SetUp(format!("the simulated {protocol} cannot listen: {error}")));
+    }
     listen(endpoint, simulator, source, speedup, Arc::clone(stop))
         .map(|rest| format!("{protocol}:{rest}"))
         .map_err(|error| LinkError::SetUp(format!("the simulated {protocol} cannot listen: {error}")))
+}
+
+/// Serves a simulator that answers datagrams, and returns its address.
+fn answer(
+    endpoint: &Endpoint,
+    simulator: Box<dyn Simulator>,
+    source: impl PointSource + 'static,
+    speedup: Speedup,
+    stop: Arc<AtomicBool>,
+) -> io::Result<SocketAddr> {
+    let socket = match endpoint {
+        Endpoint::Tcp(address) => UdpSocket::bind(address.as_str())?,
+        Endpoint::Loopback | Endpoint::PseudoTerminal => UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?,
+    };
+    let address = socket.local_addr()?;
+    spawn(move || serve_datagrams(&socket, simulator, source, speedup, &stop))?;
+    Ok(address)
 }
 
 /// Serves a simulator and returns the address without the protocol.
@@ -86,6 +109,7 @@ fn listen(
     speedup: Speedup,
     stop: Arc<AtomicBool>,
 ) -> io::Result<String> {
+    let mut simulator = simulator;
     let (listener, address) = match endpoint {
         Endpoint::PseudoTerminal => {
             let (master, slave) = serialport::TTYPort::pair()?;
@@ -107,7 +131,15 @@ fn listen(
             (listener, format!("tcp:{bound}"))
         }
     };
-    spawn(move || serve_tcp(&listener, simulator, source, speedup, &stop))?;
+    let mut listeners = vec![listener];
+    if simulator.wants_second_port() {
+        let address = listeners.iter().find_map(|listener| listener.local_addr().ok());
+        let host = address.map_or(IpAddr::V4(Ipv4Addr::LOCALHOST), |address| address.ip());
+        let second = TcpListener::bind((host, 0))?;
+        simulator.second_port(second.local_addr()?.port());
+        listeners.push(second);
+    }
+    spawn(move || serve_tcp(&listeners, simulator, source, speedup, &stop))?;
     Ok(address)
 }
 
@@ -115,27 +147,59 @@ fn spawn(work: impl FnOnce() + Send + 'static) -> io::Result<()> {
     thread::Builder::new().name("simulated-link".to_owned()).spawn(work).map(drop)
 }
 
-/// Serves one connection after the other.
-fn serve_tcp(
-    listener: &TcpListener,
+/// Serves datagrams of one peer after the other.
+fn serve_datagrams(
+    socket: &UdpSocket,
     mut simulator: Box<dyn Simulator>,
     mut source: impl PointSource,
     speedup: Speedup,
     stop: &AtomicBool,
 ) {
-    if listener.set_nonblocking(true).is_err() {
+    let clock = ScaledClock::start(speedup);
+    let mut buffer = vec![0; 4096];
+    let mut peer = None;
+    if socket.set_read_timeout(Some(POLL_INTERVAL)).is_err() {
+        return;
+    }
+    while !stop.load(Ordering::Relaxed) {
+        if let Ok((count, from)) = socket.recv_from(&mut buffer) {
+            if peer != Some(from) {
+                simulator.accept(clock.now());
+                peer = Some(from);
+            }
+            simulator.feed(buffer.get(..count).unwrap_or_default(), &mut source, clock.now());
+        }
+        simulator.tick(&mut source, clock.now());
+        while let Some(output) = simulator.next_output() {
+            if let (Output::Bytes(bytes), Some(peer)) = (output, peer) {
+                // A peer that has gone is served again when it comes back.
+                let _sent = socket.send_to(&bytes, peer);
+            }
+        }
+    }
+}
+
+/// Serves one connection after the other, on any of the listeners.
+fn serve_tcp(
+    listeners: &[TcpListener],
+    mut simulator: Box<dyn Simulator>,
+    mut source: impl PointSource,
+    speedup: Speedup,
+    stop: &AtomicBool,
+) {
+    if listeners.iter().any(|listener| listener.set_nonblocking(true).is_err()) {
         return;
     }
     let clock = ScaledClock::start(speedup);
     while !stop.load(Ordering::Relaxed) {
-        match listener.accept() {
-            Ok((stream, _)) => {
+        match listeners.iter().find_map(|listener| listener.accept().ok()) {
+            Some((stream, _)) => {
                 if stream.set_nonblocking(true).is_ok() && stream.set_nodelay(true).is_ok() {
                     // However the connection ends, the next one is accepted.
                     let _ended = talk(stream, simulator.as_mut(), &mut source, clock, stop);
                 }
             }
-            Err(_error) => thread::sleep(POLL_INTERVAL),
+            None => thread::sleep(POLL_INTERVAL),
         }
     }
 }
@@ -254,12 +318,12 @@ impl Served {
         Ok(Self { view, address, options: build::rehearsal_options(protocol), robot_title, number: 0, stop })
     }
 
-    /// Serves the controller of the same robot as well, and returns its address. `listen` is a TCP address, with the protocol in front
+    /// Serves the controller of the same robot as well, and returns its address and the options that a client needs. `listen` is a TCP address, with the protocol in front
     /// unless it is RTDE, such as `kuka:127.0.0.1:7000`.
     ///
     /// # Errors
     /// [`LinkError::SetUp`]: a robot that the protocol cannot report, or a port that is not available.
-    pub fn listen_for_robot(&self, profile: &Profile, listen: &str) -> Result<String, LinkError> {
+    pub fn listen_for_robot(&self, profile: &Profile, listen: &str) -> Result<(String, Option<String>), LinkError> {
         let named = WireProtocol::ALL
             .into_iter()
             .filter(|protocol| protocol.is_robot())
@@ -267,7 +331,8 @@ impl Served {
         let (protocol, listen) = named.unwrap_or((WireProtocol::Rtde, listen));
         check_joints(profile, protocol)?;
         let endpoint = Endpoint::Tcp(listen.to_owned());
-        serve(protocol, &[], &endpoint, self.view.clone(), Speedup(1), &self.stop)
+        let address = serve(protocol, &[], &endpoint, self.view.clone(), Speedup(1), &self.stop)?;
+        Ok((address, build::rehearsal_options(protocol)))
     }
 
     /// Address for the client.

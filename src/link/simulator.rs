@@ -9,6 +9,7 @@ pub mod ascii;
 #[cfg(test)]
 pub mod bench;
 pub mod emscon;
+pub mod fanuc;
 pub mod fault;
 pub mod geocom;
 pub mod joints;
@@ -17,6 +18,7 @@ pub mod ndi;
 pub mod rtde;
 mod schedule;
 mod writes;
+pub mod yaskawa;
 
 use std::fmt::Debug;
 
@@ -41,6 +43,14 @@ pub trait Simulator: Send + Debug {
 
     /// Handles a change of the serial line by the other side.
     fn change_line(&mut self, _change: LineChange, _now: Moment) {}
+
+    /// Whether the conversation continues at a second TCP port.
+    fn wants_second_port(&self) -> bool {
+        false
+    }
+
+    /// Takes the number of the second port.
+    fn second_port(&mut self, _port: u16) {}
 
     /// Takes bytes from the other side.
     fn feed(&mut self, bytes: &[u8], source: &mut dyn PointSource, now: Moment);

@@ -16,22 +16,26 @@ use nalgebra::Point3;
 use super::protocol::abb::{Abb, AbbOptions};
 use super::protocol::ascii::{AsciiOptions, AsciiProtocol};
 use super::protocol::emscon::{Emscon, EmsconOptions};
+use super::protocol::fanuc::Fanuc;
 use super::protocol::geocom::{GeocomOptions, GeocomProtocol};
 use super::protocol::joints::JointLines;
 use super::protocol::kuka::Kuka;
 use super::protocol::ndi::{NdiOptions, NdiProtocol};
 use super::protocol::rtde::Rtde;
+use super::protocol::yaskawa::{Yaskawa, YaskawaOptions};
 use super::protocol::{JointState, Protocol, Shot};
 use super::serve::{Endpoint, Speedup, serve};
 use super::simulator::PointSource;
 use super::simulator::abb::AbbFault;
 use super::simulator::ascii::AsciiFault;
 use super::simulator::emscon::EmsconFault;
+use super::simulator::fanuc::FanucFault;
 use super::simulator::geocom::GeocomFault;
 use super::simulator::joints::JointsFault;
 use super::simulator::kuka::KukaFault;
 use super::simulator::ndi::NdiFault;
 use super::simulator::rtde::RtdeFault;
+use super::simulator::yaskawa::{PULSES_PER_DEGREE, YaskawaFault};
 use super::transport::Stopwatch;
 use super::wire::Wire;
 use super::{Link as _, LinkError, LinkEvent, RawLog, Wired, build};
@@ -134,6 +138,10 @@ fn quick(protocol: WireProtocol) -> Box<dyn Protocol> {
         WireProtocol::Rtde => Box::new(Rtde::default()),
         WireProtocol::Joints => Box::new(JointLines::default()),
         WireProtocol::Kuka => Box::new(Kuka::default()),
+        WireProtocol::Fanuc => Box::new(Fanuc::default()),
+        WireProtocol::Yaskawa => {
+            Box::new(Yaskawa::new(YaskawaOptions { pulses_per_degree: PULSES_PER_DEGREE.to_vec() }).unwrap())
+        }
         WireProtocol::Abb => Box::new(Abb::new(AbbOptions::default()).unwrap()),
     }
 }
@@ -143,6 +151,8 @@ fn fault_names(protocol: WireProtocol) -> Vec<&'static str> {
     match protocol {
         WireProtocol::Emscon => EmsconFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Joints => JointsFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Fanuc => FanucFault::ALL.iter().map(|fault| fault.name()).collect(),
+        WireProtocol::Yaskawa => YaskawaFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Kuka => KukaFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Abb => AbbFault::ALL.iter().map(|fault| fault.name()).collect(),
         WireProtocol::Rtde => RtdeFault::ALL.iter().map(|fault| fault.name()).collect(),

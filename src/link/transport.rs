@@ -1,7 +1,7 @@
 //! Transports: serial ports, TCP in both directions, UDP. Reads have a timeout; a closed connection is an error.
 
 use std::io::{self, Read as _, Write as _};
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _, UdpSocket};
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _, UdpSocket};
 use std::time::{Duration, Instant};
 
 use serialport::SerialPort;
@@ -51,6 +51,7 @@ pub(super) fn connect(route: &Route, keep_going: &dyn Fn() -> bool) -> io::Resul
         Route::Tcp { host, port } => tcp(host, *port, keep_going),
         Route::Listen { host, port } => listen(host, *port, keep_going),
         Route::Udp { host, port } => udp(host, *port),
+        Route::Ask { host, port } => ask(host, *port),
     }
 }
 
@@ -176,6 +177,24 @@ fn udp(host: &str, port: u16) -> io::Result<Box<dyn Transport>> {
     Ok(Box::new(Datagrams { socket, peer: None, packet: vec![0; MAX_DATAGRAM] }))
 }
 
+/// A socket for datagrams to one peer and back.
+fn ask(host: &str, port: u16) -> io::Result<Box<dyn Transport>> {
+    let mut last = io::Error::other("no address");
+    for address in addresses(host, port)? {
+        let any: SocketAddr = match address {
+            SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+            SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+        };
+        match UdpSocket::bind(any).and_then(|socket| socket.connect(address).map(|()| socket)) {
+            Ok(socket) => {
+                return Ok(Box::new(Datagrams { socket, peer: Some(address), packet: vec![0; MAX_DATAGRAM] }));
+            }
+            Err(error) => last = error,
+        }
+    }
+    Err(io::Error::new(last.kind(), format!("cannot send to {host} port {port}: {last}")))
+}
+
 struct Datagrams {
     socket: UdpSocket,
     peer: Option<SocketAddr>,
@@ -203,7 +222,9 @@ impl Transport for Datagrams {
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         // Without a received datagram there is no address to answer to.
         let Some(peer) = self.peer else { return Ok(()) };
-        self.socket.send_to(bytes, peer).map(drop)
+        let sent =
+            if self.socket.peer_addr().is_ok() { self.socket.send(bytes) } else { self.socket.send_to(bytes, peer) };
+        sent.map(drop)
     }
 }
 

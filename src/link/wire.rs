@@ -21,6 +21,9 @@ const READ_TIMEOUT: Duration = Duration::from_millis(20);
 const FIRST_BACK_OFF: Duration = Duration::from_millis(500);
 /// Longest pause before reconnecting.
 const LONGEST_BACK_OFF: Duration = Duration::from_secs(10);
+/// Longest wait for the port at which a conversation continues, and the pause between attempts.
+const REDIRECTION: Duration = Duration::from_secs(4);
+const REDIRECTION_PAUSE: Duration = Duration::from_millis(100);
 /// Most events that wait for the owner of the wire. Live points are not among them.
 const EVENT_BACKLOG: usize = 256;
 /// Most joint states that wait for the owner of the wire: those of 40 s at the highest frequency.
@@ -210,7 +213,7 @@ impl Worker {
         let mut back_off = FIRST_BACK_OFF;
         while !self.is_stopped() {
             let failure = match self.connect() {
-                Ok(mut transport) => match self.talk(transport.as_mut()) {
+                Ok(transport) => match self.talk(transport) {
                     (End::Stopped, _) => return,
                     (End::Lost(failure), was_ready) => {
                         if was_ready {
@@ -241,7 +244,7 @@ impl Worker {
     }
 
     /// Runs the protocol until the connection is lost; also returns whether it was ever ready.
-    fn talk(&mut self, transport: &mut dyn Transport) -> (End, bool) {
+    fn talk(&mut self, mut transport: Box<dyn Transport>) -> (End, bool) {
         let mut buffer = vec![0; CHUNK];
         let mut was_ready = false;
         self.mark_heard(self.clock.now());
@@ -251,9 +254,36 @@ impl Worker {
             if self.is_stopped() {
                 return (End::Stopped, was_ready);
             }
-            match self.poll_once(transport, &mut buffer, &mut was_ready) {
+            if let Some(port) = self.protocol.next_redirect() {
+                drop(transport);
+                transport = match self.redirected(port) {
+                    Ok(other) => other,
+                    Err(end) => return (end, was_ready),
+                };
+            }
+            match self.poll_once(transport.as_mut(), &mut buffer, &mut was_ready) {
                 Ok(()) => {}
                 Err(end) => return (end, was_ready),
+            }
+        }
+    }
+
+    /// Connects to another port of the same host. A controller needs a moment to open it.
+    fn redirected(&self, port: u16) -> Result<Box<dyn Transport>, End> {
+        let route = match &self.address.route {
+            Route::Tcp { host, .. } => Route::Tcp { host: host.clone(), port },
+            other => other.clone(),
+        };
+        let until = self.clock.now() + REDIRECTION;
+        loop {
+            let stop = Arc::clone(&self.stop);
+            match transport::connect(&route, &move || !stop.load(Ordering::Relaxed)) {
+                Ok(transport) => return Ok(transport),
+                Err(_) if self.is_stopped() => return Err(End::Stopped),
+                Err(error) if self.clock.now() > until => {
+                    return Err(End::Lost(Failure::Unreachable(error.to_string())));
+                }
+                Err(_not_yet_open) => thread::sleep(REDIRECTION_PAUSE),
             }
         }
     }

@@ -173,8 +173,7 @@ fn connect(
             Ok((Some(Box::new(rehearsal)), answer))
         }
         InstrumentChoice::Linked(choice) => {
-            Wired::check_arm(profile, choice)?;
-            let mut wired = Wired::new(choice, log)?;
+            let mut wired = Wired::for_arm(profile, choice, log)?;
             let identity = wired.connect_while(keep_going, on_event)?;
             let answer = Answer::Connected { identity, warnings: wired.warnings(), recorded: Vec::new() };
             Ok((Some(Box::new(wired)), answer))

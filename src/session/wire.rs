@@ -17,10 +17,34 @@ pub struct LinkChoice {
     /// Address of the robot's controller, if it reports joint angles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
+    /// Options of the controller's protocol.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot_options: Option<String>,
     /// Measures automatically when the SMR rests near the predicted place.
     #[serde(default, skip_serializing_if = "is_false")]
     pub is_automatic: bool,
 }
+
+/// A serial port of this computer.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct SerialPortName {
+    /// Path of the device for an address, persistent where the system provides one.
+    pub device: String,
+    /// Maker and product of the adapter, if it states them.
+    pub description: String,
+}
+
+/// What this computer knows about links, so that one can be chosen from a list.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct KnownLinks {
+    /// Links of earlier sessions, the latest first.
+    pub recent: Vec<LinkChoice>,
+    pub ports: Vec<SerialPortName>,
+}
+
+/// Names of the forms in which programs write lines with a point, as options of `ascii`.
+pub const TEXT_FORMS: &[&str] =
+    &["bridge, asked", "bridge", "xyz", "name,x,y,z", "name x y z", "tabs", "semicolons", "UDP xyz+time", "T2SA"];
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 const fn is_false(value: &bool) -> bool {
@@ -34,6 +58,7 @@ impl From<&LinkSettings> for LinkChoice {
             address: settings.address.to_string(),
             options: settings.options.clone(),
             robot: settings.robot.as_ref().map(WireAddress::to_string),
+            robot_options: settings.robot_options.clone(),
             is_automatic: settings.is_automatic,
         }
     }

@@ -21,7 +21,7 @@
 //! | `expected_deviations` | 1 mm, α β 2 mrad, joint offset 10 mrad, prismatic offset 1 mm |
 //! | `acceptance` | no limit |
 //! | `instrument` | unknown; σ is estimated from the residuals |
-//! | `link`: `(address, options, robot, automatic)` | no proposal; the address is typed in the instrument step |
+//! | `link`: `(address, options, robot, robot_options, automatic)` | no proposal; the address is typed in the instrument step |
 //! | `tracker` | at (3000, 0, 1000) mm, 30°, 500 to 20000 mm |
 //! | `floor_mm` | 0 under an upright arm, otherwise no floor; `None`: no floor |
 

@@ -37,12 +37,26 @@ pub enum WireProtocol {
     Kuka,
     /// ABB controller with Robot Web Services of RobotWare 6: joint angles of the robot.
     Abb,
+    /// FANUC controller with the Remote Motion Interface: joint angles of the robot.
+    Fanuc,
+    /// Yaskawa controller with the High-Speed Ethernet Server: pulses of the robot's axes.
+    Yaskawa,
 }
 
 impl WireProtocol {
     /// All protocols.
-    pub const ALL: [Self; 8] =
-        [Self::Emscon, Self::Ascii, Self::Geocom, Self::Ndi, Self::Rtde, Self::Joints, Self::Kuka, Self::Abb];
+    pub const ALL: [Self; 10] = [
+        Self::Emscon,
+        Self::Ascii,
+        Self::Geocom,
+        Self::Ndi,
+        Self::Rtde,
+        Self::Joints,
+        Self::Kuka,
+        Self::Abb,
+        Self::Fanuc,
+        Self::Yaskawa,
+    ];
 
     /// Name in addresses.
     pub const fn name(self) -> &'static str {
@@ -55,6 +69,8 @@ impl WireProtocol {
             Self::Joints => "joints",
             Self::Kuka => "kuka",
             Self::Abb => "abb",
+            Self::Fanuc => "fanuc",
+            Self::Yaskawa => "yaskawa",
         }
     }
 
@@ -66,6 +82,8 @@ impl WireProtocol {
             Self::Rtde => Some(30004),
             Self::Kuka => Some(7000),
             Self::Abb => Some(80),
+            Self::Fanuc => Some(16001),
+            Self::Yaskawa => Some(10040),
             Self::Ascii | Self::Geocom | Self::Joints => None,
         }
     }
@@ -79,17 +97,17 @@ impl WireProtocol {
     const fn usual_speed(self) -> Option<u32> {
         match self {
             Self::Ascii | Self::Geocom | Self::Ndi | Self::Joints => Some(9600),
-            Self::Emscon | Self::Rtde | Self::Kuka | Self::Abb => None,
+            Self::Emscon | Self::Rtde | Self::Kuka | Self::Abb | Self::Fanuc | Self::Yaskawa => None,
         }
     }
 
     /// Form of the address of a robot's controller, for hints.
-    pub const ROBOT_ADDRESS: &str = "rtde:HOST, abb:HOST, kuka:HOST or ascii:tcp:HOST:PORT";
+    pub const ROBOT_ADDRESS: &str = "rtde:HOST, abb:HOST, kuka:HOST, fanuc:HOST, yaskawa:HOST or ascii:tcp:HOST:PORT";
 
     /// Whether this is the protocol of a robot's controller, which reports joint angles and not SMR positions.
     pub const fn is_robot(self) -> bool {
         match self {
-            Self::Rtde | Self::Joints | Self::Kuka | Self::Abb => true,
+            Self::Rtde | Self::Joints | Self::Kuka | Self::Abb | Self::Fanuc | Self::Yaskawa => true,
             Self::Emscon | Self::Ascii | Self::Geocom | Self::Ndi => false,
         }
     }
@@ -97,8 +115,9 @@ impl WireProtocol {
     /// Number of joints that the controller reports, whatever the arm; `None` if it reports those of the arm.
     pub const fn reported_joints(self) -> Option<usize> {
         match self {
-            Self::Rtde | Self::Kuka | Self::Abb => Some(6),
-            Self::Joints | Self::Emscon | Self::Ascii | Self::Geocom | Self::Ndi => None,
+            Self::Rtde | Self::Kuka | Self::Abb | Self::Fanuc => Some(6),
+            // As many as pulses per degree are stated.
+            Self::Yaskawa | Self::Joints | Self::Emscon | Self::Ascii | Self::Geocom | Self::Ndi => None,
         }
     }
 }
@@ -144,6 +163,13 @@ pub enum Route {
         /// Port.
         port: u16,
     },
+    /// This program sends UDP datagrams and receives the answers.
+    Ask {
+        /// Host name or address.
+        host: String,
+        /// Port.
+        port: u16,
+    },
     /// This program receives UDP datagrams.
     Udp {
         /// Address of this machine.
@@ -166,7 +192,7 @@ impl fmt::Display for WireAddress {
             Route::Serial { device, speed } => write!(f, "{}:serial:{device}:{speed}", self.protocol),
             Route::Tcp { host, port } => write!(f, "{}:tcp:{host}:{port}", self.protocol),
             Route::Listen { host, port } => write!(f, "{}:listen:{host}:{port}", self.protocol),
-            Route::Udp { host, port } => write!(f, "{}:udp:{host}:{port}", self.protocol),
+            Route::Udp { host, port } | Route::Ask { host, port } => write!(f, "{}:udp:{host}:{port}", self.protocol),
         }
     }
 }
@@ -181,6 +207,12 @@ impl FromStr for WireAddress {
             .ok_or_else(|| format!("'{}' is not an address such as 'emscon:192.168.0.2'", printable(text)))?;
         let protocol: WireProtocol = protocol.parse()?;
         let route = match rest.split_once(':') {
+            // Its datagrams are asked for, whatever is written.
+            parts if protocol == WireProtocol::Yaskawa => {
+                let endpoint = parts.filter(|(way, _)| *way == "udp").map_or(rest, |(_, endpoint)| endpoint);
+                let (host, port) = host_and_port(protocol, endpoint)?;
+                Route::Ask { host, port }
+            }
             Some(("serial", device)) => serial(protocol, device)?,
             Some(("tcp", endpoint)) => {
                 let (host, port) = host_and_port(protocol, endpoint)?;
@@ -276,6 +308,8 @@ pub struct LinkSettings {
     pub options: Option<String>,
     /// Address of the robot's controller, if it reports joint angles.
     pub robot: Option<WireAddress>,
+    /// Options of the controller's protocol, checked when it connects.
+    pub robot_options: Option<String>,
     /// Measure automatically when the SMR is at rest near the predicted position.
     pub is_automatic: bool,
 }
@@ -300,6 +334,8 @@ mod tests {
             ("ascii:listen:0.0.0.0:5000", "ascii:listen:0.0.0.0:5000"),
             ("ascii:udp:127.0.0.1:5000", "ascii:udp:127.0.0.1:5000"),
             ("geocom:host:1212", "geocom:tcp:host:1212"),
+            ("fanuc:10.0.0.1", "fanuc:tcp:10.0.0.1:16001"),
+            ("yaskawa:10.0.0.1", "yaskawa:udp:10.0.0.1:10040"),
         ] {
             assert_eq!(full(text).as_deref(), Ok(wanted), "{text}");
             assert_eq!(full(wanted).as_deref(), Ok(wanted), "{wanted}");

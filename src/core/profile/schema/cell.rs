@@ -66,14 +66,21 @@ pub(super) fn instrument(top: &Fields<'_>, findings: &mut Findings<'_>) -> Optio
 /// Decodes the link; `None` if it is absent or invalid.
 pub(super) fn link(top: &Fields<'_>, findings: &mut Findings<'_>) -> Option<LinkSettings> {
     let ast = top.get("link")?;
-    let inside = fields(ast, "'link'", &["address", "options", "robot", "automatic"], findings)?;
+    let inside = fields(ast, "'link'", &["address", "options", "robot", "robot_options", "automatic"], findings)?;
     let address = inside
         .require("address", "\"emscon:192.168.0.2\"", findings)
         .and_then(|ast| wire_address(ast, false, findings));
     let options = inside.get_or("options", None, |ast| text(ast, findings).map(Some));
     let robot = inside.get_or("robot", None, |ast| wire_address(ast, true, findings).map(Some));
+    let robot_options = inside.get_or("robot_options", None, |ast| text(ast, findings).map(Some));
     let automatic = inside.get_or("automatic", false, |ast| flag(ast, findings));
-    Some(LinkSettings { address: address?, options: options?, robot: robot?, is_automatic: automatic? })
+    Some(LinkSettings {
+        address: address?,
+        options: options?,
+        robot: robot?,
+        robot_options: robot_options?,
+        is_automatic: automatic?,
+    })
 }
 
 /// Decodes the address of an instrument or of a robot's controller.

@@ -1,9 +1,9 @@
 //! Options for common sources.
 
 use super::options::AsciiOptions;
-use super::options::Column;
 use super::options::Layout;
 use super::options::Mode;
+use super::options::{Column, DecimalSign, Separator};
 use crate::text::names;
 
 /// Both forms of the answer. No comma may follow the third value: with decimal commas there would be six values.
@@ -26,8 +26,16 @@ pub enum Preset {
     Mitutoyo,
     /// UDP datagrams of `x,y,z,time`.
     UdpXyzTime,
+    /// A stream of `name x y z`, separated by blanks.
+    Blanks,
+    /// A stream of name, x, y, z, separated by tabulators.
+    Tabs,
+    /// A stream of `name;x;y;z` with decimal commas.
+    Semicolons,
     /// The line recommended for bridge programs.
     Bridge,
+    /// The same from a program that measures when it receives a line.
+    BridgeAsked,
 }
 
 names!(Preset {
@@ -36,7 +44,11 @@ names!(Preset {
     T2sa = "T2SA",
     Mitutoyo = "Mitutoyo 1-D",
     UdpXyzTime = "UDP xyz+time",
+    Blanks = "name x y z",
+    Tabs = "tabs",
+    Semicolons = "semicolons",
     Bridge = "bridge",
+    BridgeAsked = "bridge, asked",
 });
 
 impl Preset {
@@ -44,15 +56,26 @@ impl Preset {
     pub fn options(self) -> AsciiOptions {
         let columns =
             |columns: &[Column]| AsciiOptions { layout: Layout::Columns(columns.to_vec()), ..AsciiOptions::default() };
+        let named = columns(&[Column::Name, Column::X, Column::Y, Column::Z]);
         match self {
             Self::Xyz => AsciiOptions::default(),
-            Self::NameXyz => columns(&[Column::Name, Column::X, Column::Y, Column::Z]),
+            Self::NameXyz => named,
             Self::T2sa => t2sa(),
             Self::Mitutoyo => AsciiOptions { layout: Layout::Regex(GAUGE_LINE.to_owned()), ..AsciiOptions::default() },
             Self::UdpXyzTime => {
                 AsciiOptions { datagrams: true, ..columns(&[Column::X, Column::Y, Column::Z, Column::Time]) }
             }
+            Self::Blanks => AsciiOptions { separator: Separator::Spaces, ..named },
+            Self::Tabs => AsciiOptions { separator: Separator::Tab, ..named },
+            Self::Semicolons => {
+                AsciiOptions { separator: Separator::Semicolon, decimal_sign: DecimalSign::Comma, ..named }
+            }
             Self::Bridge => columns(&bridge_columns()),
+            Self::BridgeAsked => AsciiOptions {
+                mode: Mode::Polled { trigger: "M\\n".to_owned() },
+                timeout_s: 30.0,
+                ..columns(&bridge_columns())
+            },
         }
     }
 }

@@ -336,3 +336,21 @@ fn a_line_that_may_answer_an_earlier_trigger_is_not_taken() {
         other => panic!("{other:?}"),
     }
 }
+
+/// How programs write the same point.
+#[test]
+fn the_forms_of_programs_are_read() {
+    for (preset, line) in [
+        (Preset::Xyz, "1.5,-2.25,3000"),
+        (Preset::NameXyz, "p 7,1.5,-2.25,3000.0"),
+        (Preset::Blanks, "p7   1.5 -2.25   3000.0"),
+        (Preset::Tabs, "p 7\t1.5\t-2.25\t3000.0"),
+        (Preset::Semicolons, "p7;1,5;-2,25;3000,0"),
+        (Preset::BridgeAsked, "P,p7,1.5,-2.25,3000.0,0.01,0.01,0.02,0,2026-01-05T08:00:00Z"),
+    ] {
+        let Ok(ParsedLine::Point(shot)) = read(&preset.options(), line) else {
+            panic!("{preset:?}: {:?}", read(&preset.options(), line));
+        };
+        assert!((shot.point - Point3::new(0.0015, -0.00225, 3.0)).norm() < 1e-12, "{preset:?}: {shot:?}");
+    }
+}
