@@ -76,6 +76,23 @@ names!(Dialect {
 });
 
 impl Dialect {
+    /// The language of the controller of a robot, by the maker in its name or title.
+    pub fn of_robot(name: &str) -> Option<Self> {
+        let name = name.to_lowercase();
+        let makers: [(&[&str], Self); 6] = [
+            (&["abb", "irb"], Self::Rapid),
+            (&["kuka", "iiwa"], Self::Krl),
+            (&["fanuc", "lrmate"], Self::Fanuc),
+            (&["universal robots", "ur3", "ur5", "ur10", "ur16", "ur20", "ur30"], Self::Urscript),
+            (&["staubli", "stäubli"], Self::Val3),
+            (&["yaskawa", "motoman"], Self::Inform),
+        ];
+        makers
+            .into_iter()
+            .find(|(makers, _)| makers.iter().any(|maker| name.contains(maker)))
+            .map(|(_, dialect)| dialect)
+    }
+
     /// The table of languages.
     const fn language(self) -> &'static Language {
         match self {

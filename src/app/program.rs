@@ -1,19 +1,14 @@
 //! `trupose program`: a plan in the language of a robot controller.
 
-use std::f64::consts::PI;
 use std::io::Write;
 
 use super::{Console, load};
 use crate::cli::ProgramArgs;
 use crate::error::{ExitStatus, Failure};
-use crate::kinematics::{Joint, JointType};
-use crate::planning::CellError;
-use crate::planning::collision::ArmShape;
-use crate::procedure::cell::cell;
+use crate::procedure::dangers::dangers;
 use crate::procedure::joint_types;
-use crate::profile::Profile;
 use crate::program::{Options, Pause, Robot, write};
-use crate::session::plan::{self, PlannedPose};
+use crate::session::plan;
 use crate::store;
 
 pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
@@ -51,7 +46,10 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
     if profile.bodies().is_empty() {
         console.remark("WARNING: the profile has no bodies: collisions were not checked");
     }
-    let found = dangers(profile, &listed.rows)?;
+    let mut found = dangers(profile, &listed.rows).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+    if let Some(more) = found.last_mut().filter(|last| last.starts_with("and ")) {
+        more.push_str("; see 'trupose plan --check'");
+    }
     for danger in &found {
         console.remark(&format!("WARNING: {danger}"));
     }
@@ -91,38 +89,4 @@ pub(super) fn run<O: Write, E: Write>(args: &ProgramArgs, console: &mut Console<
         }
     }
     Ok(if options.dangers.is_empty() { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
-}
-
-/// The first few collisions of poses, and of moves between them, according to the bodies of the profile.
-fn dangers(profile: &Profile, rows: &[PlannedPose]) -> Result<Vec<String>, Failure> {
-    const SHOWN: usize = 5;
-    if profile.bodies().is_empty() {
-        return Ok(Vec::new());
-    }
-    let usage = |error: &CellError| Failure::from_error(ExitStatus::Usage, error);
-    let wide = |joint: &Joint, limits: Option<(f64, f64)>| {
-        limits.unwrap_or(match joint.joint_type {
-            JointType::Revolute => (-2.0 * PI, 2.0 * PI),
-            JointType::Prismatic => (-10.0, 10.0),
-        })
-    };
-    let joints = profile.chain().joints().iter().zip(profile.joints());
-    let limits = joints.map(|(joint, range)| wide(joint, range.limits)).collect();
-    let cell = cell(profile, limits, None, true)?;
-    let shape = ArmShape::new(profile.chain(), &cell, 0.0).map_err(|error| usage(&error))?;
-    let poses = rows.iter().filter_map(|row| {
-        let obstruction = shape.check(&row.configuration).err()?;
-        Some(format!("in pose {} {obstruction}", row.pose))
-    });
-    let moves = rows.windows(2).filter_map(|pair| {
-        let obstruction = shape.check_move(&pair[0].configuration, &pair[1].configuration).err()?;
-        Some(format!("on the way from {} to {} {obstruction}", pair[0].pose, pair[1].pose))
-    });
-    let mut found: Vec<String> = poses.chain(moves).collect();
-    let more = found.len().saturating_sub(SHOWN);
-    found.truncate(SHOWN);
-    if more > 0 {
-        found.push(format!("and {more} more; see 'trupose plan --check'"));
-    }
-    Ok(found)
 }

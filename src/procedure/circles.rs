@@ -1,9 +1,11 @@
 //! Configurations for a circle-point analysis, in which the last two joints can turn far without touching anything.
 
+use nalgebra::DMatrix;
+
 use super::ProcedureError;
 use super::cell::{cell, planning_limits};
 use crate::identification::circle_point::{circle_plan, fit_circle};
-use crate::kinematics::ForwardKinematics;
+use crate::kinematics::{ForwardKinematics, JointType};
 use crate::planning::collision::{ArmShape, DEFAULT_CLEARANCE};
 use crate::planning::{JointBox, low_discrepancy};
 use crate::profile::Profile;
@@ -53,6 +55,72 @@ pub fn plan(profile: &Profile) -> Result<Vec<Circle>, ProcedureError> {
         }
     }
     Err(ProcedureError::NoFreeCircles)
+}
+
+/// Arcs for each joint of the whole arm (rad): half of it to either side.
+const WHOLE_ARCS: [f64; 5] = [150.0 * DEGREE, 120.0 * DEGREE, 90.0 * DEGREE, 70.0 * DEGREE, 50.0 * DEGREE];
+/// Slides of joints that slide, as a part of an arc of one radian (m).
+const SLIDE: f64 = 0.1;
+
+/// Configurations that move each joint in turn, from the base to the flange, with all others at one place: for the constants of the
+/// whole arm. The arm can go from each to the next.
+///
+/// # Errors
+/// The arm cannot move all its joints far enough anywhere in its cell, or one of them draws no circle.
+pub fn plan_whole(profile: &Profile) -> Result<Vec<Circle>, ProcedureError> {
+    let limits = planning_limits(profile)?;
+    let cell = cell(profile, limits.clone(), None, true)?;
+    let shape = ArmShape::new(profile.chain(), &cell, DEFAULT_CLEARANCE)?;
+    let joint_box = JointBox::new(limits.clone())?;
+    let middle: Vec<f64> = limits.iter().map(|(low, high)| f64::midpoint(*low, *high)).collect();
+    let bases = || std::iter::once(middle.clone()).chain(low_discrepancy(&joint_box, SEED).take(TRIES));
+    let moves = alone(profile);
+    let mut no_circle = None;
+    for (arc, base) in WHOLE_ARCS.into_iter().flat_map(|arc| bases().map(move |base| (arc, base))) {
+        let circles: Vec<Circle> =
+            moves.iter().enumerate().map(|(joint, alone)| (joint, moved(profile, joint, alone, &base, arc))).collect();
+        let visited: Vec<&Vec<f64>> = circles.iter().flat_map(|(_, plan)| plan).collect();
+        let is_within = |q: &[f64]| q.iter().zip(&limits).all(|(value, (low, high))| (*low..=*high).contains(value));
+        let is_free = visited.iter().all(|q| is_within(q) && shape.check(q).is_ok())
+            && visited.windows(2).all(|pair| shape.check_move(pair[0], pair[1]).is_ok());
+        if !is_free {
+            continue;
+        }
+        let turning: Vec<Circle> = circles
+            .iter()
+            .filter(|(joint, _)| {
+                profile.chain().joints().get(*joint).is_some_and(|joint| joint.joint_type == JointType::Revolute)
+            })
+            .cloned()
+            .collect();
+        match check_offset(profile, &turning) {
+            Ok(()) => return Ok(circles),
+            Err(error) => drop(no_circle.get_or_insert(error)),
+        }
+    }
+    Err(no_circle.unwrap_or(ProcedureError::NoFreeCircles))
+}
+
+/// Per joint, the change of the pendant values that moves this joint alone by one: elsewhere than on coupled arms, itself.
+fn alone(profile: &Profile) -> Vec<Vec<f64>> {
+    let joints = profile.chain().joints();
+    let by_pendant = DMatrix::from_fn(joints.len(), joints.len(), |joint, other| {
+        joints.get(joint).map_or(0.0, |one| one.variable_by_pendant(joint, other))
+    });
+    let inverse = by_pendant.try_inverse().unwrap_or_else(|| DMatrix::identity(joints.len(), joints.len()));
+    inverse.column_iter().map(|column| column.iter().copied().collect()).collect()
+}
+
+/// Configurations that move one joint about its place in `base`.
+fn moved(profile: &Profile, joint: usize, alone: &[f64], base: &[f64], arc: f64) -> Vec<Vec<f64>> {
+    let slides = profile.chain().joints().get(joint).is_some_and(|joint| joint.joint_type == JointType::Prismatic);
+    let reach = if slides { SLIDE * arc } else { arc };
+    (0..POINTS)
+        .map(|point| {
+            let part = point as f64 / (POINTS - 1) as f64 - 0.5;
+            base.iter().zip(alone).map(|(value, change)| value + part * reach * change).collect()
+        })
+        .collect()
 }
 
 /// Checks before anything is measured that the SMR is beside the turned axes: on an axis it draws no circle.

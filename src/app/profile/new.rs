@@ -9,19 +9,16 @@ use super::super::{Console, load};
 use crate::cli::NewProfileArgs;
 use crate::error::{ExitStatus, Failure};
 use crate::identification::circle_point::{MeasuredArm, Template, measure_arm};
-use crate::kinematics::{JointType, LinkParameter, ParameterId};
-use crate::model::{Arm, Heading, complete, geometry_only};
+use crate::kinematics::JointType;
+use crate::model::{Arm, Heading, geometry_only};
 use crate::procedure::joint_types;
+use crate::procedure::measured_arm::{ASTONISHING, ASTONISHING_ZERO_DEG, constants, profile_text};
 use crate::profile::datasheet::{Agreement, Datasheet, Dimension, Limits, Maker};
-use crate::profile::{JointRange, Masses, Profile, Target};
+use crate::profile::{JointRange, Masses, Profile};
 use crate::session::measurements::{Layout, read_as, types_in_header};
 use crate::store;
 use crate::text::{alternatives, counted};
-use crate::units::{MILLIMETRE, Quantity, from_mm, to_deg, to_mm};
-
-/// Differences from the data sheet beyond these are no assembly errors (mm), (degree); zeros of joints are set less exactly.
-const ASTONISHING: (f64, f64) = (5.0, 0.5);
-const ASTONISHING_ZERO_DEG: f64 = 2.0;
+use crate::units::{from_mm, to_deg, to_mm};
 
 pub(super) fn run<O: Write, E: Write>(
     args: &NewProfileArgs,
@@ -175,7 +172,7 @@ fn measured<O: Write, E: Write>(
         Some(profile) => profile,
         None => first_profile(&arm, &types, args)?,
     };
-    let text = written(&base, &arm, args.name.as_deref(), &file);
+    let text = profile_text(&base, &arm, args.name.as_deref(), &file);
     // A written profile must be readable.
     load::parse_profile(text.clone(), "the measured profile")?;
     Ok(text)
@@ -195,33 +192,6 @@ fn first_profile(arm: &MeasuredArm, types: &[JointType], args: &NewProfileArgs) 
     let heading = Heading { comments: &[], name, title: name, source: "measured" };
     let part = Arm { chain: &arm.chain, ranges: &ranges, beta_joints: &arm.beta_joints, masses: &Masses::Unknown };
     Ok(load::parse_profile(geometry_only(&heading, &part), "the measured profile")?.profile)
-}
-
-/// The profile with the measured constants, SMR and place of the tracker.
-fn written(profile: &Profile, arm: &MeasuredArm, name: Option<&str>, file: &str) -> String {
-    let first = profile.targets().first().cloned().unwrap_or_else(|| Target::beside_the_flange("smr"));
-    let target = Target {
-        position_in_flange: arm.point_in_flange,
-        // Relative to the last axis. The flange itself is not seen.
-        uncertainty: arm.point_sigma.max().max(MILLIMETRE),
-        ..first
-    };
-    let tracker = arm.base_from_tracker * Point3::origin();
-    let placed = profile.with_tracker_at(tracker).with_target(0, target);
-    let targets = placed.targets().to_vec();
-    let comments = [
-        "Link constants from circles: each joint was moved in turn, and the axes of the circles give the constants."
-            .to_owned(),
-        "Not measured: d and theta of the first link, all constants of the last one, and d between parallel axes."
-            .to_owned(),
-    ];
-    let heading = Heading {
-        comments: &comments,
-        name: name.unwrap_or_else(|| profile.name()),
-        title: name.unwrap_or_else(|| profile.title()),
-        source: &format!("{}, link constants measured with circles ({file})", profile.source()),
-    };
-    complete(&heading, &placed, &arm.chain, &targets)
 }
 
 /// Prints what was measured.
@@ -244,28 +214,16 @@ fn report<O: Write, E: Write>(arm: &MeasuredArm, is_compared: bool, console: &mu
     let titles = if is_compared { format!("{:>14}{:>12}", "nominal", "difference") } else { String::new() };
     console.remark(&format!("\n{:<8}{:>14}{:>10}{titles}", "constant", "measured", "sigma"));
     let mut astonishing = 0;
-    for constant in &arm.constants {
-        let ParameterId::Link { parameter, .. } = constant.id else { continue };
-        let quantity = parameter.quantity();
-        let edge = |value: f64| quantity.to_edge(value);
-        let nominal = constant.nominal.map_or_else(String::new, |nominal| {
-            let difference = edge(constant.value - nominal);
-            let limit = match (quantity, parameter) {
-                (Quantity::Length, _) => ASTONISHING.0,
-                (Quantity::Angle, LinkParameter::Theta) => ASTONISHING_ZERO_DEG,
-                (Quantity::Angle, _) => ASTONISHING.1,
-            };
-            let mark = if difference.abs() > limit { " !" } else { "" };
-            astonishing += usize::from(difference.abs() > limit);
-            format!("{:>14.3}{difference:>12.3}{mark}", edge(nominal))
-        });
-        console.remark(&format!(
-            "{:<8}{:>14.4}{:>10.4} {:<3}{nominal}",
-            constant.id.to_string(),
-            edge(constant.value),
-            edge(constant.sigma),
-            quantity.unit()
-        ));
+    for row in constants(arm) {
+        let nominal = match (row.nominal, row.difference()) {
+            (Some(nominal), Some(difference)) => {
+                let mark = if row.is_astonishing { " !" } else { "" };
+                format!("{nominal:>14.3}{difference:>12.3}{mark}")
+            }
+            _ => String::new(),
+        };
+        astonishing += usize::from(row.is_astonishing);
+        console.remark(&format!("{:<8}{:>14.4}{:>10.4} {:<3}{nominal}", row.name, row.measured, row.sigma, row.unit));
     }
     let [x, y, z] = [0, 1, 2].map(|axis| to_mm(arm.point_in_flange[axis]));
     console.remark(&format!("\nSMR in the flange: x {x:.3}, y {y:.3}, z {z:.3} mm"));
