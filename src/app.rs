@@ -23,6 +23,7 @@ mod script;
 mod session;
 mod simulate;
 mod verify;
+mod watch;
 mod wizard;
 
 use std::io::{self, Write};

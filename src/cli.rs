@@ -189,12 +189,18 @@ pub struct DemoArgs {
     /// Seed of the simulated cell: the same seed gives the same transcript
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Connect to the simulated cell over wires: 'emscon', 'ascii', 'geocom' or 'ndi', with 'serial:' in front for a serial line where the protocol allows it; with ',rtde', ',joints', ',kuka' or ',abb' the robot reports its joints
+    /// Connect to the simulated cell over wires: 'emscon', 'ascii', 'geocom' or 'ndi', with 'serial:' in front for a serial line where the protocol allows it; with ',rtde', ',joints', ',kuka', ',abb', ',fanuc' or ',yaskawa' the robot reports its joints
     #[arg(long, value_name = "PROTOCOL", value_parser = wires)]
     pub over: Option<Wires>,
+    /// Drive the screens of the wizard at reading speed; any key takes over
+    #[arg(long)]
+    pub watch: bool,
     /// Options of scripts.
     #[command(flatten)]
     pub script: ScriptArgs,
+    /// Options of the terminal.
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
 }
 
 /// Arguments of `resume`.

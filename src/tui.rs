@@ -41,7 +41,7 @@ use ratatui::layout::{Position, Rect};
 
 use crate::runtime::{CompletedIntent, Engine, signals};
 use crate::session::journal::Entry;
-use crate::wizard::{Activity, Wizard};
+use crate::wizard::{Activity, Intent, Notice, Wizard};
 use input::Input;
 use terminal::TerminalGuard;
 use theme::Theme;
@@ -102,11 +102,40 @@ impl Exit {
 /// Called with the completed intents before the program ends, however it ends.
 pub type AtEnd<'a> = &'a mut dyn FnMut(&[CompletedIntent]);
 
+/// Something that drives the wizard in place of the operator, until a key is pressed.
+pub trait Pilot {
+    /// What is done next, now that the wizard is idle; `None` at the end.
+    fn next(&mut self, wizard: &Wizard) -> Option<Move>;
+}
+
+/// A move of a pilot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Move {
+    /// Time to read the screen before it.
+    pub after: Duration,
+    /// What is about to happen, in a sentence.
+    pub caption: String,
+    pub intent: Intent,
+}
+
 /// Runs the wizard in the terminal until it ends. When the terminal is lost, the process ends here.
 ///
 /// # Errors
 /// The terminal cannot be used, or the system refuses a thread.
-pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Result<Exit> {
+pub fn run(engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Result<Exit> {
+    watch(engine, options, None, at_end)
+}
+
+/// Runs the wizard in the terminal, driven by a pilot until the operator presses a key.
+///
+/// # Errors
+/// As [`run`].
+pub fn watch<'p>(
+    mut engine: Engine,
+    options: Options,
+    pilot: Option<&'p mut (dyn Pilot + 'p)>,
+    at_end: AtEnd<'_>,
+) -> io::Result<Exit> {
     let received = signals::watch(engine.sender())?;
     if options.forces_colour {
         crossterm::style::force_color_output(true);
@@ -123,6 +152,8 @@ pub fn run(mut engine: Engine, options: Options, at_end: AtEnd<'_>) -> io::Resul
         screen,
         guard: &guard,
         ui: Ui::new(options.theme).with_bell(options.has_bell),
+        pilot,
+        planned: None,
     };
     let end = driver.run(&received);
     // Dropping it would write to the terminal once more, which may be gone.
@@ -156,15 +187,19 @@ enum End {
     Gone,
 }
 
-struct Driver<'a> {
+struct Driver<'a, 'p> {
     engine: &'a mut Engine,
     inputs: Receiver<Input>,
     screen: Terminal<CrosstermBackend<Stdout>>,
     guard: &'a TerminalGuard,
     ui: Ui,
+    /// Drives the wizard until a key is pressed.
+    pilot: Option<&'p mut (dyn Pilot + 'p)>,
+    /// The pilot's next move, and when it is due.
+    planned: Option<(Instant, Intent)>,
 }
 
-impl Driver<'_> {
+impl Driver<'_, '_> {
     fn run(&mut self, received: &signals::SignalWatch) -> End {
         let mut view = self.engine.wizard().view();
         self.ui.refresh(&view, self.engine.wizard().session());
@@ -196,6 +231,7 @@ impl Driver<'_> {
                 (is_due, is_by_key) = (false, false);
             }
             let timeout = if is_due { early } else { IDLE };
+            let timeout = self.fly().map_or(timeout, |until| timeout.min(until));
             if self.engine.wait(timeout) {
                 // Handle all events that have arrived before drawing.
                 while !self.engine.has_exited() && self.engine.wait(Duration::ZERO) {}
@@ -203,6 +239,10 @@ impl Driver<'_> {
             view = self.refresh(view, &mut is_due);
             while let Ok(input) = self.inputs.try_recv() {
                 is_by_key = true;
+                if self.takes_over(&input) {
+                    view = self.refresh(view, &mut is_due);
+                    continue;
+                }
                 match self.ui.on_input(input, &view) {
                     Command::None => {}
                     Command::Intent(intent) => {
@@ -227,6 +267,47 @@ impl Driver<'_> {
             }
             is_due |= self.ui.take_dirty();
         }
+    }
+
+    /// Lets the pilot plan or do its next move. Returns the time until it is due.
+    fn fly(&mut self) -> Option<Duration> {
+        let pilot = self.pilot.as_mut()?;
+        if self.engine.wizard().activity() != Activity::Idle || self.engine.has_exited() {
+            return None;
+        }
+        match self.planned.take() {
+            Some((at, intent)) if at <= now() => {
+                self.engine.intend(intent);
+                // What it leads to is drawn first.
+                Some(Duration::ZERO)
+            }
+            Some((at, intent)) => {
+                self.planned = Some((at, intent));
+                Some(at.saturating_duration_since(now()))
+            }
+            None => match pilot.next(self.engine.wizard()) {
+                Some(Move { after, caption, intent }) => {
+                    self.engine.remark(Notice::info(caption).hint("you are watching; any key takes over"));
+                    self.planned = Some((now() + after, intent));
+                    Some(Duration::ZERO)
+                }
+                None => {
+                    self.pilot = None;
+                    self.engine.remark(Notice::info("this was the whole calibration").hint("the keys are yours now"));
+                    Some(Duration::ZERO)
+                }
+            },
+        }
+    }
+
+    /// Whether an input only ends the pilot: the key that takes over does nothing else.
+    fn takes_over(&mut self, input: &Input) -> bool {
+        if self.pilot.is_none() || !matches!(input, Input::Key(_) | Input::Paste(_)) {
+            return false;
+        }
+        (self.pilot, self.planned) = (None, None);
+        self.engine.remark(Notice::info("you have taken over").hint("the footer shows what the keys do"));
+        true
     }
 
     /// Returns the current view. If it has changed, a frame is due.

@@ -45,6 +45,9 @@ pub(super) fn demo<O: Write, E: Write>(args: &DemoArgs, console: &mut Console<O,
         script_args.values.push(("wires".to_owned(), wires));
     }
     let script = parse(DEMO, "demo", &script_args)?;
+    if args.watch {
+        return wizard::watch(script, &script_args, args.terminal, console);
+    }
     let engine = Engine::new(live_options(clock(&script), &script_args, console)?).map_err(|error| refused(&error))?;
     play(engine, &script, &script_args, console)
 }

@@ -3,6 +3,7 @@
 use std::io::{IsTerminal as _, Write, stdin, stdout};
 use std::path::Path;
 
+use super::watch::Tour;
 use super::{Console, refused, script};
 use crate::cli::{ColorArg, ScriptArgs, TerminalArgs, TerminalEnvironment};
 use crate::error::{ExitStatus, Failure};
@@ -25,10 +26,29 @@ pub(super) fn run<O: Write, E: Write>(
     let mut engine =
         Engine::new(script::live_options(Clock::System, args, console)?).map_err(|error| refused(&error))?;
     match profile {
-        Some(profile) => engine.intend(Intent::ChooseProfile(profile.to_owned())),
+        Some(profile) => {
+            engine.intend(Intent::ChooseProfile(profile.to_owned()));
+            engine.offer_links(args.sessions.clone());
+        }
         None => engine.offer_sessions(args.sessions.clone()),
     }
     match play(engine, surface, args.record_script.as_deref(), console)? {
+        Ended::Done(status) => Ok(status),
+        Ended::Continues(folder) => resume(Some(Path::new(&folder)), args, terminal, console),
+    }
+}
+
+/// Drives the screens as a script says, until a key is pressed.
+pub(super) fn watch<O: Write, E: Write>(
+    script: Script,
+    args: &ScriptArgs,
+    terminal: TerminalArgs,
+    console: &mut Console<O, E>,
+) -> Result<ExitStatus, Failure> {
+    let options = screen(terminal, &TerminalEnvironment::read())?;
+    let engine = Engine::new(script::live_options(Clock::System, args, console)?).map_err(|error| refused(&error))?;
+    let mut tour = Tour::of(script);
+    match play(engine, Surface::Watched(options, &mut tour), args.record_script.as_deref(), console)? {
         Ended::Done(status) => Ok(status),
         Ended::Continues(folder) => resume(Some(Path::new(&folder)), args, terminal, console),
     }
@@ -43,7 +63,8 @@ pub(super) fn resume<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     let surface = surface(terminal)?;
     let folder = script::find(folder, &args.sessions)?;
-    let engine = script::open(&folder, script::live_options(Clock::System, args, console)?)?;
+    let mut engine = script::open(&folder, script::live_options(Clock::System, args, console)?)?;
+    engine.offer_links(args.sessions.clone());
     match play(engine, surface, args.record_script.as_deref(), console)? {
         Ended::Done(status) => Ok(status),
         Ended::Continues(folder) => resume(Some(Path::new(&folder)), args, terminal, console),
@@ -58,13 +79,13 @@ enum Ended {
 }
 
 /// Where the wizard is shown.
-#[derive(Clone, Copy, Debug)]
-enum Surface {
+enum Surface<'a> {
     Screen(tui::Options),
+    Watched(tui::Options, &'a mut Tour),
     Lines(Glyphs),
 }
 
-fn surface(args: TerminalArgs) -> Result<Surface, Failure> {
+fn surface(args: TerminalArgs) -> Result<Surface<'static>, Failure> {
     let environment = TerminalEnvironment::read();
     if args.plain || environment.term.as_deref() == Some("dumb") {
         return Ok(Surface::Lines(tui_options(args, &environment).theme.glyphs));
@@ -105,7 +126,7 @@ fn tui_options(args: TerminalArgs, environment: &TerminalEnvironment) -> tui::Op
 
 fn play<O: Write, E: Write>(
     engine: Engine,
-    surface: Surface,
+    surface: Surface<'_>,
     record: Option<&Path>,
     console: &mut Console<O, E>,
 ) -> Result<Ended, Failure> {
@@ -114,6 +135,7 @@ fn play<O: Write, E: Write>(
         |completed: &[CompletedIntent]| recorded = record.map_or(Ok(()), |file| write_script(file, completed));
     let exit = match surface {
         Surface::Screen(options) => tui::run(engine, options, &mut at_end),
+        Surface::Watched(options, tour) => tui::watch(engine, options, Some(tour), &mut at_end),
         Surface::Lines(glyphs) => tui::lines::run(engine, stdin(), &mut console.out, glyphs, &mut at_end),
     };
     let exit =
