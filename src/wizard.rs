@@ -23,9 +23,12 @@
 pub mod advice;
 mod cell;
 mod effect;
+mod faces;
 pub mod intent;
 mod live;
 pub mod notice;
+mod place;
+mod program;
 pub mod reading;
 mod step;
 pub mod view;
@@ -45,6 +48,7 @@ use crate::session::journal::{Entry, Line, SCHEMA};
 use crate::session::reading::LiveReading;
 use crate::session::set_up::{InstrumentChoice, Step};
 use crate::session::state::Session;
+use crate::session::wire::KnownLinks;
 use crate::text::{counted, counted_as};
 use live::Live;
 use step::{Action, Connection, Cx, Phase};
@@ -87,6 +91,9 @@ pub struct Wizard {
     /// Sessions that can be continued instead of starting one.
     sessions: Vec<SessionCard>,
     cells: cell::KnownCells,
+    programs: program::Programs,
+    /// Links that can be chosen from a list.
+    links: KnownLinks,
     /// Folder of the session to continue after the end.
     resumes: Option<String>,
     ended: Option<String>,
@@ -136,6 +143,8 @@ impl Wizard {
             live: Live::default(),
             sessions: Vec::new(),
             cells: cell::KnownCells::default(),
+            programs: program::Programs::default(),
+            links: KnownLinks::default(),
             resumes: None,
             ended: None,
             unsaved: Vec::new(),
@@ -233,6 +242,10 @@ impl Wizard {
                 self.cells.earlier = cell;
                 Vec::new()
             }
+            Event::Links(links) => {
+                self.links = links;
+                Vec::new()
+            }
             Event::Remark(notice) => {
                 self.notice = Some(notice);
                 Vec::new()
@@ -294,8 +307,17 @@ impl Wizard {
             let blocked = busy.cancelled.then(|| "already being cancelled".to_owned());
             intents.push(IntentInfo::new(Intent::Cancel, format!("cancel {}", busy.what)).unless(blocked));
         }
-        let cell = self.cells.offer(self.phase.step(), &self.session);
-        for mut info in self.phase.intents(&self.cx()).into_iter().chain(cell) {
+        let step = self.phase.step();
+        let cell = self.cells.offers(step, &self.session);
+        let programs = program::Programs::offers(step, &self.session);
+        for mut info in self
+            .phase
+            .intents(&self.cx())
+            .into_iter()
+            .chain(cell)
+            .chain(programs)
+            .chain(faces::offer(step, &self.session))
+        {
             if let Some(busy) = &busy
                 && !matches!(info.intent, Intent::Note(_))
             {
@@ -322,6 +344,7 @@ impl Wizard {
             down: self.live.down(),
             now: self.now,
             sessions: &self.sessions,
+            links: &self.links,
         }
     }
 
@@ -333,6 +356,7 @@ impl Wizard {
             down: self.live.down(),
             now: self.now,
             sessions: &self.sessions,
+            links: &self.links,
         };
         (&mut self.phase, cx)
     }
@@ -381,11 +405,13 @@ impl Wizard {
             self.resumes = Some(folder);
             return self.end(cause);
         }
-        if let Intent::DescribeCell(cell) = intent {
-            let actions = self.cells.state(*cell, &self.session);
-            self.actions.extend(actions);
-            return self.run();
-        }
+        let intent = match self.everywhere(intent) {
+            Ok(actions) => {
+                self.actions.extend(actions);
+                return self.run();
+            }
+            Err(intent) => intent,
+        };
         if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo) {
             self.live.hold_until_moved();
         }
@@ -393,6 +419,22 @@ impl Wizard {
         let actions = phase.on_intent(intent, &cx);
         self.actions.extend(actions);
         self.run()
+    }
+
+    /// Handles an intent that is the same in every step that offers it; gives back any other.
+    fn everywhere(&mut self, intent: Intent) -> Result<Vec<Action>, Intent> {
+        match intent {
+            Intent::DescribeCell(cell) => Ok(self.cells.state(*cell, &self.session)),
+            Intent::PlaceTracker(points) => Ok(self.cells.place(points, &self.session)),
+            Intent::PlaceTrackerByPoses => Ok(self.cells.place_by_poses(&self.session)),
+            Intent::LimitJoints(limits) => Ok(self.cells.limit(&limits, &self.session)),
+            Intent::AddBox(obstacle) => Ok(self.cells.add_box(obstacle, &self.session)),
+            Intent::CheckFaces(pair) => Ok(faces::check(&pair, &self.session)),
+            Intent::WriteProgram(settings) => Ok(self.programs.write(settings, &self.session, self.now)),
+            Intent::ProgramDriven => Ok(vec![Action::Write(vec![Entry::ProgramDriven])]),
+            #[expect(clippy::wildcard_enum_match_arm, reason = "all others belong to the steps")]
+            intent => Err(intent),
+        }
     }
 
     fn cancel(&mut self) -> Vec<Effect> {
@@ -410,6 +452,10 @@ impl Wizard {
             return Vec::new();
         }
         self.busy = None;
+        if let Some(actions) = self.programs.on_answer(&answer) {
+            self.actions.extend(actions);
+            return self.run();
+        }
         if let Answer::Connected { identity, warnings, recorded } = &answer {
             if !warnings.is_empty() {
                 // All warnings go into one message: a second one would replace the first.

@@ -45,8 +45,21 @@ const LAYERS: &[(&str, &[&str])] = &[
             "report",
         ],
     ),
-    ("wizard", &["units", "geometry", "kinematics", "identification", "planning", "profile", "session", "procedure"]),
-    ("runtime", &["checksum", "profile", "session", "procedure", "link", "store", "recording", "wizard"]),
+    (
+        "wizard",
+        &[
+            "units",
+            "geometry",
+            "kinematics",
+            "identification",
+            "planning",
+            "profile",
+            "program",
+            "session",
+            "procedure",
+        ],
+    ),
+    ("runtime", &["checksum", "profile", "program", "session", "procedure", "link", "store", "recording", "wizard"]),
     ("script", &["session", "wizard", "runtime"]),
     (
         "tui",

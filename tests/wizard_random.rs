@@ -251,12 +251,15 @@ impl Cell {
                 let joints = profile.chain().dof() - usize::from(self.chance(10));
                 Answer::Planned { summary: None, rows: self.poses(1, 16, joints), origin: self.text() }
             }
-            Request::PlanCircles { profile } => {
+            Request::PlanCircles { profile, .. } => {
                 let joints = profile.chain().dof();
                 Answer::CirclesPlanned(vec![
                     CircleConfigurations { joint: joints - 1, configurations: self.circle(joints, joints - 1) },
                     CircleConfigurations { joint: joints - 2, configurations: self.circle(joints, joints - 2) },
                 ])
+            }
+            Request::Program { .. } => {
+                Answer::Programmed { files: vec![("calposes.src".to_owned(), self.text())], dangers: Vec::new() }
             }
             Request::Identify(request) => match identify(request, &mut |_| ControlFlow::Continue(())) {
                 Ok(identified) => Answer::Identified(Box::new(identified)),

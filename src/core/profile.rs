@@ -26,7 +26,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 pub use builtin::{builtin, builtin_names};
 pub use cell::{Capsule, Instrument, KeepOut, Tracker};
-pub use cell_text::CellText;
+pub use cell_text::{BoxText, CellText};
 pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
 pub use expected::{ExpectedDeviation, ExpectedDeviations};
 pub use gaps::Gap;

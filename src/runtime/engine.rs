@@ -18,6 +18,7 @@ use crate::link::RawLog;
 use crate::recording::{self, Live, Recorder, RecordingEvent};
 use crate::session::advice::Advice;
 use crate::session::journal::{Journal, Line};
+use crate::session::set_up::Step;
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
 use crate::text::counted;
@@ -95,6 +96,8 @@ pub struct Engine {
     /// The last intent, until its outcome is known.
     pending: Option<Intent>,
     has_exited: bool,
+    /// Folder of the sessions whose links are on offer; `None`: none are.
+    links_in: Option<PathBuf>,
 }
 
 impl Engine {
@@ -143,12 +146,20 @@ impl Engine {
             completed: Vec::new(),
             pending: None,
             has_exited: false,
+            links_in: None,
         })
     }
 
     /// Looks for sessions in a folder that can be continued, and offers them on the first screen.
-    pub fn offer_sessions(&self, root: PathBuf) {
-        recent::look(root, self.sender.clone());
+    pub fn offer_sessions(&mut self, root: PathBuf) {
+        recent::look(root.clone(), self.sender.clone());
+        self.links_in = Some(root);
+    }
+
+    /// Looks for serial ports and for the links of the sessions in a folder, now and whenever an instrument is chosen.
+    pub fn offer_links(&mut self, root: PathBuf) {
+        recent::look_for_links(root.clone(), self.sender.clone());
+        self.links_in = Some(root);
     }
 
     pub const fn wizard(&self) -> &Wizard {
@@ -158,6 +169,11 @@ impl Engine {
     /// Returns a sender of events for other threads, such as those of keys and signals.
     pub fn sender(&self) -> Events {
         self.sender.clone()
+    }
+
+    /// Shows a message that does not concern the calibration itself.
+    pub fn remark(&mut self, notice: Notice) {
+        self.handle(Event::Remark(notice));
     }
 
     /// Returns whether the wizard has ended, so that the program may end.
@@ -294,7 +310,12 @@ impl Engine {
             _ => {}
         }
         let mut effects = self.wizard.update(Event::Tick(self.clock.now()));
+        let (is_asked, before) = (matches!(event, Event::Intent(Intent::FindLinks)), self.wizard.session().step);
         effects.extend(self.wizard.update(event));
+        let is_entered = before != Step::Instrument && self.wizard.session().step == Step::Instrument;
+        if let Some(root) = self.links_in.as_ref().filter(|_| is_asked || is_entered) {
+            recent::look_for_links(root.clone(), self.sender.clone());
+        }
         if let Some(lines) = saved {
             self.record_lines(&lines);
             self.outputs.push_back(Output::Saved(lines));

@@ -7,10 +7,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+
 use super::events::Events;
 use crate::procedure;
 use crate::profile::{Profile, builtin, builtin_names};
-use crate::session::plan;
+use crate::program::{self, Dialect};
+use crate::session::plan::{self, PlannedPose};
+use crate::session::set_up::ProgramText;
 use crate::store;
 use crate::text::causes;
 use crate::wizard::{Answer, CircleConfigurations, Event, Problem, Request, RequestId, RequestProgress};
@@ -52,7 +57,8 @@ impl Job {
             Request::LoadProfile { source } => load_profile(source),
             Request::Plan { profile, profile_text, request } => self.plan(&profile, &profile_text, &request),
             Request::LoadPlan { file, profile } => load_plan(&file, &profile),
-            Request::PlanCircles { profile } => circles(&profile),
+            Request::PlanCircles { profile, is_whole } => circles(&profile, is_whole),
+            Request::Program { profile, rows, settings, created } => robot_program(&profile, &rows, &settings, created),
             Request::Identify(request) => self.identify(&request),
             Request::Model(request) => Ok(Answer::Modelled(Box::new(procedure::models::models(&request)))),
             // Other threads carry these out.
@@ -115,8 +121,39 @@ fn load_plan(file: &str, profile: &Profile) -> Result<Answer, Problem> {
     Ok(Answer::Planned { summary: None, rows: listed.rows, origin: format!("the poses of '{file}'") })
 }
 
-fn circles(profile: &Profile) -> Result<Answer, Problem> {
-    let circles = procedure::circles::plan(profile).map_err(Problem::from)?;
+/// The robot program of a plan.
+fn robot_program(
+    profile: &Profile,
+    rows: &[PlannedPose],
+    settings: &ProgramText,
+    created: Timestamp,
+) -> Result<Answer, Problem> {
+    let dialect = settings.dialect.parse::<Dialect>().map_err(|error| Problem::new(error.to_string()))?;
+    let dangers = procedure::dangers::dangers(profile, rows).map_err(Problem::from)?;
+    let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
+    let pulses: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
+    let robot = program::Robot {
+        profile: profile.name(),
+        chain: profile.chain(),
+        max_speeds: &max_speeds,
+        pulses_per_degree: &pulses,
+        joint_aliases: profile.joint_aliases(),
+    };
+    let options = program::Options {
+        name: "calposes".to_owned(),
+        pause: settings.dwell_s.map_or(program::Pause::Acknowledge, program::Pause::Dwell),
+        speed: settings.speed_percent / 100.0,
+        created: created.to_zoned(TimeZone::UTC).datetime(),
+        dangers: dangers.clone(),
+    };
+    let written = program::write(dialect, &robot, rows, &options).map_err(|error| Problem::new(causes(&error)))?;
+    let files = written.files.into_iter().map(|file| (file.file_name, file.text)).collect();
+    Ok(Answer::Programmed { files, dangers })
+}
+
+fn circles(profile: &Profile, is_whole: bool) -> Result<Answer, Problem> {
+    let plan = if is_whole { procedure::circles::plan_whole } else { procedure::circles::plan };
+    let circles = plan(profile).map_err(Problem::from)?;
     let configurations = |(joint, configurations)| CircleConfigurations { joint, configurations };
     Ok(Answer::CirclesPlanned(circles.into_iter().map(configurations).collect()))
 }

@@ -7,8 +7,11 @@ use std::time::SystemTime;
 
 use super::events::Events;
 use super::store_thread::CELL;
+use crate::link::serial_ports;
 use crate::profile::CellText;
+use crate::session::set_up::InstrumentChoice;
 use crate::session::state::Session;
+use crate::session::wire::{KnownLinks, LinkChoice};
 use crate::store;
 use crate::store::session::{folders, read_journal};
 use crate::wizard::Event;
@@ -42,6 +45,21 @@ pub fn unfinished(root: &Path) -> Vec<SessionCard> {
     by_age(root).into_iter().take(READ).filter_map(read).take(SHOWN).collect()
 }
 
+/// The links of the latest sessions, each once.
+fn links(root: &Path) -> Vec<LinkChoice> {
+    let mut found: Vec<LinkChoice> = Vec::new();
+    for folder in by_age(root).into_iter().take(READ) {
+        let session = read_journal(&folder).ok().and_then(|lines| Session::of(&lines).ok());
+        if let Some(InstrumentChoice::Linked(choice)) = session.and_then(|session| session.instrument)
+            && !found.contains(&choice)
+        {
+            found.push(choice);
+        }
+    }
+    found.truncate(SHOWN);
+    found
+}
+
 /// The cell of the last session. A file that cannot be read is no cell.
 fn earlier_cell(root: &Path) -> Option<CellText> {
     let bytes = store::read(&root.join(CELL)).ok()?;
@@ -58,9 +76,21 @@ pub(super) fn look(root: PathBuf, events: Events) {
         if !found.is_empty() {
             events.send(Event::Sessions(found));
         }
+        events.send(Event::Links(known_links(&root)));
     };
     // Without the thread, the operator starts a new session or types 'trupose resume'.
     drop(thread::Builder::new().name("sessions".to_owned()).spawn(search));
+}
+
+fn known_links(root: &Path) -> KnownLinks {
+    KnownLinks { recent: links(root), ports: serial_ports() }
+}
+
+/// Looks for links beside the screen.
+pub(super) fn look_for_links(root: PathBuf, events: Events) {
+    let search = move || events.send(Event::Links(known_links(&root)));
+    // Without the thread, addresses can still be typed.
+    drop(thread::Builder::new().name("links".to_owned()).spawn(search));
 }
 
 #[cfg(test)]

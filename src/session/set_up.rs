@@ -198,3 +198,31 @@ impl fmt::Display for PayloadText {
         write!(f, "{} kg, centre ({x}, {y}, {z}) mm in the flange", self.mass_kg)
     }
 }
+
+/// Points in the base and as the tracker sees them (mm).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrackerPoints(pub Vec<((f64, f64, f64), (f64, f64, f64))>);
+
+/// One SMR as the instrument sees it in its two faces (mm).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FacePair {
+    pub first_mm: (f64, f64, f64),
+    pub second_mm: (f64, f64, f64),
+}
+
+/// Range of a plan per joint (degree, sliding joints mm); `None` is the robot's own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct JointLimitsText(pub Vec<(String, Option<(f64, f64)>)>);
+
+/// How the robot program of a plan is written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProgramText {
+    /// Name of the language.
+    pub dialect: String,
+    /// Rest at each measured pose (s); `None`: until the operator acknowledges.
+    pub dwell_s: Option<f64>,
+    /// Part of the full joint speed.
+    pub speed_percent: f64,
+}

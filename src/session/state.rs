@@ -18,7 +18,7 @@ use super::about::About;
 use super::calibration::{MountedText, mounted_on};
 use super::journal::{
     CirclePointText, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText,
-    from_edge, from_xyz_mm, to_xyz_mm,
+    RobotProgramText, from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
 use super::set_up::{InstrumentChoice, PayloadText, Step, TargetChoice};
@@ -63,6 +63,8 @@ pub struct Session {
     pub rows: Vec<Row>,
     /// Plans that were accepted, without their rows.
     pub plan: Option<PlanText>,
+    /// The robot program of the plan, if one was written.
+    pub robot_program: Option<RobotProgramText>,
     /// Row of the plan that was measured, skipped or gone to last.
     pub shown: Option<usize>,
     /// The last stop of the arm that is known.
@@ -298,11 +300,20 @@ impl Session {
                 }
                 self.rows.extend(rows);
                 self.plan = Some(plan.without_rows());
+                // A program of before does not drive to these poses.
+                self.robot_program = None;
             }
             Entry::PlanExtended(plan) => {
                 let rows = self.planned_rows(&plan.rows).ok_or_else(|| misfit("poses that do not fit the robot"))?;
                 self.rows.extend(rows);
                 self.plan = Some(plan.without_rows());
+                // A program of before does not drive to these poses.
+                self.robot_program = None;
+            }
+            Entry::RobotProgram(program) => self.robot_program = Some(program.clone()),
+            Entry::ProgramDriven => {
+                let program = self.robot_program.as_mut().ok_or_else(|| misfit("a program that was not written"))?;
+                program.was_driven = true;
             }
             Entry::Sample(noted) => self.add_sample(noted, line).map_err(misfit)?,
             Entry::Refused { number, pose, reason, .. } => {
@@ -376,6 +387,7 @@ impl Session {
         self.shown = None;
         self.last_stop = None;
         self.plan = None;
+        self.robot_program = None;
     }
 
     /// Puts a cell into the profile. A result from before does not know it.

@@ -3,13 +3,15 @@
 pub mod ask;
 mod cell;
 mod form;
+pub mod links;
+mod place;
 mod plain;
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-pub use form::{Build, Form};
+pub use form::{Build, Form, Take, Taken};
 pub use plain::Answered;
 
 use super::form::{ChoiceList, FieldOutcome, NumberField, TextField};
@@ -48,8 +50,21 @@ pub enum Dialog {
         /// Intent of each choice.
         intents: Vec<Intent>,
     },
+    /// Asks what comes next: an intent, or another dialog.
+    Menu {
+        list: ChoiceList,
+        /// What follows from each choice.
+        then: Vec<Chosen>,
+    },
     /// Asks for several values at once.
     Form(Form),
+}
+
+/// What follows from a choice of a menu.
+#[derive(Clone, Debug)]
+pub enum Chosen {
+    Intent(Intent),
+    Dialog(Box<Dialog>),
 }
 
 /// State of a dialog after a key.
@@ -78,6 +93,11 @@ impl Dialog {
             Intent::About(about) => Some(ask::about(about)),
             Intent::DescribeCell(cell) => Some(cell::cell(cell)),
             Intent::DescribeRobot(sheet) => Some(cell::data_sheet(sheet)),
+            Intent::PlaceTracker(points) => Some(place::tracker(points)).map(|dialog| dialog.seeing(view)),
+            Intent::CheckFaces(_) => Some(place::faces().seeing(view)),
+            Intent::LimitJoints(limits) => Some(place::limits(limits)).map(|dialog| dialog.seeing(view)),
+            Intent::AddBox(proposal) => Some(place::obstacle(&proposal.name)).map(|dialog| dialog.seeing(view)),
+            Intent::WriteProgram(settings) => Some(place::program(settings)),
             Intent::Note(_) => text(&note_label(view), "", Intent::Note),
             Intent::GoToPose(_) => choose_pose(view),
             Intent::SuggestPoses(count) => {
@@ -94,13 +114,43 @@ impl Dialog {
     pub fn rows_above(&self) -> Option<u16> {
         match self {
             Self::Text { field, .. } if field.is_checked() => Some(LINES_OF_COORDINATES),
-            Self::Text { .. } | Self::Confirm { .. } | Self::Number { .. } | Self::Choice { .. } | Self::Form(_) => {
-                None
-            }
+            Self::Text { .. }
+            | Self::Confirm { .. }
+            | Self::Number { .. }
+            | Self::Choice { .. }
+            | Self::Menu { .. }
+            | Self::Form(_) => None,
+        }
+    }
+
+    /// The dialog with what the links see now.
+    #[must_use]
+    fn seeing(mut self, view: &ViewModel) -> Self {
+        self.see(&taken(view));
+        self
+    }
+
+    /// Sees what the links see now.
+    pub fn see(&mut self, taken: &Taken) {
+        if let Self::Form(form) = self {
+            form.see(taken);
         }
     }
 
     pub fn on_key(&mut self, key: Key) -> DialogOutcome {
+        if let Self::Menu { list, then } = self {
+            let reaction = list.on_key(key);
+            return match (reaction, list.selected().and_then(|index| then.get(index))) {
+                (FieldOutcome::Submitted, Some(Chosen::Intent(intent))) => DialogOutcome::Submitted(intent.clone()),
+                (FieldOutcome::Submitted, Some(Chosen::Dialog(dialog))) => {
+                    let next = (**dialog).clone();
+                    *self = next;
+                    DialogOutcome::Open
+                }
+                (FieldOutcome::Cancelled, _) => DialogOutcome::Closed,
+                _ => DialogOutcome::Open,
+            };
+        }
         let (reaction, intent) = match self {
             Self::Confirm { intent, is_yes, .. } => match key.code {
                 KeyCode::Char('y') => (FieldOutcome::Submitted, Some(intent.clone())),
@@ -122,6 +172,8 @@ impl Dialog {
             Self::Choice { list, intents } => {
                 (list.on_key(key), list.selected().and_then(|index| intents.get(index).cloned()))
             }
+            // Handled above.
+            Self::Menu { .. } => (FieldOutcome::Ignored, None),
         };
         match (reaction, intent) {
             (FieldOutcome::Submitted, Some(intent)) => DialogOutcome::Submitted(intent),
@@ -135,7 +187,7 @@ impl Dialog {
             Self::Confirm { .. } => {}
             Self::Text { field, .. } => field.paste(text),
             Self::Number { field, .. } => field.paste(text),
-            Self::Choice { list, .. } => list.paste(text),
+            Self::Choice { list, .. } | Self::Menu { list, .. } => list.paste(text),
             Self::Form(form) => form.paste(text),
         }
     }
@@ -147,8 +199,11 @@ impl Dialog {
             Self::Confirm { .. } => {
                 items = vec![KeyHint::new("y", "yes", 1), KeyHint::new("n", "no", 1), KeyHint::new("Tab", "switch", 3)];
             }
-            Self::Choice { .. } => items.push(KeyHint::new("Up/Down", "choose", 2)),
-            Self::Form(_) => {
+            Self::Choice { .. } | Self::Menu { .. } => items.push(KeyHint::new("Up/Down", "choose", 2)),
+            Self::Form(form) => {
+                if let Some(here) = form.offer() {
+                    items = vec![KeyHint::new("Enter", format!("take {here}"), 0), KeyHint::new("Esc", "cancel", 1)];
+                }
                 items.push(KeyHint::new("Tab", "next field", 2));
                 items.push(KeyHint::new("Ctrl-U", "clear the line", 4));
             }
@@ -162,9 +217,21 @@ impl Dialog {
             Self::Confirm { lines, is_yes, .. } => draw_confirmation(lines, *is_yes, theme, area, buf),
             Self::Text { field, .. } => field.draw(theme, area, buf),
             Self::Number { field, .. } => field.draw(theme, area, buf),
-            Self::Choice { list, .. } => list.draw(theme, area, buf),
+            Self::Choice { list, .. } | Self::Menu { list, .. } => list.draw(theme, area, buf),
             Self::Form(form) => form.draw(theme, area, buf),
         }
+    }
+}
+
+/// What the links see now, as it is written into fields.
+pub fn taken(view: &ViewModel) -> Taken {
+    let Some(live) = view.live.as_ref().filter(|live| live.down.is_none()) else { return Taken::default() };
+    let point = |[x, y, z]: [f64; 3]| format!("{x:.3} {y:.3} {z:.3}");
+    Taken {
+        seen: live.point_mm.map(point),
+        smr_in_base: live.smr_in_base_mm.map(point),
+        flange_in_base: live.flange_in_base_mm.map(point),
+        joints: live.joints_shown.iter().map(|value| format!("{value:.2}")).collect(),
     }
 }
 

@@ -106,7 +106,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 pub const BELL: Key = Key::ctrl('b');
 
 /// The table. Of several bindings with the same key, the first one whose intent is possible applies.
-const BINDINGS: [Binding; 46] = [
+const BINDINGS: [Binding; 56] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Target::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Target::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -121,11 +121,21 @@ const BINDINGS: [Binding; 46] = [
     offer('d', 4, |intent| matches!(intent, Intent::DescribeRobot(_))),
     offer('c', 3, |intent| matches!(intent, Intent::ChooseInstrument(_))),
     offer('j', 4, |intent| matches!(intent, Intent::DescribeCell(_))),
+    offer('t', 6, |intent| matches!(intent, Intent::PlaceTracker(_))),
+    offer('t', 6, |intent| matches!(intent, Intent::PlaceTrackerByPoses)),
+    offer('g', 6, |intent| matches!(intent, Intent::LimitJoints(_))),
+    offer('x', 6, |intent| matches!(intent, Intent::AddBox(_))),
+    offer('2', 7, |intent| matches!(intent, Intent::CheckFaces(_))),
+    offer('f', 4, |intent| matches!(intent, Intent::WriteProgram(_))),
+    offer('y', 3, |intent| matches!(intent, Intent::ProgramDriven)),
+    offer('s', 7, |intent| matches!(intent, Intent::FindLinks)),
     offer('p', 3, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Profile))),
     offer('f', 4, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Free { .. }))),
     offer('k', 4, |intent| matches!(intent, Intent::ChooseTarget(TargetChoice::Known { .. }))),
     offer('y', 6, |intent| matches!(intent, Intent::StatePayload(_))),
     offer('c', 4, |intent| matches!(intent, Intent::StartCircles)),
+    offer('w', 5, |intent| matches!(intent, Intent::StartWholeArm)),
+    offer('s', 3, |intent| matches!(intent, Intent::SaveArm)),
     offer('u', 3, |intent| matches!(intent, Intent::UseCircles)),
     offer('d', 6, |intent| matches!(intent, Intent::DiscardCircles)),
     offer('p', 3, |intent| matches!(intent, Intent::MakePlan(_))),

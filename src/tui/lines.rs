@@ -8,7 +8,7 @@ use std::io::{self, BufRead as _, BufReader, Read, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::thread;
 
-use super::dialog::{Answered, Dialog};
+use super::dialog::{Answered, Dialog, taken};
 use super::glyphs::Glyphs;
 use super::screen::instrument::{way, ways};
 use super::values;
@@ -136,11 +136,16 @@ fn answered(asking: Asking, line: &str, view: &ViewModel) -> Outcome {
             _ => Outcome::Asks(Asking::Ways, Some(format!("'{line}' is no number of the list"))),
         },
         Asking::Dialog(mut dialog, number) => {
+            dialog.see(&taken(view));
             if let Err(problem) = dialog.answer(number, line) {
                 return Outcome::Asks(Asking::Dialog(dialog, number), Some(problem));
             }
             if dialog.question(number + 1).is_some() {
                 return Outcome::Asks(Asking::Dialog(dialog, number + 1), None);
+            }
+            if let Some(mut next) = dialog.continued() {
+                next.see(&taken(view));
+                return Outcome::Asks(Asking::Dialog(next, 0), None);
             }
             match dialog.answered() {
                 Answered::Intent(intent) => Outcome::Does(intent),

@@ -4,7 +4,7 @@ use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::dialog::{Dialog, DialogOutcome};
+use super::dialog::{Dialog, DialogOutcome, taken};
 use super::input::Input;
 use super::keymap::{self, Action, Key, KeyHint, LocalAction};
 use super::preview::{Camera, Scene};
@@ -113,6 +113,9 @@ impl Ui {
             self.help = None;
         }
         self.screen.see(view);
+        if let Some(dialog) = &mut self.dialog {
+            dialog.see(&taken(view));
+        }
         self.scene = scene(view, session);
         let attention = Attention::of(view);
         self.is_ringing |= self.has_bell && attention.is_some() && attention != self.attention;

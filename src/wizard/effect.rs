@@ -15,7 +15,8 @@ use crate::session::journal::Line;
 use crate::session::plan::PlannedPose;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
-use crate::session::set_up::InstrumentChoice;
+use crate::session::set_up::{InstrumentChoice, ProgramText};
+use crate::session::wire::KnownLinks;
 
 /// Identifies a request, so that an answer to anything but the running one can be dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -44,6 +45,8 @@ pub enum Event {
     Sessions(Vec<SessionCard>),
     /// The cell of an earlier session.
     Cell(CellText),
+    /// Links that can be chosen from a list.
+    Links(KnownLinks),
     /// A message that does not concern the calibration itself, such as a recording that stopped.
     Remark(Notice),
     /// The program has to end.
@@ -105,6 +108,13 @@ pub enum Answer {
     Identified(Box<Identified>),
     /// The models are written and verified, in memory.
     Modelled(Box<Models>),
+    /// The robot program of a plan is made, in memory.
+    Programmed {
+        /// Name and text of each file.
+        files: Vec<(String, String)>,
+        /// Collisions that the bodies of the profile predict.
+        dangers: Vec<String>,
+    },
     /// The result files are on disk.
     Delivered {
         /// Names of the files.
@@ -181,9 +191,19 @@ pub enum Request {
         file: String,
         profile: Box<Profile>,
     },
+    /// Make the robot program of these poses.
+    Program {
+        profile: Box<Profile>,
+        rows: Vec<PlannedPose>,
+        settings: ProgramText,
+        /// For the header.
+        created: Timestamp,
+    },
     /// Find configurations for the circle-point analysis.
     PlanCircles {
         profile: Box<Profile>,
+        /// Of every joint, not of the last two only.
+        is_whole: bool,
     },
     /// Identify the arm, and verify it if there are verification samples.
     Identify(Box<IdentifyRequest>),
@@ -207,6 +227,7 @@ impl Request {
             Self::Measure(_) => "measuring",
             Self::Plan { .. } => "choosing poses",
             Self::LoadPlan { .. } => "reading the plan",
+            Self::Program { .. } => "writing the robot program",
             Self::PlanCircles { .. } => "choosing circles",
             Self::Identify(_) => "identifying",
             Self::Model(_) => "writing and checking the models",

@@ -3,10 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::procedure::plan::{INTERACTIVE_CANDIDATES, PlanRequest};
-use crate::profile::CellText;
 use crate::profile::datasheet::Datasheet;
+use crate::profile::{BoxText, CellText};
 use crate::session::about::About;
-use crate::session::set_up::{InstrumentChoice, PayloadText, TargetChoice};
+use crate::session::set_up::{
+    FacePair, InstrumentChoice, JointLimitsText, PayloadText, ProgramText, TargetChoice, TrackerPoints,
+};
 
 /// A command of the operator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,14 +32,30 @@ pub enum Intent {
     /// Continue another session, by its folder.
     ResumeSession(String),
     ChooseInstrument(InstrumentChoice),
+    /// Look for serial ports and the links of earlier sessions again.
+    FindLinks,
     /// Choose where the SMR sits on the flange.
     ChooseTarget(TargetChoice),
     /// State what the flange carries besides the SMR.
     StatePayload(PayloadText),
     /// State instrument, tracker, limits, boxes and acceptance of this cell.
     DescribeCell(Box<CellText>),
+    /// State where the tracker is by points that are known in the base and that it sees.
+    PlaceTracker(TrackerPoints),
+    /// State where the tracker is by the poses measured so far.
+    PlaceTrackerByPoses,
+    /// Compare one SMR in both faces of the instrument.
+    CheckFaces(FacePair),
+    /// State the joint limits of this cell.
+    LimitJoints(JointLimitsText),
+    /// Add a box that the arm must not touch.
+    AddBox(BoxText),
     /// Locate the SMR by circle-point analysis.
     StartCircles,
+    /// Measure the constants of the whole arm by circles of every joint.
+    StartWholeArm,
+    /// Save the measured arm as a profile.
+    SaveArm,
     /// Use the result of the circle-point analysis.
     UseCircles,
     /// Discard the measured circles and start again.
@@ -50,6 +68,10 @@ pub enum Intent {
     PlanFromRecording,
     /// Accept the proposed plan for measuring.
     AcceptPlan,
+    /// Write the robot program of the plan.
+    WriteProgram(ProgramText),
+    /// Confirm that the robot program was driven once by hand.
+    ProgramDriven,
 
     /// Measure at the pose shown.
     Measure,
@@ -103,10 +125,20 @@ impl Intent {
             Self::NameSession(_) => "NameSession",
             Self::ResumeSession(_) => "ResumeSession",
             Self::ChooseInstrument(_) => "ChooseInstrument",
+            Self::FindLinks => "FindLinks",
             Self::ChooseTarget(_) => "ChooseTarget",
             Self::StatePayload(_) => "StatePayload",
             Self::DescribeCell(_) => "DescribeCell",
+            Self::PlaceTracker(_) => "PlaceTracker",
+            Self::PlaceTrackerByPoses => "PlaceTrackerByPoses",
+            Self::CheckFaces(_) => "CheckFaces",
+            Self::LimitJoints(_) => "LimitJoints",
+            Self::AddBox(_) => "AddBox",
+            Self::WriteProgram(_) => "WriteProgram",
+            Self::ProgramDriven => "ProgramDriven",
             Self::StartCircles => "StartCircles",
+            Self::StartWholeArm => "StartWholeArm",
+            Self::SaveArm => "SaveArm",
             Self::UseCircles => "UseCircles",
             Self::DiscardCircles => "DiscardCircles",
             Self::MakePlan(_) => "MakePlan",

@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use nalgebra::{Point3, Vector3};
 
 use crate::kinematics::ForwardKinematics;
+use crate::session::journal::to_edge;
 use crate::session::plan::PoseKind;
 use crate::session::reading::LiveReading;
 use crate::session::state::Session;
@@ -197,6 +198,9 @@ impl Live {
                 .and_then(|row| self.off_predicted(session, row))
                 .map(|(distance, _)| to_mm(distance)),
             joints: latest.joints.clone(),
+            joints_shown: latest.joints.as_deref().map(|joints| shown(session, joints)).unwrap_or_default(),
+            flange_in_base_mm: latest.joints.as_deref().and_then(|joints| in_base(session, joints, false)),
+            smr_in_base_mm: latest.joints.as_deref().and_then(|joints| in_base(session, joints, true)),
             joint_difference: row
                 .and_then(|row| self.joint_difference(session, row))
                 .map(|(joint, difference)| (joint, to_deg(difference))),
@@ -216,6 +220,22 @@ impl Live {
                 .collect(),
         })
     }
+}
+
+/// Joint values as the pendant shows them.
+fn shown(session: &Session, q: &[f64]) -> Vec<f64> {
+    session.robot.as_ref().map(|robot| to_edge(q, &robot.joint_types)).unwrap_or_default()
+}
+
+/// Where the nominal arm has the flange, or the SMR on it, in the base (mm).
+fn in_base(session: &Session, q: &[f64], has_smr: bool) -> Option<[f64; 3]> {
+    if has_smr {
+        return predicted(session, q).map(|point| point.coords.map(to_mm).into());
+    }
+    let profile = &session.robot.as_ref()?.profile;
+    let flange = (q.len() == profile.chain().dof())
+        .then(|| ForwardKinematics::new(profile.chain()).point_in_base(q, &Point3::origin()));
+    flange.map(|point| point.coords.map(to_mm).into())
 }
 
 /// Position of the SMR as predicted by the nominal arm (m).

@@ -17,6 +17,7 @@ mod profile;
 mod target;
 
 use jiff::Timestamp;
+pub(super) use plan::measuring_pace;
 
 use super::effect::{Answer, Request};
 use super::intent::{Intent, IntentInfo};
@@ -27,6 +28,7 @@ use crate::session::journal::Entry;
 use crate::session::plan::PlannedPose;
 use crate::session::set_up::Step;
 use crate::session::state::{Robot, Session};
+use crate::session::wire::KnownLinks;
 
 /// What a step may read.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +40,8 @@ pub(super) struct Cx<'a> {
     pub(super) now: Timestamp,
     /// Sessions that can be continued instead of starting one.
     pub(super) sessions: &'a [SessionCard],
+    /// Links that can be chosen from a list.
+    pub(super) links: &'a KnownLinks,
 }
 
 impl Cx<'_> {

@@ -10,5 +10,6 @@ mod resume;
 mod shutdown;
 mod stale;
 mod steps;
+mod tools;
 mod units;
 mod way;

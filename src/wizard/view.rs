@@ -19,7 +19,7 @@ use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::Step;
 use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummary, Warning, WorkspaceSummary};
-use crate::session::wire::LinkChoice;
+use crate::session::wire::{KnownLinks, LinkChoice};
 use crate::units::to_mm;
 pub use sessions::{SessionCard, SessionChoice};
 
@@ -84,6 +84,11 @@ pub struct LiveView {
     pub from_predicted_mm: Option<f64>,
     /// Joints that the robot reports: pendant values (rad).
     pub joints: Option<Vec<f64>>,
+    /// The same as the pendant shows them (deg, sliding joints mm); empty where none are reported.
+    pub joints_shown: Vec<f64>,
+    /// Where the nominal arm has flange and SMR at these joints, in the base.
+    pub flange_in_base_mm: Option<[f64; 3]>,
+    pub smr_in_base_mm: Option<[f64; 3]>,
     /// Index (from 0) of the joint that is farthest from the pose shown, and its difference (deg).
     pub joint_difference: Option<(usize, f64)>,
     /// Whether the robot is at rest, if it reports that.
@@ -229,6 +234,9 @@ impl ProfileCard {
 pub struct InstrumentView {
     /// Link described in the profile.
     pub link: Option<LinkChoice>,
+    /// Links of earlier sessions and serial ports.
+    #[serde(skip)]
+    pub known: KnownLinks,
     /// The choice in words.
     pub choice: Option<String>,
     /// Identity of the connected instrument.
@@ -271,10 +279,37 @@ pub struct CirclesView {
     pub fits: Vec<CircleView>,
     /// Position of the SMR.
     pub result: Option<CirclesResult>,
+    /// The whole arm, if every joint was moved.
+    pub arm: Option<ArmView>,
     /// Reason why there is no result.
     pub problem: Option<String>,
     /// Unit of the coordinates, if they are typed.
     pub typed_unit: Option<String>,
+}
+
+/// A whole arm from circles.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArmView {
+    pub constants: Vec<ConstantView>,
+    /// Centre of the SMR in the flange frame.
+    pub smr_mm: [f64; 3],
+    /// Where the tracker is in the base.
+    pub tracker_mm: [f64; 3],
+    /// Largest distance of a point from where the measured arm puts it.
+    pub worst_mm: f64,
+}
+
+/// A constant of a measured arm (mm, degree).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConstantView {
+    pub name: String,
+    pub unit: String,
+    pub measured: f64,
+    pub sigma: f64,
+    pub nominal: Option<f64>,
+    pub difference: Option<f64>,
+    /// Whether the difference is too large for an assembly error.
+    pub is_astonishing: bool,
 }
 
 /// A fitted circle, in the tracker frame.
@@ -319,9 +354,20 @@ pub struct JointShown {
     pub moves_most: bool,
 }
 
+/// The robot program of a plan.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ProgramView {
+    /// Files, language and waits.
+    pub text: String,
+    /// Whether the operator has confirmed that it was driven once by hand.
+    pub was_driven: bool,
+}
+
 /// The view of the plan step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanView {
+    /// The robot program of the accepted plan, if it was written.
+    pub program: Option<ProgramView>,
     /// Settings of the next search.
     pub settings: PlanSettings,
     /// The proposed plan.

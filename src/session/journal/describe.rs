@@ -42,6 +42,8 @@ impl Entry {
             Self::Correction(correction) => correction_text(correction),
             Self::Row(row) => format!("went to row {} of the plan", row + 1),
             Self::Passed { pose, .. } => format!("passed through '{pose}'"),
+            Self::RobotProgram(program) => format!("robot program written: {}", program.files.join(", ")),
+            Self::ProgramDriven => "the robot program was driven once by hand".to_owned(),
             Self::ThroughHome(row) => format!("going through home to row {} of the plan", row + 1),
             Self::Skipped { row, skipped: true } => format!("row {} of the plan skipped", row + 1),
             Self::Skipped { row, skipped: false } => format!("row {} of the plan is to be measured after all", row + 1),

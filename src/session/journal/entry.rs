@@ -11,7 +11,7 @@ use crate::session::about::About;
 use crate::session::calibration::Calibration;
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
-use crate::session::set_up::{InstrumentChoice, PayloadText, Step, TargetChoice};
+use crate::session::set_up::{InstrumentChoice, PayloadText, ProgramText, Step, TargetChoice};
 use crate::session::summary::IdentificationSummary;
 use crate::text::{names, written_as_text};
 use crate::units::{from_mm, to_mm};
@@ -57,6 +57,10 @@ pub enum Entry {
     Plan(PlanText),
     /// Additional poses after those of the plan.
     PlanExtended(PlanText),
+    /// The robot program of the plan is on disk.
+    RobotProgram(RobotProgramText),
+    /// The operator confirms that the robot program was driven once by hand.
+    ProgramDriven,
     /// A measured point.
     Sample(MeasuredText),
     /// A measurement that gave no sample.
@@ -124,6 +128,17 @@ pub enum Entry {
     },
     /// The program ended normally.
     Closed { reason: String },
+}
+
+/// A robot program of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RobotProgramText {
+    pub settings: ProgramText,
+    /// Names of its files in the session's folder.
+    pub files: Vec<String>,
+    /// Whether the operator has confirmed that it was driven once by hand.
+    #[serde(default)]
+    pub was_driven: bool,
 }
 
 /// A point of the circle-point analysis.

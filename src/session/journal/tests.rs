@@ -15,7 +15,9 @@ use crate::profile::{CellText, Profile, builtin};
 use crate::session::about::About;
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
-use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, RecordedSet, Step, TargetChoice};
+use crate::session::set_up::{
+    CoordinateUnit, InstrumentChoice, PayloadText, ProgramText, RecordedSet, Step, TargetChoice,
+};
 use crate::session::simulation::{Fault, JointErrorSizes, SimulatedWire, Simulation, Truth};
 use crate::session::summary::VerificationMode;
 use crate::session::wire::WireProtocol;
@@ -283,6 +285,12 @@ fn all_entries() -> Vec<Entry> {
     let instrument = InstrumentText { name: TRICKY.to_owned(), sigma_um: 7.5, sigma_um_per_m: 0.0 };
     let cell = CellText { instrument: Some(instrument), planning_limits: limits.into(), ..CellText::default() };
     entries.push(Entry::Cell(cell));
+    for dwell_s in [None, Some(6.5)] {
+        let settings = ProgramText { dialect: "krl".to_owned(), dwell_s, speed_percent: 10.0 };
+        let files = vec!["calposes.src".to_owned(), "calposes.dat".to_owned()];
+        entries.push(Entry::RobotProgram(RobotProgramText { settings, files, was_driven: false }));
+    }
+    entries.push(Entry::ProgramDriven);
     entries.push(Entry::Payload(PayloadText { mass_kg: 2.5, centre_mm: (0.1, -20.0, 1e-9) }));
     entries.extend(corrections.map(Entry::Correction));
     let decisions = [Decision::Keep, Decision::LeaveOut, Decision::Undo];
@@ -319,6 +327,8 @@ fn variant(entry: &Entry) -> usize {
         Entry::Passed { .. } => 23,
         Entry::ThroughHome(_) => 24,
         Entry::Cell(_) => 25,
+        Entry::RobotProgram(_) => 26,
+        Entry::ProgramDriven => 27,
     }
 }
 
@@ -326,7 +336,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 26);
+    assert_eq!(variants.len(), 28);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

@@ -133,7 +133,12 @@ pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
                 &proposed.options.unwrap_or_default(),
                 "Empty: defaults. For ascii a preset such as xyz or bridge; otherwise as in (measure_ms: 2000).",
             )
-            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, abb:HOST, kuka:HOST or ascii:tcp:HOST:PORT, if the robot controller reports its joint angles. Empty: it does not.")
+            .text("robot", &proposed.robot.unwrap_or_default(), "rtde:HOST, abb:HOST, kuka:HOST, fanuc:HOST, yaskawa:HOST or ascii:tcp:HOST:PORT, if the robot controller reports its joint angles. Empty: it does not.")
+            .text(
+                "robot options",
+                &proposed.robot_options.unwrap_or_default(),
+                "Usually empty. Yaskawa: (pulses_per_degree: [1000.0, ...]) unless the profile of the robot states them.",
+            )
             .pick(
                 "automatic measuring",
                 &["no", "yes"],
@@ -144,7 +149,9 @@ pub fn linked(proposal: Option<&LinkChoice>) -> Dialog {
 }
 
 fn link(values: &[String]) -> Result<Intent, String> {
-    let [address, options, robot, automatic] = values else { return Err("four values are needed".to_owned()) };
+    let [address, options, robot, robot_options, automatic] = values else {
+        return Err("five values are needed".to_owned());
+    };
     let parsed: WireAddress = address.parse()?;
     if parsed.protocol.is_robot() {
         return Err(format!("{} is a robot: enter it below", parsed.protocol));
@@ -155,7 +162,8 @@ fn link(values: &[String]) -> Result<Intent, String> {
         WireAddress::of_robot(robot)?;
     }
     let is_automatic = automatic == "yes";
-    let choice = LinkChoice { address: parsed.to_string(), options: some(options), robot, is_automatic };
+    let robot_options = some(robot_options).filter(|_| robot.is_some());
+    let choice = LinkChoice { address: parsed.to_string(), options: some(options), robot, robot_options, is_automatic };
     Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice)))
 }
 
@@ -307,6 +315,7 @@ mod tests {
             address: "emscon:tcp:192.168.0.2:700".to_owned(),
             options: Some("(measure_ms: 2000)".to_owned()),
             robot: None,
+            robot_options: None,
             is_automatic: true,
         };
         let Dialog::Form(form) = linked(Some(&choice)) else { panic!() };
@@ -319,14 +328,15 @@ mod tests {
             address: "emscon:tcp:192.168.0.2:700".to_owned(),
             options: Some("(measure_ms: 2000)".to_owned()),
             robot: Some("rtde:10.0.0.1".to_owned()),
+            robot_options: None,
             is_automatic: true,
         };
-        let typed = values(&["emscon:192.168.0.2", " (measure_ms: 2000) ", "rtde:10.0.0.1", "yes"]);
+        let typed = values(&["emscon:192.168.0.2", " (measure_ms: 2000) ", "rtde:10.0.0.1", "", "yes"]);
         assert_eq!(link(&typed), Ok(Intent::ChooseInstrument(InstrumentChoice::Linked(choice))));
         for (texts, part) in [
-            (["192.168.0.2", "", "", "no"], "address"),
-            (["rtde:10.0.0.1", "", "", "no"], "is a robot"),
-            (["emscon:a", "", "emscon:b", "no"], "is not a robot controller"),
+            (["192.168.0.2", "", "", "", "no"], "address"),
+            (["rtde:10.0.0.1", "", "", "", "no"], "is a robot"),
+            (["emscon:a", "", "emscon:b", "", "no"], "is not a robot controller"),
         ] {
             let error = link(&values(&texts)).unwrap_err();
             assert!(error.contains(part), "{error}");

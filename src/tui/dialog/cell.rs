@@ -69,7 +69,7 @@ fn instrument(pick: &str, name: &str, sigma: &str, per_metre: &str) -> Result<Op
     Ok(Some(InstrumentText { name: name.to_owned(), sigma_um, sigma_um_per_m }))
 }
 
-fn place(text: &str) -> Result<Option<(f64, f64, f64)>, String> {
+pub(super) fn place(text: &str) -> Result<Option<(f64, f64, f64)>, String> {
     let words: Vec<&str> = text.split([' ', ';']).filter(|word| !word.is_empty()).collect();
     match words.as_slice() {
         [] => Ok(None),

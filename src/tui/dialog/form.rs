@@ -26,14 +26,56 @@ pub struct Form {
     build: Build,
     /// Whether the operator has tried to submit the form. From then on errors are shown.
     is_tried: bool,
+    /// Whether each value is preceded by its label and a tabulator: for forms whose fields depend on the robot.
+    has_labels: bool,
+    /// What the links see now.
+    taken: Taken,
+}
+
+/// What a field can take over from a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Take {
+    /// The SMR as the instrument sees it (mm).
+    Seen,
+    /// The SMR in the base at the present joints (mm).
+    SmrInBase,
+    /// The flange in the base at the present joints (mm).
+    FlangeInBase,
+    /// The present value of a joint, by its index.
+    Joint(usize),
+}
+
+/// What the links see now, as it is written into fields; `None` or too short where nothing is known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Taken {
+    pub seen: Option<String>,
+    pub smr_in_base: Option<String>,
+    pub flange_in_base: Option<String>,
+    /// Per joint.
+    pub joints: Vec<String>,
+}
+
+impl Taken {
+    fn value(&self, take: Take) -> Option<&str> {
+        match take {
+            Take::Seen => self.seen.as_deref(),
+            Take::SmrInBase => self.smr_in_base.as_deref(),
+            Take::FlangeInBase => self.flange_in_base.as_deref(),
+            Take::Joint(joint) => self.joints.get(joint).map(String::as_str),
+        }
+    }
 }
 
 /// A field with an explanation.
 #[derive(Clone, Debug)]
 struct Field {
-    label: &'static str,
+    label: String,
     about: &'static str,
     value: Value,
+    /// What Enter takes over, if a link sees it.
+    take: Option<Take>,
+    /// Whether the operator has typed into it: that is not overwritten.
+    is_typed: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -56,14 +98,63 @@ const EXPLANATION: u16 = 4;
 
 impl Form {
     pub fn new(title: impl Into<String>, build: Build) -> Self {
-        Self { title: title.into(), fields: Vec::new(), focus: 0, build, is_tried: false }
+        Self {
+            title: title.into(),
+            fields: Vec::new(),
+            focus: 0,
+            build,
+            is_tried: false,
+            has_labels: false,
+            taken: Taken::default(),
+        }
     }
 
     /// Adds a line of text.
     #[must_use]
-    pub fn text(mut self, label: &'static str, value: &str, about: &'static str) -> Self {
-        self.fields.push(Field { label, about, value: Value::Text(TextField::new(label, value)) });
+    pub fn text(mut self, label: impl Into<String>, value: &str, about: &'static str) -> Self {
+        let label = label.into();
+        let value = Value::Text(TextField::new(label.clone(), value));
+        self.fields.push(Field { label, about, value, take: None, is_typed: false });
         self
+    }
+
+    /// Lets Enter take over what a link sees into the last field, and go on to the next one.
+    #[must_use]
+    pub fn taking(mut self, take: Take) -> Self {
+        if let Some(field) = self.fields.last_mut() {
+            field.take = Some(take);
+        }
+        self
+    }
+
+    /// Adds the place where Enter accepts the form.
+    #[must_use]
+    pub fn done(self) -> Self {
+        self.pick("done", &["Enter accepts all"], 0, "Up/Down goes back to a line.")
+    }
+
+    /// Puts the label and a tabulator before each value.
+    #[must_use]
+    pub const fn with_labels(mut self) -> Self {
+        self.has_labels = true;
+        self
+    }
+
+    /// Sees what the links see now.
+    pub fn see(&mut self, taken: &Taken) {
+        self.taken.clone_from(taken);
+    }
+
+    /// What Enter takes over into a field.
+    fn offered(&self, number: usize) -> Option<&str> {
+        let field = self.fields.get(number)?;
+        self.taken.value(field.take?)
+    }
+
+    /// What Enter takes over now, for the keys of the dialog.
+    pub fn offer(&self) -> Option<String> {
+        let is_typed = self.fields.get(self.focus).is_some_and(|field| field.is_typed);
+        self.offered(self.focus).filter(|_| !is_typed).map(str::to_owned)
     }
 
     /// Adds a choice of words.
@@ -75,7 +166,8 @@ impl Form {
         at: usize,
         about: &'static str,
     ) -> Self {
-        self.fields.push(Field { label, about, value: Value::Pick { options, at } });
+        let (label, value) = (label.to_owned(), Value::Pick { options, at });
+        self.fields.push(Field { label, about, value, take: None, is_typed: false });
         self
     }
 
@@ -84,7 +176,11 @@ impl Form {
     /// # Errors
     /// A field is invalid.
     pub fn value(&self) -> Result<Intent, String> {
-        let values: Vec<String> = self.fields.iter().map(|field| field.value.text()).collect();
+        let value = |field: &Field| match self.has_labels {
+            true => format!("{}\t{}", field.label, field.value.text()),
+            false => field.value.text(),
+        };
+        let values: Vec<String> = self.fields.iter().map(value).collect();
         (self.build)(&values)
     }
 
@@ -94,7 +190,10 @@ impl Form {
         let title = (number == 0).then(|| self.title.clone());
         let about = [format!("  {}", field.about)];
         let asked = match &field.value {
-            Value::Text(text) => with_value(field.label, &text.text()),
+            Value::Text(text) => match self.offered(number) {
+                Some(here) => format!("{} (. takes {here})", with_value(&field.label, &text.text())),
+                None => with_value(&field.label, &text.text()),
+            },
             Value::Pick { options, at } => {
                 format!("{}: {} [{}]", field.label, alternatives(options), options.get(*at).unwrap_or(&""))
             }
@@ -104,8 +203,9 @@ impl Form {
 
     /// Answers the question of a field, for plain lines.
     pub(super) fn answer(&mut self, number: usize, line: &str) -> Result<(), String> {
+        let here = self.offered(number).filter(|_| line == ".").map(str::to_owned);
         match self.fields.get_mut(number).map(|field| &mut field.value) {
-            Some(Value::Text(field)) => replace(field, line),
+            Some(Value::Text(field)) => replace(field, here.as_deref().unwrap_or(line)),
             Some(Value::Pick { options, at }) if !line.is_empty() => {
                 *at = options
                     .iter()
@@ -120,6 +220,16 @@ impl Form {
     pub fn on_key(&mut self, key: Key) -> FieldOutcome {
         let count = self.fields.len().max(1);
         match key.code {
+            KeyCode::Enter if self.is_on_the_way() => {
+                let here = self.offer();
+                if let (Some(here), Some(Value::Text(field))) =
+                    (here, self.fields.get_mut(self.focus).map(|field| &mut field.value))
+                {
+                    field.clear();
+                    field.paste(&here);
+                }
+                self.focus = (self.focus + 1) % count;
+            }
             KeyCode::Enter => {
                 self.is_tried = true;
                 return if self.value().is_ok() { FieldOutcome::Submitted } else { FieldOutcome::Changed };
@@ -128,20 +238,31 @@ impl Form {
             KeyCode::Tab | KeyCode::Down => self.focus = (self.focus + 1) % count,
             KeyCode::BackTab | KeyCode::Up => self.focus = (self.focus + count - 1) % count,
             _ => {
-                return match self.fields.get_mut(self.focus).map(|field| &mut field.value) {
-                    Some(Value::Text(field)) => field.on_key(key),
-                    Some(Value::Pick { options, at }) => picked(options.len().max(1), at, key),
-                    None => FieldOutcome::Ignored,
+                let Some(focused) = self.fields.get_mut(self.focus) else { return FieldOutcome::Ignored };
+                return match &mut focused.value {
+                    Value::Text(field) => {
+                        let before = field.text();
+                        let outcome = field.on_key(key);
+                        focused.is_typed |= field.text() != before;
+                        outcome
+                    }
+                    Value::Pick { options, at } => picked(options.len().max(1), at, key),
                 };
             }
         }
         FieldOutcome::Changed
     }
 
+    /// Whether Enter goes on to the next field: a link sees what this one takes.
+    fn is_on_the_way(&self) -> bool {
+        self.offered(self.focus).is_some()
+    }
+
     /// Inserts pasted text into the focused field.
     pub fn paste(&mut self, text: &str) {
-        if let Some(Value::Text(field)) = self.fields.get_mut(self.focus).map(|field| &mut field.value) {
+        if let Some(Field { value: Value::Text(field), is_typed, .. }) = self.fields.get_mut(self.focus) {
             field.paste(text);
+            *is_typed = true;
         }
     }
 
@@ -155,7 +276,7 @@ impl Form {
         for (index, field) in self.fields.iter().enumerate().skip(first).take(room) {
             let has_focus = index == self.focus;
             let role = if has_focus { Role::Title } else { Role::Dim };
-            paint::text(buf, area, (0, row), field.label, theme.style(role));
+            paint::text(buf, area, (0, row), &theme.glyphs.show(&field.label), theme.style(role));
             let column = LABELS.min(area.width);
             let place = paint::band(Rect { x: area.x + column, width: area.width - column, ..area }, row, 1);
             match &field.value {

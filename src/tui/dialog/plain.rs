@@ -1,6 +1,6 @@
 //! Dialogs one question after the other, for plain lines. The words are those of the screens.
 
-use super::{Dialog, Form};
+use super::{Chosen, Dialog, Form};
 use crate::tui::form::TextField;
 use crate::wizard::{Intent, PlanSettings};
 
@@ -23,7 +23,7 @@ impl Dialog {
             Self::Confirm { lines, .. } => Some([&lines[..], &["y or n".to_owned()]].concat()),
             Self::Text { field, .. } => Some(vec![with_value(field.label(), &field.text())]),
             Self::Number { field, .. } => Some(vec![with_value(field.label(), &field.text())]),
-            Self::Choice { list, .. } => Some(list.question()),
+            Self::Choice { list, .. } | Self::Menu { list, .. } => Some(list.question()),
         }
     }
 
@@ -53,7 +53,16 @@ impl Dialog {
                 }
                 field.value().map(|_| ())
             }
-            Self::Choice { list, .. } => list.answer(line),
+            Self::Choice { list, .. } | Self::Menu { list, .. } => list.answer(line),
+        }
+    }
+
+    /// The dialog that follows from the choice of a menu.
+    pub fn continued(&self) -> Option<Box<Self>> {
+        let Self::Menu { list, then } = self else { return None };
+        match list.selected().and_then(|index| then.get(index))? {
+            Chosen::Dialog(dialog) => Some(dialog.clone()),
+            Chosen::Intent(_) => None,
         }
     }
 
@@ -65,6 +74,10 @@ impl Dialog {
             Self::Text { field, intent } => Ok(intent(field.text().trim().to_owned())),
             Self::Number { field, intent } => field.value().map(*intent),
             Self::Form(form) => form.value(),
+            Self::Menu { list, then } => match list.selected().and_then(|index| then.get(index)) {
+                Some(Chosen::Intent(intent)) => Ok(intent.clone()),
+                Some(Chosen::Dialog(_)) | None => Err("nothing is chosen".to_owned()),
+            },
             Self::Choice { list, intents } => {
                 let chosen = list.selected().and_then(|index| intents.get(index).cloned());
                 chosen.ok_or_else(|| "nothing is chosen".to_owned())

@@ -9,7 +9,7 @@ use super::page::{Page, Parts, Scroll, picture};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::text::counted;
-use crate::tui::dialog::{Dialog, ask};
+use crate::tui::dialog::{Dialog, ask, links};
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::theme::Role;
 use crate::tui::values;
@@ -23,7 +23,7 @@ const WAYS: [(&str, &str); 6] = [
     ("by hand, in mm", "you read x y z off the instrument and type or paste them"),
     ("by hand, in m", "the same, for an instrument that shows metres"),
     ("by hand, in inch", "the same, for an instrument that shows inches"),
-    ("over a wire ...", "a tracker or another instrument on the network or a serial port"),
+    ("over a wire ...", "choose from a list: network, serial ports, links used before, rehearsals"),
     ("simulated cell ...", "an arm with hidden errors: rehearse the whole procedure"),
     ("recorded measurements ...", "tables of earlier measurements, played back as if captured now"),
 ];
@@ -85,13 +85,12 @@ pub(in crate::tui) const fn ways() -> &'static [(&'static str, &'static str)] {
 
 /// The intent of a way to measure, or the dialog that it needs first.
 pub(in crate::tui) fn way(at: usize, view: &ViewModel) -> Result<Intent, Box<Dialog>> {
-    let link = match &view.content {
-        Content::Instrument(content) => content.link.as_ref(),
-        _ => None,
-    };
     match UNITS.get(at) {
         Some(unit) => Ok(Intent::ChooseInstrument(InstrumentChoice::Manual { unit: *unit })),
-        None if at == UNITS.len() => Err(Box::new(ask::linked(link))),
+        None if at == UNITS.len() => Err(Box::new(match &view.content {
+            Content::Instrument(content) => links::links(content),
+            _ => ask::linked(None),
+        })),
         None if at == UNITS.len() + 1 => {
             let is_paper = view.header.robot.as_deref().is_some_and(|robot| robot.contains("method paper"));
             Err(Box::new(ask::simulated(is_paper)))

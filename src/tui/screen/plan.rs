@@ -213,15 +213,14 @@ impl PlanScreen {
         self.form.draw(cx.theme, settings, buf);
         let left = (SETTINGS + GAP).min(area.width);
         let figures = Rect { x: area.x + left, width: area.width - left, ..paint::band(area, 0, TOP) };
-        let folder = cx.view.header.folder.as_deref();
         figures::draw(cx.theme, content, self.search.is_running(), figures, buf);
         let below = paint::band(area, TOP, area.height);
         if self.search.is_running() {
             self.search.draw(cx.theme, below, buf);
         } else if content.proposal.is_none() && content.accepted.is_none() {
             what_happens(cx, below, buf);
-        } else if let (None, Some(folder)) = (&content.proposal, folder) {
-            figures::draw_program(cx.theme, folder, below, buf);
+        } else if content.proposal.is_none() {
+            figures::draw_program(cx.theme, content.program.as_ref(), below, buf);
         } else {
             trade_off::draw_in_short(cx.theme, content, self.form.settings().poses, below, buf);
         }

@@ -21,13 +21,17 @@ const CIRCLES: u16 = 44;
 /// Columns of the text beside the picture.
 const TEXT: u16 = 62;
 /// The menu entries, with when to choose each.
-const WAYS: [(&str, &str); 4] = [
+const WAYS: [(&str, &str); 5] = [
     ("as the profile says", "if the adapter is that of the profile and nothing was changed"),
     ("known coordinates ...", "if the adapter was measured, for example with a CMM"),
     ("left free", "if unknown: it is identified together with the arm"),
     (
         "circle-point analysis",
         "turn the last two axes, a few points each: locates the SMR and reveals wrong joint signs and a wrong frame",
+    ),
+    (
+        "the whole arm by circles",
+        "turn every axis in turn: gives all link constants beside the data sheet, as a profile to save",
     ),
 ];
 
@@ -87,7 +91,8 @@ impl TargetScreen {
                 .iter()
                 .find(|info| matches!(info.intent, Intent::ChooseTarget(TargetChoice::Free { .. })))
                 .map_or(ScreenOutcome::Ignored, |info| ScreenOutcome::Intent(info.intent.clone())),
-            _ => ScreenOutcome::Intent(Intent::StartCircles),
+            3 => ScreenOutcome::Intent(Intent::StartCircles),
+            _ => ScreenOutcome::Intent(Intent::StartWholeArm),
         }
     }
 

@@ -20,6 +20,7 @@ use crate::session::summary::{
     RejectedSummary, SelectionSummary, ShareSummary, SigmaSummary, StatisticsSummary, VerdictStatus, VerificationMode,
     VerificationSummary, Warning, WarningCode, WorkspaceSummary,
 };
+use crate::session::wire::KnownLinks;
 use crate::tui::glyphs::Glyphs;
 use crate::tui::paint;
 use crate::tui::preview::VerifiedPoint;
@@ -78,6 +79,7 @@ fn profile(has_card: bool) -> ViewModel {
 fn instrument(choice: Option<&str>, identity: Option<&str>) -> ViewModel {
     let content = Content::Instrument(InstrumentView {
         link: None,
+        known: KnownLinks::default(),
         choice: choice.map(str::to_owned),
         identity: identity.map(str::to_owned),
         recorded_poses: 0,
@@ -147,6 +149,7 @@ fn circles(is_complete: bool) -> CirclesView {
         measured: if is_complete { 12 } else { 3 },
         of: 12,
         fits: if is_complete { vec![fit("J6", 26.425), fit("J5", 159.327)] } else { Vec::new() },
+        arm: None,
         result: is_complete.then_some(CirclesResult {
             xyz_mm: [-1.4712, 26.3821, 71.9903],
             sigma_mm: [0.0051, 0.0049, 0.0112],
@@ -615,7 +618,8 @@ fn keys_become_intents() {
     );
     is(&target(None, None), &[Enter], Intent::ChooseTarget(TargetChoice::Profile));
     is(&target(None, None), &[Down, Down, Enter], Intent::ChooseTarget(TargetChoice::Free { sigma_mm: 50.0 }));
-    is(&target(None, None), &[Down, Down, Down, Down, Enter], Intent::StartCircles);
+    is(&target(None, None), &[Down, Down, Down, Enter], Intent::StartCircles);
+    is(&target(None, None), &[Down, Down, Down, Down, Enter], Intent::StartWholeArm);
     let known = TargetChoice::Known { xyz_mm: (-1.473, 26.384, 71.991), sigma_mm: 0.1 };
     is(&target(None, None), &[Char('k'), Enter], Intent::ChooseTarget(known));
     is(&target(None, Some(circles(true))), &[Enter], Intent::UseCircles);

@@ -48,6 +48,7 @@ impl StepMachine for InstrumentStep {
         vec![
             IntentInfo::new(Intent::Next, "use this instrument").unless(none).default_action(),
             IntentInfo::new(Intent::ChooseInstrument(proposal), "choose an instrument").unless(fixed),
+            IntentInfo::new(Intent::FindLinks, "look for serial ports again"),
             IntentInfo::new(Intent::Retry, "reconnect").unless(nothing_to_retry),
         ]
     }
@@ -76,6 +77,7 @@ impl StepMachine for InstrumentStep {
         let profile = cx.robot().map(|robot| &robot.profile);
         Content::Instrument(InstrumentView {
             link: link(cx),
+            known: cx.links.clone(),
             choice: cx.session.instrument.as_ref().map(instrument_text),
             identity: cx.connection.map(|connection| connection.identity.clone()),
             recorded_poses: cx.connection.map_or(0, |connection| connection.recorded.len()),

@@ -13,6 +13,7 @@ use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Intent, IntentInfo, PlanSettings};
 use crate::wizard::notice::{Notice, Problem};
+use crate::wizard::program;
 use crate::wizard::view::{Content, PlanFigures, PlanView};
 
 /// The plan step with a proposal that is not yet accepted.
@@ -63,7 +64,7 @@ pub(super) fn measured_poses(cx: &Cx<'_>) -> Vec<PlannedPose> {
 
 /// How the wizard measures; the time of a plan is predicted with it. The mean of three shots scatters less than one, and shows
 /// whether the robot was at rest.
-pub(super) fn measuring_pace() -> Pace {
+pub(in crate::wizard) fn measuring_pace() -> Pace {
     Pace { shots: 3, ..Pace::default() }
 }
 
@@ -206,6 +207,7 @@ impl StepMachine for PlanStep {
         });
         let summary = self.proposal.as_ref().and_then(|proposal| proposal.summary.clone());
         Content::Plan(PlanView {
+            program: program::view(cx.session),
             settings: self.settings,
             proposal,
             summary,

@@ -1,10 +1,14 @@
 //! Step Target: where the SMR sits on the flange.
 
+mod arm;
+
 use nalgebra::Point3;
+
+use std::collections::BTreeSet;
 
 use super::plan::measuring_pace;
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
-use crate::identification::circle_point::{CirclePointError, CircleSeries, TargetLocation, locate_target};
+use crate::identification::circle_point::{CirclePointError, CircleSeries, MeasuredArm, TargetLocation, locate_target};
 use crate::profile::{FREE_TARGET_UNCERTAINTY, Level};
 use crate::session::journal::{CirclePointText, Entry, from_edge, from_xyz_mm, target_text, to_edge, to_xyz_mm};
 use crate::session::reading::{MeasureRequest, Reading};
@@ -21,6 +25,8 @@ use crate::wizard::view::{CircleView, CirclesResult, CirclesView, Content, Joint
 #[derive(Clone, Debug, Default)]
 pub(in crate::wizard) struct TargetStep {
     plan: Vec<CircleConfigurations>,
+    /// The whole arm, once every joint was moved.
+    arm: Option<Result<Box<MeasuredArm>, String>>,
 }
 
 /// The next point of a circle to measure.
@@ -33,8 +39,9 @@ struct NextPoint<'a> {
 
 impl TargetStep {
     /// Enters the step. Circles that were started are planned again when they are continued.
-    pub(super) fn enter(_session: &Session) -> Self {
-        Self::default()
+    pub(super) fn enter(session: &Session) -> Self {
+        let is_complete = is_whole(session) && moved_joints(session) == dof(session);
+        Self { arm: is_complete.then(|| arm::measured(session)), ..Self::default() }
     }
 
     /// All planned points, in order.
@@ -79,6 +86,20 @@ impl TargetStep {
             xyz_mm,
         })])]
     }
+}
+
+fn dof(session: &Session) -> usize {
+    session.robot.as_ref().map_or(0, |robot| robot.profile.chain().dof())
+}
+
+/// Number of joints of which there are points.
+fn moved_joints(session: &Session) -> usize {
+    session.circle_points.iter().map(|point| point.joint).collect::<BTreeSet<_>>().len()
+}
+
+/// Whether the circles are those of the whole arm, which begin with the first joint and not with the last.
+fn is_whole(session: &Session) -> bool {
+    session.circle_points.first().is_some_and(|point| point.joint + 2 < dof(session))
 }
 
 /// Pose name of a point of a circle.
@@ -138,6 +159,13 @@ fn locate(session: &Session) -> Option<Result<TargetLocation, CirclePointError>>
 /// Whether the circles have a result that can be used.
 fn has_result(step: &TargetStep, session: &Session) -> Condition {
     let is_complete = step.next(session).is_none();
+    if is_whole(session) {
+        return match &step.arm {
+            Some(Ok(_)) => Ok(()),
+            Some(Err(reason)) => Err(reason.clone()),
+            None => Err("the circles are not complete".to_owned()),
+        };
+    }
     match locate(session) {
         _ if session.circle_points.is_empty() => Err("no circle has been measured".to_owned()),
         Some(Ok(_)) if is_complete => Ok(()),
@@ -177,6 +205,18 @@ impl StepMachine for TargetStep {
         let has_masses = cx.profile().is_some_and(|profile| profile.chain().loads().is_some());
 
         let start = if has_circles { "continue the circles" } else { "find it by circles" };
+        let whole = if has_circles { "continue the whole arm" } else { "measure the whole arm" };
+        let is_other = |is_wanted: bool| {
+            require(
+                !has_circles || is_whole(session) == is_wanted,
+                "circles of another kind are measured: restart them first",
+            )
+        };
+        let has_arm = || match &self.arm {
+            Some(Ok(_)) => Ok(()),
+            Some(Err(reason)) => Err(reason.clone()),
+            None => Err("the whole arm is not measured".to_owned()),
+        };
         let as_profile = Intent::ChooseTarget(TargetChoice::Profile);
         let free = Intent::ChooseTarget(TargetChoice::Free { sigma_mm: to_mm(FREE_TARGET_UNCERTAINTY) });
         let type_in = Intent::TypeReading(String::new());
@@ -204,8 +244,24 @@ impl StepMachine for TargetStep {
             offer(
                 Intent::StartCircles,
                 start,
-                [can_change(), require(self.plan.is_empty(), "the circles are already being measured"), is_connected()],
+                [
+                    can_change(),
+                    is_other(false),
+                    require(self.plan.is_empty(), "the circles are already being measured"),
+                    is_connected(),
+                ],
             ),
+            offer(
+                Intent::StartWholeArm,
+                whole,
+                [
+                    can_change(),
+                    is_other(true),
+                    require(self.plan.is_empty(), "the circles are already being measured"),
+                    is_connected(),
+                ],
+            ),
+            offer(Intent::SaveArm, "save the measured arm as a profile", [has_arm()]),
             offer(
                 Intent::Measure,
                 "measure",
@@ -246,7 +302,18 @@ impl StepMachine for TargetStep {
             }
             Intent::StartCircles => {
                 let Some(profile) = cx.profile() else { return Vec::new() };
-                vec![Action::Ask(Request::PlanCircles { profile: Box::new(profile) })]
+                vec![Action::Ask(Request::PlanCircles { profile: Box::new(profile), is_whole: false })]
+            }
+            Intent::StartWholeArm => {
+                let Some(profile) = cx.profile() else { return Vec::new() };
+                vec![Action::Ask(Request::PlanCircles { profile: Box::new(profile), is_whole: true })]
+            }
+            Intent::SaveArm => {
+                let Some(Ok(found)) = &self.arm else { return Vec::new() };
+                let file = arm::file(session, found);
+                file.map(|file| Action::Ask(Request::Deliver { files: vec![file], left_out: Vec::new() }))
+                    .into_iter()
+                    .collect()
             }
             Intent::Measure => {
                 let (Some(next), Some(robot)) = (self.next(session), cx.robot()) else { return Vec::new() };
@@ -271,6 +338,12 @@ impl StepMachine for TargetStep {
                     Err(message) => vec![Action::Say(Notice::error(message))],
                 }
             }
+            Intent::UseCircles if is_whole(session) => {
+                let Some(Ok(found)) = &self.arm else { return Vec::new() };
+                let sigma_mm = (to_mm(found.point_sigma.max()).max(1.0) * 1e4).ceil() / 1e4;
+                let choice = TargetChoice::Circles { xyz_mm: to_xyz_mm(&found.point_in_flange, 4), sigma_mm };
+                vec![Action::Write(vec![Entry::Target(choice)])]
+            }
             Intent::UseCircles => {
                 let Some(Ok(found)) = locate(session) else { return Vec::new() };
                 let sigma_mm = (to_mm(found.sigma().max()) * 1e4).ceil() / 1e4;
@@ -290,11 +363,18 @@ impl StepMachine for TargetStep {
                 Vec::new()
             }
             Answer::Measured(reading) => self.take(&reading, cx),
+            Answer::Delivered { .. } => vec![Action::Say(
+                Notice::info(format!("the measured arm is saved as {} in the folder of the session", arm::ARM_FILE))
+                    .hint("choose this file as the robot of a new session"),
+            )],
             _ => Vec::new(),
         }
     }
 
     fn on_failure(&mut self, problem: Problem, cx: &Cx<'_>) -> Vec<Action> {
+        if problem.is_unwritten {
+            return vec![Action::Say(problem.into())];
+        }
         let (Some(next), Some(robot)) = (self.next(cx.session), cx.robot()) else {
             return vec![Action::Say(problem.into())];
         };
@@ -304,6 +384,19 @@ impl StepMachine for TargetStep {
 
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
         match entry {
+            Entry::CirclesDiscarded => {
+                *self = Self::default();
+                Vec::new()
+            }
+            Entry::CirclePoint(_) if is_whole(cx.session) && self.next(cx.session).is_none() => {
+                let found = arm::measured(cx.session);
+                let said = match &found {
+                    Ok(found) => arm::verdict(found),
+                    Err(reason) => Notice::error(reason.clone()).hint("restart the circles and measure them again"),
+                };
+                self.arm = Some(found);
+                vec![Action::Say(said)]
+            }
             // Only the last point of the last circle shows whether the result can be used.
             Entry::CirclePoint(_) if self.next(cx.session).is_none() => match locate(cx.session) {
                 Some(Ok(found)) => vec![Action::Say(verdict(&found, cx.session))],
@@ -374,7 +467,7 @@ impl TargetStep {
         let name = |joint: usize| joints.get(joint).map_or_else(String::new, |joint| joint.name.clone());
         let next = self.next(session);
         let shown = next.as_ref().map_or(&[][..], |next| next.configuration);
-        let located = locate(session);
+        let located = if is_whole(session) { None } else { locate(session) };
         let found = located.as_ref().and_then(|result| result.as_ref().ok());
         let mut order: Vec<usize> = session.circle_points.iter().map(|point| point.joint).collect();
         order.dedup();
@@ -418,7 +511,11 @@ impl TargetStep {
                 Some(InstrumentChoice::Manual { unit }) => Some(unit.sign().to_owned()),
                 _ => None,
             },
-            problem: located.and_then(Result::err).map(|error| error.to_string()),
+            arm: self.arm.as_ref().and_then(|found| found.as_ref().ok()).map(|found| arm::view(found)),
+            problem: match &self.arm {
+                Some(found) => found.as_ref().err().cloned(),
+                None => located.and_then(Result::err).map(|error| error.to_string()),
+            },
         })
     }
 }

@@ -146,7 +146,16 @@ pub(super) fn answer(request: &Request) -> Answer {
         Request::LoadPlan { file, .. } => {
             Answer::Planned { summary: None, rows: plan(), origin: format!("the poses of '{file}'") }
         }
-        Request::PlanCircles { .. } => Answer::CirclesPlanned(circles()),
+        Request::PlanCircles { is_whole: false, .. } => Answer::CirclesPlanned(circles()),
+        Request::PlanCircles { profile, is_whole: true } => {
+            let planned = crate::procedure::circles::plan_whole(profile).unwrap().into_iter();
+            let planned = planned.map(|(joint, configurations)| CircleConfigurations { joint, configurations });
+            Answer::CirclesPlanned(planned.collect())
+        }
+        Request::Program { settings, rows, .. } => Answer::Programmed {
+            files: vec![(format!("calposes.{}", settings.dialect), format!("{} rows", rows.len()))],
+            dangers: Vec::new(),
+        },
         Request::Identify(request) => match identify(request, &mut |_| ControlFlow::Continue(())) {
             Ok(identified) => Answer::Identified(Box::new(identified)),
             Err(error) => failure(&error.to_string()),

@@ -74,6 +74,7 @@ fn the_first_pose_is_shown_with_all_that_can_be_done() {
             "SuggestPoses -- nothing has been measured yet",
             "Next -- 0 of at least 9 identification poses have been measured",
             "Back",
+            "WriteProgram",
             "Dismiss",
             "Quit"
         ]

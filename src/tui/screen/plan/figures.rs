@@ -8,7 +8,7 @@ use crate::text::{fixed, wrapped};
 use crate::tui::glyphs::shortened;
 use crate::tui::paint;
 use crate::tui::theme::{Role, Theme};
-use crate::wizard::view::{PlanFigures, PlanView};
+use crate::wizard::view::{PlanFigures, PlanView, ProgramView};
 
 /// Columns of the names of the numbers.
 const NAMES: usize = 16;
@@ -59,17 +59,32 @@ pub(super) fn draw(theme: Theme, content: &PlanView, is_searching: bool, area: R
 }
 
 /// Draws the command that makes the robot program of the plan.
-pub(super) fn draw_program(theme: Theme, folder: &str, area: Rect, buf: &mut Buffer) {
-    for (row, (role, line)) in (0_u16..area.height).zip(program(folder, usize::from(area.width))) {
+pub(super) fn draw_program(theme: Theme, written: Option<&ProgramView>, area: Rect, buf: &mut Buffer) {
+    for (row, (role, line)) in (0_u16..area.height).zip(program(written, usize::from(area.width))) {
         paint::text(buf, area, (0, row), &theme.glyphs.show(&line), theme.style(role));
     }
 }
 
-/// How the robot program of the plan is made.
-fn program(folder: &str, room: usize) -> Vec<(Role, String)> {
-    let plan = format!("{}/plan.csv", folder.trim_end_matches('/'));
-    let text = format!("robot program: trupose program --profile NAME --plan {plan} --dialect krl --out program");
-    wrapped(&text, room).into_iter().map(|line| (Role::Hint, line)).collect()
+/// The robot program of the plan, and what to do about it.
+fn program(written: Option<&ProgramView>, room: usize) -> Vec<(Role, String)> {
+    let said =
+        |role: Role, text: &str| wrapped(text, room).into_iter().map(move |line| (role, line)).collect::<Vec<_>>();
+    match written {
+        None => said(
+            Role::Hint,
+            "robot program: f writes it in the language of the controller, with its waits, beside plan.csv in the folder of the session.",
+        ),
+        Some(ProgramView { text, was_driven: true }) => {
+            said(Role::Plain, &format!("robot program: {text}; driven once by hand"))
+        }
+        Some(ProgramView { text, was_driven: false }) => {
+            let mut lines = said(Role::Plain, &format!("robot program: {text}"));
+            let driven =
+                "It was NOT driven by hand yet: drive it once at reduced speed, watching every move; then press y.";
+            lines.extend(said(Role::Warn, driven));
+            lines
+        }
+    }
 }
 
 fn named(name: &str, value: &str) -> (Role, String) {

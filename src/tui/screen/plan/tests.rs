@@ -106,7 +106,15 @@ fn figures() -> PlanFigures {
 }
 
 fn nothing() -> PlanView {
-    PlanView { settings: PlanSettings::default(), proposal: None, summary: None, accepted: None, left: 0, measured: 0 }
+    PlanView {
+        program: None,
+        settings: PlanSettings::default(),
+        proposal: None,
+        summary: None,
+        accepted: None,
+        left: 0,
+        measured: 0,
+    }
 }
 
 fn of(content: PlanView) -> ViewModel {

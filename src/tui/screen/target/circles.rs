@@ -3,7 +3,7 @@
 use crate::text::fixed;
 use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
-use crate::wizard::view::CirclesView;
+use crate::wizard::view::{ArmView, CirclesView};
 
 /// The next point to measure.
 pub(super) fn to_measure(circles: &CirclesView, page: &mut Page) {
@@ -30,6 +30,9 @@ pub(super) fn result(circles: &CirclesView, page: &mut Page) {
         page.marked(("NO RESULT: ", Role::Warn), problem, Role::Warn);
         page.paragraph("d restarts the circles.", Role::Plain);
         return;
+    }
+    if let Some(arm) = &circles.arm {
+        return whole_arm(arm, page);
     }
     if circles.fits.is_empty() {
         page.paragraph("They are not complete; c continues them.", Role::Plain);
@@ -59,4 +62,27 @@ pub(super) fn result(circles: &CirclesView, page: &mut Page) {
         page.pair("off", &format!("{} mm RMS over both circles", fixed(result.residual_rms_mm, 4)));
         page.paragraph("u uses this result, d restarts the circles.", Role::Hint);
     }
+}
+
+/// The constants of the whole arm beside those of the profile.
+fn whole_arm(arm: &ArmView, page: &mut Page) {
+    let head =
+        format!("{:<8}{:>12}{:>9}{:>5}{:>12}{:>11}", "constant", "measured", "sigma", "", "profile", "difference");
+    page.line(vec![(head, Role::Dim)]);
+    for row in &arm.constants {
+        let value = format!("{:<8}{:>12}{:>9} {:<4}", row.name, fixed(row.measured, 3), fixed(row.sigma, 3), row.unit);
+        let compared = match (row.nominal, row.difference) {
+            (Some(nominal), Some(difference)) => format!("{:>12}{:>11}", fixed(nominal, 3), fixed(difference, 3)),
+            _ => String::new(),
+        };
+        let (role, mark) = if row.is_astonishing { (Role::Warn, " !") } else { (Role::Plain, "") };
+        page.line(vec![(value, Role::Plain), (compared, role), (mark.to_owned(), Role::Warn)]);
+    }
+    let [x, y, z] = arm.smr_mm.map(|value| fixed(value, 3));
+    page.pair("SMR", &format!("({x}, {y}, {z}) mm in the flange"));
+    let [x, y, z] = arm.tracker_mm.map(|value| fixed(value, 0));
+    page.pair("tracker", &format!("({x}, {y}, {z}) mm in the base"));
+    page.pair("off", &format!("{} mm at most", fixed(arm.worst_mm, 3)));
+    page.paragraph("!: more than an assembly error: another arm, a wrong dimension, or other joint values.", Role::Dim);
+    page.paragraph("s saves it as a profile for a new session, u uses the SMR here, d restarts.", Role::Hint);
 }
