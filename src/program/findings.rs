@@ -3,6 +3,7 @@
 //! Readers note every value of a position type ([`Definition`]) and every motion instruction ([`Motion`]), in all files.
 //! [`Findings::resolve`] connects them by name.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::configuration::Configuration;
@@ -19,13 +20,14 @@ pub(super) struct Source<'a> {
     pub(super) robot: &'a Robot<'a>,
     pub(super) options: &'a ReadOptions,
     pub(super) program: &'a [u8],
+    /// Texts of the companions, with the line ends that the readers know.
+    pub(super) companions: &'a [Cow<'a, [u8]>],
 }
 
 impl<'a> Source<'a> {
     /// The program, which is file 0, and its companions.
     pub(super) fn files(&self) -> impl Iterator<Item = (usize, &'a [u8])> + use<'a> {
-        let companions = self.options.companions.iter().map(|companion| companion.text.as_slice());
-        std::iter::once(self.program).chain(companions).enumerate()
+        std::iter::once(self.program).chain(self.companions.iter().map(AsRef::as_ref)).enumerate()
     }
 }
 
@@ -97,7 +99,7 @@ pub(super) struct Motion {
     /// Branch, where the instruction states it and not the position.
     pub(super) configuration: Option<Configuration>,
     /// Where further points can be put in front of it.
-    pub(super) spot: Option<Spot>,
+    pub(super) spot: Option<Box<Spot>>,
 }
 
 /// Path of a motion.
@@ -185,13 +187,15 @@ impl Findings {
     pub(super) fn resolve(mut self, source: &Source<'_>) -> Result<Scan, ProgramError> {
         let names = Names::new(&self.definitions, &self.copies);
         let mut uses: BTreeMap<Key, Uses> = BTreeMap::new();
-        let mut here: Vec<Option<Box<Uses>>> = vec![None; self.definitions.len()];
-        for motion in self.motions.iter().flatten() {
+        // The motion of each value that is written in one.
+        let mut here: Vec<Option<usize>> = vec![None; self.definitions.len()];
+        for (at, motion) in self.motions.iter().enumerate() {
+            let Some(motion) = motion else { continue };
             for point in std::iter::once(&motion.point).chain(&motion.via) {
                 match point {
                     Point::Here(index) => {
-                        if let Some(uses) = here.get_mut(*index) {
-                            uses.get_or_insert_default().add(motion);
+                        if let Some(place) = here.get_mut(*index) {
+                            *place = Some(at);
                         }
                     }
                     Point::Variable { key, .. } => uses.entry(names.scoped(key)).or_default().add(motion),
@@ -218,7 +222,11 @@ impl Findings {
             let Some(definition) = self.definitions.get(index).filter(|definition| definition.file == 0) else {
                 continue;
             };
-            let mut its = here.get_mut(index).and_then(Option::take).map(|uses| *uses).unwrap_or_default();
+            let mut its = Uses::default();
+            let motion = here.get(index).copied().flatten().and_then(|at| self.motions.get(at)?.as_ref());
+            if let Some(motion) = motion {
+                its.add(motion);
+            }
             for key in [definition.key.clone(), definition.key.variable()] {
                 if let Some(found) = uses.get(&key).filter(|_| !key.name.is_empty()) {
                     its.merge(found);

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use nalgebra::Isometry3;
 
-use super::lexer::as_str;
+use super::lexer::{as_str, line_end};
 use super::motion::{Scan, Target};
 use super::orientation::Orientation;
 use super::{Dialect, Language};
@@ -68,12 +68,12 @@ pub fn has_spot(scan: &Scan, step: usize) -> bool {
 
 /// The program with these points. Insertions without a spot are left out.
 pub fn insert(dialect: Dialect, program: &[u8], scan: &Scan, insertions: &[Insertion]) -> Vec<u8> {
-    let line_end: &[u8] = if program.windows(2).any(|pair| pair == b"\r\n") { b"\r\n" } else { b"\n" };
+    let line_end = line_end(program);
     let mut text = Vec::with_capacity(program.len());
     let mut done = 0;
     for insertion in insertions {
         let step = scan.moves.get(insertion.step);
-        let spot = step.and_then(|step| step.spot.as_ref());
+        let spot = step.and_then(|step| step.spot.as_deref());
         let target = step.and_then(|step| step.target).and_then(|index| scan.targets.get(index));
         let (Some(spot), Some(target)) = (spot, target) else { continue };
         if spot.instruction.start < done {
@@ -84,7 +84,7 @@ pub fn insert(dialect: Dialect, program: &[u8], scan: &Scan, insertions: &[Inser
         for point in &insertion.points {
             let Some(literal) = literal(dialect, program, target, point) else { continue };
             text.extend(copy(program, spot, &literal));
-            text.extend_from_slice(line_end);
+            text.extend_from_slice(line_end.as_bytes());
         }
     }
     text.extend_from_slice(program.get(done..).unwrap_or_default());

@@ -1,5 +1,6 @@
 //! Words, numbers, texts and symbols of a program, with their places. Comments are skipped; bytes beyond ASCII belong to words.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// What differs between the languages.
@@ -298,6 +299,26 @@ fn end_of_number(text: &[u8], start: usize) -> usize {
         }
     }
     at
+}
+
+/// The text with a line feed for every carriage return that ends a line alone, as old editors write it. All places stay the same.
+pub(super) fn with_line_feeds(text: &[u8]) -> Cow<'_, [u8]> {
+    let is_alone = |at: usize| text.get(at) == Some(&b'\r') && text.get(at + 1) != Some(&b'\n');
+    if !(0..text.len()).any(is_alone) {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.iter().enumerate().map(|(at, byte)| if is_alone(at) { b'\n' } else { *byte }).collect())
+}
+
+/// How the lines of a program end.
+pub(super) fn line_end(text: &[u8]) -> &'static str {
+    if text.windows(2).any(|pair| pair == b"\r\n") {
+        "\r\n"
+    } else if text.contains(&b'\r') && !text.contains(&b'\n') {
+        "\r"
+    } else {
+        "\n"
+    }
 }
 
 /// Editors put a byte order mark in front of a text; it belongs to no line.

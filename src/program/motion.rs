@@ -61,7 +61,7 @@ pub enum Setting {
     /// The flange itself, or the world of the controller.
     Identity,
     /// Stated by the program or a companion file.
-    Known { name: String, pose: Isometry3<f64> },
+    Known { name: String, pose: Box<Isometry3<f64>> },
     /// Not in the files: the caller must know it.
     Named(String),
 }
@@ -90,7 +90,7 @@ pub struct Move {
     pub path: usize,
     /// The first of its routine: nothing is known of where the arm comes from.
     pub is_first: bool,
-    pub(super) spot: Option<Spot>,
+    pub(super) spot: Option<Box<Spot>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

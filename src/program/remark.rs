@@ -1,7 +1,7 @@
 //! Remarks that are put into an existing program, as the language writes them.
 
 use super::Dialect;
-use super::lexer::{BYTE_ORDER_MARK, latin, lines};
+use super::lexer::{BYTE_ORDER_MARK, latin, line_end, lines, with_line_feeds};
 use super::names::ascii;
 
 /// How a language writes a remark in a line of its own.
@@ -40,18 +40,19 @@ pub fn with_remark(dialect: Dialect, program: &[u8], text: &str) -> Option<Vec<u
         let word = words.next().unwrap_or_default();
         remark.behind.iter().any(|wanted| word.eq_ignore_ascii_case(wanted))
     };
+    let read = with_line_feeds(program);
     let place =
-        lines(program).map(|(_, place)| place).find(|place| is_place(program.get(place.clone()).unwrap_or_default()));
+        lines(&read).map(|(_, place)| place).find(|place| is_place(program.get(place.clone()).unwrap_or_default()));
     let at = match place {
         Some(line) => (line.end + 1).min(program.len()),
         None if remark.may_be_first => start,
         None => return None,
     };
-    let line_end: &str = if program.windows(2).any(|pair| pair == b"\r\n") { "\r\n" } else { "\n" };
+    let line_end = line_end(program);
     let text: String = ascii_text(text).chars().take(remark.longest).collect();
     let (before, behind) = program.split_at_checked(at)?;
     let mut result = before.to_vec();
-    if at > start && !before.ends_with(b"\n") {
+    if at > start && !before.ends_with(line_end.as_bytes()) {
         result.extend_from_slice(line_end.as_bytes());
     }
     result.extend_from_slice(format!("{}{text}{}{line_end}", remark.before, remark.after).as_bytes());

@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use super::findings::Source;
+use super::lexer::with_line_feeds;
 pub use super::motion::{Command, Companion, ReadOptions};
 use super::motion::{Form, Goal, Hint, JointUnit, Scan, Slot, Target};
 use super::orientation::Orientation;
@@ -25,7 +26,9 @@ pub fn scan(dialect: Dialect, robot: &Robot<'_>, options: &ReadOptions, program:
     if program.contains(&0) {
         return Err(ProgramError::NotText);
     }
-    let source = Source { robot, options, program };
+    let program = &*with_line_feeds(program);
+    let companions = options.companions.iter().map(|companion| with_line_feeds(&companion.text));
+    let source = Source { robot, options, program, companions: &companions.collect::<Vec<_>>() };
     let mut scan = (dialect.language().read)(&source)?;
     scan.hints.extend(offline_system(program));
     scan.hints.extend(round_numbers(program, &scan.targets));

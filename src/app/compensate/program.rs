@@ -11,7 +11,7 @@ use super::{Job, SHOWN, is_same_file, picture};
 use crate::cli::compensate::{CompensateArgs, Points};
 use crate::compensation::Status;
 use crate::error::{ExitStatus, Failure};
-use crate::program::motion::{Companion, Goal, Hint, ReadOptions, Reason, Scan};
+use crate::program::motion::{Companion, Goal, Hint, LeftAlone, ReadOptions, Reason, Scan};
 use crate::program::{Dialect, ProgramError, Robot, gzip, insert, rewrite, with_remark};
 use crate::store;
 use crate::text::{counted, printable};
@@ -122,7 +122,7 @@ pub(super) fn run<O: Write, E: Write>(
     check_paths(args, &parts)?;
     let mut report = Report { edited: job.arm.edited.clone(), ..Report::default() };
     for part in &parts {
-        add(part, &mut report);
+        add(part, args.json, &mut report);
     }
     write(args, &parts, &mut report, console)?;
     if let Some(path) = &args.record {
@@ -208,13 +208,15 @@ fn is_missed(reason: &Reason) -> bool {
     !matches!(reason, Reason::InFile(_) | Reason::SystemVariable | Reason::NotMovedTo | Reason::OtherGroup)
 }
 
-fn add(part: &Part<'_>, report: &mut Report) {
+/// Adds a program to the report; the places that are left one by one only for other programs, as there may be very many.
+fn add(part: &Part<'_>, is_complete: bool, report: &mut Report) {
     let corrected = part.results.iter().filter(|result| result.is_done()).count();
     report.corrected += corrected;
     let missed = part.scan.left.iter().filter(|left| is_missed(&left.reason)).count();
     report.left += part.results.len() - corrected + missed;
     report.targets.extend(part.results.iter().map(|result| result.report.clone()));
-    report.targets.extend(part.scan.left.iter().map(|left| super::report::TargetReport {
+    let left = part.scan.left.iter().filter(|_| is_complete);
+    report.targets.extend(left.map(|left| super::report::TargetReport {
         line: left.line,
         name: left.name.clone(),
         status: "left",
@@ -270,6 +272,33 @@ fn write<O: Write, E: Write>(
     Ok(())
 }
 
+/// A line of the program that a remark names.
+enum Note<'a> {
+    Target(&'a Corrected),
+    Left(&'a LeftAlone),
+}
+
+impl Note<'_> {
+    const fn line(&self) -> usize {
+        match self {
+            Self::Target(result) => result.report.line,
+            Self::Left(left) => left.line,
+        }
+    }
+
+    fn text(&self) -> String {
+        let named =
+            |name: &Option<String>| name.as_ref().map_or_else(String::new, |name| format!("{}: ", printable(name)));
+        match self {
+            Self::Target(result) => {
+                let left = if result.is_done() { "" } else { "left as it is: " };
+                format!("{}{left}{}", named(&result.report.name), result.report.reason.as_deref().unwrap_or_default())
+            }
+            Self::Left(left) => format!("{}left as it is: {}", named(&left.name), left.reason),
+        }
+    }
+}
+
 fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>], console: &mut Console<O, E>) {
     // What another program of this call contains is corrected there.
     let is_elsewhere = |reason: &Reason| match reason {
@@ -277,21 +306,12 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>],
         _ => false,
     };
     let left: Vec<_> = part.scan.left.iter().filter(|left| !is_elsewhere(&left.reason)).collect();
-    let mut notes: Vec<(usize, String)> = Vec::new();
-    for result in &part.results {
-        if let Some(reason) = &result.report.reason {
-            let name = result.report.name.as_ref().map_or_else(String::new, |name| format!("{}: ", printable(name)));
-            let left = if result.is_done() { "" } else { "left as it is: " };
-            notes.push((result.report.line, format!("{name}{left}{reason}")));
-        }
-    }
-    notes.extend(left.iter().map(|left| {
-        let name = left.name.as_ref().map_or_else(String::new, |name| format!("{}: ", printable(name)));
-        (left.line, format!("{name}left as it is: {}", left.reason))
-    }));
-    notes.sort();
-    for (line, note) in notes.iter().take(SHOWN) {
-        console.remark(&format!("line {line}: {note}"));
+    let with_reason = part.results.iter().filter(|result| result.report.reason.is_some());
+    let mut notes: Vec<Note<'_>> =
+        with_reason.map(Note::Target).chain(left.iter().map(|left| Note::Left(left))).collect();
+    notes.sort_by_key(Note::line);
+    for note in notes.iter().take(SHOWN) {
+        console.remark(&format!("line {}: {}", note.line(), note.text()));
     }
     if notes.len() > SHOWN {
         console.remark(&format!("and {} more lines", notes.len() - SHOWN));

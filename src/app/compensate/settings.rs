@@ -27,7 +27,7 @@ impl Settings<'_> {
         let for_all = || self.given.iter().find(|given| given.name.is_none()).map(|given| given.pose);
         match setting {
             Setting::Identity => Ok(Isometry3::identity()),
-            Setting::Known { name, pose } => Ok(of_name(name).unwrap_or(*pose)),
+            Setting::Known { name, pose } => Ok(of_name(name).unwrap_or(**pose)),
             Setting::Named(name) => of_name(name).or_else(for_all).ok_or_else(|| self.unknown(name)),
         }
     }

@@ -276,7 +276,7 @@ fn close(
         Some(number) => {
             let name = format!("{name}[{number}]");
             Ok(match frames.get(&name) {
-                Some(pose) => Setting::Known { name, pose: *pose },
+                Some(pose) => Setting::Known { name, pose: Box::new(*pose) },
                 None => Setting::Named(name),
             })
         }

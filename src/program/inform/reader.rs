@@ -160,7 +160,7 @@ impl Job<'_> {
     /// Tool and frame that count at this place.
     fn setting(&self) -> [Result<Setting, Reason>; 2] {
         let known = |name: String| match self.frames.get(&name) {
-            Some(pose) => Setting::Known { name, pose: *pose },
+            Some(pose) => Setting::Known { name, pose: Box::new(*pose) },
             None => Setting::Named(name),
         };
         let tool = known(format!("TOOL {}", self.state.tool.as_deref().unwrap_or("0")));

@@ -447,13 +447,13 @@ impl<'a> Module<'a> {
             // Not even a value that the program gives it elsewhere counts.
             Some(Frame::Unknown) | None => return Setting::Named(format!("${what}")),
             Some(Frame::Number(number)) if number.trim_start_matches('0').is_empty() => return Setting::Identity,
-            Some(Frame::Literal(pose)) => return Setting::Known { name: format!("${what}"), pose: *pose },
+            Some(Frame::Literal(pose)) => return Setting::Known { name: format!("${what}"), pose: Box::new(*pose) },
             Some(Frame::Number(number)) => format!("{what}_DATA[{number}]"),
             Some(Frame::Variable(name)) if !name.is_empty() => name.clone(),
             Some(Frame::Variable(_)) => format!("${what}"),
         };
         match self.frames.get(&name.to_lowercase()) {
-            Some(pose) => Setting::Known { name, pose: *pose },
+            Some(pose) => Setting::Known { name, pose: Box::new(*pose) },
             None => Setting::Named(name),
         }
     }
@@ -518,7 +518,7 @@ impl<'a> Module<'a> {
             tool: if is_stationary { Err(Reason::StationaryTool) } else { Ok(tool) },
             frame: Ok(self.setting(self.state.base.as_ref(), "BASE")),
             configuration: None,
-            spot: self.spot(line, with, start),
+            spot: self.spot(line, with, start).map(Box::new),
         }));
         self.behind_motion = Some((line.file, line.range.end));
         self.state = before;

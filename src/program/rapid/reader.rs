@@ -405,7 +405,7 @@ impl<'a> Module<'a> {
             tool,
             frame,
             configuration: None,
-            spot: self.spot(statement, &arguments),
+            spot: self.spot(statement, &arguments).map(Box::new),
         }));
     }
 
@@ -598,7 +598,7 @@ fn setting(
         return Ok(Setting::Identity);
     }
     match known.get(&name.to_lowercase()) {
-        Some(Ok(pose)) => Ok(Setting::Known { name, pose: *pose }),
+        Some(Ok(pose)) => Ok(Setting::Known { name, pose: Box::new(*pose) }),
         Some(Err(reason)) => Err(reason.clone()),
         None => Ok(Setting::Named(name)),
     }

@@ -357,7 +357,7 @@ impl Reader<'_, '_> {
             tool,
             frame: Ok(frame),
             configuration: near.map(Configuration::Near),
-            spot: if name == "movel" { self.spot(at, end, &parts) } else { None },
+            spot: if name == "movel" { self.spot(at, end, &parts).map(Box::new) } else { None },
         }));
         self.behind_motion = Some(end);
         end
@@ -534,12 +534,12 @@ impl Reader<'_, '_> {
             literal(tokens, range.clone(), self.script.joints)
             && let Some(pose) = form.pose(&numbers)
         {
-            return Setting::Known { name: name.to_owned(), pose };
+            return Setting::Known { name: name.to_owned(), pose: Box::new(pose) };
         }
         let variable = tokens.name(range.start).filter(|_| range.len() == 1);
         let constant = variable.as_deref().and_then(|name| self.script.constant(name, (self.file, range.start)));
         match (variable, constant) {
-            (Some(name), Some(Constant::Pose(pose))) => Setting::Known { name, pose: *pose },
+            (Some(name), Some(Constant::Pose(pose))) => Setting::Known { name, pose: Box::new(*pose) },
             (Some(name), _) => Setting::Named(name),
             (None, _) => Setting::Named(tokens.source(range)),
         }

@@ -188,7 +188,11 @@ impl Application<'_> {
         for _ in 0..DEEPEST {
             if at == indexed(root) {
                 let is_root = at == indexed(name);
-                return if is_root { Setting::Identity } else { Setting::Known { name: short(name), pose } };
+                return if is_root {
+                    Setting::Identity
+                } else {
+                    Setting::Known { name: short(name), pose: Box::new(pose) }
+                };
             }
             let Some(Child { pose: Some(own), father }) = known.get(&at) else {
                 return Setting::Named(short(name));
