@@ -237,7 +237,7 @@ fn polyscope_states_pose_tool_and_branch() {
 
 #[test]
 fn inline_forms_take_tool_and_base_from_their_data() {
-    let own = own(Dialect::Krl, include_str!("programs/krl.txt"));
+    let own = own(Dialect::Krl, &fs::read_to_string(folder().join("krl.txt")).unwrap());
     let part = &own[0];
     let scan = found(part.dialect, &part.arm, part.text.as_bytes(), part.companions.clone());
     for target in scan.targets.iter().filter(|target| target.name.as_deref() != Some("XHOME1")) {
@@ -280,37 +280,22 @@ fn own(dialect: Dialect, file: &str) -> Vec<Own> {
         .collect()
 }
 
+/// The programs of a folder, one file per dialect.
+fn programs_in(folder: &Path) -> Vec<Own> {
+    let of_dialect =
+        |dialect: &Dialect| own(*dialect, &fs::read_to_string(folder.join(format!("{dialect}.txt"))).unwrap());
+    Dialect::ALL.iter().flat_map(of_dialect).collect()
+}
+
 /// Programs in the manner of real ones: 20 of each dialect, whose targets are within the reach of a shipped arm. Tools that a program
 /// does not state are 100 mm long.
 fn typical() -> Vec<Own> {
-    [
-        (Dialect::Rapid, include_str!("programs/typical/rapid.txt")),
-        (Dialect::Krl, include_str!("programs/typical/krl.txt")),
-        (Dialect::Fanuc, include_str!("programs/typical/fanuc.txt")),
-        (Dialect::Urscript, include_str!("programs/typical/urscript.txt")),
-        (Dialect::Val3, include_str!("programs/typical/val3.txt")),
-        (Dialect::Inform, include_str!("programs/typical/inform.txt")),
-        (Dialect::Ros, include_str!("programs/typical/ros.txt")),
-    ]
-    .into_iter()
-    .flat_map(|(dialect, file)| own(dialect, file))
-    .collect()
+    programs_in(&folder().join("typical"))
 }
 
 /// Programs that show what is difficult about a language.
 fn difficult() -> Vec<Own> {
-    [
-        (Dialect::Rapid, include_str!("programs/rapid.txt")),
-        (Dialect::Krl, include_str!("programs/krl.txt")),
-        (Dialect::Fanuc, include_str!("programs/fanuc.txt")),
-        (Dialect::Urscript, include_str!("programs/urscript.txt")),
-        (Dialect::Val3, include_str!("programs/val3.txt")),
-        (Dialect::Inform, include_str!("programs/inform.txt")),
-        (Dialect::Ros, include_str!("programs/ros.txt")),
-    ]
-    .into_iter()
-    .flat_map(|(dialect, file)| own(dialect, file))
-    .collect()
+    programs_in(&folder())
 }
 
 fn all_own() -> Vec<Own> {
@@ -341,9 +326,7 @@ fn corrected(program: &Own, calibration: &str) -> serde_json::Value {
 fn of_typical_programs_more_than_95_percent_of_the_targets_are_corrected() {
     let folder = tempfile::tempdir().unwrap();
     let programs = typical();
-    for dialect in
-        [Dialect::Rapid, Dialect::Krl, Dialect::Fanuc, Dialect::Urscript, Dialect::Val3, Dialect::Inform, Dialect::Ros]
-    {
+    for &dialect in Dialect::ALL {
         let (mut count, mut done, mut left) = (0, 0, 0);
         for program in programs.iter().filter(|program| program.dialect == dialect) {
             let calibration = folder.path().join(&program.arm).to_str().unwrap().to_owned();
@@ -411,12 +394,17 @@ fn corrected_values_are_read_back_as_meant() {
     for program in all_own() {
         let profile = profile(&program.arm);
         let robot = with(&profile);
-        let options = ReadOptions { companions: program.companions.clone(), ..ReadOptions::default() };
-        for line_end in ["\n", "\r\n"] {
-            let text = program.text.replace('\n', line_end).into_bytes();
-            let scan = scan(program.dialect, &robot, &options, &text).unwrap();
+        for line_end in ["\n", "\r\n", "\r"] {
+            let bytes = program.text.replace('\n', line_end).into_bytes();
+            let companions = program.companions.iter().map(|companion| Companion {
+                text: text(&companion.text).replace("\r\n", "\n").replace('\n', line_end).into_bytes(),
+                ..companion.clone()
+            });
+            let options = ReadOptions { companions: companions.collect(), ..ReadOptions::default() };
+            let scan = scan(program.dialect, &robot, &options, &bytes).unwrap();
+            assert_eq!((scan.targets.len(), scan.left.len()), (program.targets, program.left), "{}", program.title);
             let commands = moved(&scan, 1.7e-4);
-            let written = rewrite(program.dialect, &robot, &text, &scan, &commands).unwrap();
+            let written = rewrite(program.dialect, &robot, &bytes, &scan, &commands).unwrap();
             let again = trupose::program::rewrite::scan(program.dialect, &robot, &options, &written).unwrap();
             assert_eq!(again.targets.len(), scan.targets.len(), "{}", program.title);
             assert_eq!(again.left, scan.left, "{}", program.title);
@@ -429,7 +417,7 @@ fn corrected_values_are_read_back_as_meant() {
                 let apart = distance(&target.goal, command);
                 assert!(apart < digits, "{}: {target:?} is {apart} off {command:?}", program.title);
             }
-            assert_eq!(skeleton(&written), skeleton(&text), "{}", program.title);
+            assert_eq!(skeleton(&written), skeleton(&bytes), "{}", program.title);
         }
     }
 }

@@ -92,7 +92,7 @@ pub(super) struct Motion {
     pub(super) file: usize,
     pub(super) line: usize,
     pub(super) way: Way,
-    pub(super) via: Option<Point>,
+    pub(super) via: Option<Box<Point>>,
     pub(super) point: Point,
     pub(super) tool: Result<Setting, Reason>,
     pub(super) frame: Result<Setting, Reason>,
@@ -191,7 +191,7 @@ impl Findings {
         let mut here: Vec<Option<usize>> = vec![None; self.definitions.len()];
         for (at, motion) in self.motions.iter().enumerate() {
             let Some(motion) = motion else { continue };
-            for point in std::iter::once(&motion.point).chain(&motion.via) {
+            for point in std::iter::once(&motion.point).chain(motion.via.as_deref()) {
                 match point {
                     Point::Here(index) => {
                         if let Some(place) = here.get_mut(*index) {
@@ -289,7 +289,7 @@ impl Findings {
                 }
                 Point::Current => None,
             };
-            let via = motion.via.as_ref().and_then(&mut index_of);
+            let via = motion.via.as_deref().and_then(&mut index_of);
             let target = index_of(&motion.point);
             if motion.point == Point::Current {
                 continue;

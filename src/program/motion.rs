@@ -189,7 +189,9 @@ impl fmt::Display for Reason {
             Self::MovingFrame => "its frame moves with a mechanical unit",
             Self::ExternalAxes => "external axes are not at zero",
             Self::SeventhAxis => "it states a seventh axis: an external one, or that of a seven-axis arm",
-            Self::ArmAngle => "the arm angle of a seven-axis arm cannot be kept",
+            Self::ArmAngle => {
+                "its arm angle counts from a direction that is set in the controller and not stated in the program"
+            }
             Self::OtherGroup => "a position of another group of axes",
             Self::Register => "a position register, whose value is outside the program",
             Self::OtherJoints => "values of other joints",

@@ -184,7 +184,7 @@ fn motion(statement: &Statement, positions: &BTreeMap<String, Position>, finding
     // A motion has the settings of its end. A via point with others is not tied to it and keeps those that it states.
     let is_apart =
         via.zip(used).is_some_and(|(via, end): (&Position, &Position)| via.tool != end.tool || via.frame != end.frame);
-    let via = points.pop().filter(|_| !is_apart);
+    let via = points.pop().filter(|_| !is_apart).map(Box::new);
     let identity = || Ok(Setting::Identity);
     findings.motions.push(Some(Motion {
         file: 0,

@@ -513,7 +513,7 @@ impl<'a> Module<'a> {
             file: line.file,
             line: tokens.line(line.range.start),
             way: instruction.way,
-            via: points.pop(),
+            via: points.pop().map(Box::new),
             point,
             tool: if is_stationary { Err(Reason::StationaryTool) } else { Ok(tool) },
             frame: Ok(self.setting(self.state.base.as_ref(), "BASE")),

@@ -31,6 +31,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<Scan, ProgramError> {
         each_statement(tokens, file, |statement| module.find(statement, &mut findings));
         findings.motions.push(None);
     }
+    drop(files);
     findings.resolve(source)
 }
 
@@ -400,7 +401,7 @@ impl<'a> Module<'a> {
             file: statement.file,
             line: statement.line(),
             way: instruction.way,
-            via: points.pop(),
+            via: points.pop().map(Box::new),
             point,
             tool,
             frame,

@@ -352,7 +352,7 @@ impl Reader<'_, '_> {
             file: self.file,
             line: tokens.line(at),
             way: instruction.way,
-            via: points.pop(),
+            via: points.pop().map(Box::new),
             point,
             tool,
             frame: Ok(frame),

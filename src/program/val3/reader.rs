@@ -328,7 +328,7 @@ impl Application<'_> {
             file,
             line,
             way,
-            via: points.pop(),
+            via: points.pop().map(Box::new),
             point,
             tool: Ok(tool),
             frame: Ok(frame),
