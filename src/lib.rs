@@ -12,6 +12,7 @@
 //! - [`units`], [`geometry`], [`kinematics`], [`compensation`], [`identification`], [`planning`]: the maths. No I/O, no clock, no threads, no random numbers.
 //! - [`profile`], [`session`], [`program`]: pure data. Text in, checked types out; robot programs out.
 //! - [`model`]: models of the arm in the formats of others, in and out.
+//! - [`correction`]: robot programs corrected with a calibration.
 //! - [`link`]: instruments, simulated and replayed ones among them.
 //! - [`store`], [`report`]: files on disk and text for people. Know the data, never how it was made.
 //! - [`search`], [`error`]: a pose search on several threads; how a command ends and what its message says.
@@ -26,6 +27,7 @@
 
 pub mod app;
 pub mod cli;
+pub mod correction;
 pub mod error;
 pub mod link;
 pub mod model;

@@ -1,17 +1,14 @@
 //! Arguments of the commands that apply a calibration: `compensate`, `export`, and `profile import-urdf`.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::{PayloadArgs, one_of};
+use crate::correction::settings::NamedPose;
 use crate::kinematics::Convention;
 use crate::model::{Coupling, Format};
 use crate::program::Dialect;
-use crate::text::printable;
-use crate::units::{from_deg, from_mm};
 
 /// Arguments of `compensate`.
 #[derive(Args, Debug)]
@@ -89,41 +86,6 @@ pub enum Points {
     Computed,
     /// On the robot, with its pendant or by hand
     Taught,
-}
-
-/// A pose with the name that a program gives it; without a name for all.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NamedPose {
-    pub name: Option<String>,
-    pub pose: Isometry3<f64>,
-}
-
-impl FromStr for NamedPose {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            format!(
-                "'{}' is no pose; write for example 'gripper=0,0,120,0,0,90' (mm; degrees about the fixed x, y, z)",
-                printable(text)
-            )
-        };
-        let (name, numbers) =
-            text.rsplit_once('=').map_or((None, text), |(name, numbers)| (Some(name.trim()), numbers));
-        let values: Vec<f64> = numbers
-            .split(',')
-            .map(|number| number.trim().parse())
-            .collect::<Result<_, _>>()
-            .map_err(|_not_one| wrong())?;
-        match values[..] {
-            [x, y, z, roll, pitch, yaw] if values.iter().all(|value| value.is_finite()) => {
-                let rotation = UnitQuaternion::from_euler_angles(from_deg(roll), from_deg(pitch), from_deg(yaw));
-                let translation = Translation3::new(from_mm(x), from_mm(y), from_mm(z));
-                Ok(Self { name: name.map(str::to_owned), pose: Isometry3::from_parts(translation, rotation) })
-            }
-            _ => Err(wrong()),
-        }
-    }
 }
 
 /// Arguments of `export`.

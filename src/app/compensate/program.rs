@@ -4,44 +4,30 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::super::{Console, to_json};
-use super::correct::{self, Corrected, Resolved};
-use super::report::{PathReport, Report};
-use super::settings::Settings;
-use super::{Job, SHOWN, is_same_file, picture};
+use super::{SHOWN, is_same_file, picture};
 use crate::cli::compensate::{CompensateArgs, Points};
 use crate::compensation::Status;
+use crate::correction::Corrector;
+use crate::correction::program::{self, CorrectedProgram, CorrectionError, Input, TAUGHT, Work};
+use crate::correction::report::Report;
+use crate::correction::settings::Settings;
+use crate::correction::targets::{Corrected, Resolved};
 use crate::error::{ExitStatus, Failure};
 use crate::program::motion::{Companion, Goal, Hint, LeftAlone, ReadOptions, Reason, Scan};
-use crate::program::{Dialect, ProgramError, Robot, gzip, insert, rewrite, with_remark};
+use crate::program::{Dialect, insert};
 use crate::store;
 use crate::text::{counted, printable};
 use crate::units::from_mm;
 
-/// Why points that were taught are not corrected.
-const TAUGHT: &str = "taught points are not corrected: they were recorded where the real arm was, so the arm returns to them as it is; corrected, \
-                      it would miss them by its error";
-
-/// What a program says that was corrected with an edited calibration; it fits the 32 characters of the shortest remarks.
-const EDITED: &str = "WARNING: EDITED CALIBRATION";
-
-/// A file with its text, and its bytes if they are compressed.
-type Input<'p> = (&'p Path, Option<Vec<u8>>, Vec<u8>);
-
 /// A program and what becomes of it.
 struct Part<'p> {
     path: &'p Path,
-    scan: Scan,
-    results: Vec<Corrected>,
-    corrected: Vec<u8>,
-    is_changed: bool,
-    paths: Vec<PathReport>,
-    /// Lines of moves that deviate by more than they may, and have no place for further points.
-    undivided: Vec<usize>,
+    program: CorrectedProgram,
 }
 
 pub(super) fn run<O: Write, E: Write>(
     args: &CompensateArgs,
-    job: &Job<'_>,
+    job: &Corrector<'_>,
     dialect: Dialect,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
@@ -51,73 +37,45 @@ pub(super) fn run<O: Write, E: Write>(
                 "'--insert' is for RAPID, KRL and URScript; without it the path between the targets is only judged",
             ));
     }
-    let profile = &job.arm.profile;
-    let max_speeds: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.max_speed).collect();
-    let pulses: Vec<Option<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
-    let robot = Robot {
-        profile: profile.name(),
-        chain: profile.chain(),
-        max_speeds: &max_speeds,
-        pulses_per_degree: &pulses,
-        joint_aliases: profile.joint_aliases(),
-    };
-    let texts = args.program.iter().chain(&args.companion).map(|path| {
-        let text = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
-        // What cannot be unpacked is refused by the reader.
-        Ok(match gzip::unpacked(&text) {
-            Some(unpacked) => (path.as_path(), Some(text), unpacked),
-            None => (path.as_path(), None, text),
-        })
+    let files = args.program.iter().chain(&args.companion).map(|path| {
+        let file = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;
+        Ok((path.as_path(), Input::new(file)))
     });
-    let texts: Vec<Input<'_>> = texts.collect::<Result<_, Failure>>()?;
+    let files: Vec<(&Path, Input)> = files.collect::<Result<_, Failure>>()?;
     let mut parts = Vec::new();
-    for (path, packed, text) in texts.iter().take(args.program.len()) {
-        let unusable = |error: ProgramError| Failure::new(ExitStatus::Usage, format!("'{}': {error}", path.display()));
-        let others = texts.iter().filter(|(other, ..)| other != path);
-        let companions = others.map(|(path, _, text)| Companion { name: file_name(path), text: text.clone() });
-        let options = ReadOptions {
-            joint_names: (!args.joint_names.is_empty()).then(|| args.joint_names.clone()),
-            companions: companions.collect(),
-            ignores_external_axes: args.ignore_external_axes,
+    for (path, input) in files.iter().take(args.program.len()) {
+        let others = files.iter().filter(|(other, _)| other != path);
+        let companions = others.map(|(path, input)| Companion { name: file_name(path), text: input.text.clone() });
+        let work = Work {
+            dialect,
+            options: ReadOptions {
+                joint_names: (!args.joint_names.is_empty()).then(|| args.joint_names.clone()),
+                companions: companions.collect(),
+                ignores_external_axes: args.ignore_external_axes,
+            },
+            resolved: Resolved {
+                tools: Settings { given: &args.tool, kind: "tool" },
+                frames: Settings { given: &args.frame, kind: "frame" },
+            },
+            insert: args.insert.map(from_mm),
         };
-        let scan = rewrite::scan(dialect, &robot, &options, text).map_err(unusable)?;
+        let failed = |error: CorrectionError| {
+            let status = match &error {
+                CorrectionError::Program(_) => ExitStatus::Usage,
+                CorrectionError::Unproven(_) => ExitStatus::Internal,
+            };
+            Failure::new(status, format!("'{}': {error}", path.display()))
+        };
+        let scan = program::scan(job, &work, input).map_err(|error| failed(error.into()))?;
         check_points(args.points, &scan)?;
-        let resolved = Resolved {
-            tools: Settings { given: &args.tool, kind: "tool" },
-            frames: Settings { given: &args.frame, kind: "frame" },
-        };
-        let results = correct::corrected(job, &resolved, &scan);
-        let commands: Vec<_> = results.iter().map(Corrected::command).collect();
-        let mut corrected = rewrite::rewrite(dialect, &robot, text, &scan, &commands).map_err(unusable)?;
-        let is_changed = corrected != *text;
-        let unproven = |what: String| {
-            let message =
-                format!("'{}': reading back the corrected program: {what}; nothing is written", path.display());
-            Failure::new(ExitStatus::Internal, message)
-        };
-        let (paths, insertions, undivided) = correct::between(job, &scan, &results, args.insert.map(from_mm));
-        if is_changed {
-            let again = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
-            correct::prove(job, &results, &scan, &again).map_err(unproven)?;
-            if !insertions.is_empty() {
-                corrected = insert::insert(dialect, &corrected, &again, &insertions);
-                let last = rewrite::scan(dialect, &robot, &options, &corrected).map_err(unusable)?;
-                correct::prove_inserted(&again, &insertions, &last).map_err(unproven)?;
-            }
+        let program = program::corrected(job, &work, input, scan).map_err(failed)?;
+        if program.lacks_remark {
+            console.remark(&format!(
+                "note: '{}' has no place for a remark, so it does not say that the calibration was edited",
+                path.display()
+            ));
         }
-        if is_changed && job.arm.edited.is_some() {
-            match with_remark(dialect, &corrected, EDITED) {
-                Some(text) => corrected = text,
-                None => console.remark(&format!(
-                    "note: '{}' has no place for a remark, so it does not say that the calibration was edited",
-                    path.display()
-                )),
-            }
-        }
-        if let Some(original) = packed {
-            corrected = if is_changed { gzip::packed(&corrected) } else { original.clone() };
-        }
-        parts.push(Part { path, scan, results, corrected, is_changed, paths, undivided });
+        parts.push(Part { path, program });
     }
     check_paths(args, &parts)?;
     let mut report = Report { edited: job.arm.edited.clone(), ..Report::default() };
@@ -126,7 +84,7 @@ pub(super) fn run<O: Write, E: Write>(
     }
     write(args, &parts, &mut report, console)?;
     if let Some(path) = &args.record {
-        let results = parts.iter().flat_map(|part| &part.results);
+        let results = parts.iter().flat_map(|part| &part.program.results);
         picture::write(path, results.filter_map(|result| Some((result.label(), result.poses(job)?))))?;
         report.written.push(path.display().to_string());
     }
@@ -139,8 +97,8 @@ pub(super) fn run<O: Write, E: Write>(
     for line in report.lines() {
         console.remark(&line);
     }
-    let has_targets = parts.iter().any(|part| !part.scan.targets.is_empty());
-    if parts.iter().all(|part| part.scan.targets.is_empty() && part.scan.left.is_empty()) {
+    let has_targets = parts.iter().any(|part| !part.program.scan.targets.is_empty());
+    if parts.iter().all(|part| part.program.scan.targets.is_empty() && part.program.scan.left.is_empty()) {
         console.remark("no motion target was found; is it this dialect?");
     }
     Ok(if report.left == 0 && has_targets { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
@@ -180,9 +138,9 @@ fn check_paths(args: &CompensateArgs, parts: &[Part<'_>]) -> Result<(), Failure>
         return Ok(());
     }
     for part in parts {
-        let torn = correct::half_corrected(&part.scan, &part.results);
+        let torn = part.program.torn();
         let Some(first) = torn.first() else { continue };
-        let reason = why_left(part, *first);
+        let reason = part.program.why_left(*first).map_or_else(String::new, |reason| format!(" ({reason})"));
         let message = format!(
             "'{}': {} would stay uncorrected beside corrected ones of the same path, first line {first}{reason}; nothing is written",
             part.path.display(),
@@ -194,36 +152,14 @@ fn check_paths(args: &CompensateArgs, parts: &[Part<'_>]) -> Result<(), Failure>
     Ok(())
 }
 
-/// The reason why the move on a line is left, for a message.
-fn why_left(part: &Part<'_>, line: usize) -> String {
-    let step = part.scan.moves.iter().find(|step| step.line == line);
-    let target = step.and_then(|step| part.results.get(step.target?)).and_then(|result| result.report.reason.clone());
-    let left = part.scan.left.iter().find(|left| left.line == line).map(|left| left.reason.to_string());
-    target.or(left).map_or_else(String::new, |reason| format!(" ({reason})"))
-}
-
-/// Whether something that is left counts as a motion target that should have been corrected.
-fn is_missed(reason: &Reason) -> bool {
-    // Not motions, or read with the file that has them.
-    !matches!(reason, Reason::InFile(_) | Reason::SystemVariable | Reason::NotMovedTo | Reason::OtherGroup)
-}
-
 /// Adds a program to the report; the places that are left one by one only for other programs, as there may be very many.
 fn add(part: &Part<'_>, is_complete: bool, report: &mut Report) {
-    let corrected = part.results.iter().filter(|result| result.is_done()).count();
-    report.corrected += corrected;
-    let missed = part.scan.left.iter().filter(|left| is_missed(&left.reason)).count();
-    report.left += part.results.len() - corrected + missed;
-    report.targets.extend(part.results.iter().map(|result| result.report.clone()));
-    let left = part.scan.left.iter().filter(|_| is_complete);
-    report.targets.extend(left.map(|left| super::report::TargetReport {
-        line: left.line,
-        name: left.name.clone(),
-        status: "left",
-        reason: Some(left.reason.to_string()),
-        ..super::report::TargetReport::default()
-    }));
-    report.paths.extend(part.paths.iter().cloned());
+    let program = &part.program;
+    report.corrected += program.done();
+    report.left += program.missed();
+    let count = if is_complete { usize::MAX } else { program.results.len() };
+    report.targets.extend(program.reports().take(count));
+    report.paths.extend(program.paths.iter().cloned());
 }
 
 fn write<O: Write, E: Write>(
@@ -234,7 +170,7 @@ fn write<O: Write, E: Write>(
 ) -> Result<(), Failure> {
     let Some(out) = &args.out else {
         return match parts {
-            [part] if !args.json => console.print_bytes(&part.corrected),
+            [part] if !args.json => console.print_bytes(&part.program.file),
             [_] => Ok(()),
             _ => Err(Failure::new(ExitStatus::Usage, "several programs need a folder").hint("give '--out DIR'")),
         };
@@ -257,13 +193,14 @@ fn write<O: Write, E: Write>(
         }
     }
     for (path, part) in paths.into_iter().zip(parts) {
-        store::replace_bytes(&path, &part.corrected).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
-        if part.is_changed {
+        store::replace_bytes(&path, &part.program.file)
+            .map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+        if part.program.is_changed {
             report.written.push(path.display().to_string());
         } else {
             report.unchanged.push(path.display().to_string());
         }
-        match (args.json, part.is_changed) {
+        match (args.json, part.program.is_changed) {
             (true, _) => {}
             (false, true) => console.say_written(&path)?,
             (false, false) => console.say(&format!("unchanged: {}\n", path.display()))?,
@@ -292,21 +229,28 @@ impl Note<'_> {
         match self {
             Self::Target(result) => {
                 let left = if result.is_done() { "" } else { "left as it is: " };
-                format!("{}{left}{}", named(&result.report.name), result.report.reason.as_deref().unwrap_or_default())
+                let missing = result.report.missing.as_ref();
+                let option = missing.map_or_else(String::new, |missing| {
+                    let name =
+                        if missing.name.is_empty() { String::new() } else { format!("{}=", printable(&missing.name)) };
+                    format!("; give '--{} {name}x,y,z,rx,ry,rz'", missing.kind)
+                });
+                let reason = result.report.reason.as_deref().unwrap_or_default();
+                format!("{}{left}{reason}{option}", named(&result.report.name))
             }
             Self::Left(left) => format!("{}left as it is: {}", named(&left.name), left.reason),
         }
     }
 }
 
-fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>], console: &mut Console<O, E>) {
+fn remarks<O: Write, E: Write>(job: &Corrector<'_>, part: &Part<'_>, all: &[Part<'_>], console: &mut Console<O, E>) {
     // What another program of this call contains is corrected there.
     let is_elsewhere = |reason: &Reason| match reason {
         Reason::InFile(name) => all.iter().any(|other| file_name(other.path) == *name),
         _ => false,
     };
-    let left: Vec<_> = part.scan.left.iter().filter(|left| !is_elsewhere(&left.reason)).collect();
-    let with_reason = part.results.iter().filter(|result| result.report.reason.is_some());
+    let left: Vec<_> = part.program.scan.left.iter().filter(|left| !is_elsewhere(&left.reason)).collect();
+    let with_reason = part.program.results.iter().filter(|result| result.report.reason.is_some());
     let mut notes: Vec<Note<'_>> =
         with_reason.map(Note::Target).chain(left.iter().map(|left| Note::Left(left))).collect();
     notes.sort_by_key(Note::line);
@@ -316,11 +260,11 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>],
     if notes.len() > SHOWN {
         console.remark(&format!("and {} more lines", notes.len() - SHOWN));
     }
-    if let Some(first) = part.undivided.first() {
+    if let Some(first) = part.program.undivided.first() {
         console.remark(&format!(
             "{} would need more points and cannot get them, first line {first}: points are put only into plain linear moves directly behind another \
              move",
-            counted(part.undivided.len(), "move")
+            counted(part.program.undivided.len(), "move")
         ));
     }
     let external = |reason: &Reason| matches!(reason, Reason::ExternalAxes | Reason::SeventhAxis);
@@ -330,7 +274,7 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>],
         );
     }
     let (joints, mut largest) = (job.joints(), vec![0.0; job.joints().len()]);
-    for result in &part.results {
+    for result in &part.program.results {
         result.widen(&mut largest);
     }
     let corrections = joints.iter().zip(&largest).map(|(joint, largest)| {
@@ -340,15 +284,18 @@ fn remarks<O: Write, E: Write>(job: &Job<'_>, part: &Part<'_>, all: &[Part<'_>],
     let corrections: Vec<String> = corrections.collect();
     let count = |is_pose: bool| {
         let of_kind = |index: &usize| {
-            part.scan.targets.get(*index).is_some_and(|target| matches!(target.goal, Goal::Pose(_)) == is_pose)
+            part.program.scan.targets.get(*index).is_some_and(|target| matches!(target.goal, Goal::Pose(_)) == is_pose)
         };
-        let indices: Vec<usize> = (0..part.results.len()).filter(of_kind).collect();
-        let done = indices.iter().filter(|index| part.results[**index].is_done()).count();
+        let indices: Vec<usize> = (0..part.program.results.len()).filter(of_kind).collect();
+        let done = indices.iter().filter(|index| part.program.results[**index].is_done()).count();
         (done, indices.len())
     };
     let ((joint, joints_found), (pose, poses_found)) = (count(false), count(true));
-    let position_only =
-        part.results.iter().filter(|result| result.is_done() && result.report.status == Status::PositionOnly.name());
+    let position_only = part
+        .program
+        .results
+        .iter()
+        .filter(|result| result.is_done() && result.report.status == Status::PositionOnly.name());
     console.remark(&format!(
         "{}: {joint} of {joints_found} joint targets and {pose} of {poses_found} Cartesian targets corrected ({} in position only), {} left; \
          largest corrections: {}",

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::super::Console;
-use super::report::Moved;
-use super::{Job, reason, status_reason};
 use crate::compensation::{Goal, PoseGoal};
+use crate::correction::report::Moved;
+use crate::correction::{Corrector, reason, status_reason};
 use crate::error::{ExitStatus, Failure};
 use crate::units::{from_deg, from_mm, to_mm};
 
@@ -109,7 +109,7 @@ impl Pose {
     }
 }
 
-pub(super) fn run<O: Write, E: Write>(job: &Job<'_>, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+pub(super) fn run<O: Write, E: Write>(job: &Corrector<'_>, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
     let unreadable =
         |error: std::io::Error| Failure::new(ExitStatus::Store, format!("cannot read the standard input: {error}"));
     let mut input = std::io::stdin().lock();
@@ -128,7 +128,7 @@ pub(super) fn run<O: Write, E: Write>(job: &Job<'_>, console: &mut Console<O, E>
     }
 }
 
-fn answered(job: &Job<'_>, line: &[u8]) -> Answer {
+fn answered(job: &Corrector<'_>, line: &[u8]) -> Answer {
     let request: Request = match serde_json::from_slice(line) {
         Ok(request) => request,
         Err(error) => {
@@ -153,7 +153,7 @@ fn refused(id: Value, error: String) -> Answer {
 }
 
 /// Joint values of the edge (deg, mm) as those of the inside.
-fn inside(job: &Job<'_>, values: &[f64]) -> Result<Vec<f64>, String> {
+fn inside(job: &Corrector<'_>, values: &[f64]) -> Result<Vec<f64>, String> {
     let joints = job.joints();
     if values.len() != joints.len() || !values.iter().all(|value| value.is_finite()) {
         return Err(format!("the arm has {} joints; {} finite values are given", joints.len(), values.len()));
@@ -161,11 +161,11 @@ fn inside(job: &Job<'_>, values: &[f64]) -> Result<Vec<f64>, String> {
     Ok(values.iter().zip(joints).map(|(value, joint)| joint.joint_type.quantity().from_edge(*value)).collect())
 }
 
-fn at_edge(job: &Job<'_>, q: &[f64]) -> Vec<f64> {
+fn at_edge(job: &Corrector<'_>, q: &[f64]) -> Vec<f64> {
     q.iter().zip(job.joints()).map(|(value, joint)| joint.joint_type.quantity().to_edge(*value)).collect()
 }
 
-fn of_joints(job: &Job<'_>, joints: &[f64]) -> Result<Answer, String> {
+fn of_joints(job: &Corrector<'_>, joints: &[f64]) -> Result<Answer, String> {
     let done = job.compensator.solve(&Goal::Configuration(inside(job, joints)?));
     let status = done.status.name();
     if !done.status.is_usable() {
@@ -187,7 +187,7 @@ fn of_joints(job: &Job<'_>, joints: &[f64]) -> Result<Answer, String> {
     })
 }
 
-fn of_pose(job: &Job<'_>, request: &Request, pose: &Pose) -> Result<Answer, String> {
+fn of_pose(job: &Corrector<'_>, request: &Request, pose: &Pose) -> Result<Answer, String> {
     let known = |pose: &Option<Pose>| pose.as_ref().map_or_else(|| Ok(Isometry3::identity()), Pose::isometry);
     let (tool, frame) = (known(&request.tool)?, known(&request.frame)?);
     let near = request.near.as_ref().map(|near| inside(job, near)).transpose()?;

@@ -6,10 +6,11 @@ use std::path::Path;
 use nalgebra::{Isometry3, Point3, Translation3};
 
 use super::super::{Console, to_json};
-use super::report::{Moved, Report, TargetReport};
-use super::{Job, SHOWN, picture, reason};
+use super::{SHOWN, picture};
 use crate::cli::compensate::CompensateArgs;
 use crate::compensation::{Compensated, Goal, Status};
+use crate::correction::report::{Moved, Report, TargetReport};
+use crate::correction::{Corrector, reason};
 use crate::error::{ExitStatus, Failure};
 use crate::kinematics::Joint;
 use crate::procedure::joint_types;
@@ -38,7 +39,7 @@ impl Row<'_> {
 
 pub(super) fn run<O: Write, E: Write>(
     args: &CompensateArgs,
-    job: &Job<'_>,
+    job: &Corrector<'_>,
     path: &Path,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
@@ -98,7 +99,7 @@ pub(super) fn run<O: Write, E: Write>(
     Ok(if report.left == 0 { ExitStatus::Accepted } else { ExitStatus::NotAccepted })
 }
 
-fn solved<'t>(job: &Job<'_>, target: &'t TargetRow) -> Row<'t> {
+fn solved<'t>(job: &Corrector<'_>, target: &'t TargetRow) -> Row<'t> {
     let goal = goal(&target.goal);
     let done = job.compensator.solve(&goal);
     let uncertainty = job.uncertainty(&done.command, &job.tools[1]).filter(|_| done.status.is_usable());
@@ -124,7 +125,7 @@ fn solved<'t>(job: &Job<'_>, target: &'t TargetRow) -> Row<'t> {
 }
 
 /// The tool of the nominal arm at a target and at its command.
-fn tool_poses(job: &Job<'_>, goal: &Goal, done: &Compensated) -> Option<[Isometry3<f64>; 2]> {
+fn tool_poses(job: &Corrector<'_>, goal: &Goal, done: &Compensated) -> Option<[Isometry3<f64>; 2]> {
     let nominal = job.compensator.inverse().forward();
     let tool = |q: &[f64]| nominal.base_from_flange(q) * job.tools[0];
     let commanded = tool(&done.command);

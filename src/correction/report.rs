@@ -1,37 +1,62 @@
 //! What happened to each target: for people, and as JSON.
 
+use std::fmt;
+
 use nalgebra::Isometry3;
 use serde::Serialize;
 
-use crate::text::{counted, decimal};
+use crate::text::{counted, decimal, printable};
 use crate::units::{to_deg, to_mm};
 
 /// A target and its correction.
 #[derive(Clone, Debug, Default, Serialize)]
-pub(super) struct TargetReport {
-    pub(super) line: usize,
+pub struct TargetReport {
+    pub line: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) name: Option<String>,
-    pub(super) status: &'static str,
+    pub name: Option<String>,
+    pub status: &'static str,
     /// Why it is not corrected, or only in part.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) reason: Option<String>,
+    pub reason: Option<String>,
+    /// The tool or the frame that nobody states.
+    #[serde(skip)]
+    pub missing: Option<Missing>,
     #[serde(flatten)]
-    pub(super) moved: Option<Moved>,
+    pub moved: Option<Moved>,
     /// Predicted error of the identified arm there.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) uncertainty_mm: Option<f64>,
+    pub uncertainty_mm: Option<f64>,
+}
+
+/// A tool or a frame that neither the program nor its user states.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Missing {
+    /// `tool` or `frame`.
+    pub kind: &'static str,
+    /// Name in the program; empty if it has none.
+    pub name: String,
+}
+
+impl fmt::Display for Missing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, name } = self;
+        if name.is_empty() {
+            write!(f, "its {kind} is not stated")
+        } else {
+            write!(f, "its {kind} '{}' is not in the given files", printable(name))
+        }
+    }
 }
 
 /// By how much a command differs from its target: the tool of the nominal arm, from one to the other.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Moved {
-    pub(super) moved_mm: f64,
-    pub(super) moved_deg: f64,
+pub struct Moved {
+    pub moved_mm: f64,
+    pub moved_deg: f64,
 }
 
 impl Moved {
-    pub(super) fn between(meant: &Isometry3<f64>, commanded: &Isometry3<f64>) -> Self {
+    pub fn between(meant: &Isometry3<f64>, commanded: &Isometry3<f64>) -> Self {
         Self {
             moved_mm: to_mm((commanded.translation.vector - meant.translation.vector).norm()),
             moved_deg: to_deg(commanded.rotation.angle_to(&meant.rotation)),
@@ -41,34 +66,34 @@ impl Moved {
 
 /// The result of a table or a program.
 #[derive(Clone, Debug, Default, Serialize)]
-pub(super) struct Report {
-    pub(super) targets: Vec<TargetReport>,
-    pub(super) corrected: usize,
-    pub(super) left: usize,
+pub struct Report {
+    pub targets: Vec<TargetReport>,
+    pub corrected: usize,
+    pub left: usize,
     /// Moves between corrected targets, with the largest deviation of the path.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) paths: Vec<PathReport>,
+    pub paths: Vec<PathReport>,
     /// That the calibration was changed after it was written.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) edited: Option<String>,
+    pub edited: Option<String>,
     /// Files that were written.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) written: Vec<String>,
+    pub written: Vec<String>,
     /// Copies of programs in which nothing was corrected.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) unchanged: Vec<String>,
+    pub unchanged: Vec<String>,
 }
 
 /// A linear or circular move between corrected targets.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct PathReport {
-    pub(super) line: usize,
+pub struct PathReport {
+    pub line: usize,
     /// Largest distance of the tool from where the nominal arm would have had it, with the targets corrected and without.
-    pub(super) corrected_mm: f64,
-    pub(super) uncorrected_mm: f64,
+    pub corrected_mm: f64,
+    pub uncorrected_mm: f64,
     /// Points that were put into it.
     #[serde(skip_serializing_if = "is_zero")]
-    pub(super) inserted: usize,
+    pub inserted: usize,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
@@ -78,7 +103,7 @@ const fn is_zero(count: &usize) -> bool {
 
 impl Report {
     /// The largest and the mean move, the largest predicted error and the worst path, in one line each.
-    pub(super) fn lines(&self) -> Vec<String> {
+    pub fn lines(&self) -> Vec<String> {
         let moved: Vec<&Moved> = self.targets.iter().filter_map(|target| target.moved.as_ref()).collect();
         let mut lines = Vec::new();
         if !moved.is_empty() {

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3};
 use super::between::{Ends, deviation, divided};
 use super::report::{Moved, PathReport, TargetReport};
 use super::settings::Settings;
-use super::{Job, reason, status_reason};
+use super::{Corrector, reason, status_reason};
 use crate::compensation::{self, PoseGoal, Status};
 use crate::inverse::Posture;
 use crate::program::configuration::Configuration;
@@ -15,15 +15,15 @@ use crate::units::{MICROMETRE, MICRORADIAN, to_mm};
 
 /// How the options resolve what a program only names.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Resolved<'a> {
-    pub(super) tools: Settings<'a>,
-    pub(super) frames: Settings<'a>,
+pub struct Resolved<'a> {
+    pub tools: Settings<'a>,
+    pub frames: Settings<'a>,
 }
 
 /// A target with its correction.
 #[derive(Clone, Debug)]
-pub(super) struct Corrected {
-    pub(super) report: TargetReport,
+pub struct Corrected {
+    pub report: TargetReport,
     done: Option<Done>,
 }
 
@@ -48,7 +48,7 @@ const LARGEST_ROUNDING: (f64, f64) = (5e-5, 1e-4);
 
 /// Corrects all targets of a program. They are solved in the order in which they are moved to, because a target without a
 /// configuration is reached from the one before.
-pub(super) fn corrected(job: &Job<'_>, resolved: &Resolved<'_>, scan: &Scan) -> Vec<Corrected> {
+pub fn corrected(corrector: &Corrector<'_>, resolved: &Resolved<'_>, scan: &Scan) -> Vec<Corrected> {
     let mut results: Vec<Option<Corrected>> = vec![None; scan.targets.len()];
     let mut before: Option<Vec<f64>> = None;
     // After a move that is not known, and at the beginning of a routine, the arm may be anywhere.
@@ -69,8 +69,8 @@ pub(super) fn corrected(job: &Job<'_>, resolved: &Resolved<'_>, scan: &Scan) -> 
         let result = results[index].get_or_insert_with(|| {
             let mut report = TargetReport { line: target.line, name: target.name.clone(), ..TargetReport::default() };
             let done = match &target.goal {
-                Goal::Joints(q) => of_joints(job, q, &mut report),
-                Goal::Pose(pose) => of_pose(job, resolved, pose, before.as_deref(), &mut report),
+                Goal::Joints(q) => of_joints(corrector, q, &mut report),
+                Goal::Pose(pose) => of_pose(corrector, resolved, pose, before.as_deref(), &mut report),
             };
             Corrected { report, done }
         });
@@ -80,19 +80,19 @@ pub(super) fn corrected(job: &Job<'_>, resolved: &Resolved<'_>, scan: &Scan) -> 
     results.into_iter().flatten().collect()
 }
 
-fn of_joints(job: &Job<'_>, q: &[f64], report: &mut TargetReport) -> Option<Done> {
-    let done = job.compensator.solve(&compensation::Goal::Configuration(q.to_vec()));
+fn of_joints(corrector: &Corrector<'_>, q: &[f64], report: &mut TargetReport) -> Option<Done> {
+    let done = corrector.compensator.solve(&compensation::Goal::Configuration(q.to_vec()));
     report.status = done.status.name();
     if done.status != Status::Reached {
-        report.reason = Some(reason(&done, job.joints()));
+        report.reason = Some(reason(&done, corrector.joints()));
     }
     if !done.status.is_usable() {
         return None;
     }
-    let flange_from_tool = job.tools[1];
-    is_known(job, &done.command, &flange_from_tool, report)?;
-    let nominal = job.compensator.inverse().forward();
-    let tool = |q: &[f64]| nominal.base_from_flange(q) * job.tools[0];
+    let flange_from_tool = corrector.tools[1];
+    is_known(corrector, &done.command, &flange_from_tool, report)?;
+    let nominal = corrector.compensator.inverse().forward();
+    let tool = |q: &[f64]| nominal.base_from_flange(q) * corrector.tools[0];
     let meant = done.meant.clone()?;
     report.moved = Some(Moved::between(&tool(&meant), &tool(&done.command)));
     Some(Done {
@@ -103,12 +103,12 @@ fn of_joints(job: &Job<'_>, q: &[f64], report: &mut TargetReport) -> Option<Done
         flange_from_tool,
         base_from_frame: Isometry3::identity(),
         near: None,
-        has_orientation: done.status == Status::Reached && !job.position_only,
+        has_orientation: done.status == Status::Reached && !corrector.position_only,
     })
 }
 
 fn of_pose(
-    job: &Job<'_>,
+    corrector: &Corrector<'_>,
     resolved: &Resolved<'_>,
     pose: &PoseTarget,
     before: Option<&[f64]>,
@@ -117,13 +117,14 @@ fn of_pose(
     let settings = (resolved.tools.pose(&pose.tool), resolved.frames.pose(&pose.frame));
     let (flange_from_tool, frame) = match settings {
         (Ok(tool), Ok(frame)) => (tool, frame),
-        (Err(reason), _) | (_, Err(reason)) => {
+        (Err(missing), _) | (_, Err(missing)) => {
             report.status = "unknown_setting";
-            report.reason = Some(reason);
+            report.reason = Some(missing.to_string());
+            report.missing = Some(missing);
             return None;
         }
     };
-    let base_from_frame = job.base_from_world() * frame;
+    let base_from_frame = corrector.base_from_world() * frame;
     let near = match &pose.configuration {
         Configuration::Near(near) => Some(near.clone()),
         Configuration::Rapid { .. }
@@ -141,16 +142,16 @@ fn of_pose(
         is_meant: &is_meant,
         near: near.as_deref(),
     };
-    let done = match job.compensator.solve_pose(&goal) {
+    let done = match corrector.compensator.solve_pose(&goal) {
         Ok(done) => done,
         Err(status) => {
             report.status = status.name();
-            report.reason = Some(status_reason(&status, job.joints()));
+            report.reason = Some(status_reason(&status, corrector.joints()));
             return None;
         }
     };
     report.status = Status::Reached.name();
-    is_known(job, &done.command, &flange_from_tool, report)?;
+    is_known(corrector, &done.command, &flange_from_tool, report)?;
     report.moved = Some(Moved::between(&goal.base_from_tool, &done.base_from_tool));
     Some(Done {
         command: Command::Pose(base_from_frame.inverse() * done.base_from_tool),
@@ -165,10 +166,15 @@ fn of_pose(
 }
 
 /// Notes how well the arm is known there; `None`, with the reason, if not well enough.
-fn is_known(job: &Job<'_>, q: &[f64], flange_from_tool: &Isometry3<f64>, report: &mut TargetReport) -> Option<()> {
-    let uncertainty = job.uncertainty(q, flange_from_tool);
+fn is_known(
+    corrector: &Corrector<'_>,
+    q: &[f64],
+    flange_from_tool: &Isometry3<f64>,
+    report: &mut TargetReport,
+) -> Option<()> {
+    let uncertainty = corrector.uncertainty(q, flange_from_tool);
     report.uncertainty_mm = uncertainty.map(to_mm);
-    if let Some(reason) = job.too_uncertain(uncertainty) {
+    if let Some(reason) = corrector.too_uncertain(uncertainty) {
         report.status = "uncertain";
         report.reason = Some(reason);
         return None;
@@ -177,27 +183,27 @@ fn is_known(job: &Job<'_>, q: &[f64], flange_from_tool: &Isometry3<f64>, report:
 }
 
 impl Corrected {
-    pub(super) const fn is_done(&self) -> bool {
+    pub const fn is_done(&self) -> bool {
         self.done.is_some()
     }
 
-    pub(super) fn command(&self) -> Option<Command> {
+    pub fn command(&self) -> Option<Command> {
         self.done.as_ref().map(|done| done.command.clone())
     }
 
     /// The name or the line of the target.
-    pub(super) fn label(&self) -> String {
+    pub fn label(&self) -> String {
         self.report.name.clone().unwrap_or_else(|| format!("line {}", self.report.line))
     }
 
     /// Where the tool is meant to be, and where the nominal arm has it at the command (m).
-    pub(super) fn poses(&self, job: &Job<'_>) -> Option<[Isometry3<f64>; 2]> {
+    pub fn poses(&self, corrector: &Corrector<'_>) -> Option<[Isometry3<f64>; 2]> {
         let done = self.done.as_ref()?;
-        Some([done.base_from_tool, done.commanded_pose(job)])
+        Some([done.base_from_tool, done.commanded_pose(corrector)])
     }
 
     /// Largest correction of each joint so far, with this one.
-    pub(super) fn widen(&self, largest: &mut [f64]) {
+    pub fn widen(&self, largest: &mut [f64]) {
         let Some(done) = &self.done else { return };
         for (largest, (command, meant)) in largest.iter_mut().zip(done.commanded.iter().zip(&done.meant)) {
             *largest = largest.max((command - meant).abs());
@@ -206,13 +212,13 @@ impl Corrected {
 }
 
 impl Done {
-    fn commanded_pose(&self, job: &Job<'_>) -> Isometry3<f64> {
-        job.compensator.inverse().forward().base_from_flange(&self.commanded) * self.flange_from_tool
+    fn commanded_pose(&self, corrector: &Corrector<'_>) -> Isometry3<f64> {
+        corrector.compensator.inverse().forward().base_from_flange(&self.commanded) * self.flange_from_tool
     }
 }
 
 /// Lines of moves that belong to a path of which a part only is corrected.
-pub(super) fn half_corrected(scan: &Scan, results: &[Corrected]) -> Vec<usize> {
+pub fn half_corrected(scan: &Scan, results: &[Corrected]) -> Vec<usize> {
     let is_done = |step: &Move| step.target.and_then(|index| results.get(index)).is_some_and(Corrected::is_done);
     let paths = |wanted: bool| {
         let moves = scan.moves.iter().filter(move |step| is_done(step) == wanted);
@@ -225,8 +231,8 @@ pub(super) fn half_corrected(scan: &Scan, results: &[Corrected]) -> Vec<usize> {
 
 /// How far the paths of linear and circular moves deviate between corrected targets, and the points that keep linear ones within `limit`
 /// (m). The second list has the lines of moves that deviate by more and cannot be divided.
-pub(super) fn between(
-    job: &Job<'_>,
+pub fn between(
+    corrector: &Corrector<'_>,
     scan: &Scan,
     results: &[Corrected],
     limit: Option<f64>,
@@ -250,29 +256,29 @@ pub(super) fn between(
         let (Some(from), Some(to)) = (done(before.target), done(step.target)) else { continue };
         // The point before is left with the tool of this move.
         let tool = to.flange_from_tool;
-        let start = |q: &[f64]| job.compensator.inverse().forward().base_from_flange(q) * tool;
+        let start = |q: &[f64]| corrector.compensator.inverse().forward().base_from_flange(q) * tool;
         let at = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
         let meant =
             Ends { from: start(&from.meant), via: via.map(|via| at(&via.base_from_tool)), to: to.base_from_tool };
         let commanded = Ends {
             from: start(&from.commanded),
-            via: via.map(|via| at(&via.commanded_pose(job))),
-            to: to.commanded_pose(job),
+            via: via.map(|via| at(&via.commanded_pose(corrector))),
+            to: to.commanded_pose(corrector),
         };
         let ends = [&meant, &commanded];
-        let Some(report) = deviation(step.line, &job.compensator, &tool, ends, &from.meant) else { continue };
+        let Some(report) = deviation(step.line, &corrector.compensator, &tool, ends, &from.meant) else { continue };
         let Some(limit) = limit.filter(|limit| report.corrected_mm > to_mm(*limit)) else {
             reports.push(report);
             continue;
         };
         let is_linear = step.kind == MoveKind::Linear && has_spot(scan, index + 1);
         let divided =
-            is_linear.then(|| divided(step.line, &job.compensator, &tool, ends, &from.meant, limit)).flatten();
+            is_linear.then(|| divided(step.line, &corrector.compensator, &tool, ends, &from.meant, limit)).flatten();
         if let Some((points, report)) = divided {
             let frame_from_base = to.base_from_frame.inverse();
             let points = points.into_iter().map(|point| InsertedPoint {
                 frame_from_tool: frame_from_base * point.base_from_tool,
-                posture: job.compensator.inverse().posture(&point.commanded),
+                posture: corrector.compensator.inverse().posture(&point.commanded),
                 joints: point.commanded,
             });
             insertions.push(Insertion { step: index + 1, points: points.collect() });
@@ -289,7 +295,7 @@ pub(super) fn between(
 ///
 /// # Errors
 /// In words, what is not as it has to be.
-pub(super) fn prove_inserted(before: &Scan, insertions: &[Insertion], written: &Scan) -> Result<(), String> {
+pub fn prove_inserted(before: &Scan, insertions: &[Insertion], written: &Scan) -> Result<(), String> {
     let mut inserted = insertions.iter().flat_map(|insertion| &insertion.points).peekable();
     let mut old = before.targets.iter().peekable();
     for new in &written.targets {
@@ -328,7 +334,7 @@ fn is_same_place(one: &Goal, other: &Goal) -> bool {
 ///
 /// # Errors
 /// In words, the first target that is not what it has to be.
-pub(super) fn prove(job: &Job<'_>, results: &[Corrected], old: &Scan, written: &Scan) -> Result<(), String> {
+pub fn prove(corrector: &Corrector<'_>, results: &[Corrected], old: &Scan, written: &Scan) -> Result<(), String> {
     if written.targets.len() != old.targets.len() {
         return Err(format!("{} targets became {}", old.targets.len(), written.targets.len()));
     }
@@ -341,10 +347,10 @@ pub(super) fn prove(job: &Job<'_>, results: &[Corrected], old: &Scan, written: &
             }
             continue;
         };
-        let Some((q, rounding)) = taken(job, done, new) else {
+        let Some((q, rounding)) = taken(corrector, done, new) else {
             return failed("the controller would not reach the written target in its configuration".to_owned());
         };
-        let there = job.compensator.identified_pose(&q, &done.flange_from_tool);
+        let there = corrector.compensator.identified_pose(&q, &done.flange_from_tool);
         let position = (there.translation.vector - done.base_from_tool.translation.vector).norm();
         let angle = if done.has_orientation { there.rotation.angle_to(&done.base_from_tool.rotation) } else { 0.0 };
         let is_right = rounding.0 <= LARGEST_ROUNDING.0
@@ -364,7 +370,7 @@ pub(super) fn prove(job: &Job<'_>, results: &[Corrected], old: &Scan, written: &
 
 /// The configuration that the controller takes for a written target, and by how much the digits differ from the command, as a distance
 /// and an angle of the tool.
-fn taken(job: &Job<'_>, done: &Done, written: &Target) -> Option<(Vec<f64>, (f64, f64))> {
+fn taken(corrector: &Corrector<'_>, done: &Done, written: &Target) -> Option<(Vec<f64>, (f64, f64))> {
     let q = match &written.goal {
         Goal::Joints(q) => q.clone(),
         Goal::Pose(pose) => {
@@ -375,11 +381,11 @@ fn taken(job: &Job<'_>, done: &Done, written: &Target) -> Option<(Vec<f64>, (f64
                 is_meant: &is_meant,
                 near: done.near.as_deref(),
             };
-            job.compensator.taken(&goal).ok()?
+            corrector.compensator.taken(&goal).ok()?
         }
     };
-    let pose = job.compensator.inverse().forward().base_from_flange(&q) * done.flange_from_tool;
-    let command = done.commanded_pose(job);
+    let pose = corrector.compensator.inverse().forward().base_from_flange(&q) * done.flange_from_tool;
+    let command = done.commanded_pose(corrector);
     let position = (pose.translation.vector - command.translation.vector).norm();
     Some((q, (position, pose.rotation.angle_to(&command.rotation))))
 }
