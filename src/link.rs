@@ -33,6 +33,8 @@ pub use simulated::{HiddenArm, SimulatedCell};
 pub use wire::RawLog;
 pub use wired::Wired;
 
+use nalgebra::Point3;
+
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 
 /// A source of measured points.
@@ -49,6 +51,15 @@ pub trait Link: Send {
     /// # Errors
     /// No reading could be taken.
     fn measure(&mut self, request: &MeasureRequest, keep_going: &dyn Fn() -> bool) -> Result<Reading, LinkError>;
+
+    /// Turns the instrument to a place in its own frame (m), where it searches for the reflector. Calls `keep_going` like
+    /// [`Self::measure`].
+    ///
+    /// # Errors
+    /// It cannot be turned, or has found nothing there.
+    fn point(&mut self, _at: Point3<f64>, _keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        Err(LinkError::SetUp("this instrument cannot be turned from here".to_owned()))
+    }
 
     /// The live view between measurements and the events since the last call; waits up to `wait`. A link without a live view
     /// returns `None` at once.

@@ -28,6 +28,7 @@ pub mod intent;
 mod live;
 pub mod notice;
 mod place;
+mod pointing;
 mod program;
 pub mod reading;
 mod step;
@@ -310,6 +311,7 @@ impl Wizard {
         let step = self.phase.step();
         let cell = self.cells.offers(step, &self.session);
         let programs = program::Programs::offers(step, &self.session);
+        let turn = pointing::offer(step, &self.session, self.phase.shown_row(), self.connection.is_some());
         for mut info in self
             .phase
             .intents(&self.cx())
@@ -317,6 +319,7 @@ impl Wizard {
             .chain(cell)
             .chain(programs)
             .chain(faces::offer(step, &self.session))
+            .chain(turn)
         {
             if let Some(busy) = &busy
                 && !matches!(info.intent, Intent::Note(_))
@@ -429,6 +432,7 @@ impl Wizard {
             Intent::PlaceTrackerByPoses => Ok(self.cells.place_by_poses(&self.session)),
             Intent::LimitJoints(limits) => Ok(self.cells.limit(&limits, &self.session)),
             Intent::AddBox(obstacle) => Ok(self.cells.add_box(obstacle, &self.session)),
+            Intent::TurnTracker => Ok(pointing::turn(&self.session, self.phase.shown_row())),
             Intent::CheckFaces(pair) => Ok(faces::check(&pair, &self.session)),
             Intent::WriteProgram(settings) => Ok(self.programs.write(settings, &self.session, self.now)),
             Intent::ProgramDriven => Ok(vec![Action::Write(vec![Entry::ProgramDriven])]),
@@ -452,6 +456,10 @@ impl Wizard {
             return Vec::new();
         }
         self.busy = None;
+        if matches!(answer, Answer::Turned) {
+            self.notice = Some(pointing::turned());
+            return self.run();
+        }
         if let Some(actions) = self.programs.on_answer(&answer) {
             self.actions.extend(actions);
             return self.run();

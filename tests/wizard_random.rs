@@ -240,6 +240,7 @@ impl Cell {
                 Answer::Connected { identity: self.text(), warnings: Vec::new(), recorded }
             }
             Request::Measure(request) => Answer::Measured(self.reading(request)),
+            Request::Turn { .. } => Answer::Turned,
             Request::Plan { profile, request, .. } => {
                 let count = request.poses.min(14);
                 let first = usize::try_from(request.numbered_after).unwrap() + 1;

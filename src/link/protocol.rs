@@ -54,6 +54,12 @@ pub trait Protocol: Send + Debug {
     /// Requests one shot. Answered by [`ProtocolEvent::Failed`] if the link is not ready or another shot is in progress.
     fn trigger(&mut self, now: Moment);
 
+    /// Turns the instrument to a place in its own frame (m), where it searches for the reflector; answered by
+    /// [`ProtocolEvent::Pointed`] or [`ProtocolEvent::Failed`]. Returns `false` if the instrument cannot be turned.
+    fn point(&mut self, _at: &Point3<f64>, _now: Moment) -> bool {
+        false
+    }
+
     /// Cancels the shot in progress without an answer; a late result of it is discarded.
     fn cancel(&mut self, now: Moment);
 
@@ -107,6 +113,8 @@ pub enum ProtocolEvent {
     Offered(Shot),
     /// Joint values reported by the robot.
     Joints(JointState),
+    /// The instrument has turned to where it was sent, and has found the reflector there.
+    Pointed,
     /// A message for the operator.
     Status(Status),
     /// The connection is lost.

@@ -8,6 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use nalgebra::Point3;
+
 use super::cell_view::{Advance, CellView, SharedView, check_joints};
 use super::serve::{Endpoint, Speedup, serve};
 use super::{Link, LinkError, LinkEvent, RawLog, SimulatedCell, Wired, build};
@@ -101,6 +103,10 @@ impl Link for Rehearsal {
         // Time is virtual, as without wires.
         reading.seconds = self.view.lock().cell.time(request, reading.shots);
         Ok(reading)
+    }
+
+    fn point(&mut self, at: Point3<f64>, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        self.wired.point(at, keep_going)
     }
 
     fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkEvent>)> {

@@ -86,7 +86,7 @@ impl WiredRobot {
                     self.down = Some(failure);
                 }
                 Ok(WireEvent::Status(status)) => events.push(LinkEvent::Notice(status.text)),
-                Ok(WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_)) => {}
+                Ok(WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_) | WireEvent::Pointed) => {}
                 Err(RecvTimeoutError::Timeout) => break,
                 Err(RecvTimeoutError::Disconnected) => {
                     self.down = Some(link_ended());

@@ -10,6 +10,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use nalgebra::Point3;
+
 use super::protocol::rest::RestDetector;
 use super::protocol::{Failure, Identity, JointState, Protocol, ProtocolEvent, Shot, Status};
 use super::transport::{self, Stopwatch, Transport};
@@ -41,6 +43,8 @@ pub(super) enum WireEvent {
     Shot(Shot),
     /// The requested shot failed.
     Failed(Failure),
+    /// The instrument has turned to where it was sent.
+    Pointed,
     /// A measurement that was started at the instrument itself.
     Offered(Shot),
     /// A message for the operator.
@@ -61,6 +65,7 @@ pub(super) struct Latest {
 
 enum Command {
     Trigger,
+    Point(Point3<f64>),
     Cancel,
 }
 
@@ -131,6 +136,11 @@ impl Wire {
     /// Requests a shot; `false` if the thread has ended or its command queue is full.
     pub(super) fn trigger(&self) -> bool {
         self.commands.try_send(Command::Trigger).is_ok()
+    }
+
+    /// Turns the instrument to a place in its frame (m); `false` if the thread has ended or its command queue is full.
+    pub(super) fn point(&self, at: Point3<f64>) -> bool {
+        self.commands.try_send(Command::Point(at)).is_ok()
     }
 
     /// Cancels the shot in progress.
@@ -293,6 +303,12 @@ impl Worker {
         while let Ok(command) = self.received.try_recv() {
             match command {
                 Command::Trigger => self.protocol.trigger(self.clock.now()),
+                Command::Point(at) => {
+                    if !self.protocol.point(&at, self.clock.now()) {
+                        let failure = Failure::Refused("this instrument cannot be turned from here".to_owned());
+                        self.forward(ProtocolEvent::Failed(failure), was_ready)?;
+                    }
+                }
                 Command::Cancel => self.protocol.cancel(self.clock.now()),
             }
         }
@@ -346,6 +362,7 @@ impl Worker {
             }
             ProtocolEvent::Shot(shot) => WireEvent::Shot(shot),
             ProtocolEvent::Failed(failure) => WireEvent::Failed(failure),
+            ProtocolEvent::Pointed => WireEvent::Pointed,
             ProtocolEvent::Offered(shot) => WireEvent::Offered(shot),
             ProtocolEvent::Status(status) => WireEvent::Status(status),
             ProtocolEvent::Live(shot) => {
@@ -393,7 +410,7 @@ impl Worker {
             if self.is_stopped() {
                 return false;
             }
-            if let Ok(Command::Trigger) = self.received.recv_timeout(READ_TIMEOUT) {
+            if let Ok(Command::Trigger | Command::Point(_)) = self.received.recv_timeout(READ_TIMEOUT) {
                 let failure = Failure::Disconnected("the link is reconnecting".to_owned());
                 if !self.send_event(WireEvent::Failed(failure)) {
                     return false;

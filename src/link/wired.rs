@@ -26,6 +26,8 @@ const SHOT_ATTEMPTS: u32 = 3;
 const RETRY_PAUSE: Duration = Duration::from_secs(2);
 /// Pause before a retry with a simulated instrument.
 const SIMULATED_RETRY_PAUSE: Duration = Duration::from_millis(100);
+/// Longest wait until the instrument has turned to a place and has searched there.
+const TURN_TIMEOUT: Duration = Duration::from_secs(90);
 /// Longest wait until the robot is at rest.
 const REST_TIMEOUT: Duration = Duration::from_secs(20);
 /// Longest wait until a simulated robot is at rest.
@@ -70,6 +72,8 @@ pub struct Wired {
     /// Set for a simulated instrument.
     before_shot: Option<BeforeShot>,
     joints: JointRecord,
+    /// Whether the instrument has turned to where it was sent last.
+    has_pointed: bool,
 }
 
 /// Joint values of the measurement in progress.
@@ -163,6 +167,7 @@ impl Wired {
             previous_point: None,
             before_shot: None,
             joints: JointRecord::default(),
+            has_pointed: false,
         }
     }
 
@@ -197,7 +202,7 @@ impl Wired {
                         self.robot_down = Some(failure);
                     }
                     WireEvent::Status(status) => self.events.push(LinkEvent::Notice(format!("robot: {}", status.text))),
-                    WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_) => {}
+                    WireEvent::Shot(_) | WireEvent::Failed(_) | WireEvent::Offered(_) | WireEvent::Pointed => {}
                 }
             }
             for (at, state) in robot.take_joints() {
@@ -236,6 +241,10 @@ impl Wired {
                 }
                 WireEvent::Shot(shot) => return Some(Ok(shot)),
                 WireEvent::Failed(failure) => return Some(Err(failure)),
+                WireEvent::Pointed => {
+                    self.has_pointed = true;
+                    return None;
+                }
                 WireEvent::Offered(_) => {
                     let text = "a measurement triggered at the instrument itself was ignored".to_owned();
                     self.events.push(LinkEvent::Notice(text));
@@ -247,6 +256,38 @@ impl Wired {
             }
         }
         None
+    }
+
+    /// Turns the instrument to a place in its own frame (m) and waits until it has found the reflector there.
+    ///
+    /// # Errors
+    /// The instrument cannot be turned, or it has found nothing.
+    fn turn(&mut self, at: Point3<f64>, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        drop(self.drain(Duration::ZERO));
+        self.check_up()?;
+        self.has_pointed = false;
+        if !self.instrument.point(at) {
+            let text = "the link does not accept commands".to_owned();
+            return Err(LinkError::Instrument(Failure::Disconnected(text)));
+        }
+        let until = self.instrument.now() + TURN_TIMEOUT;
+        loop {
+            if let Some(Err(failure)) = self.drain(POLL_INTERVAL) {
+                return Err(LinkError::Instrument(failure));
+            }
+            if self.has_pointed {
+                return Ok(());
+            }
+            if !keep_going() {
+                self.instrument.cancel();
+                return Err(LinkError::Cancelled);
+            }
+            if self.instrument.now() > until {
+                self.instrument.cancel();
+                let seconds = TURN_TIMEOUT.as_secs_f64();
+                return Err(LinkError::Instrument(Failure::Silent { what: "turning to the SMR".to_owned(), seconds }));
+            }
+        }
     }
 
     /// Waits for `time`; fails if it is cancelled or the link is lost.
@@ -457,6 +498,10 @@ impl Link for Wired {
         let of_robot = self.joints.watch.remarks().iter().map(|text| format!("robot: {text}"));
         reading.remarks.extend(of_robot.map(|text| Remark { text, is_warning: false }));
         Ok(reading)
+    }
+
+    fn point(&mut self, at: Point3<f64>, keep_going: &dyn Fn() -> bool) -> Result<(), LinkError> {
+        self.turn(at, keep_going)
     }
 
     fn watch(&mut self, wait: Duration) -> Option<(LiveReading, Vec<LinkEvent>)> {

@@ -17,7 +17,7 @@ use super::store_thread::{Command, StoreThread};
 use crate::link::RawLog;
 use crate::recording::{self, Live, Recorder, RecordingEvent};
 use crate::session::advice::Advice;
-use crate::session::journal::{Journal, Line};
+use crate::session::journal::{Journal, Line, from_xyz_mm};
 use crate::session::set_up::Step;
 use crate::session::state::Session;
 use crate::store::session::SessionFolder;
@@ -355,6 +355,7 @@ impl Engine {
         let is_started = match request {
             Request::Connect { instrument, profile } => self.link.connect(id, instrument, profile, flag),
             Request::Measure(request) => self.link.measure(id, request, flag),
+            Request::Turn { at_mm } => self.link.turn(id, from_xyz_mm(at_mm), flag),
             Request::Deliver { files, left_out } => self.store.ask(Command::Replace { id, files, left_out }),
             request => jobs::start(id, request, flag, self.sender.clone()),
         };

@@ -62,7 +62,9 @@ impl Job {
             Request::Identify(request) => self.identify(&request),
             Request::Model(request) => Ok(Answer::Modelled(Box::new(procedure::models::models(&request)))),
             // Other threads carry these out.
-            Request::Connect { .. } | Request::Measure(_) | Request::Deliver { .. } => Ok(Answer::Cancelled),
+            Request::Connect { .. } | Request::Measure(_) | Request::Turn { .. } | Request::Deliver { .. } => {
+                Ok(Answer::Cancelled)
+            }
         };
         match answer {
             Ok(answer) if is_search || !self.is_cancelled() => answer,

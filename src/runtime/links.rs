@@ -10,6 +10,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
+use nalgebra::Point3;
+
 use super::events::Events;
 use crate::link::{Link, LinkError, LinkEvent, RawLog, Rehearsal, Replay, SimulatedCell, Wired};
 use crate::profile::Profile;
@@ -31,6 +33,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(100);
 enum Command {
     Connect { id: RequestId, instrument: InstrumentChoice, profile: Box<Profile>, cancelled: Arc<AtomicBool> },
     Measure { id: RequestId, request: MeasureRequest, cancelled: Arc<AtomicBool> },
+    Turn { id: RequestId, at: Point3<f64>, cancelled: Arc<AtomicBool> },
 }
 
 /// The channel of the link thread. The thread ends with it; the engine does not wait for an instrument that does not answer.
@@ -57,6 +60,11 @@ impl LinkThread {
         self.commands.try_send(Command::Connect { id, instrument, profile, cancelled }).is_ok()
     }
 
+    /// Turns the instrument to a place in its own frame (m).
+    pub(super) fn turn(&self, id: RequestId, at: Point3<f64>, cancelled: Arc<AtomicBool>) -> bool {
+        self.commands.try_send(Command::Turn { id, at, cancelled }).is_ok()
+    }
+
     pub(super) fn measure(&self, id: RequestId, request: MeasureRequest, cancelled: Arc<AtomicBool>) -> bool {
         self.commands.try_send(Command::Measure { id, request, cancelled }).is_ok()
     }
@@ -78,6 +86,16 @@ fn work(commands: &Receiver<Command>, events: &Events, log: Option<&RawLog>) {
                     Err(LinkError::Cancelled) => (id, Answer::Cancelled),
                     Err(error) => (id, failed(&error)),
                 }
+            }
+            Command::Turn { id, at, cancelled } => {
+                let keep_going = || !cancelled.load(Ordering::Relaxed);
+                let answer = match link.as_mut().map(|link| link.point(at, &keep_going)) {
+                    Some(Ok(())) => Answer::Turned,
+                    Some(Err(LinkError::Cancelled)) => Answer::Cancelled,
+                    Some(Err(error)) => failed(&error),
+                    None => failed(&LinkError::SetUp("no instrument is connected".to_owned())),
+                };
+                (id, answer)
             }
             Command::Measure { id, request, cancelled } => {
                 let live_poll = link.as_ref().and_then(|link| link.live_poll());

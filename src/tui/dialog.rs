@@ -294,6 +294,11 @@ fn choose_pose(view: &ViewModel) -> Option<Dialog> {
 fn confirm(intent: &Intent, info: &IntentInfo, view: &ViewModel) -> Option<Dialog> {
     let lines = match info.danger {
         Danger::None => return None,
+        Danger::Turns => vec![
+            format!("{}?", capitalised(&info.label)),
+            "Its head moves, searches there and locks. Nobody may look into the beam, and nothing may be in its way."
+                .to_owned(),
+        ],
         Danger::DropsData => vec![
             format!("{}?", capitalised(&info.label)),
             "It will no longer count. It stays in the journal; nothing is deleted.".to_owned(),

@@ -106,7 +106,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 pub const BELL: Key = Key::ctrl('b');
 
 /// The table. Of several bindings with the same key, the first one whose intent is possible applies.
-const BINDINGS: [Binding; 56] = [
+const BINDINGS: [Binding; 57] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Target::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Target::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -150,6 +150,7 @@ const BINDINGS: [Binding; 56] = [
     offer('x', 3, |intent| matches!(intent, Intent::LeaveOut)),
     offer('r', 3, |intent| matches!(intent, Intent::MeasureAgain)),
     offer('c', 3, |intent| matches!(intent, Intent::ApplyRemedy)),
+    offer('l', 6, |intent| matches!(intent, Intent::TurnTracker)),
     offer('s', 5, |intent| matches!(intent, Intent::Skip)),
     offer('h', 4, |intent| matches!(intent, Intent::ThroughHome)),
     offer('u', 5, |intent| matches!(intent, Intent::Undo)),

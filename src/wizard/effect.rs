@@ -95,6 +95,8 @@ pub enum Answer {
         recorded: Vec<PlannedPose>,
     },
     Measured(Reading),
+    /// The instrument has turned to where it was sent, and has found the reflector.
+    Turned,
     /// Poses to measure.
     Planned {
         /// Figures of the plan; `None` for a plan from a file.
@@ -180,6 +182,10 @@ pub enum Request {
         profile: Box<Profile>,
     },
     Measure(MeasureRequest),
+    /// Turn the instrument to a place in its own frame.
+    Turn {
+        at_mm: (f64, f64, f64),
+    },
     Plan {
         /// Profile with the target as chosen.
         profile: Box<Profile>,
@@ -225,6 +231,7 @@ impl Request {
             Self::LoadProfile { .. } => "reading the profile",
             Self::Connect { .. } => "connecting",
             Self::Measure(_) => "measuring",
+            Self::Turn { .. } => "turning the tracker",
             Self::Plan { .. } => "choosing poses",
             Self::LoadPlan { .. } => "reading the plan",
             Self::Program { .. } => "writing the robot program",

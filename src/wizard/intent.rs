@@ -91,6 +91,8 @@ pub enum Intent {
     Passed,
     /// Go through home to the pose shown.
     ThroughHome,
+    /// Turn the tracker to where the SMR is at the pose shown.
+    TurnTracker,
     /// Skip the pose shown.
     Skip,
     /// Undo the last sample.
@@ -154,6 +156,7 @@ impl Intent {
             Self::ApplyRemedy => "ApplyRemedy",
             Self::Passed => "Passed",
             Self::ThroughHome => "ThroughHome",
+            Self::TurnTracker => "TurnTracker",
             Self::Skip => "Skip",
             Self::Undo => "Undo",
             Self::GoToPose(_) => "GoToPose",
@@ -196,6 +199,8 @@ pub enum Danger {
     None,
     /// Removes a sample from the result; it stays in the journal.
     DropsData,
+    /// Moves the head of the tracker.
+    Turns,
     /// Ends the program.
     Leaves,
 }

@@ -112,6 +112,11 @@ impl WireProtocol {
         }
     }
 
+    /// Whether the instrument can be turned to a place by this protocol.
+    pub const fn can_be_turned(self) -> bool {
+        matches!(self, Self::Emscon | Self::Geocom)
+    }
+
     /// Number of joints that the controller reports, whatever the arm; `None` if it reports those of the arm.
     pub const fn reported_joints(self) -> Option<usize> {
         match self {

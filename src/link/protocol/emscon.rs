@@ -22,6 +22,8 @@ mod tests;
 
 use std::time::Duration;
 
+use nalgebra::Point3;
+
 pub use command::{Command, SystemSettings, Units};
 pub use packet::{Fields, Framer, MAX_PACKET, MIN_PACKET, Packet, PacketError, Reply, SingleResult, f64_at, i32_at};
 pub use status::{
@@ -108,6 +110,11 @@ impl Protocol for Emscon {
 
     fn trigger(&mut self, now: Moment) {
         self.conversation.trigger(now);
+    }
+
+    fn point(&mut self, at: &Point3<f64>, now: Moment) -> bool {
+        self.conversation.point(at, now);
+        true
     }
 
     fn cancel(&mut self, now: Moment) {

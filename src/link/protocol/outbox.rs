@@ -68,7 +68,11 @@ impl Outbox {
                     |other| matches!(other, ProtocolEvent::Status(status) if status.severity == severity),
                 );
             }
-            ProtocolEvent::Ready(_) | ProtocolEvent::Shot(_) | ProtocolEvent::Failed(_) | ProtocolEvent::Lost(_) => {}
+            ProtocolEvent::Ready(_)
+            | ProtocolEvent::Shot(_)
+            | ProtocolEvent::Failed(_)
+            | ProtocolEvent::Pointed
+            | ProtocolEvent::Lost(_) => {}
         }
         self.events.push_back(event);
     }

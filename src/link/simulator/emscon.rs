@@ -15,18 +15,24 @@ use std::time::Duration;
 
 pub use fault::EmsconFault;
 
+use nalgebra::Point3;
+
 use self::tracker::Tracker;
 use self::wire::PacketWriter;
 use super::fault::{FaultPlan, Planned};
 use super::writes::Writes;
 use super::{Output, PointSource, Simulator};
 use crate::link::protocol::Moment;
+use crate::link::protocol::emscon::f64_at;
 use crate::link::protocol::emscon::{
     CommandId, CoordinateType, Framer, LaserStatus, ProcessorStatus, ResultStatus, SystemEvent, TrackerStatus, i32_at,
 };
 
 /// Interval of the reflector positions.
 const POSITION_INTERVAL: Duration = Duration::from_millis(300);
+
+/// Radius in which a turned tracker finds the reflector (m).
+const SEARCH: f64 = 0.3;
 
 /// Duration of the initialisation.
 const INITIALIZATION: Duration = Duration::from_secs(20);
@@ -107,6 +113,7 @@ impl EmsconSimulator {
             }
             CommandId::Initialize => self.work = Some((Work::Initialize, now + INITIALIZATION)),
             CommandId::StartMeasurement => self.start(source, now),
+            CommandId::GoPosition => self.go(request, source),
             CommandId::StopMeasurement => {
                 self.work = self.work.filter(|(work, _)| *work != Work::Measure);
                 self.send(PacketWriter::reply(command, ResultStatus::AllOk).finish());
@@ -184,6 +191,15 @@ impl EmsconSimulator {
         if self.is_instant {
             self.finish(Work::Measure, source);
         }
+    }
+
+    /// Turns to a place, where the reflector is found if it is near.
+    fn go(&mut self, request: &[u8], source: &mut dyn PointSource) {
+        let coordinate = |index: usize| f64_at(request, 12 + 8 * index) / 1000.0;
+        let place = Point3::new(coordinate(0), coordinate(1), coordinate(2));
+        let is_near = source.position().is_some_and(|shot| (shot.point - place).norm() < SEARCH);
+        let status = if is_near { ResultStatus::AllOk } else { ResultStatus::NoDistanceSet };
+        self.send(PacketWriter::reply(CommandId::GoPosition, status).finish());
     }
 
     fn finish(&mut self, work: Work, source: &mut dyn PointSource) {

@@ -3,6 +3,8 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
+use nalgebra::Vector3;
+
 use super::Output;
 use super::PointSource;
 use super::Simulator;
@@ -16,6 +18,9 @@ use crate::link::protocol::geocom::encode_reply;
 
 /// Duration of a measurement.
 const MEASURING: Duration = Duration::from_millis(1500);
+
+/// Angle in which a turned instrument finds the prism (rad).
+const SEARCH: f64 = 0.1;
 
 /// Time from any other request to its answer.
 const ANSWERING: Duration = Duration::from_millis(30);
@@ -144,7 +149,10 @@ impl GeocomSimulator {
         if matches!(request.rpc, 17017 | 2108 | 2082 | 2116) {
             return self.measure(&request, with_crc, source, now);
         }
-        let (transport, code, parameters) = self.ordinary(&request);
+        let (transport, code, parameters) = match request.rpc {
+            9027 => (0, turned(&request.parameters, source), String::new()),
+            _ => self.ordinary(&request),
+        };
         let answer = encode_reply(transport, self.number(&request), code, &parameters, with_crc);
         self.send(now + ANSWERING, ended(&answer));
     }
@@ -322,6 +330,14 @@ fn polar(shot: &Shot) -> [f64; 3] {
     let horizontal = point.x.atan2(point.y).rem_euclid(TAU);
     let zenith = point.x.hypot(point.y).atan2(point.z);
     [horizontal, zenith, point.norm()]
+}
+
+/// Return code of a turn: the prism is found where it is near the direction.
+fn turned(parameters: &str, source: &mut dyn PointSource) -> u32 {
+    let angles: Vec<f64> = parameters.split(',').filter_map(|text| text.trim().parse().ok()).collect();
+    let (&[horizontal, zenith, ..], Some(shot)) = (angles.as_slice(), source.position()) else { return 8710 };
+    let direction = Vector3::new(zenith.sin() * horizontal.sin(), zenith.sin() * horizontal.cos(), zenith.cos());
+    if direction.angle(&shot.point.coords) < SEARCH { 0 } else { 8710 }
 }
 
 impl Simulator for GeocomSimulator {

@@ -441,3 +441,21 @@ fn who_takes_the_connection_and_says_nothing_is_perhaps_another_device() {
     assert!(failure.hint().contains("the port"), "{}", failure.hint());
     drop(listener);
 }
+
+#[test]
+fn instruments_with_motors_turn_to_the_reflector_and_say_where_there_is_none() {
+    for protocol in [WireProtocol::Emscon, WireProtocol::Geocom] {
+        let mut bench = Bench::tcp(protocol, &[]);
+        bench.wired.connect().unwrap();
+        let there = Stage::point(bench.stage.shots());
+        bench.wired.point(there, &|| true).unwrap();
+        let error = bench.wired.point(Point3::new(-1.0, 0.5, 0.4), &|| true).unwrap_err();
+        assert!(matches!(&error, LinkError::Instrument(_)), "{protocol}: {error:?}");
+        // It measures as before.
+        bench.measure().unwrap();
+    }
+    let mut bench = Bench::tcp(WireProtocol::Ascii, &[]);
+    bench.wired.connect().unwrap();
+    let error = bench.wired.point(Stage::point(0), &|| true).unwrap_err();
+    assert!(error.to_string().contains("cannot be turned"), "{error}");
+}

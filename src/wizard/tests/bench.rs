@@ -131,6 +131,7 @@ pub(super) fn answer(request: &Request) -> Answer {
             Answer::Connected { identity: "bench instrument".to_owned(), warnings: Vec::new(), recorded }
         }
         Request::Measure(request) => Answer::Measured(reading(request)),
+        Request::Turn { .. } => Answer::Turned,
         Request::Plan { request, .. } if request.included.is_empty() => {
             Answer::Planned { summary: None, rows: plan(), origin: "the plan of the bench".to_owned() }
         }

@@ -2,11 +2,11 @@
 
 use super::bench::{Bench, MANUAL, blocked, offers, started};
 use crate::profile::{BoxText, Profile};
-use crate::session::journal::Entry;
-use crate::session::set_up::{FacePair, JointLimitsText, ProgramText, Step, TrackerPoints};
+use crate::session::journal::{Entry, from_xyz_mm};
+use crate::session::set_up::{FacePair, InstrumentChoice, JointLimitsText, ProgramText, Step, TrackerPoints};
 use crate::session::wire::{KnownLinks, LinkChoice, SerialPortName};
 use crate::wizard::view::Content;
-use crate::wizard::{Event, Intent, Request};
+use crate::wizard::{Danger, Event, Intent, Request};
 
 fn program(dialect: &str) -> ProgramText {
     ProgramText { dialect: dialect.to_owned(), dwell_s: Some(6.0), speed_percent: 10.0 }
@@ -164,4 +164,31 @@ fn known_links_are_shown_in_the_instrument_step() {
     assert!(bench.wizard.update(Event::Links(known.clone())).is_empty());
     let Content::Instrument(view) = bench.wizard.view().content else { panic!() };
     assert_eq!(view.known, known);
+}
+
+#[test]
+fn the_tracker_is_turned_only_once_its_place_is_known_and_after_a_word() {
+    let choice = LinkChoice { address: "emscon:10.0.0.2".to_owned(), ..LinkChoice::default() };
+    let linked = InstrumentChoice::Linked(choice);
+    let mut bench = Bench::with(&linked, Step::Capture);
+    assert!(blocked(&bench.wizard, "TurnTracker").contains("after 4 measured poses"));
+    bench.measure(4);
+    let offer = bench.wizard.intents().into_iter().find(|info| info.intent == Intent::TurnTracker).unwrap();
+    assert_eq!(offer.danger, Danger::Turns);
+    if let Some(reason) = &offer.blocked {
+        assert!(reason.contains("at most 60 deg"), "{reason}");
+        return;
+    }
+    assert!(!offer.is_default, "turning by hand stays the usual way");
+    let effects = bench.intend(Intent::TurnTracker);
+    let (_, Request::Turn { at_mm }) = started(&effects) else { panic!("{effects:?}") };
+    let next = bench.capture().row.unwrap();
+    let there = super::bench::seen_at(&bench.wizard.session().rows[next].planned.configuration);
+    let off = (from_xyz_mm(at_mm) - there).norm();
+    assert!(off < 1e-3, "{off}");
+    bench.settle(effects);
+    assert!(bench.told().contains("has found the SMR"), "{}", bench.told());
+    // A typed instrument has no motors.
+    let typed = Bench::with(&MANUAL, Step::Capture);
+    assert!(!offers(&typed.wizard).iter().any(|offer| offer.starts_with("TurnTracker")));
 }

@@ -1,6 +1,11 @@
 //! Commands to the tracker.
 
+use nalgebra::Point3;
+
 use super::status::{CommandId, CoordinateType, LengthUnit, MeasurementMode, PacketType};
+
+/// Units of length on the wire.
+const MM_PER_METRE: f64 = 1000.0;
 
 /// Units that are set at the tracker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,6 +178,12 @@ impl Command {
     /// Sets the system settings.
     pub fn set_system_settings(settings: SystemSettings) -> Self {
         Self::with(CommandId::SetSystemSettings, &settings.numbers())
+    }
+
+    /// Turns to a place (m; the units set are mm) and searches for the reflector there.
+    pub fn go_position(at: &Point3<f64>, use_adm: bool) -> Self {
+        let place = at.coords.iter().flat_map(|value| (value * MM_PER_METRE).to_le_bytes());
+        Self { id: CommandId::GoPosition, body: place.chain(i32::from(use_adm).to_le_bytes()).collect() }
     }
 
     /// The command as bytes.

@@ -3,6 +3,8 @@
 
 use std::time::Duration;
 
+use nalgebra::Point3;
+
 use super::super::excerpt::excerpt;
 use super::super::outbox::Outbox;
 use super::super::{Failure, Moment, ProtocolEvent, Severity};
@@ -36,6 +38,8 @@ enum Phase {
     Starting,
     /// Shot: waiting for the result.
     Waiting { since: Moment, until: Moment },
+    /// Turning to where it was sent.
+    Turning,
     /// The shot was cancelled; its results are discarded until the stop command is answered.
     Stopping,
 }
@@ -153,14 +157,25 @@ impl Conversation {
             Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {
                 self.fail(too_early("a measurement is in progress"));
             }
+            Phase::Turning => self.fail(too_early("the tracker is turning")),
             Phase::Stopping => self.fail(too_early("the previous measurement is being stopped")),
+        }
+    }
+
+    /// Turns the tracker to a place (m), where it searches for the reflector.
+    pub(super) fn point(&mut self, at: &Point3<f64>, now: Moment) {
+        if self.phase == Phase::Idle {
+            self.phase = Phase::Turning;
+            self.send(Command::go_position(at, self.options.use_adm), now);
+        } else {
+            self.fail(Failure::TooEarly("the tracker is busy or not set up".to_owned()));
         }
     }
 
     /// Cancels the shot in progress.
     pub(super) fn cancel(&mut self, now: Moment) {
         match self.phase {
-            Phase::Asking => self.phase = Phase::Idle,
+            Phase::Asking | Phase::Turning => self.phase = Phase::Idle,
             Phase::Starting | Phase::Waiting { .. } => self.stop(now),
             Phase::Off | Phase::Settling | Phase::Idle | Phase::Stopping => {}
         }
@@ -173,7 +188,7 @@ impl Conversation {
             Phase::Off => None,
             Phase::Waiting { until, .. } => Some(exchange.map_or(until, |deadline| deadline.min(until))),
             Phase::Idle => exchange.or_else(|| Some(self.keep_alive_at())),
-            Phase::Settling | Phase::Asking | Phase::Starting | Phase::Stopping => exchange,
+            Phase::Settling | Phase::Asking | Phase::Starting | Phase::Turning | Phase::Stopping => exchange,
         }
     }
 
@@ -239,6 +254,14 @@ impl Conversation {
                 self.fail(status.failure("starting the measurement"));
                 self.settle_or_idle(now);
             }
+            Phase::Turning => {
+                if status == ResultStatus::AllOk {
+                    self.outbox.push(ProtocolEvent::Pointed);
+                } else {
+                    self.fail(status.failure("turning to the SMR"));
+                }
+                self.settle_or_idle(now);
+            }
             Phase::Stopping => self.settle_or_idle(now),
         }
     }
@@ -294,7 +317,7 @@ impl Conversation {
                     .report(Severity::Warning, "ignored a point that arrived while the settings were being checked");
                 return;
             }
-            Phase::Idle | Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {}
+            Phase::Idle | Phase::Asking | Phase::Starting | Phase::Turning | Phase::Waiting { .. } => {}
         }
         let is_requested = matches!(self.phase, Phase::Waiting { .. });
         let checked = shot_of(result, &self.options, self.face);
@@ -370,7 +393,7 @@ impl Conversation {
                 self.is_dirty |= !self.set_up.will_read(event);
                 return;
             }
-            Phase::Idle | Phase::Stopping => {}
+            Phase::Idle | Phase::Turning | Phase::Stopping => {}
             Phase::Asking | Phase::Starting | Phase::Waiting { .. } => {
                 self.fail(Failure::Settings(format!("{} while a point was being measured", event.words())));
             }
@@ -379,7 +402,7 @@ impl Conversation {
         match self.phase {
             Phase::Starting | Phase::Waiting { .. } => self.stop(now),
             Phase::Idle | Phase::Asking => self.settle_or_idle(now),
-            Phase::Off | Phase::Settling | Phase::Stopping => {}
+            Phase::Off | Phase::Settling | Phase::Turning | Phase::Stopping => {}
         }
     }
 
@@ -461,7 +484,7 @@ impl Conversation {
     }
 
     fn lose(&mut self, failure: Failure) {
-        if matches!(self.phase, Phase::Asking | Phase::Starting | Phase::Waiting { .. }) {
+        if matches!(self.phase, Phase::Asking | Phase::Starting | Phase::Turning | Phase::Waiting { .. }) {
             self.fail(failure.clone());
         }
         self.phase = Phase::Off;

@@ -93,7 +93,7 @@ impl Exchange {
 /// Time limit of a command.
 pub(super) const fn time_limit(command: CommandId) -> Duration {
     match command {
-        CommandId::Initialize => INITIALIZE,
+        CommandId::Initialize | CommandId::GoPosition => INITIALIZE,
         _ => ORDINARY,
     }
 }

@@ -93,6 +93,7 @@ numbers! {
         48 GetSystemSettings "reading the system settings",
         49 StartMeasurement "measuring",
         52 StopMeasurement "stopping the measurement",
+        55 GoPosition "turning to the SMR",
         80 SetStatisticMode "setting the kind of statistics",
         81 GetStatisticMode "reading the kind of statistics",
     }

@@ -60,6 +60,9 @@ const POSSIBLE_AIR: std::ops::RangeInclusive<f64> = -70.0..=150.0;
 /// Corrections above this are far from the standard atmosphere of the instruments (ppm).
 const SUSPICIOUS_AIR: f64 = 25.0;
 
+/// Longest time to turn to a place and to search there.
+const TURNING: Duration = Duration::from_secs(60);
+
 /// Note on the accuracy of total stations.
 const ACCURACY: &str = "total stations measure to about 0.5 to 1 mm per point: good for a coarse placement of the base, \
                         not for a full calibration (see the data sheet)";
@@ -101,6 +104,8 @@ enum Phase {
     Measuring {
         steps: Vec<Call>,
     },
+    /// Turning to where it was sent.
+    Turning,
 }
 
 /// What follows when the instrument answers again.
@@ -196,6 +201,7 @@ impl GeocomProtocol {
             Phase::Idle { since } => self.phase = Phase::Idle { since },
             Phase::KeepAlive { is_wanted } => self.handle_keep_alive(&outcome, is_wanted, now),
             Phase::Measuring { steps } => self.handle_measured(outcome, steps, now),
+            Phase::Turning => self.handle_turned(&outcome, now),
         }
     }
 
@@ -295,6 +301,18 @@ impl GeocomProtocol {
             // Another program has changed a setting of the set-up, which sets it again.
             Err(failure @ Failure::Settings(_)) if reply.code == OK => self.lose(failure),
             Err(failure) => self.outbox.fail(failure),
+        }
+    }
+
+    fn handle_turned(&mut self, outcome: &Outcome, now: Moment) {
+        self.phase = Phase::Idle { since: now };
+        match outcome {
+            Outcome::Reply(_, reply) if reply.code == OK => self.outbox.push(ProtocolEvent::Pointed),
+            Outcome::Reply(..) | Outcome::Busy(_) => self.outbox.fail(failure_of_outcome(outcome, TURNING)),
+            other => {
+                self.outbox.fail(failure_of_outcome(other, TURNING));
+                self.wake(now, WAKE_LIMIT, AfterWaking::Idle);
+            }
         }
     }
 
@@ -598,6 +616,7 @@ impl Protocol for GeocomProtocol {
             Phase::Closed | Phase::Waking { .. } | Phase::SetUp { .. } => {
                 Failure::TooEarly("the set-up is not complete".to_owned())
             }
+            Phase::Turning => Failure::TooEarly("the instrument is turning".to_owned()),
             Phase::KeepAlive { .. } | Phase::Measuring { .. } => {
                 Failure::TooEarly("another shot is in progress".to_owned())
             }
@@ -605,8 +624,23 @@ impl Protocol for GeocomProtocol {
         self.outbox.fail(failure);
     }
 
+    fn point(&mut self, at: &Point3<f64>, now: Moment) -> bool {
+        if !matches!(self.phase, Phase::Idle { .. }) {
+            self.outbox.fail(Failure::TooEarly("the instrument is busy or not set up".to_owned()));
+            return true;
+        }
+        let horizontal = at.x.atan2(at.y).rem_euclid(TAU);
+        let zenith = (at.z / at.coords.norm().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0).acos();
+        // Precise, with search of the target; the last parameter is reserved.
+        let parameters = format!("{horizontal:.9},{zenith:.9},0,1,0");
+        self.phase = Phase::Turning;
+        self.ask(Call { rpc: 9027, parameters, limit: TURNING, what: "turning to the prism" }, now);
+        true
+    }
+
     fn cancel(&mut self, now: Moment) {
         match &mut self.phase {
+            Phase::Turning => self.wake(now, TURNING, AfterWaking::Idle),
             Phase::KeepAlive { is_wanted } => *is_wanted = false,
             Phase::Measuring { .. } => {
                 // The instrument answers nothing else until it has finished the measurement.
