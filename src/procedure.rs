@@ -18,6 +18,7 @@ pub mod health;
 pub mod identify;
 mod intervals;
 pub mod iso9283;
+pub mod joint_check;
 mod joint_errors;
 pub mod known;
 pub mod measured_arm;

@@ -38,7 +38,10 @@ use std::collections::VecDeque;
 
 use jiff::Timestamp;
 
-pub use effect::{Answer, CircleConfigurations, Effect, Event, Request, RequestId, RequestProgress, StoreEvent};
+pub use effect::{
+    Answer, CircleConfigurations, Effect, Event, JointCheckStop, NamedPoint, Request, RequestId, RequestProgress,
+    StoreEvent,
+};
 pub use intent::{Danger, Intent, IntentInfo, PlanSettings};
 pub use notice::{Notice, Problem, Severity};
 pub use view::ViewModel;
@@ -415,7 +418,7 @@ impl Wizard {
             }
             Err(intent) => intent,
         };
-        if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo) {
+        if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo | Intent::Redo) {
             self.live.hold_until_moved();
         }
         let (phase, cx) = self.phase_and_cx();

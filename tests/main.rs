@@ -27,6 +27,7 @@ mod gravity;
 mod health;
 mod inverse;
 mod iso9283;
+mod joint_check;
 mod joint_errors;
 mod kinematics;
 mod lines;

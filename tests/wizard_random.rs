@@ -26,8 +26,8 @@ use trupose::session::simulation::Simulation;
 use trupose::session::state::Session;
 use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
 use trupose::wizard::{
-    Answer, CircleConfigurations, Effect, Event, Intent, PlanSettings, Problem, Request, RequestId, RequestProgress,
-    StoreEvent, Wizard,
+    Answer, CircleConfigurations, Effect, Event, Intent, JointCheckStop, NamedPoint, PlanSettings, Problem, Request,
+    RequestId, RequestProgress, StoreEvent, Wizard,
 };
 
 /// Streams of events, where `TRUPOSE_WIZARD_SEEDS` does not ask for more.
@@ -188,6 +188,16 @@ impl Cell {
             Intent::GoToPose(_) if self.chance(80) => Intent::GoToPose(self.rng.random_range(0..40).to_string()),
             Intent::GoToPose(_) => Intent::GoToPose(self.text()),
             Intent::Note(_) => Intent::Note(self.text()),
+            Intent::NotePose { .. } => {
+                Intent::NotePose { pose: self.rng.random_range(0..20).to_string(), text: self.text() }
+            }
+            Intent::Exclude(_) => Intent::Exclude(self.rng.random_range(0..20).to_string()),
+            Intent::Include(_) => Intent::Include(self.rng.random_range(0..20).to_string()),
+            Intent::ReadPoints(_) => Intent::ReadPoints(self.text()),
+            Intent::ShowPoints(_) => {
+                let lines: Vec<String> = (0..self.pick(4)).map(|_| self.coordinates()).collect();
+                Intent::ShowPoints(lines.join("\n"))
+            }
             Intent::About(_) => Intent::About(Box::new(About {
                 serial: self.text(),
                 operator: self.text(),
@@ -261,6 +271,23 @@ impl Cell {
             }
             Request::Program { .. } => {
                 Answer::Programmed { files: vec![("calposes.src".to_owned(), self.text())], dangers: Vec::new() }
+            }
+            Request::PlanJointCheck { profile } => {
+                let joints = profile.chain().dof();
+                let mut configuration = vec![0.3; joints];
+                let mut stops = vec![JointCheckStop { joint: None, configuration: configuration.clone() }];
+                for joint in 0..joints {
+                    configuration[joint] += 10.0 * DEGREE;
+                    stops.push(JointCheckStop { joint: Some(joint), configuration: configuration.clone() });
+                }
+                Answer::JointCheckPlanned(stops)
+            }
+            Request::ReadPoints { file, .. } => {
+                let point = |_| NamedPoint {
+                    name: self.chance(50).then(|| self.rng.random_range(0..20).to_string()),
+                    point: Point3::new(1.0, 2.0, self.rng.random_range(0.0..3.0)),
+                };
+                Answer::Points { file: file.clone(), points: (0..3).map(point).collect() }
             }
             Request::Identify(request) => match identify(request, &mut |_| ControlFlow::Continue(())) {
                 Ok(identified) => Answer::Identified(Box::new(identified)),
@@ -436,9 +463,10 @@ impl Cell {
 fn every_intent() -> Vec<Intent> {
     use Intent::{
         About, AcceptPlan, AcceptReading, ApplyRemedy, Back, Cancel, ChooseInstrument, ChooseProfile, ChooseTarget,
-        Deliver, DiscardCircles, Dismiss, GoToPose, Identify, Keep, LeaveOut, LoadPlan, MakePlan, Measure,
-        MeasureAgain, NameSession, Next, Note, PlanFromRecording, Quit, Retry, Skip, StartCircles, SuggestPoses,
-        TypeReading, Undo, UseCircles,
+        Deliver, DiscardCircles, DiscardJointCheck, Dismiss, DropPoints, Exclude, GoToPose, Identify, Include, Keep,
+        LeaveOut, LoadPlan, MakePlan, Measure, MeasureAgain, NameSession, Next, Note, NotePose, PlanFromRecording,
+        Quit, ReadPoints, Redo, Retry, ShowPoints, Skip, StartCircles, StartJointCheck, SuggestPoses, TakeAllPoints,
+        TakePoints, TypeReading, Undo, UseCircles,
     };
     vec![
         Next,
@@ -467,6 +495,17 @@ fn every_intent() -> Vec<Intent> {
         ApplyRemedy,
         Skip,
         Undo,
+        Redo,
+        Exclude(String::new()),
+        Include(String::new()),
+        ReadPoints(String::new()),
+        ShowPoints(String::new()),
+        TakePoints,
+        TakeAllPoints,
+        DropPoints,
+        StartJointCheck,
+        DiscardJointCheck,
+        NotePose { pose: String::new(), text: String::new() },
         GoToPose(String::new()),
         Note(String::new()),
         SuggestPoses(1),

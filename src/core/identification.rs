@@ -54,6 +54,7 @@ pub mod circle_point;
 mod error;
 mod factor;
 mod feature;
+pub mod joint_check;
 mod lengths;
 mod linearise;
 mod mistake;

@@ -140,6 +140,17 @@ impl SimulatedCell {
                         *value += quantity.from_edge(by);
                     }
                 }
+                FaultKind::JointUnit { joint, factor } => {
+                    if let Some(value) = here.get_mut(joint) {
+                        *value *= factor;
+                    }
+                }
+                FaultKind::JointCoupling { joint, with, factor } => {
+                    let other = here.get(with).copied().unwrap_or(0.0);
+                    if let Some(value) = here.get_mut(joint) {
+                        *value += factor * other;
+                    }
+                }
                 FaultKind::JointSign { joint } => {
                     if let Some(value) = here.get_mut(joint) {
                         *value = -*value;
@@ -250,7 +261,8 @@ const fn default_reach(joint_type: JointType) -> f64 {
 /// Checks that the arm has the joint of a fault.
 fn check_fault(fault: &Fault, profile: &Profile) -> Result<(), LinkError> {
     let (joint, quantity) = match fault.kind {
-        FaultKind::JointSign { joint } => (joint, None),
+        FaultKind::JointSign { joint } | FaultKind::JointUnit { joint, .. } => (joint, None),
+        FaultKind::JointCoupling { joint, with, .. } => (joint.max(with), None),
         FaultKind::MistypedJoint { joint, quantity, .. } => (joint, Some(quantity)),
         _ => return Ok(()),
     };

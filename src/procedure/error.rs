@@ -60,6 +60,9 @@ pub enum ProcedureError {
     /// Circles that would all end in a collision.
     #[error("the arm cannot turn its last two joints far enough anywhere in its cell without touching something")]
     NoFreeCircles,
+    /// Moves of the joint check that would all end in a collision.
+    #[error("the arm cannot move each of its joints by a few degrees anywhere in its cell without touching something")]
+    NoFreeMoves,
     /// A known mistake explains the points better than this robot does.
     #[error("{gap}: {mistake}")]
     Mistaken {
@@ -109,7 +112,7 @@ impl ProcedureError {
             Self::NoLimits { .. } => &[Advice::StateLimits],
             Self::Unreachable => &[Advice::NarrowRanges],
             Self::NothingToScore { .. } => &[Advice::OmitKind],
-            Self::Circles(_) | Self::NoFreeCircles => &[Advice::StateTarget],
+            Self::Circles(_) | Self::NoFreeCircles | Self::NoFreeMoves => &[Advice::StateTarget],
             Self::NoCircle { .. } => &[Advice::MountBesideAxis],
             Self::Identification(error) => match error {
                 IdentificationError::RankUnclear { .. } => &[Advice::UsePrior, Advice::PlanPoses],

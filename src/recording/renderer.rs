@@ -113,7 +113,7 @@ impl Renderer {
                 result::draw(self, identified, line.time);
                 self.layout(line.number);
             }
-            Entry::Correction(_) => {
+            Entry::Correction(_) | Entry::Undone { .. } | Entry::Redone { .. } => {
                 // It may have changed the configuration or the unit of any sample.
                 for (number, moment) in self.moments.clone() {
                     self.corrected(number, moment);

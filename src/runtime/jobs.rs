@@ -12,13 +12,18 @@ use jiff::tz::TimeZone;
 
 use super::events::Events;
 use crate::procedure;
+use crate::procedure::joint_check::Stop;
 use crate::profile::{Profile, builtin, builtin_names};
 use crate::program::{self, Dialect};
+use crate::session::measurements::{self, Expected};
 use crate::session::plan::{self, PlannedPose};
-use crate::session::set_up::ProgramText;
+use crate::session::set_up::{CoordinateUnit, ProgramText};
+use crate::session::workbook;
 use crate::store;
 use crate::text::causes;
-use crate::wizard::{Answer, CircleConfigurations, Event, Problem, Request, RequestId, RequestProgress};
+use crate::wizard::{
+    self, Answer, CircleConfigurations, Event, JointCheckStop, NamedPoint, Problem, Request, RequestId, RequestProgress,
+};
 
 /// Starts a request. Returns `false` if the system refuses a thread.
 pub(super) fn start(id: RequestId, request: Request, cancelled: Arc<AtomicBool>, events: Events) -> bool {
@@ -59,6 +64,8 @@ impl Job {
             Request::LoadPlan { file, profile } => load_plan(&file, &profile),
             Request::PlanCircles { profile, is_whole } => circles(&profile, is_whole),
             Request::Program { profile, rows, settings, created } => robot_program(&profile, &rows, &settings, created),
+            Request::PlanJointCheck { profile } => joint_check(&profile),
+            Request::ReadPoints { file, profile, unit } => points(file, &profile, unit),
             Request::Identify(request) => self.identify(&request),
             Request::Model(request) => Ok(Answer::Modelled(Box::new(procedure::models::models(&request)))),
             // Other threads carry these out.
@@ -151,6 +158,34 @@ fn robot_program(
     let written = program::write(dialect, &robot, rows, &options).map_err(|error| Problem::new(causes(&error)))?;
     let files = written.files.into_iter().map(|file| (file.file_name, file.text)).collect();
     Ok(Answer::Programmed { files, dangers })
+}
+
+/// Reads the points of a file: a table as `trupose import` reads it, or lines as they are pasted.
+fn points(file: String, profile: &Profile, unit: CoordinateUnit) -> Result<Answer, Problem> {
+    let bytes = store::read(Path::new(&file)).map_err(|error| Problem::new(causes(&error)))?;
+    let text = if workbook::is_workbook(&bytes) {
+        workbook::sheet_text(&bytes, &file, None).map_err(|errors| Problem::new(errors.to_string()))?.into_bytes()
+    } else {
+        bytes
+    };
+    let joints = procedure::joint_types(profile);
+    let named = |(name, point)| NamedPoint { name, point };
+    let points = match measurements::points_alone(&Expected::of(profile, &joints), unit.sign(), &text, &file) {
+        Ok(points) => points.into_iter().map(named).collect(),
+        Err(errors) => wizard::reading::parse_named(&String::from_utf8_lossy(&text), unit).map_err(|_not_lines| {
+            Problem::new(errors.to_string()).hint(format!(
+                "a table needs titles such as 'pose, x_mm, y_mm, z_mm'; without titles, write one point per line: name x y z in {}",
+                unit.sign()
+            ))
+        })?,
+    };
+    Ok(Answer::Points { file, points })
+}
+
+fn joint_check(profile: &Profile) -> Result<Answer, Problem> {
+    let stops = procedure::joint_check::plan(profile).map_err(Problem::from)?;
+    let stop = |stop: Stop| JointCheckStop { joint: stop.joint, configuration: stop.configuration };
+    Ok(Answer::JointCheckPlanned(stops.into_iter().map(stop).collect()))
 }
 
 fn circles(profile: &Profile, is_whole: bool) -> Result<Answer, Problem> {

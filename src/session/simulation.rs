@@ -190,6 +190,16 @@ pub enum FaultKind {
     Metre,
     /// A joint turns the other way than its profile says.
     JointSign { joint: usize },
+    /// A joint moves this many times as far as shown: its values are in another unit than its profile says.
+    JointUnit { joint: usize, factor: f64 },
+    /// A joint moves with another one, which its profile does not say.
+    JointCoupling {
+        joint: usize,
+        /// The other joint.
+        with: usize,
+        /// Movement per movement of the other joint.
+        factor: f64,
+    },
     /// A joint is elsewhere than shown, by this much (deg or mm).
     MistypedJoint {
         joint: usize,
@@ -226,7 +236,13 @@ impl FaultKind {
     /// Whether the fault stays once it is there; a slip happens once.
     pub const fn lasts(&self) -> bool {
         match self {
-            Self::Inch | Self::Metre | Self::JointSign { .. } | Self::TargetBumped { .. } | Self::Drift { .. } => true,
+            Self::Inch
+            | Self::Metre
+            | Self::JointSign { .. }
+            | Self::JointUnit { .. }
+            | Self::JointCoupling { .. }
+            | Self::TargetBumped { .. }
+            | Self::Drift { .. } => true,
             Self::WrongPose
             | Self::SwappedRows
             | Self::MistypedJoint { .. }

@@ -5,6 +5,7 @@
 //! configuration).
 
 mod correction;
+mod history;
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -17,8 +18,8 @@ use thiserror::Error;
 use super::about::About;
 use super::calibration::{MountedText, mounted_on};
 use super::journal::{
-    CirclePointText, Decision, Entry, FindingText, IdentifiedText, Journal, Line, MeasuredText, PlanText, PlannedText,
-    RobotProgramText, from_edge, from_xyz_mm, to_xyz_mm,
+    CirclePointText, Decision, Entry, FindingText, IdentifiedText, JointCheckPointText, Journal, Line, MeasuredText,
+    PlanText, PlannedText, RobotProgramText, from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
 use super::set_up::{InstrumentChoice, PayloadText, Step, TargetChoice};
@@ -27,6 +28,8 @@ use crate::profile::{CellText, Profile};
 use crate::units::from_mm;
 pub use correction::Corrected;
 use correction::is_factor;
+pub use history::Deed;
+use history::History;
 
 /// A longer time between two entries (s) is a break, or a clock that was set.
 const LONGEST_STEP: f64 = 3600.0;
@@ -59,6 +62,8 @@ pub struct Session {
     pub limits_set: Option<LimitsSet>,
     /// Points of the circle-point analysis.
     pub circle_points: Vec<CirclePointText>,
+    /// Points of the joint check.
+    pub joint_check: Vec<JointCheckPointText>,
     /// All rows of all plans, in the order of the programs.
     pub rows: Vec<Row>,
     /// Plans that were accepted, without their rows.
@@ -102,6 +107,8 @@ pub struct Session {
     pub resumed: usize,
     /// Whether it ended normally.
     pub closed: bool,
+    /// What can be undone and redone.
+    history: History,
 }
 
 /// The robot of a session.
@@ -259,6 +266,19 @@ impl Session {
     /// # Errors
     /// The entry does not fit; the session is then unchanged.
     pub fn apply(&mut self, line: &Line) -> Result<(), FoldError> {
+        match &line.entry {
+            Entry::Undone { line: undone, .. } => self.undo(line, *undone)?,
+            Entry::Redone { line: redone, .. } => self.redo(line, *redone)?,
+            _ => {
+                self.apply_once(line)?;
+                self.remember(line);
+            }
+        }
+        Ok(())
+    }
+
+    /// Applies a line that neither undoes nor redoes another one.
+    fn apply_once(&mut self, line: &Line) -> Result<(), FoldError> {
         let misfit = |what: &str| FoldError::Misfit { line: line.number, what: what.to_owned() };
         match &line.entry {
             Entry::Opened { program, name, .. } => {
@@ -293,6 +313,14 @@ impl Session {
                 self.circle_points.push(point.clone());
             }
             Entry::CirclesDiscarded => self.circle_points.clear(),
+            Entry::JointCheckPoint(point) => {
+                self.pass("the last point of the joint check", &point.joints)
+                    .ok_or_else(|| misfit("a point of the joint check that does not fit the robot"))?;
+                self.measurements = self.measurements.max(point.number);
+                self.joint_check.push(point.clone());
+            }
+            Entry::JointCheckDiscarded => self.joint_check.clear(),
+            Entry::Undone { .. } | Entry::Redone { .. } => {}
             Entry::Plan(plan) => {
                 let rows = self.planned_rows(&plan.rows).ok_or_else(|| misfit("a plan that does not fit the robot"))?;
                 for row in &mut self.rows {
@@ -464,7 +492,7 @@ impl Session {
 
     /// Whether anything was measured.
     pub fn has_measurements(&self) -> bool {
-        !self.samples.is_empty() || !self.circle_points.is_empty()
+        !self.samples.is_empty() || !self.circle_points.is_empty() || !self.joint_check.is_empty()
     }
 
     /// The samples that count.

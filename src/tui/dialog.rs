@@ -21,7 +21,7 @@ use super::theme::{Role, Theme};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::session::simulation::{Simulation, Truth};
 use crate::text::wrapped;
-use crate::wizard::view::{Content, ViewModel};
+use crate::wizard::view::{Content, RowState, RowView, ViewModel};
 use crate::wizard::{Danger, Intent, IntentInfo};
 
 /// Label, text, how it is understood or a problem of two lines.
@@ -42,6 +42,8 @@ pub enum Dialog {
     },
     /// Asks for a text.
     Text { field: TextField, intent: fn(String) -> Intent },
+    /// Asks for a note to a pose.
+    Note { field: TextField, pose: String },
     /// Asks for a number.
     Number { field: NumberField, intent: fn(f64) -> Intent },
     /// Asks for one of several intents.
@@ -99,7 +101,16 @@ impl Dialog {
             Intent::AddBox(proposal) => Some(place::obstacle(&proposal.name)).map(|dialog| dialog.seeing(view)),
             Intent::WriteProgram(settings) => Some(place::program(settings)),
             Intent::Note(_) => text(&note_label(view), "", Intent::Note),
-            Intent::GoToPose(_) => choose_pose(view),
+            Intent::NotePose { .. } => {
+                choose_pose(view, |_| true, |pose| Intent::NotePose { pose, text: String::new() })
+            }
+            Intent::GoToPose(_) => choose_pose(view, |_| true, Intent::GoToPose),
+            Intent::Exclude(_) => choose_pose(view, |state| state == RowState::Measured, Intent::Exclude),
+            Intent::Include(_) => choose_pose(view, |state| state == RowState::LeftOut, Intent::Include),
+            Intent::ReadPoints(proposal) => {
+                text("File with the points (text, CSV or xlsx)", proposal, Intent::ReadPoints)
+            }
+            Intent::ShowPoints(_) => text("Points, one per line", "", Intent::ShowPoints),
             Intent::SuggestPoses(count) => {
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
                 let intent = |count: f64| Intent::SuggestPoses(count as usize);
@@ -115,6 +126,7 @@ impl Dialog {
         match self {
             Self::Text { field, .. } if field.is_checked() => Some(LINES_OF_COORDINATES),
             Self::Text { .. }
+            | Self::Note { .. }
             | Self::Confirm { .. }
             | Self::Number { .. }
             | Self::Choice { .. }
@@ -167,6 +179,7 @@ impl Dialog {
                 _ => (FieldOutcome::Ignored, None),
             },
             Self::Text { field, intent } => (field.on_key(key), Some(intent(field.text().trim().to_owned()))),
+            Self::Note { field, pose } => (field.on_key(key), Some(note(pose, field))),
             Self::Number { field, intent } => (field.on_key(key), field.value().ok().map(*intent)),
             Self::Form(form) => (form.on_key(key), form.value().ok()),
             Self::Choice { list, intents } => {
@@ -185,7 +198,7 @@ impl Dialog {
     pub fn paste(&mut self, text: &str) {
         match self {
             Self::Confirm { .. } => {}
-            Self::Text { field, .. } => field.paste(text),
+            Self::Text { field, .. } | Self::Note { field, .. } => field.paste(text),
             Self::Number { field, .. } => field.paste(text),
             Self::Choice { list, .. } | Self::Menu { list, .. } => list.paste(text),
             Self::Form(form) => form.paste(text),
@@ -207,7 +220,9 @@ impl Dialog {
                 items.push(KeyHint::new("Tab", "next field", 2));
                 items.push(KeyHint::new("Ctrl-U", "clear the line", 4));
             }
-            Self::Text { .. } | Self::Number { .. } => items.push(KeyHint::new("Ctrl-U", "clear the line", 4)),
+            Self::Text { .. } | Self::Note { .. } | Self::Number { .. } => {
+                items.push(KeyHint::new("Ctrl-U", "clear the line", 4))
+            }
         }
         items
     }
@@ -215,7 +230,7 @@ impl Dialog {
     pub fn draw(&self, theme: Theme, area: Rect, buf: &mut Buffer) {
         match self {
             Self::Confirm { lines, is_yes, .. } => draw_confirmation(lines, *is_yes, theme, area, buf),
-            Self::Text { field, .. } => field.draw(theme, area, buf),
+            Self::Text { field, .. } | Self::Note { field, .. } => field.draw(theme, area, buf),
             Self::Number { field, .. } => field.draw(theme, area, buf),
             Self::Choice { list, .. } | Self::Menu { list, .. } => list.draw(theme, area, buf),
             Self::Form(form) => form.draw(theme, area, buf),
@@ -272,6 +287,11 @@ fn choose_instrument(view: &ViewModel) -> Dialog {
     Dialog::Choice { list: ChoiceList::new("Instrument", labels, 0), intents }
 }
 
+/// The note in a field.
+fn note(pose: &str, field: &TextField) -> Intent {
+    Intent::NotePose { pose: pose.to_owned(), text: field.text().trim().to_owned() }
+}
+
 /// The label of a note, with the pose that it will be attached to.
 fn note_label(view: &ViewModel) -> String {
     match &view.content {
@@ -283,11 +303,14 @@ fn note_label(view: &ViewModel) -> String {
     }
 }
 
-fn choose_pose(view: &ViewModel) -> Option<Dialog> {
+/// A choice among the poses in some states; `None` if there is none.
+fn choose_pose(view: &ViewModel, is_wanted: fn(RowState) -> bool, intent: fn(String) -> Intent) -> Option<Dialog> {
     let Content::Capture(content) = &view.content else { return None };
-    let labels = content.rows.iter().map(|row| format!("{}  {}  {}", row.pose, row.kind, row.state.words())).collect();
-    let shown = content.rows.iter().position(|row| Some(row.row) == content.row);
-    let intents = content.rows.iter().map(|row| Intent::GoToPose(row.pose.clone())).collect();
+    let rows: Vec<&RowView> = content.rows.iter().filter(|row| is_wanted(row.state)).collect();
+    let labels: Vec<String> =
+        rows.iter().map(|row| format!("{}  {}  {}", row.pose, row.kind, row.state.words())).collect();
+    let shown = rows.iter().position(|row| Some(row.row) == content.row);
+    let intents = rows.iter().map(|row| intent(row.pose.clone())).collect();
     Some(Dialog::Choice { list: ChoiceList::new("Pose", labels, shown.unwrap_or(0)), intents })
 }
 

@@ -106,7 +106,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 pub const BELL: Key = Key::ctrl('b');
 
 /// The table. Of several bindings with the same key, the first one whose intent is possible applies.
-const BINDINGS: [Binding; 57] = [
+const BINDINGS: [Binding; 66] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Target::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Target::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -138,6 +138,8 @@ const BINDINGS: [Binding; 57] = [
     offer('s', 3, |intent| matches!(intent, Intent::SaveArm)),
     offer('u', 3, |intent| matches!(intent, Intent::UseCircles)),
     offer('d', 6, |intent| matches!(intent, Intent::DiscardCircles)),
+    offer('x', 3, |intent| matches!(intent, Intent::StartJointCheck)),
+    offer('X', 7, |intent| matches!(intent, Intent::DiscardJointCheck)),
     offer('p', 3, |intent| matches!(intent, Intent::MakePlan(_))),
     offer('l', 5, |intent| matches!(intent, Intent::LoadPlan(_))),
     offer('r', 5, |intent| matches!(intent, Intent::PlanFromRecording)),
@@ -154,6 +156,13 @@ const BINDINGS: [Binding; 57] = [
     offer('s', 5, |intent| matches!(intent, Intent::Skip)),
     offer('h', 4, |intent| matches!(intent, Intent::ThroughHome)),
     offer('u', 5, |intent| matches!(intent, Intent::Undo)),
+    offer('U', 5, |intent| matches!(intent, Intent::Redo)),
+    bind(Key::ctrl('r'), 9, Target::Offer(|intent| matches!(intent, Intent::Redo))),
+    offer('l', 6, |intent| matches!(intent, Intent::ReadPoints(_))),
+    offer('t', 2, |intent| matches!(intent, Intent::TakePoints)),
+    offer('a', 2, |intent| matches!(intent, Intent::TakeAllPoints)),
+    offer('d', 2, |intent| matches!(intent, Intent::DropPoints)),
+    bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::DropPoints))),
     offer('g', 6, |intent| matches!(intent, Intent::GoToPose(_))),
     offer('w', 6, |intent| matches!(intent, Intent::Note(_))),
     offer('e', 7, |intent| matches!(intent, Intent::SuggestPoses(_))),

@@ -359,6 +359,13 @@ fn with_value(intent: &Intent, value: &str) -> Option<Intent> {
         Intent::TypeReading(_) => Intent::TypeReading(text),
         Intent::GoToPose(_) => Intent::GoToPose(text),
         Intent::Note(_) => Intent::Note(text),
+        Intent::Exclude(_) => Intent::Exclude(text),
+        Intent::Include(_) => Intent::Include(text),
+        Intent::ReadPoints(_) => Intent::ReadPoints(text),
+        Intent::NotePose { .. } => {
+            let (pose, note) = value.split_once(char::is_whitespace)?;
+            Intent::NotePose { pose: pose.to_owned(), text: note.trim().to_owned() }
+        }
         Intent::SuggestPoses(_) => Intent::SuggestPoses(value.parse().ok()?),
         _ => return None,
     })

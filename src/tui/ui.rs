@@ -16,7 +16,7 @@ use crate::session::set_up::Step;
 use crate::session::state::Session;
 use crate::units::{DEGREE, MILLIMETRE};
 use crate::wizard::Intent;
-use crate::wizard::view::{Content, TargetView, ViewModel};
+use crate::wizard::view::{Content, JointShown, TargetView, ViewModel};
 
 /// Rows of a screen below a dialog that are worth showing.
 const FEWEST_BELOW: u16 = 8;
@@ -317,11 +317,11 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
                 None => scene,
             })
         }
+        Content::Target(TargetView { joint_check: Some(check), .. }) if !check.joints.is_empty() => {
+            at_joints(session, &check.joints)
+        }
         Content::Target(TargetView { circles: Some(circles), .. }) if !circles.joints.is_empty() => {
-            let profile = &session.robot.as_ref()?.profile;
-            let size = |unit: &str| if unit == "deg" { DEGREE } else { MILLIMETRE };
-            let q: Vec<f64> = circles.joints.iter().map(|joint| joint.value * size(&joint.unit)).collect();
-            (q.len() == profile.chain().dof()).then(|| Scene::of(profile, &q))
+            at_joints(session, &circles.joints)
         }
         Content::Instrument(_) | Content::Target(_) => Scene::of_session(session, None),
         Content::Capture(content) => Scene::of_session(session, content.row),
@@ -329,6 +329,14 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
         Content::Verify(_) => Scene::of_identified(session, true),
         Content::Deliver(_) => None,
     }
+}
+
+/// The robot at joint values that are shown.
+fn at_joints(session: &Session, joints: &[JointShown]) -> Option<Scene> {
+    let profile = &session.robot.as_ref()?.profile;
+    let size = |unit: &str| if unit == "deg" { DEGREE } else { MILLIMETRE };
+    let q: Vec<f64> = joints.iter().map(|joint| joint.value * size(&joint.unit)).collect();
+    (q.len() == profile.chain().dof()).then(|| Scene::of(profile, &q))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Inputs of the wizard ([`Event`]) and the work that it asks for ([`Effect`]).
 
 use jiff::Timestamp;
+use nalgebra::Point3;
 
 use super::intent::Intent;
 use super::notice::{Notice, Problem};
@@ -15,7 +16,7 @@ use crate::session::journal::Line;
 use crate::session::plan::PlannedPose;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
-use crate::session::set_up::{InstrumentChoice, ProgramText};
+use crate::session::set_up::{CoordinateUnit, InstrumentChoice, ProgramText};
 use crate::session::wire::KnownLinks;
 
 /// Identifies a request, so that an answer to anything but the running one can be dropped.
@@ -107,6 +108,14 @@ pub enum Answer {
     },
     /// Configurations for the circle-point analysis, one list per joint turned.
     CirclesPlanned(Vec<CircleConfigurations>),
+    /// Stops of the joint check.
+    JointCheckPlanned(Vec<JointCheckStop>),
+    /// Points of a file, to be looked at before they are taken.
+    Points {
+        /// Name of the file.
+        file: String,
+        points: Vec<NamedPoint>,
+    },
     Identified(Box<Identified>),
     /// The models are written and verified, in memory.
     Modelled(Box<Models>),
@@ -137,6 +146,24 @@ pub struct CircleConfigurations {
     pub joint: usize,
     /// Pendant values (rad, sliding joints m), in order.
     pub configurations: Vec<Vec<f64>>,
+}
+
+/// A point of a table, with the name that it has there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPoint {
+    /// Name of the point or its pose, if it has one.
+    pub name: Option<String>,
+    /// In the tracker frame (m).
+    pub point: Point3<f64>,
+}
+
+/// A stop of the joint check.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointCheckStop {
+    /// Index of the joint that is moved to get there, from 0; none for the first stop.
+    pub joint: Option<usize>,
+    /// Pendant values (rad, sliding joints m).
+    pub configuration: Vec<f64>,
 }
 
 /// Progress of a running request.
@@ -211,6 +238,17 @@ pub enum Request {
         /// Of every joint, not of the last two only.
         is_whole: bool,
     },
+    /// Find a configuration around which each joint can be moved by a few degrees.
+    PlanJointCheck {
+        profile: Box<Profile>,
+    },
+    /// Read points for the plan from a file.
+    ReadPoints {
+        file: String,
+        profile: Box<Profile>,
+        /// Unit of coordinates whose columns state none.
+        unit: CoordinateUnit,
+    },
     /// Identify the arm, and verify it if there are verification samples.
     Identify(Box<IdentifyRequest>),
     /// Write the identified arm in other formats, and verify each.
@@ -236,6 +274,8 @@ impl Request {
             Self::LoadPlan { .. } => "reading the plan",
             Self::Program { .. } => "writing the robot program",
             Self::PlanCircles { .. } => "choosing circles",
+            Self::PlanJointCheck { .. } => "choosing where the joints are moved",
+            Self::ReadPoints { .. } => "reading the points",
             Self::Identify(_) => "identifying",
             Self::Model(_) => "writing and checking the models",
             Self::Deliver { .. } => "writing files",

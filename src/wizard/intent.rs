@@ -60,6 +60,10 @@ pub enum Intent {
     UseCircles,
     /// Discard the measured circles and start again.
     DiscardCircles,
+    /// Move each joint by a few degrees and measure, to check its sign, zero, unit and coupling.
+    StartJointCheck,
+    /// Measure the joint check again.
+    DiscardJointCheck,
 
     MakePlan(PlanSettings),
     /// Load the poses from a file.
@@ -95,12 +99,34 @@ pub enum Intent {
     TurnTracker,
     /// Skip the pose shown.
     Skip,
-    /// Undo the last sample.
+    /// Undo what was done last.
     Undo,
+    /// Redo what was undone last.
+    Redo,
+    /// Exclude a pose of the plan, by name.
+    Exclude(String),
+    /// Let an excluded pose of the plan count again, by name.
+    Include(String),
+    /// Read points for this plan from a file of the tracker, to be looked at before they are taken.
+    ReadPoints(String),
+    /// Show points that were pasted, one per line, to be looked at before they are taken.
+    ShowPoints(String),
+    /// Take the points that are shown and fit.
+    TakePoints,
+    /// Take all points that are shown, and ask about those that do not fit.
+    TakeAllPoints,
+    /// Take none of the points that are shown.
+    DropPoints,
     /// Go to another pose of the plan, by name.
     GoToPose(String),
     /// Attach a note to the pose shown.
     Note(String),
+    /// Attach a note to another pose of the plan.
+    NotePose {
+        /// Name of the pose.
+        pose: String,
+        text: String,
+    },
     /// Add this many poses, the most informative ones after those measured.
     SuggestPoses(usize),
 
@@ -143,6 +169,8 @@ impl Intent {
             Self::SaveArm => "SaveArm",
             Self::UseCircles => "UseCircles",
             Self::DiscardCircles => "DiscardCircles",
+            Self::StartJointCheck => "StartJointCheck",
+            Self::DiscardJointCheck => "DiscardJointCheck",
             Self::MakePlan(_) => "MakePlan",
             Self::LoadPlan(_) => "LoadPlan",
             Self::PlanFromRecording => "PlanFromRecording",
@@ -159,8 +187,17 @@ impl Intent {
             Self::TurnTracker => "TurnTracker",
             Self::Skip => "Skip",
             Self::Undo => "Undo",
+            Self::Redo => "Redo",
+            Self::Exclude(_) => "Exclude",
+            Self::Include(_) => "Include",
+            Self::ReadPoints(_) => "ReadPoints",
+            Self::ShowPoints(_) => "ShowPoints",
+            Self::TakePoints => "TakePoints",
+            Self::TakeAllPoints => "TakeAllPoints",
+            Self::DropPoints => "DropPoints",
             Self::GoToPose(_) => "GoToPose",
             Self::Note(_) => "Note",
+            Self::NotePose { .. } => "NotePose",
             Self::SuggestPoses(_) => "SuggestPoses",
             Self::Identify => "Identify",
             Self::About(_) => "About",

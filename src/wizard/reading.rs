@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 
+use super::effect::NamedPoint;
 use crate::session::reading::Reading;
 use crate::session::set_up::CoordinateUnit;
 use crate::text::{counted, printable, shortened};
@@ -89,21 +90,29 @@ pub fn check(text: &str, unit: CoordinateUnit) -> Result<(), String> {
 /// # Errors
 /// What is wrong, and in which line.
 pub fn parse_all(text: &str, unit: CoordinateUnit) -> Result<Vec<Point3<f64>>, String> {
+    Ok(parse_named(text, unit)?.into_iter().map(|named| named.point).collect())
+}
+
+/// As [`parse_all`], with the names of the points.
+///
+/// # Errors
+/// What is wrong, and in which line.
+pub fn parse_named(text: &str, unit: CoordinateUnit) -> Result<Vec<NamedPoint>, String> {
     let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     let one = parse(text, unit);
     if one.is_ok() || lines.len() < 2 {
-        return one.map(|point| vec![point]);
+        return one.map(|point| vec![NamedPoint { name: None, point }]);
     }
     let mut points = Vec::new();
     for (line, number) in lines.iter().zip(1..) {
         let named = || {
             let (name, rest) = line.split_once([' ', '\t', ',', ';'])?;
-            name.contains(char::is_alphabetic)
-                .then(|| parse(rest.trim_start_matches([' ', ',', ';']), unit).ok())
-                .flatten()
+            let point = parse(rest.trim_start_matches([' ', ',', ';']), unit).ok()?;
+            let is_name = name.contains(char::is_alphabetic) || name.chars().all(|c| c.is_ascii_digit());
+            is_name.then(|| NamedPoint { name: Some(name.to_owned()), point })
         };
         match parse(line, unit) {
-            Ok(point) => points.push(point),
+            Ok(point) => points.push(NamedPoint { name: None, point }),
             Err(problem) => match named() {
                 Some(point) => points.push(point),
                 None if number == 1 && !line.contains(|c: char| c.is_ascii_digit()) => {}

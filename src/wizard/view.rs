@@ -2,6 +2,8 @@
 //!
 //! Units are in the names. No residual of a fit is shown as an accuracy.
 
+mod joint_check;
+mod rows;
 mod sessions;
 
 use serde::Serialize;
@@ -21,6 +23,8 @@ use crate::session::set_up::Step;
 use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummary, Warning, WorkspaceSummary};
 use crate::session::wire::{KnownLinks, LinkChoice};
 use crate::units::to_mm;
+pub use joint_check::{JointCheckRow, JointCheckVerdict, JointCheckView};
+pub use rows::{MeasuredRow, ProposedPointView, ProposedState, ProposedView, RowState, RowView};
 pub use sessions::{SessionCard, SessionChoice};
 
 /// Content of a screen.
@@ -262,6 +266,11 @@ pub struct TargetView {
     pub payload: Option<String>,
     /// The circle-point analysis, once it has begun.
     pub circles: Option<CirclesView>,
+    /// The joint check, once it has begun.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint_check: Option<JointCheckView>,
+    /// Whether the joint check is advisable: the profile is new, and nothing has shown yet that it fits the robot.
+    pub advises_joint_check: bool,
 }
 
 /// The view of the circle-point analysis.
@@ -436,6 +445,11 @@ pub struct CaptureView {
     pub too_few: Option<String>,
     /// All rows of the plan that are to be measured.
     pub rows: Vec<RowView>,
+    /// Whether the fit of the rows is to the nominal arm, because no result is of the samples that count now.
+    pub fit_is_nominal: bool,
+    /// Points that are shown before they are taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proposed: Option<ProposedView>,
     /// Notes with their poses.
     pub notes: Vec<(Option<String>, String)>,
     /// Refused measurements: pose and reason.
@@ -533,59 +547,6 @@ pub struct PredictionView {
     pub open: usize,
     /// Whether the remaining poses are not worth their time: the error is well below the limit, or they hardly change it.
     pub is_enough: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RowState {
-    /// Still to be measured.
-    Open,
-    /// Measured, and the sample counts.
-    Measured,
-    /// Measured, but the sample is excluded.
-    LeftOut,
-    /// Skipped by the operator.
-    Skipped,
-}
-
-impl RowState {
-    /// The state in a word.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Open => "open",
-            Self::Measured => "done",
-            Self::LeftOut => "excluded",
-            Self::Skipped => "skipped",
-        }
-    }
-}
-
-/// A row of the plan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RowView {
-    /// Row of the plan, from 0.
-    pub row: usize,
-    pub pose: String,
-    pub kind: PoseKind,
-    /// State of the row.
-    pub state: RowState,
-    /// The sample that counts, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub measured: Option<MeasuredRow>,
-    /// Whether there is a note about the pose.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub has_note: bool,
-}
-
-/// What is known about the sample of a row.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MeasuredRow {
-    /// Distance from where the identified arm has it, once it is identified from the samples that count now.
-    pub fit_mm: Option<f64>,
-    pub scatter_mm: Option<f64>,
-    pub shots: u32,
-    /// Time of day (UTC), `09:15`.
-    pub time: String,
 }
 
 /// The view of the identify step.

@@ -40,7 +40,11 @@ impl Station {
     pub(super) fn update(&mut self, session: &Session, entry: &Entry) -> bool {
         match entry {
             Entry::Profile { .. } => *self = Self::default(),
-            Entry::Sample(_) | Entry::Correction(_) | Entry::Decision { .. } => {
+            Entry::Sample(_)
+            | Entry::Correction(_)
+            | Entry::Decision { .. }
+            | Entry::Undone { .. }
+            | Entry::Redone { .. } => {
                 // Every sample is compared with all others, which would take long for thousands.
                 if session.samples.len() > ALL && !session.samples.len().is_multiple_of(ALL) {
                     return false;

@@ -40,6 +40,16 @@ impl Entry {
                 format!("measurement {sample}: {decision}")
             }
             Self::Correction(correction) => correction_text(correction),
+            Self::Undone { line, what } => format!("undone: {what} (line {line})"),
+            Self::Redone { line, what } => format!("done again: {what} (line {line})"),
+            Self::JointCheckPoint(point) => {
+                let turned = point.joint.map_or_else(
+                    || "start of the joint check".to_owned(),
+                    |joint| format!("joint check, joint {} moved", joint + 1),
+                );
+                format!("measurement {}: {turned}, at {}", point.number, xyz(point.xyz_mm))
+            }
+            Self::JointCheckDiscarded => "joint check discarded".to_owned(),
             Self::Row(row) => format!("went to row {} of the plan", row + 1),
             Self::Passed { pose, .. } => format!("passed through '{pose}'"),
             Self::RobotProgram(program) => format!("robot program written: {}", program.files.join(", ")),

@@ -80,6 +80,24 @@ pub enum Entry {
     },
     /// Correction of a wrong entry.
     Correction(Correction),
+    /// What was done in a line, and in those that belong to it, is undone.
+    Undone {
+        /// Line of the journal, from 1.
+        line: u64,
+        /// What that was, in words.
+        what: String,
+    },
+    /// What was undone is done after all.
+    Redone {
+        /// Line of the journal, from 1.
+        line: u64,
+        /// What that was, in words.
+        what: String,
+    },
+    /// A point of the joint check.
+    JointCheckPoint(JointCheckPointText),
+    /// The joint check is to be measured again.
+    JointCheckDiscarded,
     /// The operator selected this row of the plan, from 0.
     Row(usize),
     /// The operator has driven the arm through a configuration that is not measured, on the way to the next pose.
@@ -148,6 +166,20 @@ pub struct CirclePointText {
     pub number: u64,
     /// Joint that is turned, from 0.
     pub joint: usize,
+    /// Pendant joint values.
+    pub joints: Vec<f64>,
+    /// Measured point in the tracker frame.
+    pub xyz_mm: (f64, f64, f64),
+}
+
+/// A point of the joint check.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointCheckPointText {
+    /// Number of the measurement in the session.
+    pub number: u64,
+    /// Joint that is turned, from 0; none at the pose where the check begins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<usize>,
     /// Pendant joint values.
     pub joints: Vec<f64>,
     /// Measured point in the tracker frame.

@@ -252,6 +252,21 @@ fn all_entries() -> Vec<Entry> {
         Entry::Profile { source: TRICKY.to_owned(), sha256: "00".to_owned(), text: builtin("ur5").unwrap().to_owned() },
         Entry::CirclePoint(CirclePointText { number: 1, joint: 5, joints: vec![1.0, 2.0], xyz_mm: (1.0, 2.0, 3.0) }),
         Entry::CirclesDiscarded,
+        Entry::Undone { line: 4, what: TRICKY.to_owned() },
+        Entry::Redone { line: 4, what: String::new() },
+        Entry::JointCheckPoint(JointCheckPointText {
+            number: 1,
+            joint: None,
+            joints: vec![1.0, 2.0],
+            xyz_mm: (1.0, 2.0, 3.0),
+        }),
+        Entry::JointCheckPoint(JointCheckPointText {
+            number: 2,
+            joint: Some(1),
+            joints: vec![1.0, 12.0],
+            xyz_mm: (1.0, -2.0, 3.0),
+        }),
+        Entry::JointCheckDiscarded,
         Entry::Plan(plan()),
         Entry::PlanExtended(PlanText { rows: Vec::new(), condition_number: None, minutes: None, ..plan() }),
         Entry::Sample(sample(2)),
@@ -329,6 +344,10 @@ fn variant(entry: &Entry) -> usize {
         Entry::Cell(_) => 25,
         Entry::RobotProgram(_) => 26,
         Entry::ProgramDriven => 27,
+        Entry::Undone { .. } => 28,
+        Entry::Redone { .. } => 29,
+        Entry::JointCheckPoint(_) => 30,
+        Entry::JointCheckDiscarded => 31,
     }
 }
 
@@ -336,7 +355,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 28);
+    assert_eq!(variants.len(), 32);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

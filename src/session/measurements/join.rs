@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use nalgebra::Point3;
+
 use super::foreign::{Expected, Foreign, Reading, Understood, Wanted, understand};
 use super::{Measurements, farthest_joint, read_understood};
 use crate::session::table::{self, Defect, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode};
@@ -88,6 +90,34 @@ pub fn joined(
     };
     let names: Vec<&str> = std::iter::once(joints.0).chain(points.iter().map(|file| file.name.as_str())).collect();
     read_understood(Ok(whole), &names.join("' and '"), expected.joints, Vec::new(), Vec::new())
+}
+
+/// Reads a file with points alone, each with its name if the file has names. Coordinates whose columns state no unit are in `unit`.
+///
+/// # Errors
+/// The file cannot be understood.
+pub fn points_alone(
+    expected: &Expected<'_>,
+    unit: &str,
+    content: &[u8],
+    file: &str,
+) -> Result<Vec<(Option<String>, Point3<f64>)>, TableErrors> {
+    let units = format!("deg,{unit}").parse().unwrap_or_default();
+    let reading = Reading { units, ..Reading::default() };
+    let part = part(expected, &reading, file, content, Wanted::Points)?;
+    let mut coordinates = Vec::with_capacity(3);
+    for base in ["x", "y", "z"] {
+        let index = part.quantity(base).unwrap_or(usize::MAX);
+        let unit = part.foreign.canonical.get(index).and_then(|name| name.split_once('_')).map_or("", |(_, unit)| unit);
+        coordinates.push(part.numbers(NumberColumn::in_unit(index, unit))?);
+    }
+    let names = part.column("pose").map(|column| part.cells(column));
+    let name = |row: usize| names.as_ref()?.get(row).filter(|name| !name.is_empty()).map(|name| (*name).to_owned());
+    let point = |row: usize| {
+        let at = |axis: usize| coordinates.get(axis)?.get(row).copied();
+        Some((name(row), Point3::new(at(0)?, at(1)?, at(2)?)))
+    };
+    Ok((0..part.foreign.records.len()).filter_map(point).collect())
 }
 
 /// Understands one of the files.

@@ -10,12 +10,14 @@ use crate::text::printable;
 use crate::units::Quantity;
 
 /// How each fault is written, the parts in brackets may be missing.
-const FORMS: [(&str, &str); 11] = [
+const FORMS: [(&str, &str); 13] = [
     ("wrong-pose", "wrong-pose@FIRST[-LAST]"),
     ("swapped-rows", "swapped-rows@FIRST"),
     ("inch", "inch@FIRST[-LAST]"),
     ("metre", "metre@FIRST[-LAST]"),
     ("joint-sign", "joint-sign@FIRST[-LAST]:jJOINT"),
+    ("joint-unit", "joint-unit@FIRST[-LAST]:jJOINT:FACTOR"),
+    ("joint-coupling", "joint-coupling@FIRST[-LAST]:jJOINT:jOTHER[:FACTOR]"),
     ("mistyped-joint", "mistyped-joint@FIRST[-LAST]:jJOINT:SIZEdeg (or SIZEmm)"),
     ("target-bumped", "target-bumped@FIRST[-LAST]:SIZEmm"),
     ("not-at-rest", "not-at-rest@FIRST[-LAST]:SIZEmm"),
@@ -63,6 +65,8 @@ impl FaultKind {
             Self::Inch => "inch",
             Self::Metre => "metre",
             Self::JointSign { .. } => "joint-sign",
+            Self::JointUnit { .. } => "joint-unit",
+            Self::JointCoupling { .. } => "joint-coupling",
             Self::MistypedJoint { .. } => "mistyped-joint",
             Self::TargetBumped { .. } => "target-bumped",
             Self::NotAtRest { .. } => "not-at-rest",
@@ -82,6 +86,10 @@ impl fmt::Display for Fault {
         }
         match self.kind {
             FaultKind::JointSign { joint } => write!(f, ":j{}", joint.saturating_add(1)),
+            FaultKind::JointUnit { joint, factor } => write!(f, ":j{}:{factor}", joint.saturating_add(1)),
+            FaultKind::JointCoupling { joint, with, factor } => {
+                write!(f, ":j{}:j{}:{factor}", joint.saturating_add(1), with.saturating_add(1))
+            }
             FaultKind::MistypedJoint { joint, by, quantity } => {
                 write!(f, ":j{}:{by}{}", joint.saturating_add(1), quantity.unit())
             }
@@ -148,6 +156,18 @@ fn read(name: &str, rest: &str) -> Result<Fault, String> {
         "metre" => FaultKind::Metre,
         "beam-break" => FaultKind::BeamBreak,
         "joint-sign" => FaultKind::JointSign { joint: joint(parts.next())? },
+        "joint-unit" => {
+            let joint = joint(parts.next())?;
+            FaultKind::JointUnit { joint, factor: factor(parts.next().ok_or("the factor is missing")?)? }
+        }
+        "joint-coupling" => {
+            let (joint, with) = (joint(parts.next())?, joint(parts.next())?);
+            if joint == with {
+                return Err("a joint moves with another one, not with itself".to_owned());
+            }
+            let factor = parts.next().map_or(Ok(1.0), factor)?;
+            FaultKind::JointCoupling { joint, with, factor }
+        }
         "mistyped-joint" => {
             let joint = joint(parts.next())?;
             let (by, quantity) = joint_step(parts.next())?;
@@ -176,6 +196,12 @@ fn joint(text: Option<&str>) -> Result<usize, String> {
     let text = text.ok_or("the joint is missing (j1, j2, …)")?;
     let number = text.strip_prefix(['j', 'J']).and_then(|number| number.parse::<usize>().ok());
     number.and_then(|number| number.checked_sub(1)).ok_or_else(|| format!("'{text}' is not a joint (j1, j2, …)"))
+}
+
+/// `57.3`, `-1`: a factor other than zero.
+fn factor(text: &str) -> Result<f64, String> {
+    let factor = text.parse::<f64>().ok().filter(|factor| factor.is_finite() && *factor != 0.0);
+    factor.ok_or_else(|| format!("'{text}' is not a factor (57.3, -1, …)"))
 }
 
 /// `5deg`, `-2.5mm`: a size other than zero and what it measures.
@@ -259,9 +285,9 @@ mod tests {
             .map(message)
             .join("\n"),
             @r#"
-            'wrongpose@12' is not a fault: the name 'wrongpose' is not known; known are wrong-pose, swapped-rows, inch, metre, joint-sign, mistyped-joint, target-bumped, not-at-rest, outlier, beam-break, drift, written as in 'wrong-pose@12'
-            '' is not a fault: the name '' is not known; known are wrong-pose, swapped-rows, inch, metre, joint-sign, mistyped-joint, target-bumped, not-at-rest, outlier, beam-break, drift, written as in 'wrong-pose@12'
-            '�[2J@1' is not a fault: the name '�[2J' is not known; known are wrong-pose, swapped-rows, inch, metre, joint-sign, mistyped-joint, target-bumped, not-at-rest, outlier, beam-break, drift, written as in 'wrong-pose@12'
+            'wrongpose@12' is not a fault: the name 'wrongpose' is not known; known are wrong-pose, swapped-rows, inch, metre, joint-sign, joint-unit, joint-coupling, mistyped-joint, target-bumped, not-at-rest, outlier, beam-break, drift, written as in 'wrong-pose@12'
+            '' is not a fault: the name '' is not known; known are wrong-pose, swapped-rows, inch, metre, joint-sign, joint-unit, joint-coupling, mistyped-joint, target-bumped, not-at-rest, outlier, beam-break, drift, written as in 'wrong-pose@12'
+            '�[2J@1' is not a fault: the name '�[2J' is not known; known are wrong-pose, swapped-rows, inch, metre, joint-sign, joint-unit, joint-coupling, mistyped-joint, target-bumped, not-at-rest, outlier, beam-break, drift, written as in 'wrong-pose@12'
             'outlier' is not a fault: the number of the measurement is missing; it is written outlier@FIRST[-LAST]:SIZEmm
             'outlier@0:2mm' is not a fault: '0' is not the number of a measurement (1, 2, 3, …); it is written outlier@FIRST[-LAST]:SIZEmm
             'outlier@10' is not a fault: the size is missing (such as 2mm); it is written outlier@FIRST[-LAST]:SIZEmm

@@ -24,12 +24,17 @@ pub fn coordinates(view: &ViewModel, begun: &str) -> Dialog {
             let pose = content.finding.as_ref().map(|finding| finding.pose.as_str()).or(content.pose.as_deref());
             (content.typed_unit.as_deref(), pose.map_or_else(String::new, |pose| format!(" at pose {pose}")))
         }
-        Content::Target(content) => {
-            let circles = content.circles.as_ref();
-            let joint = circles.and_then(|circles| circles.joint.as_deref());
-            let place = joint.map_or_else(String::new, |joint| format!(" on the circle of {joint}"));
-            (circles.and_then(|circles| circles.typed_unit.as_deref()), place)
-        }
+        Content::Target(content) => match (&content.joint_check, &content.circles) {
+            (Some(check), _) if !check.joints.is_empty() => {
+                let place = check.joint.as_ref().map_or_else(String::new, |joint| format!(" with {joint} moved"));
+                (check.typed_unit.as_deref(), place)
+            }
+            (_, circles) => {
+                let joint = circles.as_ref().and_then(|circles| circles.joint.as_deref());
+                let place = joint.map_or_else(String::new, |joint| format!(" on the circle of {joint}"));
+                (circles.as_ref().and_then(|circles| circles.typed_unit.as_deref()), place)
+            }
+        },
         _ => (None, String::new()),
     };
     let unit = CoordinateUnit::ALL.into_iter().find(|one| Some(one.sign()) == unit).unwrap_or_default();

@@ -21,7 +21,7 @@ impl Dialog {
             Self::Form(form) => form.question(number),
             _ if number > 0 => None,
             Self::Confirm { lines, .. } => Some([&lines[..], &["y or n".to_owned()]].concat()),
-            Self::Text { field, .. } => Some(vec![with_value(field.label(), &field.text())]),
+            Self::Text { field, .. } | Self::Note { field, .. } => Some(vec![with_value(field.label(), &field.text())]),
             Self::Number { field, .. } => Some(vec![with_value(field.label(), &field.text())]),
             Self::Choice { list, .. } | Self::Menu { list, .. } => Some(list.question()),
         }
@@ -43,7 +43,7 @@ impl Dialog {
                 };
                 Ok(())
             }
-            Self::Text { field, .. } => {
+            Self::Text { field, .. } | Self::Note { field, .. } => {
                 replace(field, line);
                 field.problem().map_or(Ok(()), Err)
             }
@@ -72,6 +72,7 @@ impl Dialog {
             Self::Confirm { is_yes: false, .. } => return Answered::Cancelled,
             Self::Confirm { intent, .. } => Ok(intent.clone()),
             Self::Text { field, intent } => Ok(intent(field.text().trim().to_owned())),
+            Self::Note { field, pose } => Ok(super::note(pose, field)),
             Self::Number { field, intent } => field.value().map(*intent),
             Self::Form(form) => form.value(),
             Self::Menu { list, then } => match list.selected().and_then(|index| then.get(index)) {

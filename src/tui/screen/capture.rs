@@ -15,21 +15,20 @@ mod live;
 mod notes;
 mod poses;
 mod prediction;
+mod proposed;
 
 use crossterm::event::KeyCode;
-use nalgebra::Point3;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::page::picture_if_any;
+use super::page::{Scroll, picture_if_any};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
 use crate::session::set_up::CoordinateUnit;
-use crate::text::counted;
 use crate::tui::dialog::{Dialog, ask};
+use crate::tui::form::TextField;
 use crate::tui::keymap::{Key, KeyHint};
 use crate::tui::paint;
 use crate::tui::widget::{TabView, draw_tabs};
-use crate::units::to_mm;
 use crate::wizard::view::{CaptureView, Content, RowState, RowView, ViewModel};
 use crate::wizard::{Intent, reading};
 
@@ -41,8 +40,8 @@ const VIEWS: [u16; 2] = [72, 46];
 const AROUND_JOINTS: u16 = 7;
 /// Columns between view and picture.
 const GAP: u16 = 2;
-/// Most pasted points that are listed.
-const POINTS_SHOWN: usize = 12;
+/// Columns for which the lines of the points shown are counted.
+const PROPOSED: u16 = 78;
 /// Rows that PgUp and PgDn scroll.
 const PAGE: usize = 8;
 
@@ -78,6 +77,8 @@ pub(super) struct CaptureScreen {
     by_fit: bool,
     /// Scroll position of the notes.
     scroll: usize,
+    /// Scroll position of the points that are shown before they are taken.
+    shown: Scroll,
 }
 
 fn content(view: &ViewModel) -> Option<&CaptureView> {
@@ -97,27 +98,17 @@ fn reading_dialog(cx: &ScreenCx<'_>, begun: &str) -> ScreenOutcome {
     ScreenOutcome::Open(Box::new(ask::coordinates(cx.view, begun)))
 }
 
-/// Asks whether the points of several lines belong to the poses to come; `None` if there is only one, or they cannot be read.
-fn points_dialog(content: &CaptureView, text: &str) -> Option<ScreenOutcome> {
+/// Shows the points of several lines before they are taken; `None` if there is only one, or they cannot be read.
+fn several_points(content: &CaptureView, text: &str) -> Option<ScreenOutcome> {
     let unit = CoordinateUnit::ALL.into_iter().find(|one| Some(one.sign()) == content.typed_unit.as_deref())?;
     let points = reading::parse_all(text, unit).ok().filter(|points| points.len() > 1)?;
-    let is_next = |row: &&RowView| row.state == RowState::Open && content.row.is_none_or(|shown| row.row >= shown);
-    let poses: Vec<&str> = content.rows.iter().filter(is_next).map(|row| row.pose.as_str()).collect();
-    let line = |(index, point): (usize, &Point3<f64>)| {
-        let pose = poses.get(index).map_or("no pose is left", |pose| *pose);
-        let [x, y, z] = [point.x, point.y, point.z].map(to_mm);
-        format!("{pose:>5}  x {x:.3}  y {y:.3}  z {z:.3} mm")
-    };
-    let mut lines = vec![format!(
-        "Take {} for the poses that follow? Each is checked; a question stops them.",
-        counted(points.len(), "point")
-    )];
-    lines.extend(points.iter().enumerate().take(POINTS_SHOWN).map(line));
-    if points.len() > POINTS_SHOWN {
-        lines.push(format!("and {} more", points.len() - POINTS_SHOWN));
-    }
-    let intent = Intent::TypeReading(text.to_owned());
-    Some(ScreenOutcome::Open(Box::new(Dialog::Confirm { intent, lines, is_yes: true })))
+    (points.len() > 1).then(|| ScreenOutcome::Intent(Intent::ShowPoints(text.to_owned())))
+}
+
+/// Asks for a note to a pose.
+fn note_dialog(pose: &str) -> ScreenOutcome {
+    let field = TextField::new(format!("Note to pose {pose}"), "");
+    ScreenOutcome::Open(Box::new(Dialog::Note { field, pose: pose.to_owned() }))
 }
 
 impl CaptureScreen {
@@ -127,6 +118,12 @@ impl CaptureScreen {
         let is_shown = |index: &usize| content.rows.get(*index).is_some_and(|row| Some(row.row) == content.row);
         let shown = || order.iter().position(is_shown).unwrap_or(0);
         self.cursor.unwrap_or_else(shown).min(content.rows.len().saturating_sub(1))
+    }
+
+    /// The pose that has the focus in the list.
+    fn row<'a>(&self, content: &'a CaptureView) -> Option<&'a RowView> {
+        let order = poses::order(content, self.by_fit);
+        content.rows.get(*order.get(self.selected(content))?)
     }
 
     fn on_list_key(&mut self, code: KeyCode, content: &CaptureView) -> ScreenOutcome {
@@ -139,13 +136,21 @@ impl CaptureScreen {
             KeyCode::PageDown => (selected + PAGE).min(last),
             KeyCode::Home => 0,
             KeyCode::End => last,
-            KeyCode::Enter => {
-                let order = poses::order(content, self.by_fit);
-                let row = order.get(selected).and_then(|index| content.rows.get(*index));
-                let Some(row) = row else { return ScreenOutcome::Ignored };
+            KeyCode::Enter | KeyCode::Char('r') => {
+                let Some(row) = self.row(content) else { return ScreenOutcome::Ignored };
                 self.tab = Tab::GoTo;
                 self.cursor = None;
                 return ScreenOutcome::Intent(Intent::GoToPose(row.pose.clone()));
+            }
+            KeyCode::Char('x') => {
+                let row = self.row(content);
+                return row.map_or(ScreenOutcome::Ignored, |row| match row.state {
+                    RowState::LeftOut => ScreenOutcome::Intent(Intent::Include(row.pose.clone())),
+                    _ => ScreenOutcome::Intent(Intent::Exclude(row.pose.clone())),
+                });
+            }
+            KeyCode::Char('w') => {
+                return self.row(content).map_or(ScreenOutcome::Ignored, |row| note_dialog(&row.pose));
             }
             KeyCode::Char('o') => {
                 self.by_fit = !self.by_fit;
@@ -175,11 +180,23 @@ impl CaptureScreen {
 
 impl Screen for CaptureScreen {
     fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
+        if content(cx.view).is_some_and(|content| content.proposed.is_some()) {
+            return vec![Scroll::key_hint()];
+        }
         let mut items = vec![KeyHint::new("Tab", self.tab.turned(1).1.to_lowercase(), 4)];
         match self.tab {
             Tab::Poses => {
-                items.push(KeyHint::new("Enter", "go to this pose", 0));
+                let row = content(cx.view).and_then(|content| self.row(content));
+                let state = row.map_or(RowState::Open, |row| row.state);
+                let enter = if state == RowState::Open { "go to this pose" } else { "measure this pose again" };
+                items.push(KeyHint::new("Enter", enter, 0));
                 items.push(KeyHint::new("Up/Down", "choose", 1));
+                match state {
+                    RowState::Measured => items.push(KeyHint::new("x", "exclude it", 2)),
+                    RowState::LeftOut => items.push(KeyHint::new("x", "let it count again", 2)),
+                    RowState::Open | RowState::Skipped => {}
+                }
+                items.push(KeyHint::new("w", "note to it", 3));
                 items.push(KeyHint::new("o", if self.by_fit { "plan order" } else { "worst fit first" }, 2));
             }
             Tab::Notes => items.push(KeyHint::new("Up/Down", "scroll", 7)),
@@ -193,6 +210,10 @@ impl Screen for CaptureScreen {
 
     fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome {
         let Some(content) = content(cx.view) else { return ScreenOutcome::Ignored };
+        if let Some(proposed) = &content.proposed {
+            let lines = proposed::page(cx.theme, proposed, PROPOSED).len();
+            return self.shown.on_key(key, lines).into();
+        }
         match key.code {
             _ if key.has_modifier() => return ScreenOutcome::Ignored,
             code if self.tab.on_key(code) => {}
@@ -216,7 +237,7 @@ impl Screen for CaptureScreen {
     fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome {
         match content(cx.view) {
             Some(content) if takes_typing(cx.view) => {
-                points_dialog(content, text).unwrap_or_else(|| reading_dialog(cx, text.trim()))
+                several_points(content, text).unwrap_or_else(|| reading_dialog(cx, text.trim()))
             }
             _ => ScreenOutcome::Ignored,
         }
@@ -230,6 +251,13 @@ impl Screen for CaptureScreen {
     fn draw(&self, cx: &ScreenCx<'_>, area: Rect, buf: &mut Buffer) {
         let Some(content) = content(cx.view) else { return };
         let (main, beside) = parts(cx, content, area);
+        if let Some(proposed) = &content.proposed {
+            proposed::page(cx.theme, proposed, main.width).draw(self.shown.0, main, buf);
+            if let Some(beside) = beside {
+                picture_if_any(cx, beside, buf);
+            }
+            return;
+        }
         draw_tabs(cx.theme, self.tab, paint::band(main, 0, 1), buf);
         let body = paint::band(main, 1, main.height);
         match self.tab {

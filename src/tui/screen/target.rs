@@ -1,6 +1,7 @@
 //! Screen Target: four ways to locate the SMR, and the circle-point analysis.
 
 mod circles;
+mod joint_check;
 
 use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
@@ -33,6 +34,10 @@ const WAYS: [(&str, &str); 5] = [
         "the whole arm by circles",
         "turn every axis in turn: gives all link constants beside the data sheet, as a profile to save",
     ),
+    (
+        "joint check",
+        "move each joint a little: verifies sign, zero, unit and coupling in two minutes",
+    ),
 ];
 
 /// The focus in the menu.
@@ -58,9 +63,11 @@ fn is_offered(cx: &ScreenCx<'_>, wanted: &Intent) -> bool {
     cx.view.offers(|intent| intent == wanted)
 }
 
-/// Whether a point of a circle is to be measured now.
-fn is_in_circles(cx: &ScreenCx<'_>) -> bool {
-    content(cx).and_then(|content| content.circles.as_ref()).is_some_and(|circles| circles.joint.is_some())
+/// Whether a point of a circle or of the joint check is to be measured now.
+fn is_measuring(cx: &ScreenCx<'_>) -> bool {
+    let Some(content) = content(cx) else { return false };
+    let in_circles = content.circles.as_ref().is_some_and(|circles| circles.joint.is_some());
+    in_circles || content.joint_check.as_ref().is_some_and(|check| !check.joints.is_empty())
 }
 
 /// Whether the circles have a result that is not used yet.
@@ -72,7 +79,7 @@ fn has_new_result(cx: &ScreenCx<'_>) -> bool {
 impl TargetScreen {
     /// Whether the menu is shown.
     fn has_menu(cx: &ScreenCx<'_>) -> bool {
-        !is_in_circles(cx) && !is_fixed(cx)
+        !is_measuring(cx) && !is_fixed(cx)
     }
 
     /// Whether Enter chooses from the menu.
@@ -92,13 +99,18 @@ impl TargetScreen {
                 .find(|info| matches!(info.intent, Intent::ChooseTarget(TargetChoice::Free { .. })))
                 .map_or(ScreenOutcome::Ignored, |info| ScreenOutcome::Intent(info.intent.clone())),
             3 => ScreenOutcome::Intent(Intent::StartCircles),
-            _ => ScreenOutcome::Intent(Intent::StartWholeArm),
+            4 => ScreenOutcome::Intent(Intent::StartWholeArm),
+            _ => ScreenOutcome::Intent(Intent::StartJointCheck),
         }
     }
 
     fn page(&self, cx: &ScreenCx<'_>, columns: u16) -> Page {
         let mut page = Page::new(cx.theme, columns);
         let Some(content) = content(cx) else { return page };
+        if let Some(check) = content.joint_check.as_ref().filter(|check| !check.joints.is_empty()) {
+            joint_check::to_measure(check, &mut page);
+            return page;
+        }
         if let Some(circles) = content.circles.as_ref().filter(|circles| circles.joint.is_some()) {
             circles::to_measure(circles, &mut page);
             return page;
@@ -118,6 +130,16 @@ impl TargetScreen {
             page.gap();
             circles::result(circles, &mut page);
         }
+        if let Some(check) = &content.joint_check {
+            page.gap();
+            joint_check::result(check, &mut page);
+        } else if content.advises_joint_check {
+            page.gap();
+            page.paragraph(
+                "This profile is new: check its joints before 60 poses are spent on it. Two minutes; n skips it.",
+                Role::Warn,
+            );
+        }
         page.gap();
         if !Self::has_menu(cx) {
             page.paragraph("Samples were measured with this SMR: a different mounting needs a new session.", Role::Dim);
@@ -130,7 +152,7 @@ impl TargetScreen {
 
 /// Columns of the text beside the picture.
 fn columns(cx: &ScreenCx<'_>) -> u16 {
-    if is_in_circles(cx) { CIRCLES } else { TEXT }
+    if is_measuring(cx) { CIRCLES } else { TEXT }
 }
 
 /// Asks for coordinates, starting with those of the profile.
@@ -173,7 +195,7 @@ impl Screen for TargetScreen {
 
     fn on_paste(&mut self, text: &str, cx: &ScreenCx<'_>) -> ScreenOutcome {
         // Coordinates copied from the instrument's software.
-        if is_in_circles(cx) && is_offered(cx, &Intent::TypeReading(String::new())) {
+        if is_measuring(cx) && is_offered(cx, &Intent::TypeReading(String::new())) {
             return ScreenOutcome::Intent(Intent::TypeReading(text.trim().to_owned()));
         }
         ScreenOutcome::Ignored

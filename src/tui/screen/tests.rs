@@ -104,6 +104,8 @@ fn target(choice: Option<&str>, circles: Option<CirclesView>) -> ViewModel {
         choice: choice.map(str::to_owned),
         payload: None,
         circles,
+        joint_check: None,
+        advises_joint_check: false,
     });
     let unusable = (!is_complete).then(|| "the circles are not complete".to_owned());
     let offers = vec![

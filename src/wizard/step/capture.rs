@@ -1,28 +1,32 @@
 //! Step Capture: pose by pose, every point checked against all earlier ones.
 
 mod checks;
+mod conditions;
+mod messages;
 mod pasted;
 mod prediction;
+mod proposed;
 mod show;
 mod way;
 
 use super::plan::{PLAN_FILE, measuring_pace, plan_not_saved, plan_request, plan_text, write_plan};
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::session::journal::{
-    Correction, Decision, Entry, FindingCause, FindingText, Line, MeasuredText, from_xyz_mm, to_edge, to_xyz_mm,
+    Decision, Entry, FindingCause, FindingText, Line, MeasuredText, from_xyz_mm, to_edge, to_xyz_mm,
 };
 use crate::session::plan::PoseKind;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
-use crate::session::state::{Robot, Row, Sample, SampleState, Session};
+use crate::session::state::{Deed, Row, Sample, SampleState, Session};
 use crate::text::printable;
 use crate::units::{from_mm, to_mm};
 use crate::wizard::effect::{Answer, Request};
 use crate::wizard::intent::{Danger, Intent, IntentInfo, PlanSettings};
-use crate::wizard::live::AS_PLANNED;
 use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
 use crate::wizard::view::{Content, MoveCheck};
+use conditions::Conditions;
+use messages::{bounded, corrected, not_as_planned, other_unit, refused, remarked};
 use prediction::Prediction;
 pub(super) use prediction::fewest_samples;
 use way::{Way, Waypoint};
@@ -50,8 +54,10 @@ pub(in crate::wizard) struct CaptureStep {
     prediction: Prediction,
     /// Number of the measurement that is being written and that the prediction already includes.
     expected: Option<u64>,
-    /// Points that were pasted and wait for their poses.
+    /// Points that were pasted or read from a file and wait for their turn.
     pasted: pasted::Pasted,
+    /// Points that are shown to be looked at before they are taken.
+    proposal: Option<proposed::Proposal>,
 }
 
 /// A reading that counts only if the operator accepts it.
@@ -93,6 +99,7 @@ impl CaptureStep {
             prediction: Prediction::of(session, fewest),
             expected: None,
             pasted: pasted::Pasted::new(),
+            proposal: None,
         };
         step.question_last_doubt(session);
         step.find_way(session);
@@ -154,17 +161,14 @@ impl CaptureStep {
         }))]
     }
 
-    /// Takes a reading of the row shown: refuses it, holds it back, or writes it as a sample.
-    fn take(&mut self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
-        let (Some(row), Some(robot)) = (self.row, cx.robot()) else { return Vec::new() };
-        let Some(shown) = cx.session.rows.get(row) else { return Vec::new() };
-        self.reached = Some(row);
-        let number = cx.session.measurements + 1;
-        let planned = &shown.planned;
+    /// The record of a reading at a row of the plan, before any check.
+    fn noted(reading: &Reading, row: usize, cx: &Cx<'_>) -> Option<MeasuredText> {
+        let robot = cx.robot()?;
+        let planned = &cx.session.rows.get(row)?.planned;
         let reported = reading.configuration.as_deref().map(|values| to_edge(values, &robot.joint_types));
         let scatter = reading.joint_scatter.as_ref();
-        let noted = MeasuredText {
-            number,
+        Some(MeasuredText {
+            number: cx.session.measurements + 1,
             row,
             pose: planned.pose.clone(),
             kind: planned.kind,
@@ -186,7 +190,14 @@ impl CaptureStep {
             predicted_error_sigma: None,
             remarks: reading.remarks.iter().map(|remark| remark.text.clone()).collect(),
             findings: Vec::new(),
-        };
+        })
+    }
+
+    /// Takes a reading of the row shown: refuses it, holds it back, or writes it as a sample.
+    fn take(&mut self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
+        let (Some(row), Some(robot)) = (self.row, cx.robot()) else { return Vec::new() };
+        let Some(noted) = Self::noted(reading, row, cx) else { return Vec::new() };
+        self.reached = Some(row);
         let previous = cx.session.samples.last().map(|sample| sample.noted.xyz_mm);
         let previous = previous.map(from_xyz_mm);
         let gate = reading::gate(&from_xyz_mm(noted.xyz_mm), previous.as_ref());
@@ -285,6 +296,8 @@ impl CaptureStep {
                 self.prediction.restart(session);
                 match decision {
                     Decision::Undo => self.row = session.sample(*sample).map(|sample| sample.row),
+                    // A pose that waits is still the next one.
+                    Decision::Keep | Decision::LeaveOut if self.row.is_some_and(|row| session.is_open(row)) => {}
                     Decision::Keep | Decision::LeaveOut => self.advance(session),
                 }
                 self.question_last_doubt(session);
@@ -297,6 +310,22 @@ impl CaptureStep {
                 }
                 self.question_last_doubt(session);
                 return vec![Action::Say(Notice::info(corrected(correction)))];
+            }
+            Entry::Undone { what, .. } => {
+                self.turned_back(session);
+                if let Some(row) = session.shown.filter(|row| session.is_open(*row)) {
+                    self.row = Some(row);
+                }
+                self.question_last_doubt(session);
+                return vec![Action::Say(Notice::info(format!("undone: {what}")).hint("redo does it after all"))];
+            }
+            Entry::Redone { what, .. } => {
+                self.turned_back(session);
+                if self.row.is_none_or(|row| !session.is_open(row)) {
+                    self.advance(session);
+                }
+                self.question_last_doubt(session);
+                return vec![Action::Say(Notice::info(format!("done again: {what}")))];
             }
             Entry::Row(row) => {
                 self.row = Some(*row);
@@ -322,6 +351,31 @@ impl CaptureStep {
         Vec::new()
     }
 
+    /// Forgets what belongs to the state before an undo or a redo.
+    fn turned_back(&mut self, session: &Session) {
+        self.held = None;
+        self.expected = None;
+        self.prediction.restart(session);
+    }
+
+    /// Excludes a pose, or lets it count again.
+    fn count_pose(pose: &str, counts: bool, session: &Session) -> Vec<Action> {
+        let say = |text: String| vec![Action::Say(Notice::error(text))];
+        let Some(row) = row_of_pose(pose, session) else {
+            return say(format!("there is no pose '{}' in the plan", printable(pose)));
+        };
+        let (state, decision, reason) = if counts {
+            (SampleState::LeftOut, Decision::Keep, "is not excluded")
+        } else {
+            (SampleState::Counts, Decision::LeaveOut, "has no sample that counts")
+        };
+        let sample = session.samples.iter().find(|sample| sample.row == row && sample.state == state);
+        match sample {
+            Some(sample) => vec![Action::Write(vec![Entry::Decision { sample: sample.noted.number, decision }])],
+            None => say(format!("pose {} {reason}", session.row_name(row))),
+        }
+    }
+
     fn manual_unit(cx: &Cx<'_>) -> Option<CoordinateUnit> {
         match cx.session.instrument {
             Some(InstrumentChoice::Manual { unit }) => Some(unit),
@@ -330,11 +384,18 @@ impl CaptureStep {
     }
 }
 
+/// The label of undo or redo, with what it would be.
+fn turned(verb: &str, deed: Option<Deed>) -> String {
+    deed.map_or_else(|| verb.to_owned(), |deed| format!("{verb}: {}", deed.what))
+}
+
 /// The row of a pose by its name: an open one, else a skipped one, else one that is done.
 fn row_of_pose(pose: &str, session: &Session) -> Option<usize> {
     let rows = session.rows.iter().enumerate();
-    let named: Vec<(usize, &Row)> =
-        rows.filter(|(_, row)| row.planned.pose == pose && row.planned.kind.is_measured()).collect();
+    let is_named = |(index, row): &(usize, &Row)| {
+        row.planned.kind.is_measured() && (row.planned.pose == pose || session.row_name(*index) == pose)
+    };
+    let named: Vec<(usize, &Row)> = rows.filter(is_named).collect();
     // The first active row is the pose itself; its repetitions for drift come later.
     let found = (named.iter().find(|(index, _)| session.is_open(*index)))
         .or_else(|| named.iter().find(|(_, row)| row.active && row.skipped))
@@ -343,116 +404,11 @@ fn row_of_pose(pose: &str, session: &Session) -> Option<usize> {
     found.map(|(index, _)| *index)
 }
 
-/// The message about a robot that is not at the configuration shown. The reported values are used; both are kept.
-fn not_as_planned(noted: &MeasuredText, robot: &Robot) -> Option<Notice> {
-    let reported = noted.reported_joints.as_ref()?;
-    let differences = reported.iter().zip(&noted.joints).map(|(reported, shown)| (reported - shown).abs());
-    let (joint, difference) = differences.enumerate().max_by(|(_, one), (_, other)| one.total_cmp(other))?;
-    let joint = robot.profile.chain().joints().get(joint)?;
-    let quantity = joint.joint_type.quantity();
-    (quantity.from_edge(difference) > AS_PLANNED).then(|| {
-        Notice::attention(format!(
-            "pose {}: joint {} is {difference:.3} {} away from the plan",
-            noted.pose,
-            joint.name,
-            quantity.unit()
-        ))
-        .hint("the joint values reported by the robot are used; the planned ones are kept for reference. Remeasure if this was unintended")
-    })
-}
-
-/// The message about remarks of the instrument that the operator has to see.
-fn remarked(pose: &str, reading: &Reading) -> Option<Notice> {
-    let warnings: Vec<&str> =
-        reading.remarks.iter().filter(|remark| remark.is_warning).map(|remark| remark.text.as_str()).collect();
-    let notice = || {
-        Notice::attention(format!("pose {pose}: the instrument says: {}", warnings.join("; ")))
-            .hint("the point is kept with this remark; measure again if that may be better")
-    };
-    (!warnings.is_empty()).then(notice)
-}
-
-/// The entry of a reading that is refused.
-fn refused(noted: &MeasuredText, reason: String) -> Entry {
-    let xyz_mm =
-        [noted.xyz_mm.0, noted.xyz_mm.1, noted.xyz_mm.2].iter().all(|value| value.is_finite()).then_some(noted.xyz_mm);
-    Entry::Refused { number: noted.number, pose: noted.pose.clone(), reason, xyz_mm }
-}
-
-/// Conditions for the intents of the capture step, each with the reason if it is not met.
-struct Conditions<'a> {
-    step: &'a CaptureStep,
-    cx: &'a Cx<'a>,
-}
-
-impl Conditions<'_> {
-    fn at_a_pose(&self) -> Condition {
-        require(self.step.row.is_some(), "all poses of the plan have been measured")
-    }
-
-    fn connected(&self) -> Condition {
-        require(self.cx.connection.is_some(), "the instrument is not responding; go back to the instrument step")
-    }
-
-    /// The link works. A key pressed now must not trigger a measurement later.
-    fn online(&self) -> Condition {
-        self.cx.down.map_or(Ok(()), |cause| Err(format!("the link is down: {cause}; reconnecting")))
-    }
-
-    /// The instrument supplies the coordinates.
-    fn automatic(&self) -> Condition {
-        require(CaptureStep::manual_unit(self.cx).is_none(), "the coordinates are typed in")
-    }
-
-    /// The operator types the coordinates.
-    fn typed(&self) -> Condition {
-        require(CaptureStep::manual_unit(self.cx).is_some(), "the instrument supplies the coordinates")
-    }
-
-    fn questioned(&self) -> Condition {
-        require(self.step.doubt(self.cx.session).is_some(), "no sample is in question")
-    }
-
-    /// No sample is questioned.
-    fn resolved(&self) -> Condition {
-        require(
-            self.step.doubt(self.cx.session).is_none(),
-            "resolve the questioned sample first: keep it, remeasure it or exclude it",
-        )
-    }
-
-    fn at_a_pose_or_questioned(&self) -> Condition {
-        self.questioned().or_else(|_| self.at_a_pose())
-    }
-
-    /// The finding about the questioned sample proposes a correction.
-    fn correctable(&self) -> Condition {
-        let doubt = self.step.doubt(self.cx.session);
-        require(doubt.is_some_and(|(_, finding)| finding.remedy.is_some()), "no correction is proposed")
-    }
-
-    /// A stop lies on the way to the pose.
-    fn on_the_way(&self) -> Condition {
-        require(!self.step.stops().is_empty(), "there is no stop on the way to this pose")
-    }
-
-    /// The way can be changed to one through home.
-    fn homeward(&self) -> Condition {
-        require(self.step.way.can_go_home, "the way goes through home already, or there is no home")
-    }
-
-    fn held(&self) -> Condition {
-        require(self.step.held.is_some(), "no reading is held back")
-    }
-
-    /// At least one sample counts.
-    fn sampled(&self) -> Condition {
-        require(self.cx.session.counted().next().is_some(), "nothing has been measured yet")
-    }
-}
-
 impl StepMachine for CaptureStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
+        if let Some(proposal) = &self.proposal {
+            return proposal.intents();
+        }
         let session = cx.session;
         let is = Conditions { step: self, cx };
         let shown = self.row.and_then(|row| session.rows.get(row));
@@ -477,18 +433,25 @@ impl StepMachine for CaptureStep {
             offer(Intent::Passed, "the arm is there", [is.at_a_pose(), is.resolved(), is.on_the_way()]),
             offer(Intent::ThroughHome, "go through home", [is.at_a_pose(), is.resolved(), is.homeward()]),
             offer(Intent::Skip, "skip this pose", [is.at_a_pose(), is.resolved()]),
-            offer(Intent::Undo, "undo the last sample", [is.sampled()]).with_danger(Danger::DropsData),
+            offer(Intent::Undo, &turned("undo", session.undoable()), [is.undoable()]),
+            offer(Intent::Redo, &turned("redo", session.redoable()), [is.redoable()]),
+            offer(Intent::Exclude(String::new()), "exclude a pose", [is.sampled()]),
+            offer(Intent::Include(String::new()), "let an excluded pose count again", [is.excluded()]),
+            offer(Intent::ReadPoints(String::new()), "points from a file", [is.typed(), is.at_a_pose(), is.resolved()]),
+            offer(Intent::ShowPoints(String::new()), "paste points", [is.typed(), is.at_a_pose(), is.resolved()]),
             offer(
                 Intent::GoToPose(pose),
                 "go to another pose",
                 [require(!session.rows.is_empty(), "there is no plan")],
             ),
             offer(Intent::Note(String::new()), "write a note", []),
+            offer(Intent::NotePose { pose: String::new(), text: String::new() }, "write a note to a pose", []),
             offer(Intent::SuggestPoses(SUGGESTED), "add more poses", [is.sampled()]),
             offer(Intent::Next, "continue to Identify", [has_enough(session, self.fewest)]),
         ];
         let is_manual = Self::manual_unit(cx).is_some();
-        let has_open = session.open_rows().next().is_some();
+        // A pose that is measured already was chosen to be measured again.
+        let has_open = self.row.is_some() || session.open_rows().next().is_some();
         let next = match (self.doubt(session), has_open) {
             (Some(_), _) if is_manual => type_in,
             (None, true) if is_manual && self.stops().is_empty() => type_in,
@@ -551,8 +514,38 @@ impl StepMachine for CaptureStep {
                 self.row.map(|row| Action::Write(vec![Entry::Skipped { row, skipped: true }])).into_iter().collect()
             }
             Intent::Undo => {
-                let last = session.samples.iter().rev().find(|sample| sample.state == SampleState::Counts);
-                last.map(|sample| Action::Write(undo(sample.noted.number, session))).into_iter().collect()
+                let deed = session.undoable().map(|Deed { line, what }| Entry::Undone { line, what });
+                deed.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+            }
+            Intent::Redo => {
+                let deed = session.redoable().map(|Deed { line, what }| Entry::Redone { line, what });
+                deed.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+            }
+            Intent::Exclude(pose) => Self::count_pose(&pose, false, session),
+            Intent::Include(pose) => Self::count_pose(&pose, true, session),
+            Intent::ReadPoints(file) => {
+                let (Some(profile), Some(unit)) = (cx.profile(), Self::manual_unit(cx)) else { return Vec::new() };
+                vec![Action::Ask(Request::ReadPoints { file, profile: Box::new(profile), unit })]
+            }
+            Intent::ShowPoints(text) => self.propose_pasted(&text, cx),
+            Intent::TakePoints => self.take_proposed(false, cx),
+            Intent::TakeAllPoints => self.take_proposed(true, cx),
+            Intent::DropPoints => {
+                self.proposal = None;
+                vec![Action::Say(Notice::info("no point was taken"))]
+            }
+            Intent::NotePose { pose, text } => {
+                let text = printable(text.trim());
+                match row_of_pose(&pose, session).and_then(|row| session.rows.get(row)) {
+                    Some(_) if text.is_empty() => Vec::new(),
+                    Some(row) => {
+                        vec![Action::Write(vec![Entry::Note { pose: Some(row.planned.pose.clone()), text }])]
+                    }
+                    None => {
+                        let pose = printable(&pose);
+                        vec![Action::Say(Notice::error(format!("there is no pose '{pose}' in the plan")))]
+                    }
+                }
             }
             Intent::GoToPose(pose) => Self::go_to(&pose, session),
             Intent::Note(text) => {
@@ -574,6 +567,7 @@ impl StepMachine for CaptureStep {
         let was_measuring = std::mem::take(&mut self.measuring);
         match answer {
             Answer::Measured(reading) if was_measuring => self.take(&reading, cx),
+            Answer::Points { file, points } => self.propose(format!("'{file}'"), &points, cx),
             Answer::Delivered { .. } => vec![Action::Say(
                 Notice::info(format!("the plan is saved as {PLAN_FILE} in the folder of the session")).hint(
                     "make the robot program from it, and drive it once by hand at reduced speed before measuring",
@@ -608,49 +602,5 @@ impl StepMachine for CaptureStep {
 
     fn content(&self, cx: &Cx<'_>) -> Content {
         Content::Capture(Box::new(show::view(self, cx)))
-    }
-}
-
-/// Ends a correction of the unit at the last measurement: it must not convert measurements to come.
-fn bounded(remedy: Correction, session: &Session) -> Correction {
-    match remedy {
-        // Earlier versions proposed it without an end.
-        Correction::Scale { since, factor, until: None } => {
-            Correction::Scale { since, factor, until: Some(session.measurements) }
-        }
-        remedy => remedy,
-    }
-}
-
-/// The entries that undo a sample and the corrections that it led to.
-fn undo(sample: u64, session: &Session) -> Vec<Entry> {
-    let corrections = session.corrections_since(sample);
-    let taken_back = corrections.map(|corrected| Entry::Correction(Correction::TakenBack { line: corrected.line }));
-    taken_back.chain([Entry::Decision { sample, decision: Decision::Undo }]).collect()
-}
-
-/// The message about a sample that is still in the unit from which the previous one was converted.
-fn other_unit(noted: &MeasuredText, factor: f64) -> Notice {
-    let what = format!("pose {}: still in the wrong unit; its coordinates are multiplied by {factor}", noted.pose);
-    Notice::attention(what)
-        .hint("switch the instrument back to the expected unit; points in that unit are taken as they are")
-}
-
-fn corrected(correction: &Correction) -> String {
-    match correction {
-        Correction::Scale { since, factor, until } => {
-            let which = match until {
-                None => format!("from measurement {since} on"),
-                Some(until) if until == since => format!("of measurement {since}"),
-                Some(until) => format!("of measurements {since} to {until}"),
-            };
-            format!("coordinates {which} are multiplied by {factor}; the original values stay in the journal")
-        }
-        Correction::Swap { first, second } => format!("measurements {first} and {second} were swapped"),
-        Correction::Row { sample, .. } => format!("measurement {sample} was assigned to the pose where the robot was"),
-        Correction::Joints { sample, .. } => format!("measurement {sample} now uses the corrected joint values"),
-        Correction::TakenBack { .. } => {
-            "the correction that followed from the measurement is undone with it; both stay in the journal".to_owned()
-        }
     }
 }

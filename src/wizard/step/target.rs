@@ -1,6 +1,7 @@
 //! Step Target: where the SMR sits on the flange.
 
 mod arm;
+mod joint_check;
 
 use nalgebra::Point3;
 
@@ -15,7 +16,7 @@ use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::session::state::{Robot, Session};
 use crate::units::{to_deg, to_mm};
-use crate::wizard::effect::{Answer, CircleConfigurations, Request};
+use crate::wizard::effect::{Answer, CircleConfigurations, JointCheckStop, Request};
 use crate::wizard::intent::{Intent, IntentInfo};
 use crate::wizard::notice::{Notice, Problem};
 use crate::wizard::reading;
@@ -27,6 +28,8 @@ pub(in crate::wizard) struct TargetStep {
     plan: Vec<CircleConfigurations>,
     /// The whole arm, once every joint was moved.
     arm: Option<Result<Box<MeasuredArm>, String>>,
+    /// Stops of the joint check, once it was started.
+    check: Vec<JointCheckStop>,
 }
 
 /// The next point of a circle to measure.
@@ -56,6 +59,14 @@ impl TargetStep {
         let (joint, configuration) = *points.get(index)?;
         let following = points.get(index + 1).map(|(_, q)| *q);
         Some(NextPoint { joint, configuration, following, index })
+    }
+
+    /// Takes a reading for the joint check or for a circle, whichever is being measured.
+    fn take_any(&self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
+        if joint_check::next(&self.check, cx.session).is_some() {
+            return joint_check::take(&self.check, reading, cx);
+        }
+        self.take(reading, cx)
     }
 
     fn take(&self, reading: &Reading, cx: &Cx<'_>) -> Vec<Action> {
@@ -190,7 +201,9 @@ impl StepMachine for TargetStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let session = cx.session;
         let is_manual = matches!(session.instrument, Some(InstrumentChoice::Manual { .. }));
-        let is_measuring_circles = self.next(session).is_some();
+        let is_checking = joint_check::next(&self.check, session).is_some();
+        let is_measuring_circles = self.next(session).is_some() && !is_checking;
+        let is_measuring = is_measuring_circles || is_checking;
         let has_circles = !session.circle_points.is_empty();
         let can_change = || {
             require(
@@ -199,7 +212,7 @@ impl StepMachine for TargetStep {
             )
         };
         let has_choice = || require(session.target.is_some(), "choose where the SMR is first");
-        let has_point = || require(is_measuring_circles, "start the circles first");
+        let has_point = || require(is_measuring, "start the circles or the joint check first");
         let is_connected = || require(cx.connection.is_some(), "the instrument is not responding");
 
         let has_masses = cx.profile().is_some_and(|profile| profile.chain().loads().is_some());
@@ -220,9 +233,11 @@ impl StepMachine for TargetStep {
         let as_profile = Intent::ChooseTarget(TargetChoice::Profile);
         let free = Intent::ChooseTarget(TargetChoice::Free { sigma_mm: to_mm(FREE_TARGET_UNCERTAINTY) });
         let type_in = Intent::TypeReading(String::new());
-        let next = match (is_measuring_circles, is_manual) {
+        let check = if session.joint_check.is_empty() { "check the joints" } else { "continue the joint check" };
+        let next = match (is_measuring, is_manual) {
             (true, false) => &Intent::Measure,
             (true, true) => &type_in,
+            (false, _) if session.target.is_some() && joint_check::is_advisable(session) => &Intent::StartJointCheck,
             (false, _) if session.target.is_some() => &Intent::Next,
             (false, _) => &as_profile,
         };
@@ -248,8 +263,27 @@ impl StepMachine for TargetStep {
                     can_change(),
                     is_other(false),
                     require(self.plan.is_empty(), "the circles are already being measured"),
+                    require(!is_checking, "the joint check is being measured"),
                     is_connected(),
                 ],
+            ),
+            offer(
+                Intent::StartJointCheck,
+                check,
+                [
+                    require(
+                        session.samples.is_empty(),
+                        "poses are measured already: their distances show wrong joints",
+                    ),
+                    require(!is_measuring_circles, "the circles are being measured"),
+                    joint_check::can_start(&self.check, session),
+                    is_connected(),
+                ],
+            ),
+            offer(
+                Intent::DiscardJointCheck,
+                "restart the joint check",
+                [require(!session.joint_check.is_empty(), "no joint has been checked")],
             ),
             offer(
                 Intent::StartWholeArm,
@@ -315,6 +349,15 @@ impl StepMachine for TargetStep {
                     .into_iter()
                     .collect()
             }
+            Intent::StartJointCheck => {
+                let Some(profile) = cx.profile() else { return Vec::new() };
+                vec![Action::Ask(Request::PlanJointCheck { profile: Box::new(profile) })]
+            }
+            Intent::DiscardJointCheck => vec![Action::Write(vec![Entry::JointCheckDiscarded])],
+            Intent::Measure if joint_check::next(&self.check, session).is_some() => {
+                let request = joint_check::request(&self.check, cx);
+                request.map(|request| Action::Ask(Request::Measure(request))).into_iter().collect()
+            }
             Intent::Measure => {
                 let (Some(next), Some(robot)) = (self.next(session), cx.robot()) else { return Vec::new() };
                 let pace = measuring_pace();
@@ -334,7 +377,7 @@ impl StepMachine for TargetStep {
                     _ => CoordinateUnit::default(),
                 };
                 match reading::parse(&text, unit) {
-                    Ok(point) => self.take(&reading::typed(point), cx),
+                    Ok(point) => self.take_any(&reading::typed(point), cx),
                     Err(message) => vec![Action::Say(Notice::error(message))],
                 }
             }
@@ -362,7 +405,11 @@ impl StepMachine for TargetStep {
                 self.plan = plan;
                 Vec::new()
             }
-            Answer::Measured(reading) => self.take(&reading, cx),
+            Answer::JointCheckPlanned(stops) => {
+                self.check = stops;
+                Vec::new()
+            }
+            Answer::Measured(reading) => self.take_any(&reading, cx),
             Answer::Delivered { .. } => vec![Action::Say(
                 Notice::info(format!("the measured arm is saved as {} in the folder of the session", arm::ARM_FILE))
                     .hint("choose this file as the robot of a new session"),
@@ -375,9 +422,11 @@ impl StepMachine for TargetStep {
         if problem.is_unwritten {
             return vec![Action::Say(problem.into())];
         }
-        let (Some(next), Some(robot)) = (self.next(cx.session), cx.robot()) else {
-            return vec![Action::Say(problem.into())];
-        };
+        let Some(robot) = cx.robot() else { return vec![Action::Say(problem.into())] };
+        if let Some(stop) = joint_check::next(&self.check, cx.session) {
+            return cx.refuse(joint_check::stop_name(robot, stop), problem);
+        }
+        let Some(next) = self.next(cx.session) else { return vec![Action::Say(problem.into())] };
         let pose = pose_name(robot, next.joint, next.index);
         cx.refuse(pose, problem)
     }
@@ -385,7 +434,7 @@ impl StepMachine for TargetStep {
     fn on_applied(&mut self, entry: &Entry, cx: &Cx<'_>) -> Vec<Action> {
         match entry {
             Entry::CirclesDiscarded => {
-                *self = Self::default();
+                *self = Self { check: std::mem::take(&mut self.check), ..Self::default() };
                 Vec::new()
             }
             Entry::CirclePoint(_) if is_whole(cx.session) && self.next(cx.session).is_none() => {
@@ -397,6 +446,7 @@ impl StepMachine for TargetStep {
                 self.arm = Some(found);
                 vec![Action::Say(said)]
             }
+            Entry::JointCheckPoint(_) => joint_check::conclusion(cx.session).map(Action::Say).into_iter().collect(),
             // Only the last point of the last circle shows whether the result can be used.
             Entry::CirclePoint(_) if self.next(cx.session).is_none() => match locate(cx.session) {
                 Some(Ok(found)) => vec![Action::Say(verdict(&found, cx.session))],
@@ -422,6 +472,8 @@ impl StepMachine for TargetStep {
             choice: cx.session.target.as_ref().map(target_text),
             payload: cx.session.payload.map(|payload| payload.to_string()),
             circles: self.circles(cx),
+            joint_check: joint_check::view(&self.check, cx),
+            advises_joint_check: joint_check::is_advisable(cx.session),
         })
     }
 }

@@ -20,8 +20,8 @@ use crate::session::state::Session;
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE};
 use crate::wizard::view::{CaptureView, Content};
 use crate::wizard::{
-    Answer, CircleConfigurations, Effect, Event, Intent, PlanSettings, Problem, Request, RequestId, StoreEvent,
-    ViewModel, Wizard,
+    Answer, CircleConfigurations, Effect, Event, Intent, JointCheckStop, NamedPoint, PlanSettings, Problem, Request,
+    RequestId, StoreEvent, ViewModel, Wizard,
 };
 
 /// Identification poses of the plan.
@@ -157,6 +157,15 @@ pub(super) fn answer(request: &Request) -> Answer {
             files: vec![(format!("calposes.{}", settings.dialect), format!("{} rows", rows.len()))],
             dangers: Vec::new(),
         },
+        Request::PlanJointCheck { .. } => Answer::JointCheckPlanned(joint_check()),
+        Request::ReadPoints { file, .. } if file == "points.csv" => {
+            let named =
+                |row: &PlannedPose| NamedPoint { name: Some(row.pose.clone()), point: seen_at(&row.configuration) };
+            let rows: Vec<PlannedPose> =
+                plan().into_iter().filter(|row| row.kind == PoseKind::Identification).collect();
+            Answer::Points { file: file.clone(), points: rows.iter().map(named).collect() }
+        }
+        Request::ReadPoints { file, .. } => failure(&format!("cannot read '{file}'")),
         Request::Identify(request) => match identify(request, &mut |_| ControlFlow::Continue(())) {
             Ok(identified) => Answer::Identified(Box::new(identified)),
             Err(error) => failure(&error.to_string()),
@@ -167,6 +176,17 @@ pub(super) fn answer(request: &Request) -> Answer {
             Answer::Delivered { files, sums: Vec::new(), left_out: left_out.clone() }
         }
     }
+}
+
+/// Each joint moved by ten degrees.
+fn joint_check() -> Vec<JointCheckStop> {
+    let mut q = vec![0.3, 0.2, -0.4, 0.3, 0.6, 0.1];
+    let mut stops = vec![JointCheckStop { joint: None, configuration: q.clone() }];
+    for joint in 0..q.len() {
+        q[joint] += 10.0 * DEGREE;
+        stops.push(JointCheckStop { joint: Some(joint), configuration: q.clone() });
+    }
+    stops
 }
 
 /// The last two joints turned, six points each.

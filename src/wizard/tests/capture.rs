@@ -1,11 +1,13 @@
 //! Measuring: pose by pose, in any order, with second thoughts.
 
-use super::bench::{Bench, IDENTIFICATION, MANUAL, MEASURED, VERIFICATION, blocked, offers, seen_at, started, texts};
+use super::bench::{
+    Bench, IDENTIFICATION, MANUAL, MEASURED, VERIFICATION, blocked, fold, offers, seen_at, started, texts,
+};
 use crate::session::journal::Entry;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::Step;
 use crate::session::state::{Row, SampleState};
-use crate::wizard::view::RowState;
+use crate::wizard::view::{ProposedState, RowState};
 use crate::wizard::{Intent, Request};
 
 fn go_to(pose: &str) -> Intent {
@@ -68,9 +70,15 @@ fn the_first_pose_is_shown_with_all_that_can_be_done() {
             "Passed*",
             "ThroughHome -- the way goes through home already, or there is no home",
             "Skip",
-            "Undo -- nothing has been measured yet",
+            "Undo -- there is nothing to undo",
+            "Redo -- there is nothing to redo",
+            "Exclude -- nothing has been measured yet",
+            "Include -- no pose is excluded",
+            "ReadPoints -- the instrument supplies the coordinates",
+            "ShowPoints -- the instrument supplies the coordinates",
             "GoToPose",
             "Note",
+            "NotePose",
             "SuggestPoses -- nothing has been measured yet",
             "Next -- 0 of at least 9 identification poses have been measured",
             "Back",
@@ -246,7 +254,7 @@ fn undo_takes_back_one_sample_after_the_other() {
     let mut bench = Bench::at(Step::Capture);
     bench.measure(3);
     let effects = bench.intend(Intent::Undo);
-    assert_eq!(texts(&effects), ["append 13 measurement 3: undone"]);
+    assert_eq!(texts(&effects), ["append 13 undone: pose 3 measured (line 12)"]);
     bench.settle(effects);
     assert_eq!((bench.capture().pose.as_deref(), bench.capture().measured), (Some("3"), 2));
     bench.does(Intent::Undo);
@@ -258,7 +266,140 @@ fn undo_takes_back_one_sample_after_the_other() {
     assert_eq!(bench.wizard.session().measurements, 4, "numbers are never used twice");
     bench.does(Intent::Undo);
     bench.does(Intent::Undo);
-    assert_eq!(blocked(&bench.wizard, "Undo"), "nothing has been measured yet");
+    assert_eq!(blocked(&bench.wizard, "Undo"), "there is nothing to undo");
+}
+
+/// Excluding, skipping, noting and correcting are undone like measuring, and everything can be redone, here and from the journal.
+#[test]
+fn the_whole_history_is_undone_and_redone() {
+    let mut bench = Bench::at(Step::Capture);
+    bench.measure(3);
+    bench.does(Intent::Exclude("2".to_owned()));
+    bench.does(Intent::Skip);
+    bench.does(Intent::NotePose { pose: "1".to_owned(), text: "warm".to_owned() });
+    bench.does(Intent::Include("2".to_owned()));
+    bench.does(Intent::SuggestPoses(2));
+    bench.measure(2);
+    let picture = |bench: &Bench| {
+        let view = bench.capture();
+        (view.rows, view.notes, view.measured, view.open, view.skipped)
+    };
+    let mut before = vec![picture(&bench)];
+    while bench.wizard.session().undoable().is_some() {
+        bench.does(Intent::Undo);
+        before.push(picture(&bench));
+        assert_eq!(fold(&bench.journal), *bench.wizard.session(), "a resumed session is the same");
+    }
+    assert_eq!(before.len(), 11, "ten deeds");
+    let nothing = before.last().unwrap();
+    assert_eq!((nothing.2, nothing.3, nothing.4), (0, MEASURED, 0));
+    assert!(nothing.0.iter().all(|row| row.state == RowState::Open) && nothing.1.is_empty());
+    for earlier in before.iter().rev().skip(1) {
+        bench.does(Intent::Redo);
+        assert_eq!(picture(&bench), *earlier);
+        assert_eq!(fold(&bench.journal), *bench.wizard.session());
+    }
+    assert_eq!(blocked(&bench.wizard, "Redo"), "there is nothing to redo");
+    // What is done after an undo takes the place of what was undone.
+    bench.does(Intent::Undo);
+    bench.does(Intent::Note("other".to_owned()));
+    assert_eq!(blocked(&bench.wizard, "Redo"), "there is nothing to redo");
+    assert_eq!(bench.wizard.session().samples.len(), 5, "a sample is never deleted");
+}
+
+#[test]
+fn a_pose_is_excluded_and_counts_again_by_name() {
+    let mut bench = Bench::at(Step::Capture);
+    bench.measure(4);
+    bench.does(Intent::Exclude("2".to_owned()));
+    assert_eq!(bench.capture().rows[1].state, RowState::LeftOut);
+    assert_eq!(bench.capture().pose.as_deref(), Some("5"), "the pose that waits stays");
+    bench.does(Intent::Exclude("2".to_owned()));
+    assert_eq!(bench.told(), "pose 2 has no sample that counts");
+    bench.does(Intent::Include("2".to_owned()));
+    assert_eq!(bench.capture().rows[1].state, RowState::Measured);
+    bench.does(Intent::Exclude("99".to_owned()));
+    assert_eq!(bench.told(), "there is no pose '99' in the plan");
+}
+
+#[test]
+fn a_pose_can_be_measured_again_when_all_are_done() {
+    let mut bench = Bench::at(Step::Capture);
+    bench.measure(usize::MAX);
+    bench.does(go_to("3"));
+    assert!(offers(&bench.wizard).contains(&"Measure*".to_owned()), "{:?}", offers(&bench.wizard));
+    bench.does(go_to("1 (again)"));
+    let row = bench.capture().row.unwrap();
+    assert_eq!(bench.wizard.session().rows[row].planned.kind, PoseKind::Drift);
+}
+
+#[test]
+fn points_are_shown_with_their_checks_before_any_is_taken() {
+    let mut bench = Bench::with(&MANUAL, Step::Capture);
+    let text = pasted(&bench, 0..9);
+    let mut lines: Vec<String> = text.lines().map(|line| line.replace("P, ", "")).collect();
+    // One digit is wrong in the sixth, and the eighth is no measurement.
+    lines[5] = "1000 2000 3000".to_owned();
+    lines[7] = "0 0 0".to_owned();
+    bench.does(Intent::ShowPoints(lines.join("\n")));
+    assert_eq!(bench.wizard.session().samples.len(), 0, "nothing is taken yet");
+    let shown = bench.capture().proposed.unwrap();
+    let poses: Vec<&str> = shown.points.iter().filter_map(|point| point.pose.as_deref()).collect();
+    assert_eq!(poses, ["1", "2", "3", "4", "5", "6", "7", "8", "9"]);
+    let states: Vec<ProposedState> = shown.points.iter().map(|point| point.state).collect();
+    let (fits, asks, no) = (ProposedState::Fits, ProposedState::InQuestion, ProposedState::Impossible);
+    assert_eq!(states, [fits, fits, fits, fits, fits, asks, fits, no, fits]);
+    assert!(shown.points[5].message.is_some());
+    assert_eq!(shown.points[7].message.as_deref(), Some("the reading is 0, 0, 0: the instrument has no target"));
+    bench.does(Intent::TakePoints);
+    assert_eq!(bench.capture().measured, 7);
+    assert_eq!(bench.capture().finding, None);
+    assert_eq!(bench.capture().pose.as_deref(), Some("10"));
+    assert_eq!(bench.capture().rows[5].state, RowState::Open, "the others are still to be measured");
+}
+
+#[test]
+fn all_points_are_taken_with_questions_or_none() {
+    let mut bench = Bench::with(&MANUAL, Step::Capture);
+    let text = pasted(&bench, 0..7);
+    let mut lines: Vec<String> = text.lines().map(|line| line.replace("P, ", "")).collect();
+    lines[5] = "1000 2000 3000".to_owned();
+    let text = lines.join("\n");
+    bench.does(Intent::ShowPoints(text.clone()));
+    bench.does(Intent::DropPoints);
+    assert_eq!((bench.capture().measured, bench.capture().proposed), (0, None));
+    bench.does(Intent::ShowPoints(text));
+    bench.does(Intent::TakeAllPoints);
+    assert_eq!(bench.wizard.session().samples.len(), 6, "the question comes before the seventh is taken");
+    assert!(bench.capture().finding.is_some());
+    bench.does(Intent::LeaveOut);
+    assert_eq!(bench.wizard.session().samples.len(), 7);
+}
+
+#[test]
+fn points_of_a_file_go_to_the_poses_that_they_name() {
+    let mut bench = Bench::with(&MANUAL, Step::Capture);
+    bench.does(Intent::ReadPoints("missing.csv".to_owned()));
+    assert_eq!(bench.told(), "cannot read 'missing.csv'");
+    bench.does(Intent::ReadPoints("points.csv".to_owned()));
+    let shown = bench.capture().proposed.unwrap();
+    assert_eq!(shown.points.len(), IDENTIFICATION);
+    assert!(shown.points.iter().all(|point| point.pose == point.name && point.state == ProposedState::Fits));
+    bench.does(Intent::TakePoints);
+    assert_eq!(bench.capture().identification, IDENTIFICATION);
+}
+
+#[test]
+fn a_refused_point_of_several_says_which_why_and_what_to_do() {
+    let mut bench = Bench::with(&MANUAL, Step::Capture);
+    let text = pasted(&bench, 0..4);
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines[1] = "0 0 0";
+    bench.does(Intent::TypeReading(lines.join("\n")));
+    assert_eq!(
+        bench.told(),
+        "the point for pose 2 was not taken: the reading is 0, 0, 0: the instrument has no target; the points after it were not taken either (3 and 4)"
+    );
 }
 
 #[test]

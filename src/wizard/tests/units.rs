@@ -66,9 +66,11 @@ fn undo_takes_the_correction_back_that_the_sample_led_to() {
     let mut bench = one_in_inches();
     corrects(&mut bench);
     let effects = bench.intend(Intent::Undo);
-    assert_eq!(texts(&effects), ["append 20 the correction in line 19 is undone | 21 measurement 9: undone"]);
+    assert_eq!(texts(&effects), ["append 20 undone: a correction (line 19)"]);
     bench.settle(effects);
-    assert!(bench.told().contains("is undone with it"), "{}", bench.told());
+    assert_eq!(bench.told(), "undone: a correction");
+    assert!(cause(&bench).is_some(), "the question is open again");
+    bench.does(Intent::Undo);
     let session = bench.wizard.session();
     assert_eq!((session.corrections.len(), session.counted().count(), session.correction_of(9)), (0, 8, 1.0));
     assert_eq!((bench.capture().pose.as_deref(), cause(&bench)), (Some("9"), None));
@@ -87,7 +89,7 @@ fn undoing_past_the_sample_takes_the_correction_back_as_well() {
     corrects(&mut bench);
     assert!(all_are_right(bench.wizard.session()));
     bench.measure(2);
-    for undone in 1..=6 {
+    for undone in 1..=7 {
         assert_eq!(bench.wizard.session().corrections.len(), usize::from(undone <= 3));
         bench.does(Intent::Undo);
     }

@@ -35,13 +35,18 @@ fn rows() -> Vec<RowView> {
             1..=14 => RowState::Measured,
             _ => RowState::Open,
         },
-        measured: (row < 15 && row != 5 && row != 7).then(|| MeasuredRow {
+        measured: (row < 15 && row != 5).then(|| MeasuredRow {
             fit_mm: (row < 10).then_some(0.01 * ((row * 7) % 10) as f64),
             scatter_mm: Some(0.004),
             shots: 3,
             time: format!("09:{row:02}"),
+            measurement: row as u64,
+            xyz_mm: [1234.5678, -345.6789, 987.6543],
+            findings: Vec::new(),
+            earlier: usize::from(row == 4),
         }),
-        has_note: row == 3,
+        joints: vec![-12.345, 48.0, -117.25, 179.999, -90.5, 0.0],
+        notes: if row == 3 { vec!["cable touched the arm".to_owned()] } else { Vec::new() },
     };
     (1..=40).map(row).collect()
 }
@@ -82,6 +87,8 @@ fn normal() -> CaptureView {
         typed_unit: None,
         too_few: None,
         rows: rows(),
+        fit_is_nominal: false,
+        proposed: None,
         notes: vec![(Some("3".to_owned()), "cable touched the arm".to_owned())],
         refused: vec![("6".to_owned(), "the beam was interrupted".to_owned())],
     }

@@ -1,9 +1,13 @@
 //! The view of the capture step.
 
 use super::{CaptureStep, has_enough};
-use crate::session::journal::PairText;
+use crate::geometry::Registration;
+use crate::kinematics::ForwardKinematics;
+use crate::profile::Profile;
+use crate::session::journal::{PairText, to_edge};
 use crate::session::plan::PoseKind;
-use crate::session::state::{Sample, SampleState, Session};
+use crate::session::state::{Note, Sample, SampleState, Session};
+use crate::session::station;
 use crate::units::to_mm;
 use crate::wizard::step::Cx;
 use crate::wizard::view::{
@@ -11,10 +15,14 @@ use crate::wizard::view::{
     SampleView,
 };
 
+/// Most samples that are compared with the nominal arm whenever the screen is drawn.
+const MOST_COMPARED: usize = 300;
+
 /// The view of a capture step.
 pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
     let session = cx.session;
-    let rows: Vec<RowView> = (0..session.rows.len()).filter_map(|row| row_view(session, row)).collect();
+    let fits = Fits::new(session);
+    let rows: Vec<RowView> = (0..session.rows.len()).filter_map(|row| row_view(session, row, &fits)).collect();
     let count = |kind| session.counted_of(kind).count();
     let open = session.open_rows().count();
     let measured = session.counted().count();
@@ -50,6 +58,8 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         typed_unit: CaptureStep::manual_unit(cx).map(|unit| unit.sign().to_owned()),
         too_few: has_enough(session, step.fewest).err(),
         rows,
+        fit_is_nominal: matches!(fits, Fits::Nominal(_)),
+        proposed: step.proposal.as_ref().map(|proposal| proposal.view(session)),
         notes: session.notes.iter().map(|note| (note.pose.clone(), note.text.clone())).collect(),
         refused: session.refused.iter().map(|refused| (refused.pose.clone(), refused.reason.clone())).collect(),
     }
@@ -88,38 +98,95 @@ fn joints(step: &CaptureStep, cx: &Cx<'_>) -> Vec<JointShown> {
         .collect()
 }
 
-fn row_view(session: &Session, index: usize) -> Option<RowView> {
+fn row_view(session: &Session, index: usize, fits: &Fits) -> Option<RowView> {
     let row = session.rows.get(index)?;
     if !row.planned.kind.is_measured() {
         return None;
     }
-    let sample = session.sample_of_row(index);
-    let left_out = session.samples.iter().any(|sample| sample.row == index && sample.state == SampleState::LeftOut);
+    let stands =
+        |sample: &&Sample| sample.row == index && matches!(sample.state, SampleState::Counts | SampleState::LeftOut);
+    let sample = session.samples.iter().find(stands);
     let state = match sample {
+        Some(sample) if sample.state == SampleState::LeftOut => RowState::LeftOut,
         Some(_) => RowState::Measured,
-        None if left_out => RowState::LeftOut,
         None if row.skipped => RowState::Skipped,
         None if !row.active => return None,
         None => RowState::Open,
     };
-    let pose = row.planned.pose.clone();
-    let has_note = session.notes.iter().any(|note| note.pose.as_ref() == Some(&pose));
-    let measured = sample.map(|sample| MeasuredRow {
-        fit_mm: fit_mm(session, sample),
+    let about = |note: &&Note| note.pose.as_ref() == Some(&row.planned.pose);
+    let joint_types = session.robot.as_ref().map_or(&[][..], |robot| &robot.joint_types);
+    Some(RowView {
+        row: index,
+        pose: session.row_name(index),
+        kind: row.planned.kind,
+        state,
+        joints: to_edge(&row.planned.configuration, joint_types),
+        measured: sample.map(|sample| measured_row(session, sample, fits)),
+        notes: session.notes.iter().filter(about).map(|note| note.text.clone()).collect(),
+    })
+}
+
+fn measured_row(session: &Session, sample: &Sample, fits: &Fits) -> MeasuredRow {
+    let number = sample.noted.number;
+    let findings = session.samples.iter().flat_map(|sample| &sample.noted.findings);
+    let point = session.point_of(sample);
+    MeasuredRow {
+        fit_mm: fits.of(session, sample),
         scatter_mm: sample.noted.scatter_mm,
         shots: sample.noted.shots,
         // `2026-03-01T09:15:02Z`
         time: sample.time.to_string().get(11..16).unwrap_or_default().to_owned(),
-    });
-    Some(RowView { row: index, pose, kind: row.planned.kind, state, measured, has_note })
+        measurement: number,
+        xyz_mm: [point.x, point.y, point.z].map(to_mm),
+        findings: findings.filter(|finding| finding.about == number).map(|finding| finding.message.clone()).collect(),
+        earlier: session.samples.iter().filter(|other| other.row == sample.row && other.noted.number < number).count(),
+    }
 }
 
-/// How far a sample is from where the identified arm has it (mm), if the result is of the samples that count now.
-fn fit_mm(session: &Session, sample: &Sample) -> Option<f64> {
-    let result = session.identified.as_ref().filter(|_| session.is_current())?;
-    let at = result.samples.iter().position(|number| *number == sample.noted.number)?;
-    let (x, y, z) = result.points.get(at)?.identified_mm;
-    Some(x.hypot(y).hypot(z))
+/// What samples are compared with.
+enum Fits {
+    /// The identified arm: the result is of the samples that count now.
+    Identified,
+    /// The nominal arm, to which the samples are registered.
+    Nominal(Box<(Registration, Profile)>),
+    /// Nothing yet.
+    Unknown,
+}
+
+impl Fits {
+    /// The identified arm if there is one, or else the nominal one, for as many samples as are compared in no time.
+    fn new(session: &Session) -> Self {
+        if session.identified.is_some() && session.is_current() {
+            return Self::Identified;
+        }
+        if session.samples.len() > MOST_COMPARED {
+            return Self::Unknown;
+        }
+        match (station::registration(session), session.mounted_profile()) {
+            (Some(registration), Some(profile)) => Self::Nominal(Box::new((registration, profile))),
+            _ => Self::Unknown,
+        }
+    }
+
+    /// How far a sample is from where the arm has it (mm).
+    fn of(&self, session: &Session, sample: &Sample) -> Option<f64> {
+        match self {
+            Self::Identified => {
+                let result = session.identified.as_ref()?;
+                let at = result.samples.iter().position(|number| *number == sample.noted.number)?;
+                let (x, y, z) = result.points.get(at)?.identified_mm;
+                Some(x.hypot(y).hypot(z))
+            }
+            Self::Nominal(with) => {
+                let (registration, profile) = with.as_ref();
+                let target = profile.targets().first()?.position_in_flange;
+                let q = session.configuration_of(sample);
+                let nominal = ForwardKinematics::new(profile.chain()).point_in_base(&q, &target);
+                Some(to_mm((registration.to_from_from * session.point_of(sample) - nominal).norm()))
+            }
+            Self::Unknown => None,
+        }
+    }
 }
 
 fn sample_view(session: &Session, sample: &Sample) -> SampleView {
