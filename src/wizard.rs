@@ -22,6 +22,7 @@
 
 pub mod advice;
 mod cell;
+mod done;
 mod effect;
 mod faces;
 pub mod intent;
@@ -110,6 +111,7 @@ struct Busy {
     id: RequestId,
     what: &'static str,
     progress: Option<RequestProgress>,
+    done: done::Done,
     cancelled: bool,
 }
 
@@ -233,6 +235,7 @@ impl Wizard {
             Event::Answer { id, answer } => self.on_answer(id, answer),
             Event::Progress { id, progress } => {
                 if let Some(busy) = self.busy.as_mut().filter(|busy| busy.id == id) {
+                    busy.done.take(&progress);
                     busy.progress = Some(progress);
                 }
                 Vec::new()
@@ -595,7 +598,7 @@ impl Wizard {
                 }
                 Action::Ask(request) => {
                     let id = self.next_id();
-                    self.busy = Some(Busy { id, what: request.what(), progress: None, cancelled: false });
+                    self.busy = Some(Busy { id, what: request.what(), progress: None, done: done::Done::default(), cancelled: false });
                     effects.push(Effect::Start { id, request });
                 }
                 Action::Disconnect => {

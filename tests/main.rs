@@ -57,6 +57,8 @@ mod scripts;
 #[cfg(unix)]
 mod sessions;
 #[cfg(target_os = "linux")]
+mod technician;
+#[cfg(target_os = "linux")]
 mod terminal;
 mod triage;
 mod whole_arm;

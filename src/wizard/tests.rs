@@ -5,6 +5,7 @@ mod bench;
 mod capture;
 mod cell;
 mod gates;
+mod joint_check;
 mod journal_first;
 mod resume;
 mod shutdown;

@@ -24,7 +24,7 @@ use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummar
 use crate::session::wire::{KnownLinks, LinkChoice};
 use crate::units::to_mm;
 pub use joint_check::{JointCheckRow, JointCheckVerdict, JointCheckView};
-pub use rows::{MeasuredRow, ProposedPointView, ProposedState, ProposedView, RowState, RowView};
+pub use rows::{ExpectedView, MeasuredRow, ProposedPointView, ProposedState, ProposedView, RowState, RowView};
 pub use sessions::{SessionCard, SessionChoice};
 
 /// Content of a screen.
@@ -144,7 +144,7 @@ pub struct BusyView {
     pub what: &'static str,
     /// Progress in words.
     pub progress: Option<String>,
-    /// Completed fraction, 0 … 1, where it is known.
+    /// Completed fraction, 0 … 1, where it is known; it never decreases, and reaches 1 only with the answer.
     pub part: Option<f64>,
     /// Figures of merit of the best pose set so far, while a search runs.
     pub figures: Option<Figures>,
@@ -445,6 +445,8 @@ pub struct CaptureView {
     pub too_few: Option<String>,
     /// All rows of the plan that are to be measured.
     pub rows: Vec<RowView>,
+    /// Where the instrument will see the SMR at the pose shown, once the samples say where it stands.
+    pub expected: Option<ExpectedView>,
     /// Whether the fit of the rows is to the nominal arm, because no result is of the samples that count now.
     pub fit_is_nominal: bool,
     /// Points that are shown before they are taken.
@@ -622,7 +624,7 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
         busy: wizard.busy.as_ref().map(|busy| BusyView {
             what: busy.what,
             progress: busy.progress.as_ref().map(progress_text),
-            part: busy.progress.as_ref().and_then(part_done),
+            part: busy.done.part(),
             figures: busy.progress.as_ref().and_then(figures),
             is_cancelled: busy.cancelled,
         }),
@@ -656,12 +658,7 @@ fn progress_text(progress: &RequestProgress) -> String {
                 Stage::Prediction => "predicting",
                 Stage::Objective { .. } => "choosing",
             };
-            format!(
-                "{stage}, start {} of {starts}: condition {:.1}, predicted error {:.3} sigma",
-                found.start + 1,
-                found.figures.condition_number,
-                found.figures.predicted_error
-            )
+            format!("{stage}, start {} of {starts}", found.start + 1)
         }
         RequestProgress::Identify(identification::Stage::Step(Iteration { cost, step, .. })) => {
             format!("cost {cost:.6e}, largest change {step:.1e} expected deviations")
@@ -677,16 +674,5 @@ const fn figures(progress: &RequestProgress) -> Option<Figures> {
     match progress {
         RequestProgress::Search(plan::Progress::Sweep { found, .. }) => Some(found.figures),
         RequestProgress::Search(_) | RequestProgress::Identify(_) => None,
-    }
-}
-
-/// Part of the stage of a search that is done.
-fn part_done(progress: &RequestProgress) -> Option<f64> {
-    match progress {
-        RequestProgress::Search(plan::Progress::Sweep { done, sweeps, .. }) => {
-            Some((*done as f64 / (*sweeps).max(1) as f64).min(1.0))
-        }
-        RequestProgress::Search(plan::Progress::Searching | plan::Progress::Unreachable { .. })
-        | RequestProgress::Identify(_) => None,
     }
 }

@@ -24,6 +24,15 @@ pub struct RowView {
     pub notes: Vec<String>,
 }
 
+/// Where the instrument will see the SMR.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ExpectedView {
+    /// Place in the tracker frame, from the nominal arm.
+    pub xyz_mm: [f64; 3],
+    /// How far the samples so far are from such places (RMS).
+    pub spread_mm: f64,
+}
+
 /// What is known about the sample of a row.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeasuredRow {

@@ -262,6 +262,12 @@ fn status(cx: &ScreenCx<'_>, content: &CaptureView, is_tall: bool) -> Vec<(Strin
     if let Some(live) = &cx.view.live {
         lines.extend(values::live(live).map(|text| (format!("now: {text}"), Role::Hint)));
     }
+    if let (Some(expected), Some(_)) = (&content.expected, &content.typed_unit) {
+        let [x, y, z] = expected.xyz_mm;
+        let spread = expected.spread_mm;
+        let text = format!("expected here: x {x:.1}  y {y:.1}  z {z:.1} mm, give or take {spread:.1} mm");
+        lines.push((text, Role::Hint));
+    }
     if let Some(last) = &content.last {
         let scatter = last.scatter_mm.map_or_else(String::new, |scatter| format!(", scatter {scatter:.3} mm"));
         let [x, y, z] = last.xyz_mm;

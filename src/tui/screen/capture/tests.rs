@@ -87,6 +87,7 @@ fn normal() -> CaptureView {
         typed_unit: None,
         too_few: None,
         rows: rows(),
+        expected: None,
         fit_is_nominal: false,
         proposed: None,
         notes: vec![(Some("3".to_owned()), "cable touched the arm".to_owned())],

@@ -11,7 +11,7 @@ use crate::session::station;
 use crate::units::to_mm;
 use crate::wizard::step::Cx;
 use crate::wizard::view::{
-    CaptureView, DriftView, FindingView, JointShown, MeasuredRow, PairView, PredictionView, RowState, RowView,
+    CaptureView, DriftView, ExpectedView, FindingView, JointShown, MeasuredRow, PairView, PredictionView, RowState, RowView,
     SampleView,
 };
 
@@ -58,6 +58,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         typed_unit: CaptureStep::manual_unit(cx).map(|unit| unit.sign().to_owned()),
         too_few: has_enough(session, step.fewest).err(),
         rows,
+        expected: step.row.and_then(|row| expected(session, row, &fits)),
         fit_is_nominal: matches!(fits, Fits::Nominal(_)),
         proposed: step.proposal.as_ref().map(|proposal| proposal.view(session)),
         notes: session.notes.iter().map(|note| (note.pose.clone(), note.text.clone())).collect(),
@@ -159,13 +160,15 @@ impl Fits {
         if session.identified.is_some() && session.is_current() {
             return Self::Identified;
         }
+        Self::nominal(session).map_or(Self::Unknown, Self::Nominal)
+    }
+
+    /// The samples registered to the nominal arm.
+    fn nominal(session: &Session) -> Option<Box<(Registration, Profile)>> {
         if session.samples.len() > MOST_COMPARED {
-            return Self::Unknown;
+            return None;
         }
-        match (station::registration(session), session.mounted_profile()) {
-            (Some(registration), Some(profile)) => Self::Nominal(Box::new((registration, profile))),
-            _ => Self::Unknown,
-        }
+        Some(Box::new((station::registration(session)?, session.mounted_profile()?)))
     }
 
     /// How far a sample is from where the arm has it (mm).
@@ -187,6 +190,21 @@ impl Fits {
             Self::Unknown => None,
         }
     }
+}
+
+/// Where the instrument will see the SMR at a row.
+fn expected(session: &Session, row: usize, fits: &Fits) -> Option<ExpectedView> {
+    let own = if matches!(fits, Fits::Identified) { Fits::nominal(session) } else { None };
+    let with = match (fits, &own) {
+        (Fits::Nominal(with), _) => with,
+        (_, own) => own.as_ref()?,
+    };
+    let (registration, profile) = with.as_ref();
+    let target = profile.targets().first()?.position_in_flange;
+    let q = &session.rows.get(row)?.planned.configuration;
+    let in_base = ForwardKinematics::new(profile.chain()).point_in_base(q, &target);
+    let point = registration.to_from_from.inverse_transform_point(&in_base);
+    Some(ExpectedView { xyz_mm: [point.x, point.y, point.z].map(to_mm), spread_mm: to_mm(registration.rms) })
 }
 
 fn sample_view(session: &Session, sample: &Sample) -> SampleView {
