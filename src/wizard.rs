@@ -598,7 +598,13 @@ impl Wizard {
                 }
                 Action::Ask(request) => {
                     let id = self.next_id();
-                    self.busy = Some(Busy { id, what: request.what(), progress: None, done: done::Done::default(), cancelled: false });
+                    self.busy = Some(Busy {
+                        id,
+                        what: request.what(),
+                        progress: None,
+                        done: done::Done::default(),
+                        cancelled: false,
+                    });
                     effects.push(Effect::Start { id, request });
                 }
                 Action::Disconnect => {

@@ -223,7 +223,8 @@ fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
                 if pose == "13" && !has_dropped {
                     has_dropped = true;
                     drop(cell);
-                    technician.sees(LONG, "that the link is down", |shown| shown.has("down") || shown.has("reconnecting"));
+                    technician
+                        .sees(LONG, "that the link is down", |shown| shown.has("down") || shown.has("reconnecting"));
                     cell = Cell::start(place.0.path(), &listen, Some(&plan));
                     cell.go(to);
                     technician.sees(LONG, "the tracker again", |shown| !shown.has("the link is down"));
@@ -242,8 +243,12 @@ fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
     let state = session(&place);
     assert!(state.counted().count() >= 20, "{}", state.counted().count());
     assert!(has_dropped && corrected > 0, "the connection was cut, and a correction was applied");
-    let findings: Vec<String> =
-        state.samples.iter().flat_map(|sample| &sample.noted.findings).map(|finding| finding.cause.to_string()).collect();
+    let findings: Vec<String> = state
+        .samples
+        .iter()
+        .flat_map(|sample| &sample.noted.findings)
+        .map(|finding| finding.cause.to_string())
+        .collect();
     assert!(!findings.is_empty());
 
     technician.does("n", "step 6", |shown| shown.step() == Some(6));

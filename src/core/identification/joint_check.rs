@@ -22,6 +22,8 @@ const STEPS: usize = 12;
 const ARM: f64 = 0.2 * MILLIMETRE;
 /// An explanation has to leave less than this part of what the simpler one leaves.
 const BETTER: f64 = 0.25;
+/// Explanations are alike if they leave at most this many times as much as the best one.
+const ALIKE: f64 = 1.5;
 /// What explains the points leaves at most this much (m, rms), or this part of the largest movement.
 const EXPLAINED: (f64, f64) = (1.0 * MILLIMETRE, 0.01);
 /// Expected error of a zero (rad, m) of an arm whose zeros are right.
@@ -94,6 +96,17 @@ impl JointFault {
             | Self::Zero { joint, .. }
             | Self::Coupled { joint, .. } => Some(joint),
             Self::Mirrored => None,
+        }
+    }
+
+    /// How rare it is: the smaller the likelier among faults that explain the points equally.
+    const fn rarity(&self) -> usize {
+        match *self {
+            Self::Reversed { .. } => 1,
+            Self::Coupled { .. } | Self::Unit { .. } => 2,
+            // Half a turn looks like a reversed joint or two, which is commoner.
+            Self::Zero { .. } => 3,
+            Self::Mirrored => 8,
         }
     }
 
@@ -277,10 +290,15 @@ impl Check<'_> {
                 );
             }
             next.sort_by(|one, other| one.fit.rms.total_cmp(&other.fit.rms));
-            next.truncate(KEPT);
-            if let Some(first) = next.first().filter(|first| first.fit.rms < BETTER * best.fit.rms) {
-                best = first.clone();
+            // Of explanations that leave about the same, the commonest.
+            let least = next.first().map_or(f64::INFINITY, |first| first.fit.rms);
+            let alike = next.iter().filter(|one| one.fit.rms <= ALIKE * least.max(self.sigma));
+            let rarity = |one: &Hypothesis| one.faults.iter().map(JointFault::rarity).sum::<usize>();
+            let commonest = alike.min_by_key(|one| rarity(one)).filter(|one| one.fit.rms < BETTER * best.fit.rms);
+            if let Some(found) = commonest {
+                best = found.clone();
             }
+            next.truncate(KEPT);
             kept = next;
         }
         best
@@ -507,7 +525,11 @@ impl Linear {
     }
 
     fn solve(&self) -> Option<DVector<f64>> {
-        let solved = self.matrix.clone().svd(true, true).solve(&self.right, 1e-12).ok()?;
+        let normal = self.matrix.tr_mul(&self.matrix);
+        let solved = match normal.cholesky() {
+            Some(factor) => factor.solve(&self.matrix.tr_mul(&self.right)),
+            None => self.matrix.clone().svd(true, true).solve(&self.right, 1e-12).ok()?,
+        };
         solved.iter().all(|value| value.is_finite()).then_some(solved)
     }
 

@@ -254,7 +254,8 @@ mod tests {
         assert_eq!(spaced.to_string(), "mistyped-joint@8:j2:5deg");
         for (name, _) in FORMS {
             let [a, b, c] = ["", ":j2", ":1mm"].map(|size| format!("{name}@2{size}").parse::<Fault>());
-            let others = [":j2:1deg", ":1mm/h"].map(|size| format!("{name}@2{size}").parse::<Fault>());
+            let others =
+                [":j2:1deg", ":1mm/h", ":j2:2.5", ":j2:j3"].map(|size| format!("{name}@2{size}").parse::<Fault>());
             let read: Vec<Fault> = [a, b, c].into_iter().chain(others).flatten().collect();
             assert!(read.len() == 1 && read[0].kind.name() == name, "{name}: {read:?}");
         }

@@ -104,7 +104,7 @@ impl Session {
         }
     }
 
-    /// Name of a row of the plan. A pose that is measured again to see drift has the name of the first with `(again)`.
+    /// Name of a row of the plan. A pose that is measured again to see drift has the name of the first with `again`.
     pub fn row_name(&self, row: usize) -> String {
         let Some(named) = self.rows.get(row) else { return "?".to_owned() };
         let pose = &named.planned.pose;
@@ -113,8 +113,8 @@ impl Session {
         }
         let is_same = |other: &&super::Row| other.planned.kind == PoseKind::Drift && other.planned.pose == *pose;
         match self.rows.iter().take(row).filter(is_same).count() {
-            0 => format!("{pose} (again)"),
-            earlier => format!("{pose} (again {})", earlier + 1),
+            0 => format!("{pose} again"),
+            earlier => format!("{pose} again {}", earlier + 1),
         }
     }
 

@@ -622,6 +622,7 @@ fn keys_become_intents() {
     is(&target(None, None), &[Down, Down, Enter], Intent::ChooseTarget(TargetChoice::Free { sigma_mm: 50.0 }));
     is(&target(None, None), &[Down, Down, Down, Enter], Intent::StartCircles);
     is(&target(None, None), &[Down, Down, Down, Down, Enter], Intent::StartWholeArm);
+    is(&target(None, None), &[Down, Down, Down, Down, Down, Enter], Intent::StartJointCheck);
     let known = TargetChoice::Known { xyz_mm: (-1.473, 26.384, 71.991), sigma_mm: 0.1 };
     is(&target(None, None), &[Char('k'), Enter], Intent::ChooseTarget(known));
     is(&target(None, Some(circles(true))), &[Enter], Intent::UseCircles);

@@ -328,7 +328,7 @@ fn a_pose_can_be_measured_again_when_all_are_done() {
     bench.measure(usize::MAX);
     bench.does(go_to("3"));
     assert!(offers(&bench.wizard).contains(&"Measure*".to_owned()), "{:?}", offers(&bench.wizard));
-    bench.does(go_to("1 (again)"));
+    bench.does(go_to("1 again"));
     let row = bench.capture().row.unwrap();
     assert_eq!(bench.wizard.session().rows[row].planned.kind, PoseKind::Drift);
 }

@@ -35,7 +35,10 @@ fn every_joint_is_moved_once_and_is_right() {
     assert!(verdict.joints.iter().all(|joint| joint.is_right), "{:?}", verdict.joints);
     assert!(bench.told().starts_with("all joints are as the profile says"), "{}", bench.told());
     assert!(done.joints.is_empty());
-    assert_eq!(blocked(&bench.wizard, "StartJointCheck"), "the joints are checked; measure the check again to repeat it");
+    assert_eq!(
+        blocked(&bench.wizard, "StartJointCheck"),
+        "the joints are checked; measure the check again to repeat it"
+    );
     assert!(offers(&bench.wizard).contains(&"Next*".to_owned()));
 }
 

@@ -9,7 +9,7 @@ use crate::session::plan::PoseKind;
 pub struct RowView {
     /// Row of the plan, from 0.
     pub row: usize,
-    /// Name of the pose; `(again)` marks one that is measured again to see drift.
+    /// Name of the pose; `again` marks one that is measured again to see drift.
     pub pose: String,
     pub kind: PoseKind,
     /// State of the row.

@@ -10,7 +10,7 @@ use crate::tui::widget::{Column, Table};
 use crate::wizard::view::{CaptureView, RowState, RowView};
 
 /// Columns of the bar for the largest misfit.
-const BAR: u16 = 5;
+const BAR: u16 = 3;
 /// Rows of the detail, with the rule above it.
 const DETAIL: u16 = 6;
 /// Rows of the table that are worth more than the detail.
@@ -19,7 +19,7 @@ const FEWEST_ROWS: u16 = 5;
 /// The columns. Until there is a result, samples are compared with the nominal arm.
 const fn columns(is_nominal: bool) -> [Column<'static>; 8] {
     [
-        Column::text("pose", 9),
+        Column::text("pose", 7),
         Column::text("for", 14),
         Column::text("state", 13),
         Column::number(if is_nominal { "off mm" } else { "fit mm" }, 6),

@@ -187,9 +187,7 @@ fn the_picture_is_turned_only_where_it_is_seen() {
 
 #[test]
 fn the_focus_of_a_list_stays_in_view() {
-    for (view, last) in
-        [(target(None, None), "the whole arm by circles"), (instrument(None, None), "recorded measurements")]
-    {
+    for (view, last) in [(target(None, None), "joint check"), (instrument(None, None), "recorded measurements")] {
         for count in 0..7 {
             let shown = terminal(&view, &vec![Key::plain_code(KeyCode::Down); count], (60, 18), theme(true));
             let focus =

@@ -11,8 +11,8 @@ use crate::session::station;
 use crate::units::to_mm;
 use crate::wizard::step::Cx;
 use crate::wizard::view::{
-    CaptureView, DriftView, ExpectedView, FindingView, JointShown, MeasuredRow, PairView, PredictionView, RowState, RowView,
-    SampleView,
+    CaptureView, DriftView, ExpectedView, FindingView, JointShown, MeasuredRow, PairView, PredictionView, RowState,
+    RowView, SampleView,
 };
 
 /// Most samples that are compared with the nominal arm whenever the screen is drawn.
