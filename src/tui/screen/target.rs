@@ -22,7 +22,7 @@ const CIRCLES: u16 = 44;
 /// Columns of the text beside the picture.
 const TEXT: u16 = 62;
 /// The menu entries, with when to choose each.
-const WAYS: [(&str, &str); 5] = [
+const WAYS: [(&str, &str); 6] = [
     ("as the profile says", "if the adapter is that of the profile and nothing was changed"),
     ("known coordinates ...", "if the adapter was measured, for example with a CMM"),
     ("left free", "if unknown: it is identified together with the arm"),
@@ -34,10 +34,7 @@ const WAYS: [(&str, &str); 5] = [
         "the whole arm by circles",
         "turn every axis in turn: gives all link constants beside the data sheet, as a profile to save",
     ),
-    (
-        "joint check",
-        "move each joint a little: verifies sign, zero, unit and coupling in two minutes",
-    ),
+    ("joint check", "move each joint a little: verifies sign, zero, unit and coupling in two minutes"),
 ];
 
 /// The focus in the menu.

@@ -292,6 +292,7 @@ impl StepMachine for TargetStep {
                     can_change(),
                     is_other(true),
                     require(self.plan.is_empty(), "the circles are already being measured"),
+                    require(!is_checking, "the joint check is being measured"),
                     is_connected(),
                 ],
             ),

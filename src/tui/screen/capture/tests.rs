@@ -8,7 +8,7 @@ use crate::tui::dialog::DialogOutcome;
 use crate::tui::screen::bench::{drawn, leaks, paste, press, shown, themes, view};
 use crate::wizard::view::{
     DriftView, FindingView, JointShown, LivePoint, LiveView, MeasuredRow, MoveCheck, PairView, PredictionView,
-    SampleView,
+    ProposedPointView, ProposedState, ProposedView, SampleView,
 };
 use crate::wizard::{IntentInfo, Notice};
 
@@ -370,6 +370,61 @@ fn a_pose_is_chosen_from_the_list() {
     assert_eq!(screen.tab, Tab::Picture);
     // There the arrows turn the picture.
     assert!(matches!(press(&mut screen, &view, Key::plain_code(KeyCode::Up)), ScreenOutcome::Ignored));
+}
+
+/// The list: the pose under the cursor is excluded, counts again, gets a note; lines that are pasted are looked at first.
+#[test]
+fn the_list_decides_about_the_pose_under_the_cursor() {
+    let view = of(normal());
+    let mut screen = on(Tab::Poses);
+    for _ in 0..20 {
+        press(&mut screen, &view, Key::plain_code(KeyCode::Up));
+    }
+    for _ in 0..3 {
+        press(&mut screen, &view, Key::plain_code(KeyCode::Down));
+    }
+    let does = |screen: &mut CaptureScreen, key| match press(screen, &view, Key::char(key)) {
+        ScreenOutcome::Intent(intent) => intent,
+        reply => panic!("{reply:?}"),
+    };
+    assert_eq!(does(&mut screen, 'x'), Intent::Exclude("4".to_owned()));
+    insta::assert_snapshot!("poses_detail", shown(&drawn(&screen, &view, themes()[0], (80, 24))));
+    let ScreenOutcome::Open(mut dialog) = press(&mut screen, &view, Key::char('w')) else { panic!("no question") };
+    dialog.paste("warm");
+    let note = Intent::NotePose { pose: "4".to_owned(), text: "warm".to_owned() };
+    assert_eq!(dialog.on_key(Key::plain_code(KeyCode::Enter)), DialogOutcome::Submitted(note));
+    for _ in 0..3 {
+        press(&mut screen, &view, Key::plain_code(KeyCode::Down));
+    }
+    assert_eq!(does(&mut screen, 'x'), Intent::Include("7".to_owned()));
+    assert_eq!(does(&mut screen, 'r'), Intent::GoToPose("7".to_owned()));
+    let view = manual();
+    let lines = "1 2 3\n4 5 6";
+    match paste(&mut on(Tab::GoTo), &view, lines) {
+        ScreenOutcome::Intent(intent) => assert_eq!(intent, Intent::ShowPoints(lines.to_owned())),
+        reply => panic!("{reply:?}"),
+    }
+}
+
+#[test]
+fn points_are_listed_with_what_the_checks_say() {
+    let point = |number: usize, state, message: Option<&str>| ProposedPointView {
+        name: (number < 3).then(|| format!("P{number}")),
+        pose: Some((14 + number).to_string()),
+        xyz_mm: [1234.5678 + number as f64, -345.6789, 987.6543],
+        state,
+        message: message.map(str::to_owned),
+    };
+    let proposed = ProposedView {
+        source: "'tracker.csv'".to_owned(),
+        points: vec![
+            point(1, ProposedState::Fits, None),
+            point(2, ProposedState::InQuestion, Some("the reading of pose 16 is bad; measure it again")),
+            point(3, ProposedState::Impossible, Some("the reading is 0, 0, 0: the instrument has no target")),
+        ],
+    };
+    let view = of(CaptureView { proposed: Some(proposed), ..normal() });
+    insta::assert_snapshot!("proposed", shown(&drawn(&on(Tab::GoTo), &view, themes()[0], (80, 24))));
 }
 
 proptest! {
