@@ -1,7 +1,5 @@
 //! Literal bytes: both ends could agree on a wrong layout, so neither is tested against the other here.
 
-use nalgebra::Point3;
-
 use super::super::shot::shot_of;
 use super::super::*;
 use crate::link::protocol::Failure;
