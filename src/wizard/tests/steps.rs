@@ -87,9 +87,14 @@ fn instrument_connects_as_soon_as_it_is_chosen() {
         [
             "Next -- choose an instrument first",
             "ChooseInstrument",
+            "FindLinks",
             "Retry -- there is nothing to reconnect",
             "Back",
+            "PlaceTracker",
+            "LimitJoints",
+            "AddBox",
             "DescribeCell",
+            "CheckFaces",
             "Quit"
         ]
     );
@@ -193,6 +198,9 @@ fn plan_is_proposed_then_accepted() {
             "PlanFromRecording -- the instrument does not play back recorded measurements",
             "Next -- accept a plan first",
             "Back",
+            "PlaceTracker",
+            "LimitJoints",
+            "AddBox",
             "DescribeCell",
             "Quit"
         ]

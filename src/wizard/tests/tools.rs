@@ -30,6 +30,7 @@ fn the_program_of_an_accepted_plan_is_written_and_driven_once() {
     // A resumed session knows both; another plan has no program yet.
     let (resumed, _) = bench.resumed(bench.journal.len());
     assert_eq!(resumed.wizard.session().robot_program, bench.wizard.session().robot_program);
+    bench.measure(12);
     bench.does(Intent::SuggestPoses(2));
     assert_eq!(bench.wizard.session().robot_program, None);
 }
