@@ -1,6 +1,6 @@
 //! Names of the values of an enum: one list of them gives `Display`, `FromStr` and serde.
 //!
-//! RON writes a derived enum as a bare word. Where a file has always had a quoted text, [`written_as_text`] keeps it.
+//! RON writes a derived enum as a bare word. Where a file has always had a quoted text, [`crate::written_as_text`] keeps it.
 
 use thiserror::Error;
 
