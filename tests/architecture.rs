@@ -174,7 +174,8 @@ fn modules() -> Vec<(PathBuf, String, String)> {
     paths
         .into_iter()
         .map(|path| {
-            let inside = path.strip_prefix(root.join("core")).or_else(|_| path.strip_prefix(&root)).unwrap().with_extension("");
+            let inside =
+                path.strip_prefix(root.join("core")).or_else(|_| path.strip_prefix(&root)).unwrap().with_extension("");
             let top = inside.components().next().unwrap().as_os_str().to_str().unwrap().to_owned();
             let text = fs::read_to_string(&path).unwrap();
             (path, top, text)
