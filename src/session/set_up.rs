@@ -201,6 +201,7 @@ impl fmt::Display for PayloadText {
 
 /// Points in the base and as the tracker sees them (mm).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct TrackerPoints(pub Vec<((f64, f64, f64), (f64, f64, f64))>);
 
 /// One SMR as the instrument sees it in its two faces (mm).
@@ -213,6 +214,7 @@ pub struct FacePair {
 
 /// Range of a plan per joint (degree, sliding joints mm); `None` is the robot's own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct JointLimitsText(pub Vec<(String, Option<(f64, f64)>)>);
 
 /// How the robot program of a plan is written.

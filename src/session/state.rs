@@ -328,7 +328,6 @@ impl Session {
                 }
                 self.rows.extend(rows);
                 self.plan = Some(plan.without_rows());
-                // A program of before does not drive to these poses.
                 self.robot_program = None;
             }
             Entry::PlanExtended(plan) => {
