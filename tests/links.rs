@@ -97,6 +97,8 @@ fn a_rehearsal_over_every_wire_ends_with_the_calibration_of_one_in_process() {
         ("Tcp(Emscon), Tcp(Kuka)", 1e-6),
         ("Tcp(Emscon), Tcp(Abb)", 1e-6),
         ("Tcp(Emscon), Tcp(Fanuc)", 1e-6),
+        // Half a pulse of a thousandth of a degree.
+        ("Tcp(Emscon), Tcp(Yaskawa)", 0.05),
         ("Serial(Ascii)", 1e-3),
         ("Serial(Geocom)", 0.05),
         ("Serial(Ndi)", 0.05),

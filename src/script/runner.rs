@@ -384,7 +384,8 @@ impl<'a, W: Write> Runner<'a, W> {
                 return Err(Stop::Failed(format!("no point after {TRIES} attempts")));
             }
         }
-        let is_complete = Check::Exists.test(&self.view(), "target.circles.result").is_ok();
+        let has = |what: &str| Check::Exists.test(&self.view(), what).is_ok();
+        let is_complete = has("target.circles.result") || has("target.circles.arm");
         if is_complete { Ok(()) } else { Err(Stop::Failed("the circles have no result".to_owned())) }
     }
 
