@@ -59,30 +59,29 @@ impl Programs {
 
     /// Takes the answers that belong to the program; `None` if it is another one.
     pub(super) fn on_answer(&mut self, answer: &Answer) -> Option<Vec<Action>> {
-        match answer {
-            Answer::Programmed { files, dangers } => {
-                let settings = self.asked.take()?;
-                let names = files.iter().map(|(name, _)| name.clone()).collect();
-                let written = RobotProgramText { settings, files: names, was_driven: false };
-                self.pending = Some((written, dangers.clone()));
-                Some(vec![Action::Ask(Request::Deliver { files: files.clone(), left_out: Vec::new() })])
-            }
-            Answer::Delivered { .. } => {
-                let (written, dangers) = self.pending.take()?;
-                let said = notice(&written, &dangers);
-                Some(vec![Action::Write(vec![Entry::RobotProgram(written)]), Action::Say(said)])
-            }
-            Answer::Failed(problem) => {
-                let was_asked = self.asked.take().is_some();
-                let was_pending = self.pending.take().is_some();
-                let notice = || Notice::error(format!("no robot program: {}", problem.message));
-                (was_asked || was_pending).then(|| {
-                    vec![Action::Say(problem.hints.iter().fold(notice(), |notice, hint| notice.hint(hint.clone())))]
-                })
-            }
-            Answer::Cancelled => (self.asked.take().is_some() || self.pending.take().is_some()).then(Vec::new),
-            _ => None,
+        if let Answer::Programmed { files, dangers } = answer {
+            let settings = self.asked.take()?;
+            let names = files.iter().map(|(name, _)| name.clone()).collect();
+            let written = RobotProgramText { settings, files: names, was_driven: false };
+            self.pending = Some((written, dangers.clone()));
+            return Some(vec![Action::Ask(Request::Deliver { files: files.clone(), left_out: Vec::new() })]);
         }
+        if let Answer::Delivered { .. } = answer {
+            let (written, dangers) = self.pending.take()?;
+            let said = notice(&written, &dangers);
+            return Some(vec![Action::Write(vec![Entry::RobotProgram(written)]), Action::Say(said)]);
+        }
+        if let Answer::Failed(problem) = answer {
+            let notice = Notice::error(format!("no robot program: {}", problem.message));
+            let notice = problem.hints.iter().fold(notice, |notice, hint| notice.hint(hint.clone()));
+            return self.was_running().then(|| vec![Action::Say(notice)]);
+        }
+        (matches!(answer, Answer::Cancelled) && self.was_running()).then(Vec::new)
+    }
+
+    /// Whether a program was being written, which has ended now.
+    fn was_running(&mut self) -> bool {
+        self.asked.take().is_some() | self.pending.take().is_some()
     }
 }
 

@@ -121,9 +121,9 @@ impl Simulator for YaskawaSimulator {
             }
             // Requests that are understood have no content.
             if let Some(request) = self.received.first_chunk::<HEADER>() {
-                let word = |at: usize| u16::from_le_bytes([request[at], request[at + 1]]);
-                let (id, command, service) =
-                    (request[11], Command { number: word(24), instance: word(26) }, request[29]);
+                let number = u16::from_le_bytes([request[24], request[25]]);
+                let instance = u16::from_le_bytes([request[26], request[27]]);
+                let (id, command, service) = (request[11], Command { number, instance }, request[29]);
                 self.received.clear();
                 self.answer(id, command, service, source, now);
             }

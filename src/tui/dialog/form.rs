@@ -176,9 +176,8 @@ impl Form {
     /// # Errors
     /// A field is invalid.
     pub fn value(&self) -> Result<Intent, String> {
-        let value = |field: &Field| match self.has_labels {
-            true => format!("{}\t{}", field.label, field.value.text()),
-            false => field.value.text(),
+        let value = |field: &Field| {
+            if self.has_labels { format!("{}\t{}", field.label, field.value.text()) } else { field.value.text() }
         };
         let values: Vec<String> = self.fields.iter().map(value).collect();
         (self.build)(&values)

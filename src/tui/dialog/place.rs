@@ -90,7 +90,7 @@ fn limited(values: &[String]) -> Result<Intent, String> {
             ("", _) | (_, "") => return Err(format!("{name}: give both limits, or neither")),
             (low, high) => {
                 let (one, other) = (number(label, low)?, number(label, high)?);
-                if one == other {
+                if (one - other).abs() < f64::EPSILON {
                     return Err(format!("{name}: the limits are the same"));
                 }
                 // Driven to in either order.
@@ -146,7 +146,7 @@ pub(super) fn program(known: &ProgramText) -> Dialog {
 
 fn programmed(values: &[String]) -> Result<Intent, String> {
     let [language, wait, dwell, speed] = values else { return Err("four values are needed".to_owned()) };
-    let dwell_s = if wait == WAITS[1] { None } else { Some(number("time", dwell)?) };
+    let dwell_s = if WAITS.last() == Some(&wait.as_str()) { None } else { Some(number("time", dwell)?) };
     if dwell_s.is_some_and(|dwell| !(0.5..=3600.0).contains(&dwell)) {
         return Err("the time is from 0.5 to 3600 s".to_owned());
     }
