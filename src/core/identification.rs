@@ -104,6 +104,9 @@ use solver::{Basis, Linearised, Solution, Solve};
 const FIRST_SIGMA: f64 = 50.0 * MICROMETRE;
 /// Two rows are swapped if exchanging their points leaves less than this fraction of their residuals.
 const SWAP_FITS: f64 = 0.05;
+/// Targets that were found this close (m) to where they were thought to be, and how often they are looked for without a prior.
+const SAME_TARGET: f64 = 10.0 * MICROMETRE;
+const TARGET_ROUNDS: usize = 6;
 /// A mirrored registration must be this much better than the proper one to be called the truth.
 const MIRROR_RATIO: f64 = 0.4;
 
@@ -132,7 +135,37 @@ pub fn identify_while(
     settings: &Settings,
     progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
 ) -> Result<Identification, IdentificationError> {
+    if settings.prior == Prior::None && settings.iterations > 1 {
+        return identify_without_prior(problem, settings, progress);
+    }
     identify_prepared(&Prepared::new(problem, settings)?, settings, progress)
+}
+
+/// The directions in which a fit without a prior may move are those that the data see with the targets where they are. The profile
+/// only guesses that, so they are judged again where the targets were found.
+fn identify_without_prior(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    progress: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+) -> Result<Identification, IdentificationError> {
+    problem.check()?;
+    check_chirality(problem, problem.arm, None)?;
+    let is_target = |parameter: &&FreeParameter| parameter.id.target().is_some();
+    let free: Vec<FreeParameter> = problem.parameters.iter().filter(is_target).copied().collect();
+    if free.is_empty() {
+        return identify_prepared(&Prepared::new(problem, settings)?, settings, progress);
+    }
+    let mut targets = verification::fit_setup(problem.arm, &free, problem.observations)?.arm.targets;
+    let mut round = 1;
+    loop {
+        let found = identify_prepared(&Prepared::seen_with(problem, settings, &targets)?, settings, progress)?;
+        let moved = found.arm.targets.iter().zip(&targets).map(|(to, from)| (to - from).norm()).fold(0.0, f64::max);
+        if moved <= SAME_TARGET || round == TARGET_ROUNDS {
+            return Ok(found);
+        }
+        targets = found.arm.targets;
+        round += 1;
+    }
 }
 
 /// What is known of the parameters before the data: their deviations with a covariance ((m) and (rad)).
@@ -251,6 +284,24 @@ impl<'a, 'p> Prepared<'a, 'p> {
         let observability = Observability::new(&problem.of_geometry(&geometry(problem)));
         check_chirality(problem, problem.arm, None)?;
         let basis = Basis::new(problem, settings.prior, &observability)?;
+        Ok(Self { problem, weighting: settings.weighting, observability, basis, groups: Groups::new(problem) })
+    }
+
+    /// Without a prior, with the directions that the data see with the targets at these positions. What the data cannot tell from a move
+    /// of a target is left to the arm as designed.
+    fn seen_with(
+        problem: &'a Problem<'p>,
+        settings: &Settings,
+        targets: &[Point3<f64>],
+    ) -> Result<Self, IdentificationError> {
+        let arm = Arm { targets: targets.to_vec(), ..problem.arm.clone() };
+        let observability = Observability::new(&Problem { arm: &arm, ..problem.of_geometry(&geometry(problem)) });
+        let deviation = |parameter: &FreeParameter| {
+            let value = |arm: &Arm| parameter.id.target().and_then(|_| arm.value(parameter.id)).unwrap_or(0.0);
+            value(&arm) - value(problem.arm)
+        };
+        let mean = DVector::from_iterator(problem.parameters.len(), problem.parameters.iter().map(deviation));
+        let basis = Basis::new(problem, Prior::None, &observability)?.about_mean(mean);
         Ok(Self { problem, weighting: settings.weighting, observability, basis, groups: Groups::new(problem) })
     }
 

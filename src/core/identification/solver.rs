@@ -71,6 +71,11 @@ impl Basis {
         Ok(Self { transform, is_diagonal: false, mean: belief.mean.clone(), prior_weight: 1.0 })
     }
 
+    /// The same, about other deviations than none.
+    pub(crate) fn about_mean(self, mean: DVector<f64>) -> Self {
+        Self { mean, ..self }
+    }
+
     pub(crate) fn new(
         problem: &Problem<'_>,
         prior: Prior,
