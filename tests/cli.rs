@@ -179,7 +179,7 @@ fn poor_data_are_never_accepted() {
         }
     });
     let (code, report) = mixed.json(&[]);
-    assert_eq!((code, report["verdict"]["status"].as_str()), (4, Some("not_accepted")));
+    assert_eq!((code, report["verdict"]["status"].as_str()), (1, Some("not_accepted")));
     assert!(codes(&report).contains(&"implausible".to_owned()));
 }
 
@@ -470,21 +470,44 @@ fn simulated_points_are_called_so_wherever_they_go() {
     assert_eq!(warnings(&report).len(), 1);
 }
 
+/// Points of other rows: the numbers stay, and say everywhere that they are not accepted.
 #[test]
-fn no_usable_solution_ends_with_4_and_leaves_no_calibration() {
-    let shifted = Table::changed(|_, rows| {
+fn data_of_no_robot_leave_a_result_that_is_never_accepted() {
+    let shuffled = Table::changed(|_, rows| {
         let points: Vec<Vec<String>> = rows.iter().map(|row| row[7..].to_vec()).collect();
         for (index, row) in rows.iter_mut().enumerate() {
             row.splice(7.., points[(index * 25 + 11) % points.len()].clone());
         }
     });
     let folder = tempfile::tempdir().unwrap();
-    let (code, out, err) = shifted.identify(&["--out", folder.path().to_str().unwrap()]);
+    let (code, out, err) = shuffled.identify(&["--out", folder.path().to_str().unwrap()]);
+    assert_eq!(code, 1, "{err}");
+    assert!(out.contains("Verdict: NOT ACCEPTED") && out.contains("implausible"), "{out}");
+    let calibration = folder.path().join("calibration.ron");
+    let (_, report) = verified(calibration.to_str().unwrap(), "sessions/soochow-example/verification.csv", &[]);
+    let warnings = report["warnings"].as_array().unwrap();
+    let says = |warning: &Value| warning["message"].as_str().unwrap().contains("not acceptable");
+    assert!(warnings.iter().any(says), "{warnings:?}");
+    assert_ne!(report["verdict"]["status"], "accepted");
+}
+
+#[test]
+fn no_usable_solution_ends_with_4_and_leaves_no_calibration() {
+    let scattered = Table::changed(|_, rows| {
+        for (index, row) in rows.iter_mut().enumerate() {
+            for (axis, cell) in row[7..].iter_mut().enumerate() {
+                *cell = format!("{}", (index * 7919 + axis * 104_729 + index * index * 31) % 6000);
+            }
+        }
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--prior", "none", "--out", folder.path().to_str().unwrap()];
+    let (code, out, err) = scattered.identify(&arguments);
     assert_eq!(code, 4, "{err}");
     assert!(!folder.path().join("calibration.ron").exists());
     assert!(out.contains("Verdict: NOT ACCEPTED") && err.contains("not written: calibration.ron"), "{out}{err}");
     fs::write(folder.path().join("calibration.ron"), "old").unwrap();
-    let (_, _, err) = shifted.identify(&["--out", folder.path().to_str().unwrap()]);
+    let (_, _, err) = scattered.identify(&arguments);
     assert!(err.contains("from an earlier run"), "{err}");
     assert_eq!(fs::read_to_string(folder.path().join("calibration.ron")).unwrap(), "old");
     assert!(folder.path().join("report.json").exists());

@@ -60,6 +60,7 @@ mod sessions;
 mod technician;
 #[cfg(target_os = "linux")]
 mod terminal;
+mod tested;
 mod triage;
 mod whole_arm;
 mod wizard_random;

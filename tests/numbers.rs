@@ -1,111 +1,15 @@
 //! Numbers that hold: what a verification counts, when it is compared with the nominal arm, and what the words about it say.
 
-use std::ops::ControlFlow;
-
-use nalgebra::{Isometry3, Point3, Vector3};
-use rand::RngExt as _;
+use nalgebra::{Point3, Vector3};
 use trupose::identification::plausibility::{Columns, Mistake, compare_with_nominal};
-use trupose::identification::{Observations, PointSample, Problem};
-use trupose::kinematics::{Arm, Place};
-use trupose::procedure::identify::{Identified, IdentifyRequest, NamedSample, SampleSet, identify};
-use trupose::procedure::{EstimationSettings, ProcedureError};
+use trupose::identification::{Observations, Problem};
+use trupose::procedure::identify::NamedSample;
 use trupose::profile::{Level, Profile, builtin};
-use trupose::session::summary::{VerdictStatus, VerificationMode, Warning};
-use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
+use trupose::session::summary::VerdictStatus;
+use trupose::units::{DEGREE, MILLIMETRE};
 
-use crate::support::paper_case::{normal, seeded};
-
-const NOISE: f64 = 10.0 * MICROMETRE;
-
-/// A simulated robot in front of a tracker.
-struct Bench {
-    profile: Profile,
-    text: String,
-    real: Arm,
-    rng: rand_chacha::ChaCha8Rng,
-}
-
-impl Bench {
-    /// The robot of a profile whose constants are off by `size` times what is expected.
-    fn new(text: &str, size: f64, seed: u64) -> Self {
-        let profile = Profile::parse(text, "robot").unwrap_or_else(|errors| panic!("{errors}")).0;
-        let mut rng = seeded(seed);
-        let deviations: Vec<_> = profile
-            .parameters(Level::Geometric)
-            .into_iter()
-            .map(|parameter| (parameter.id, size * normal(&mut rng) * parameter.expected))
-            .collect();
-        let real = profile.arm().with(deviations).unwrap();
-        Self { profile, text: text.to_owned(), real, rng }
-    }
-
-    fn builtin(name: &str, seed: u64) -> Self {
-        Self::new(builtin(name).unwrap(), 0.5, seed)
-    }
-
-    fn configurations(&mut self, count: usize) -> Vec<Vec<f64>> {
-        let limits: Vec<_> = self.profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect();
-        (0..count).map(|_| limits.iter().map(|(low, high)| self.rng.random_range(*low..*high)).collect()).collect()
-    }
-
-    fn point(&mut self, at: &Place) -> Point3<f64> {
-        let station = Isometry3::new(Vector3::new(2.0, 1.0, 0.4), Vector3::new(0.1, 0.2, 1.0));
-        let noise = Vector3::from_fn(|_, _| NOISE * normal(&mut self.rng));
-        station.inverse() * self.real.point_in_base(at) + noise
-    }
-
-    fn measured(&mut self, configurations: &[Vec<f64>], target: usize) -> Vec<NamedSample> {
-        let named = |(index, configuration): (usize, &Vec<f64>)| {
-            let at = Place { configuration: configuration.clone(), target };
-            let point = self.point(&at);
-            NamedSample {
-                pose: (index + 1).to_string(),
-                line: index + 2,
-                sample: PointSample { at, station: 0, point, sigma: None },
-                temperature: None,
-            }
-        };
-        configurations.iter().enumerate().map(named).collect()
-    }
-
-    fn random(&mut self, count: usize) -> Vec<NamedSample> {
-        let configurations = self.configurations(count);
-        self.measured(&configurations, 0)
-    }
-
-    fn try_identify(
-        &self,
-        identification: Vec<NamedSample>,
-        verification: Vec<NamedSample>,
-    ) -> Result<Identified, ProcedureError> {
-        let verification_mode = if verification.is_empty() { VerificationMode::None } else { VerificationMode::File };
-        let request = IdentifyRequest {
-            mounted: None,
-            payload: None,
-            profile: self.profile.clone(),
-            profile_text: self.text.clone(),
-            created: "2026-01-02T03:04:05Z".to_owned(),
-            inputs: Vec::new(),
-            settings: EstimationSettings { level: Level::Geometric, ..EstimationSettings::default() },
-            identification: SampleSet::from(identification),
-            verification: SampleSet::from(verification),
-            basis: "other poses".to_owned(),
-            verification_mode,
-            layout: None,
-            socket_distance_mm: None,
-            previous: None,
-        };
-        identify(&request, &mut |_| ControlFlow::Continue(()))
-    }
-
-    fn identify(&self, identification: Vec<NamedSample>, verification: Vec<NamedSample>) -> Identified {
-        self.try_identify(identification, verification).unwrap()
-    }
-}
-
-fn warning<'a>(identified: &'a Identified, code: &str) -> Option<&'a Warning> {
-    identified.summary.warnings.iter().find(|warning| warning.code.as_str() == code)
-}
+use crate::support::bench::{Bench, NOISE, altered, warning};
+use crate::support::paper_case::normal;
 
 /// 28 of 447 rows of one measured set were at identified poses, and blocked everything.
 #[test]
@@ -311,14 +215,6 @@ fn mistakes(bench: &Bench, samples: &[NamedSample]) -> Vec<Mistake> {
     compare_with_nominal(&problem).unwrap().mistakes
 }
 
-fn altered(samples: &[NamedSample], change: impl Fn(&mut [f64])) -> Vec<NamedSample> {
-    let mut samples = samples.to_vec();
-    for named in &mut samples {
-        change(&mut named.sample.at.configuration);
-    }
-    samples
-}
-
 /// An arm that is its own mirror image with joints 1, 4 and 6 reversed: the advice to reverse an axis of the tracker led to a
 /// mirrored arm that was accepted.
 #[test]
@@ -366,6 +262,27 @@ fn exchanged_coordinates_are_named_before_a_mirrored_frame() {
     let said = warning(&identified, "implausible").unwrap();
     let hint = "the columns of A5 and A6 hold only zeros: are the columns shifted, so that the first one holds A3?";
     assert!(said.message.contains(hint) && said.blocks_acceptance, "{said:?}");
+    assert!(identified.calibration.is_some(), "it blocks the acceptance, not the result");
+    assert_eq!(identified.summary.verdict.status, VerdictStatus::NotAccepted);
+}
+
+/// The values of joints 3 to 6 in the first columns, and zeros behind them, of an arm whose first joints stay at zero.
+#[test]
+fn shifted_columns_with_zeros_are_named() {
+    for first in [1, 2] {
+        let mut bench = Bench::builtin("abb_irb120", 16);
+        let mut poses = bench.configurations(40);
+        poses.iter_mut().for_each(|q| q[..first].fill(0.0));
+        let samples = bench.measured(&poses, 0);
+        let shifted = altered(&samples, |q| {
+            q.rotate_left(first);
+            q[6 - first..].fill(0.0);
+        });
+        let found = mistakes(&bench, &shifted);
+        assert!(found.contains(&Mistake::Columns(Columns::Shifted { first })), "{found:?}");
+        let refused = bench.try_identify(shifted, Vec::new()).unwrap_err().to_string();
+        assert!(refused.contains(&format!("the first one holds J{}", first + 1)), "{refused}");
+    }
 }
 
 #[test]

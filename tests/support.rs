@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::thread;
 
+pub(crate) mod bench;
 pub(crate) mod derivatives;
 pub(crate) mod faulty_session;
 pub(crate) mod invented;

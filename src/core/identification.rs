@@ -72,6 +72,7 @@ mod settings;
 mod solver;
 mod systematic;
 mod terms;
+pub mod tested;
 pub mod triage;
 pub mod verification;
 

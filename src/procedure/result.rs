@@ -1,8 +1,9 @@
 //! Warnings about the result of an identification, and whether it is usable.
 
 use crate::identification::plausibility::{Weakness, weaknesses};
+use crate::identification::tested::{JointDoubt, joint_doubts};
 use crate::identification::{Identification, Prior, Problem, Settings, TerminationReason, Unmodelled};
-use crate::kinematics::Joint;
+use crate::kinematics::{Joint, JointType};
 use crate::profile::Level;
 use crate::report::number;
 use crate::session::advice::Advice;
@@ -100,6 +101,7 @@ pub(crate) fn result_warnings(
         );
         warnings.push(Warning::new(WarningCode::DoesNotFit, message, true));
     }
+    warnings.extend(joint_doubts(problem, found).iter().map(|doubt| doubt_warning(joints, doubt)));
     warnings.extend(run_away(found, settings));
     if let Some(stated) = found.sigma.instrument.filter(|_| found.sigma.excess() > SIGMA_EXCESS) {
         let message = format!(
@@ -135,6 +137,48 @@ pub(crate) fn result_warnings(
         }
     }
     warnings
+}
+
+/// A warning about a joint that the data contradict, or show nothing of. What is behind a joint that nothing has shown may be anywhere, so
+/// only the zero that the SMR's place leaves open does not block acceptance: the place of the SMR is right with it.
+fn doubt_warning(joints: &[Joint], doubt: &JointDoubt) -> Warning {
+    match doubt {
+        JointDoubt::Reversed { joint, given, reversed } => {
+            let message = format!(
+                "joint {} counts the other way: with its sign reversed the points fit to {} mm per coordinate instead of {} mm; check the sign of its column, or 'direction' in the profile",
+                joints[*joint].name,
+                number(to_mm(*reversed), 4),
+                number(to_mm(*given), 4)
+            );
+            Warning::new(WarningCode::ReversedJoint, message, true)
+        }
+        JointDoubt::Unseen { joint, lever } => {
+            let joint = &joints[*joint];
+            let (why, beside) = match joint.joint_type {
+                JointType::Revolute => {
+                    (format!("the SMR is {} mm from its axis", number(to_mm(*lever), 3)), "beside that axis")
+                }
+                JointType::Prismatic => ("the SMR hardly moves with it".to_owned(), "where it moves with the joint"),
+            };
+            let message = format!(
+                "joint {} was not tested: {why}, so all points would be the same if its sign, its zero or its scale were wrong. The figures are those of an SMR there, and say nothing about a tool elsewhere. Mount the SMR {beside}, or measure with a second place of the SMR as well",
+                joint.name
+            );
+            Warning::new(WarningCode::UntestedJoint, message, true)
+        }
+        JointDoubt::Zero { joint } => {
+            let joint = &joints[*joint];
+            let by = match joint.joint_type {
+                JointType::Revolute => "90 deg",
+                JointType::Prismatic => "100 mm",
+            };
+            let message = format!(
+                "the zero of joint {} was not tested: with {by} added to it all points would fit as well, and the SMR would only be found elsewhere on the flange. Check the joint at its mark, or state where the SMR is ('position_mm' with 'uncertainty_mm')",
+                joint.name
+            );
+            Warning::new(WarningCode::UntestedJoint, message, false)
+        }
+    }
 }
 
 /// A warning about samples that did not fit and were kept, because they are the arm.
@@ -201,13 +245,10 @@ fn run_away(found: &Identification, settings: &Settings) -> Option<Warning> {
     })
 }
 
-/// Whether `found` with its warnings is unusable. A step limit that the operator asked for does not make it so.
+/// Whether `found` is unusable, because the solver found no solution. A step limit that the operator asked for does not make it so, and
+/// neither do data that do not describe the robot: those block the acceptance.
 pub(crate) fn is_unusable(warnings: &[Warning], found: &Identification, settings: &Settings) -> bool {
     let as_asked =
         found.termination == TerminationReason::IterationLimit && settings.iterations < Settings::default().iterations;
-    warnings.iter().any(|warning| match warning.code {
-        WarningCode::Implausible => true,
-        WarningCode::NotConverged => !as_asked,
-        _ => false,
-    })
+    !as_asked && warnings.iter().any(|warning| warning.code == WarningCode::NotConverged)
 }

@@ -101,6 +101,8 @@ codes! {
     RanAway => "ran_away",
     /// The model lacks something in a part of the workspace.
     RegionNotDescribed => "region_not_described",
+    /// The data fit better with a joint reversed.
+    ReversedJoint => "reversed_joint",
     /// Points to verify at poses that were identified are left out.
     SeenBefore => "seen_before",
     /// Residuals are larger than the stated accuracy.
@@ -109,6 +111,8 @@ codes! {
     Simulated => "simulated",
     /// Something odd in a table.
     Table => "table",
+    /// The data do not show the sign or the zero of a joint.
+    UntestedJoint => "untested_joint",
     /// A joint has an unusually large error of its own.
     UnusualJoint => "unusual_joint",
     /// A weakness of a plan.

@@ -27,7 +27,7 @@ const EXPLAINS: f64 = 0.25;
 /// A mistake explains the data only if what is left is below this fraction of their extent.
 const FITS: f64 = 0.1;
 /// Evenly picked points that are tried against each mistake: a mistake in a whole table shows in any part of it.
-const TRIED_POINTS: usize = 500;
+pub(super) const TRIED_POINTS: usize = 500;
 /// Points at which mistakes of several numbers are looked at, and how many of those mistakes are then tried.
 const GLANCED_AT: usize = 60;
 const LOOKED_INTO: usize = 12;
@@ -178,7 +178,7 @@ impl<'a, 'p> Trial<'a, 'p> {
 }
 
 /// At most `most` of the points, evenly picked.
-fn evenly(points: &[PointSample], most: usize) -> Vec<PointSample> {
+pub(super) fn evenly(points: &[PointSample], most: usize) -> Vec<PointSample> {
     let used = points.len().min(most);
     (0..used).map(|index| points[index * points.len() / used].clone()).collect()
 }
@@ -288,6 +288,17 @@ fn structural_rank(problem: &Problem<'_>) -> usize {
     Observability::new(&generic).rank.unwrap_or(problem.parameters.len())
 }
 
+/// How far a joint moves over all samples ((rad) or (m)), if it hardly does.
+pub(super) fn still_range(observations: &Observations, joint: usize, joint_type: JointType) -> Option<f64> {
+    let values = || observations.places().map(|place| place.configuration[joint]);
+    let range = values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
+    let still = match joint_type {
+        JointType::Revolute => STILL_JOINT,
+        JointType::Prismatic => STILL_SLIDE,
+    };
+    (range < still).then_some(range)
+}
+
 /// Looks at how rich the accepted data of an identification are.
 pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec<Weakness> {
     let accepted = problem.observations.without(&identification.rejected);
@@ -309,13 +320,7 @@ pub fn weaknesses(problem: &Problem<'_>, identification: &Identification) -> Vec
         found.push(Weakness::TooFewData { values, combinations, repeats: values < all });
     }
     for (joint, definition) in problem.arm.chain.joints().iter().enumerate() {
-        let values = || problem.observations.places().map(|place| place.configuration[joint]);
-        let range = values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
-        let still = match definition.joint_type {
-            JointType::Revolute => STILL_JOINT,
-            JointType::Prismatic => STILL_SLIDE,
-        };
-        if range < still {
+        if let Some(range) = still_range(problem.observations, joint, definition.joint_type) {
             found.push(Weakness::StillJoint { joint, range });
         }
     }

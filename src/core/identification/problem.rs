@@ -139,6 +139,20 @@ impl Observations {
         self.of_samples(|sample| rejected.iter().all(|rejected| rejected.sample != sample))
     }
 
+    /// The observations with every place altered.
+    #[must_use]
+    pub(super) fn at(&self, change: impl Fn(&mut Place)) -> Self {
+        let mut altered = self.clone();
+        altered.points.iter_mut().for_each(|sample| change(&mut sample.at));
+        altered.shared.iter_mut().flat_map(|shared| &mut shared.at).for_each(&change);
+        for end in altered.lengths.iter_mut().flat_map(|length| [&mut length.from, &mut length.to]) {
+            if let LengthEnd::Target(at) = end {
+                change(at);
+            }
+        }
+        altered
+    }
+
     /// The samples that `keep` picks. Shared points keep their place in the list, also without a seat.
     #[must_use]
     pub fn of_samples(&self, keep: impl Fn(SampleIndex) -> bool) -> Self {
