@@ -20,8 +20,8 @@ mod slips;
 mod tests;
 mod words;
 
-use super::PointSample;
 use super::linearise::SMALLEST_SIGMA;
+use super::{PointSample, RejectionReason};
 use crate::kinematics::{Arm, FreeParameter};
 use crate::units::Quantity;
 use fit::{Item, Nominal};
@@ -66,6 +66,8 @@ pub struct Finding {
     pub share: f64,
     /// Other explanations that are not much worse, best first.
     pub alternatives: Vec<Explanation>,
+    /// The slip of the pen that explains a bad reading of this sample: a wrong sign or digit of one coordinate.
+    pub typed: Option<RejectionReason>,
     /// Whether so few samples came before that a pose exchanged with a later one looks like a bad reading.
     pub is_early: bool,
 }
@@ -188,6 +190,7 @@ fn not_at_rest(triage: &Triage<'_>, newest: usize) -> Option<Finding> {
         cause: Cause::NotAtRest { scatter },
         share: 1.0,
         alternatives: Vec::new(),
+        typed: None,
         is_early: false,
     })
 }

@@ -7,7 +7,7 @@
 use nalgebra::Point3;
 
 use super::super::robust::gross_trust;
-use super::super::{Observations, Problem};
+use super::super::{Observations, Problem, RejectionReason};
 use super::alarm::{EARLIER, SHIFT, limit_of_sum};
 use super::fit::{Fit, Item, Nominal, Step};
 use super::slips::{Slip, outlier_energy, slips};
@@ -450,6 +450,10 @@ impl<'a> Case<'a, '_> {
         });
         let alternatives = others.filter(|other| other.share > WORTH_NAMING).take(NAMED).collect();
         let (ratio, worst) = self.deviations(best.sample);
+        let blamed = self.found.iter().filter(|hypothesis| weight(hypothesis) / total > WORTH_NAMING);
+        let mut unexplained = blamed.filter(|hypothesis| hypothesis.cause == Cause::Unexplained);
+        let typed =
+            unexplained.any(|hypothesis| hypothesis.sample == best.sample).then(|| self.typed(best.sample)).flatten();
         Some(Finding {
             sample: best.sample,
             ratio,
@@ -457,8 +461,19 @@ impl<'a> Case<'a, '_> {
             cause: best.cause.clone(),
             share: weight(best) / total,
             alternatives,
+            typed,
             is_early: best.sample == self.newest && self.base.items.len() < SETTLED && !self.triage.planned.is_empty(),
         })
+    }
+
+    /// The wrong sign or digit of one coordinate that makes a sample unlike what the others say.
+    fn typed(&self, sample: usize) -> Option<RejectionReason> {
+        let without = [&self.aside[..], &[sample]].concat();
+        let others = self.fit(&without, None, |_| {})?;
+        let item = &self.items[sample];
+        let innovation = others.innovation(item);
+        let sigma = (innovation.covariance.trace() / 3.0).sqrt();
+        RejectionReason::typed(&item.point, &others.fitting(item, &innovation), sigma)
     }
 
     /// How far a sample is off the others, and the distances that show it.

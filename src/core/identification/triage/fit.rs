@@ -424,6 +424,12 @@ impl<'a> Fit<'a> {
         self.probe(item).at(&item.at.configuration)
     }
 
+    /// Where `item` was predicted, in the frame of its station.
+    pub(super) fn fitting(&self, item: &Item, innovation: &Innovation) -> Point3<f64> {
+        let base_from_station = self.state.base_from_station[item.station];
+        item.point - base_from_station.inverse_transform_vector(&innovation.error)
+    }
+
     /// The point of `item`, not one of those fitted, to be compared with predictions for any configuration.
     pub(super) fn probe<'f>(&'f self, item: &Item) -> Probe<'f, 'a> {
         Probe {

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::{Cause, Explanation, Finding, Names, Triage, triage};
-use crate::identification::PointSample;
+use crate::identification::{PointSample, RejectionReason};
 use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, Place};
 use crate::profile::{Level, Profile, builtin};
 use crate::units::{INCH, MICROMETRE, MILLIMETRE, from_deg, from_mm};
@@ -320,6 +320,7 @@ fn several_suspects_are_all_named() {
         cause: Cause::Unexplained,
         share: 0.4,
         alternatives: vec![blame(1), blame(0)],
+        typed: None,
         is_early: false,
     };
     assert_eq!(finding.suspects(), [3, 1, 0]);
@@ -343,6 +344,39 @@ fn an_early_exchange_is_not_called_a_bad_reading_alone() {
     session.samples[15].point.x += from_mm(300.0);
     let late = session.after(16).unwrap();
     assert!(!late.is_early && !told(&late).contains("exchanged"), "{}", told(&late));
+}
+
+/// A coordinate that was read off a display is typed with another digit, or without its sign.
+#[test]
+fn slips_of_the_pen_are_named_while_measuring() {
+    let mut session = Session::new(12);
+    session.samples[15].point.y *= -1.0;
+    let finding = session.after(16).unwrap();
+    assert_eq!(finding.typed, Some(RejectionReason::Sign { axis: 1 }), "{finding:?}");
+    let text = told(&finding);
+    assert!(
+        text.contains("the sign of y of point 16 is wrong")
+            && text.ends_with("compare the coordinates with the display of the instrument, or measure it again"),
+        "{text}"
+    );
+    for (axis, by) in [(0, 30.0), (2, -40.0), (1, 70.0), (0, 500.0)] {
+        let mut session = Session::new(12);
+        session.samples[15].point[axis] += from_mm(by);
+        let finding = session.after(16).unwrap();
+        let Some(RejectionReason::Digit { axis: found, by: less }) = finding.typed else { panic!("{finding:?}") };
+        assert!(found == axis && (less - from_mm(by)).abs() < 1e-9, "{finding:?}");
+        let text = told(&finding);
+        let words = if by > 0.0 { "mm less)" } else { "mm more)" };
+        assert!(text.contains("one digit of") && text.contains(words), "{text}");
+    }
+    // Neither a bumped SMR nor another pose is one.
+    let mut session = Session::new(12);
+    session.samples[15].point.coords += Vector3::new(from_mm(3.1), from_mm(-1.7), from_mm(0.4));
+    assert_eq!(session.after(16).unwrap().typed, None);
+    let mut session = Session::new(3);
+    let next = session.planned[10].clone();
+    session.take_at(9, &next);
+    assert_eq!(session.after(10).unwrap().typed, None);
 }
 
 #[test]

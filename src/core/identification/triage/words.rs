@@ -1,5 +1,6 @@
 //! A finding in words that a technician understands: what, how sure, what to do.
 
+use super::super::RejectionReason;
 use super::{Cause, Explanation, Finding};
 use crate::units::{Quantity, to_mm};
 
@@ -58,18 +59,18 @@ impl Finding {
                 "the distances do not fit ({}), but it cannot be told yet which of {} is wrong: the next point will tell; most likely {}",
                 self.how_far(names),
                 listed.join(", "),
-                story(self.sample, &self.cause, names)
+                self.story(self.sample, &self.cause, names)
             );
         }
         let others = self.alternatives.iter().filter(|other| other.share > EITHER);
-        let mut stories = vec![story(self.sample, &self.cause, names)];
+        let mut stories = vec![self.story(self.sample, &self.cause, names)];
         for Explanation { sample, cause, .. } in others {
-            let told = story(*sample, cause, names);
+            let told = self.story(*sample, cause, names);
             if !stories.contains(&told) {
                 stories.push(told);
             }
         }
-        if self.is_early && self.cause == Cause::Unexplained && stories.len() == 1 {
+        if self.is_early && self.cause == Cause::Unexplained && self.typed.is_none() && stories.len() == 1 {
             stories.push(format!(
                 "{sample} was taken at a pose that comes later (two poses exchanged), which cannot be told from a bad reading yet"
             ));
@@ -79,7 +80,21 @@ impl Finding {
             [only] => format!("most likely {only}"),
             stories => format!("either {}", stories.join(", or ")),
         };
-        format!("{sample} does not fit ({}): {told}; {}", self.how_far(names), advice(&self.cause, names))
+        format!("{sample} does not fit ({}): {told}; {}", self.how_far(names), self.advice(names))
+    }
+
+    fn story(&self, sample: usize, cause: &Cause, names: &Names<'_>) -> String {
+        let typed = self.typed.filter(|_| sample == self.sample && *cause == Cause::Unexplained);
+        typed
+            .and_then(|typed| typed_story(typed, &(names.sample)(sample)))
+            .unwrap_or_else(|| story(sample, cause, names))
+    }
+
+    fn advice(&self, names: &Names<'_>) -> String {
+        if self.cause == Cause::Unexplained && self.typed.is_some() {
+            return "compare the coordinates with the display of the instrument, or measure it again".to_owned();
+        }
+        advice(&self.cause, names)
     }
 
     fn how_far(&self, names: &Names<'_>) -> String {
@@ -126,6 +141,21 @@ fn story(sample: usize, cause: &Cause, names: &Names<'_>) -> String {
         Cause::InstrumentMoved { since } => format!("the tracker stands elsewhere since {}", (names.sample)(*since)),
         Cause::NotAtRest { .. } => format!("at {named} the robot was not at rest"),
         Cause::Unexplained => format!("the reading of {named} is bad"),
+    }
+}
+
+/// A slip of the pen in a coordinate of the sample `named`.
+fn typed_story(typed: RejectionReason, named: &str) -> Option<String> {
+    let name = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("a coordinate");
+    match typed {
+        RejectionReason::Sign { axis } => {
+            Some(format!("the sign of {} of {named} is wrong (the point fits with the other one)", name(axis)))
+        }
+        RejectionReason::Digit { axis, by } => {
+            let (by, way) = (to_mm(by.abs()), if by > 0.0 { "less" } else { "more" });
+            Some(format!("one digit of {} of {named} is wrong (the point fits with {by:.1} mm {way})", name(axis)))
+        }
+        RejectionReason::Outlier | RejectionReason::SwappedWith(_) => None,
     }
 }
 
