@@ -79,6 +79,18 @@ pub enum ProcedureError {
         if .0.len() == 1 { "samples" } else { "those" }, text::listed(.0)
     )]
     UnknownTargets(Vec<String>),
+    /// Samples and parameters that would take more memory than a computer should give.
+    #[error(
+        "{samples} samples with {parameters} parameters would take about {gigabytes:.0} GB of memory, and at most {most:.0} GB are used: identify from fewer samples"
+    )]
+    TooLarge {
+        samples: usize,
+        parameters: usize,
+        /// What they would take (GB).
+        gigabytes: f64,
+        /// What is used at most (GB).
+        most: f64,
+    },
     /// Nothing can be identified.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
@@ -132,6 +144,7 @@ impl ProcedureError {
             | Self::Mistaken { .. }
             | Self::Earlier(_)
             | Self::Compared(_)
+            | Self::TooLarge { .. }
             | Self::OnePosition => &[],
         }
     }

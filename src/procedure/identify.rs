@@ -26,6 +26,11 @@ use crate::session::summary::{
 };
 use crate::units::to_mm;
 
+/// Most numbers in the rows of one fit, and the bytes that a fit takes for each of them: its rows, those of the step that is tried, and
+/// their factor.
+const MOST_NUMBERS: usize = 1 << 27;
+const BYTES_PER_NUMBER: usize = 32;
+
 /// A measured point with the place where it was recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedSample {
@@ -182,6 +187,8 @@ pub fn identify(
     }
     let settings = request.settings.solver(profile, typical_distance(&observations));
     let candidates = if beginning.is_some() { Vec::new() } else { request.settings.candidates() };
+    let of_joints = candidates.iter().flatten().map(|terms| terms.parameters(&arm.chain).len()).max().unwrap_or(0);
+    check_size(observations.places().count(), parameters.len() + of_joints)?;
     let with_terms = match &beginning {
         Some(beginning) => {
             warnings.extend(beginning.warning());
@@ -244,6 +251,17 @@ pub fn identify(
         ..calibration(&summary, &request.profile_text, &nominal, &problem, of_identification, found)
     });
     Ok(Identified { summary, calibration, found: with_terms.found, nominal })
+}
+
+/// Refuses a fit that would take more memory than a computer should give: where the system refuses it, the program ends without a word
+/// about the cause.
+fn check_size(samples: usize, parameters: usize) -> Result<(), ProcedureError> {
+    let numbers = samples.saturating_mul(3 * parameters);
+    let gigabytes = |numbers: usize| numbers as f64 * BYTES_PER_NUMBER as f64 / 1e9;
+    if numbers <= MOST_NUMBERS {
+        return Ok(());
+    }
+    Err(ProcedureError::TooLarge { samples, parameters, gigabytes: gigabytes(numbers), most: gigabytes(MOST_NUMBERS) })
 }
 
 /// Warnings about a set of samples as such.
@@ -476,5 +494,17 @@ fn calibration(
         workspace: summary.workspace.clone(),
         earlier: Vec::new(),
         profile: profile_text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fits_that_take_all_the_memory_are_refused() {
+        assert!(check_size(250_000, 28).is_ok() && check_size(150_000, 240).is_ok());
+        let refused = check_size(250_000, 240).unwrap_err().to_string();
+        assert!(refused.contains("would take about 6 GB of memory, and at most 4 GB are used"), "{refused}");
     }
 }
