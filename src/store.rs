@@ -303,6 +303,25 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
+    #[test]
+    fn what_was_written_of_several_files_and_what_was_not_is_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        replace(&at("c"), "old").unwrap();
+        fs::create_dir_all(at("b/inside")).unwrap();
+        let files = ["a", "b", "c"].map(|name| (at(name), b"new".as_slice()));
+        let error = replace_all(files, Links::Followed).unwrap_err();
+        assert_eq!(error.to_string(), "only a part of the files was written: a new, b, c NOT written");
+        assert_eq!((read(&at("a")).unwrap(), read(&at("c")).unwrap()), (b"new".to_vec(), b"old".to_vec()));
+        let left = fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, 3, "no temporary file is left");
+        // Where that is seen before anything is replaced, nothing is.
+        replace(&at("a"), "old").unwrap();
+        let files = ["a", "b"].map(|name| (at(name), b"new".as_slice()));
+        assert!(matches!(replace_all(files, Links::Refused), Err(StoreError::NotOwn { .. })));
+        assert_eq!(read(&at("a")).unwrap(), b"old");
+    }
+
     #[cfg(unix)]
     #[test]
     fn links_stay_and_the_files_behind_them_are_replaced() {

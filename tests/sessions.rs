@@ -494,6 +494,87 @@ fn a_delivery_that_does_not_fit_leaves_no_part_of_itself_and_can_be_repeated() {
     assert!(files().contains("report.html") && files().contains("calibration.ron"));
 }
 
+/// With a virtual clock nothing of a run is left to chance, the recording included.
+#[test]
+fn a_run_with_a_virtual_clock_makes_the_same_files_again() {
+    let files = || {
+        let place = Place::new();
+        let script = place.write_script("run.script.ron", &whole().join(", "));
+        assert_eq!(place.run(&["--script", &script, "--json"]).status.code(), Some(0));
+        let names = fs::read_dir(place.session()).unwrap().map(|entry| entry.unwrap().file_name());
+        let names = names.filter(|name| name != ".lock");
+        names.map(|name| (name.clone(), fs::read(place.session().join(name)).unwrap())).collect::<BTreeMap<_, _>>()
+    };
+    let (once, again) = (files(), files());
+    assert!(
+        once.keys().eq(again.keys()) && once.contains_key("recording.rrd".as_ref() as &std::ffi::OsStr),
+        "{:?}",
+        once.keys()
+    );
+    for (name, bytes) in &once {
+        assert!(again[name] == *bytes, "{} differs", name.display());
+    }
+}
+
+/// The system refuses memory, and the program ends as it does then: not as after a defect, and with all that was saved.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_that_gets_no_memory_loses_nothing_that_was_saved() {
+    let expected = finished().measurements("sessions/s");
+    for kilobytes in [60_000, 150_000, 200_000, 230_000, 260_000, 300_000, 350_000] {
+        let place = Place::new();
+        let script = place.write_script("run.script.ron", &whole().join(", "));
+        let limited = format!("ulimit -v {kilobytes}; exec '{PROGRAM}' --script {script} --json");
+        let output = Command::new("sh").args(["-c", &limited]).current_dir(place.0.path()).output().unwrap();
+        assert!(!matches!(output.status.code(), Some(70 | 101)), "{kilobytes}: {}", text(&output.stderr));
+        everything_saved_is_there(&output.stdout, &place.session());
+        let Ok(journal) = read_journal(&place.session()) else { continue };
+        if !Session::of(&journal).unwrap().closed {
+            place.complete("sessions/s");
+        }
+        assert_eq!(place.measurements("sessions/s"), expected, "{kilobytes} kB");
+    }
+}
+
+/// A digit or byte of any file of a result: also of those that have no place for a check sum of their own.
+#[test]
+fn a_change_of_any_delivered_file_is_named() {
+    let place = finished();
+    let show = || text(&place.run(&["session", "show", "sessions/s"]).stdout);
+    let Some(Entry::Delivered { files, .. }) = read_journal(&place.session())
+        .unwrap()
+        .lines
+        .into_iter()
+        .rev()
+        .map(|line| line.entry)
+        .find(|entry| matches!(entry, Entry::Delivered { .. }))
+    else {
+        panic!("nothing was delivered")
+    };
+    assert!(
+        ["corrected.urdf", "dh.csv", "corrected.ron"].iter().all(|name| files.iter().any(|file| file == name)),
+        "{files:?}"
+    );
+    assert!(!show().contains("CHANGED"), "{}", show());
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    for name in &files {
+        let file = place.session().join(name);
+        let whole = fs::read(&file).unwrap();
+        for _ in 0..3 {
+            let mut bytes = whole.clone();
+            let digits: Vec<usize> = (0..bytes.len()).filter(|at| bytes[*at].is_ascii_digit()).collect();
+            let at = digits[random.random_range(0..digits.len())];
+            bytes[at] = b'0' + (bytes[at] - b'0' + random.random_range(1..10)) % 10;
+            fs::write(&file, bytes).unwrap();
+            assert!(show().contains(&format!("{name}: CHANGED since it was")), "{name}, byte {at}: {}", show());
+        }
+        fs::remove_file(&file).unwrap();
+        assert!(show().contains(&format!("{name}: NOT readable")), "{}", show());
+        fs::write(&file, whole).unwrap();
+    }
+    assert!(!show().contains("CHANGED"), "{}", show());
+}
+
 #[test]
 fn a_reader_that_goes_away_costs_nothing_that_was_saved() {
     let expected = finished().measurements("sessions/s");
