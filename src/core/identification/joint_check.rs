@@ -37,7 +37,7 @@ const TURNS: [f64; 4] = [1.0 / DEGREE, DEGREE, 0.9, 1.0 / 0.9];
 /// Factors between units of sliding joints: inches, centimetres and metres.
 const SLIDES: [f64; 6] = [INCH / MILLIMETRE, MILLIMETRE / INCH, 10.0, 0.1, 1000.0, 0.001];
 /// A move is right if it is as long as asked within this part, or within three standard deviations.
-const MOVE: f64 = 0.05;
+const MOVE: f64 = 0.2;
 /// A movement whose standard deviation is a larger part of it than this is not seen.
 const UNSEEN: f64 = 0.3;
 

@@ -7,7 +7,7 @@ use crate::session::export::plan_csv;
 use crate::session::journal::{Entry, PlanText};
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
-use crate::session::set_up::Step;
+use crate::session::set_up::{InstrumentChoice, Step};
 use crate::session::state::Session;
 use crate::wizard::advice;
 use crate::wizard::effect::{Answer, Request};
@@ -68,6 +68,17 @@ pub(in crate::wizard) fn measuring_pace() -> Pace {
     Pace { shots: 3, ..Pace::default() }
 }
 
+/// Time (s) to drive the arm to a pose by hand, read the instrument and type the coordinates.
+const BY_HAND: f64 = 50.0;
+
+/// How fast the operator of a session measures: coordinates that are typed take their time.
+fn pace(session: &Session) -> Pace {
+    match session.instrument {
+        Some(InstrumentChoice::Manual { .. }) => Pace { settle: BY_HAND, shots: 1, ..Pace::default() },
+        _ => measuring_pace(),
+    }
+}
+
 /// Name of the file with the plan in the session's folder.
 pub(super) const PLAN_FILE: &str = "plan.csv";
 
@@ -96,7 +107,7 @@ pub(super) fn plan_request(cx: &Cx<'_>, settings: &PlanSettings) -> Option<Reque
         included: measured_poses(cx),
         numbered_after: highest_pose_number(cx),
         created: cx.now.to_string(),
-        pace: measuring_pace(),
+        pace: pace(cx.session),
         ..PlanRequest::default()
     };
     Some(Request::Plan {

@@ -270,12 +270,14 @@ fn minutes_left(session: &Session, open: usize) -> Option<f64> {
 
 /// Longest time from sample to sample that is no pause (min).
 const LONGEST_STEP: f64 = 5.0;
+/// Shortest time from sample to sample (min) of points that were not given together.
+const SHORTEST_STEP: f64 = 0.03;
 
 /// The usual time from sample to sample, from their times in minutes.
 fn pace(times: &[f64]) -> Option<f64> {
     // A clock that was set back, or a lunch break, says nothing about the pace.
     let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
-    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0 && *step <= LONGEST_STEP).collect();
+    let mut steps: Vec<f64> = steps.filter(|step| (SHORTEST_STEP..=LONGEST_STEP).contains(step)).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied()
 }
