@@ -193,7 +193,8 @@ pub fn check_joints(
             faults.push(JointFault::Zero { joint, offset });
         }
     }
-    let moves = check.moves(&best);
+    let offsets: Vec<f64> = zeros.iter().map(|zero| zero.map_or(0.0, |(offset, _)| offset)).collect();
+    let moves = check.moves(&best.faults, &offsets, &fit);
     let joints = (0..chain.dof()).map(|joint| JointSeen {
         asked: check.asked(joint),
         seen: moves.get(joint).copied().flatten(),
@@ -400,16 +401,18 @@ impl Check<'_> {
     }
 
     /// How far each joint was moved, with its standard deviation.
-    fn moves(&self, best: &Hypothesis) -> Vec<Option<(f64, f64)>> {
+    fn moves(&self, faults: &[JointFault], offsets: &[f64], fit: &Fit) -> Vec<Option<(f64, f64)>> {
         let count = self.chain.dof();
-        let flanges = self.flanges(&best.faults, |_, _| {});
-        let points = self.points(&best.faults);
+        let shift = |q: &mut [f64]| q.iter_mut().zip(offsets).for_each(|(value, offset)| *value += offset);
+        let flanges = self.flanges(faults, |_, q| shift(q));
+        let points = self.points(faults);
         // A joint that was moved farther than asked is still there at all later stops.
         let after = |joint: usize| self.stops.iter().position(|stop| stop.joint == Some(joint)).unwrap_or(usize::MAX);
         let columns: Vec<Extra> = (0..count)
             .map(|joint| {
                 let first = after(joint);
-                let moved = self.flanges(&best.faults, |index, q| {
+                let moved = self.flanges(faults, |index, q| {
+                    shift(q);
                     if index >= first
                         && let Some(value) = q.get_mut(joint)
                     {
@@ -419,7 +422,6 @@ impl Check<'_> {
                 Extra { flanges: moved, expected: self.asked(joint).abs().max(STEP), now: 0.0 }
             })
             .collect();
-        let fit = &best.fit;
         let system = Linear::new(self, &flanges, &points, (fit.target, fit.base_from_tracker), &columns);
         let Some(step) = system.solve() else { return vec![None; count] };
         let sigma = system.deviations();
@@ -428,7 +430,7 @@ impl Check<'_> {
             let of = |index: usize| {
                 let stop = self.stops.get(index)?;
                 let mut q = stop.configuration.clone();
-                best.faults.iter().for_each(|fault| fault.correct(&stop.configuration, &mut q));
+                faults.iter().for_each(|fault| fault.correct(&stop.configuration, &mut q));
                 q.get(joint).copied()
             };
             let index = after(joint);
