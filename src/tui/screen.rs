@@ -90,6 +90,11 @@ pub trait Screen: fmt::Debug {
 
     fn on_key(&mut self, key: Key, cx: &ScreenCx<'_>) -> ScreenOutcome;
 
+    /// Whether letters are typed into a field of the screen, so that those of the table have no effect.
+    fn takes_letters(&self) -> bool {
+        false
+    }
+
     /// Handles pasted text.
     fn on_paste(&mut self, _text: &str, _cx: &ScreenCx<'_>) -> ScreenOutcome {
         ScreenOutcome::Ignored

@@ -242,6 +242,9 @@ impl Ui {
         let mut items = keymap::key_hints(&cx.view.intents, self.theme.glyphs);
         // The screen handles keys first, so its keys hide those of the table.
         items.retain(|item| !own.iter().any(|one| one.key == item.key));
+        if self.screen.takes_letters() {
+            items.retain(|item| item.key.chars().count() > 1);
+        }
         let bell = keymap::BELL.name(self.theme.glyphs);
         for item in items.iter_mut().filter(|item| item.key == bell) {
             let now = if self.has_bell { "on" } else { "off" };

@@ -126,6 +126,10 @@ fn file() -> ScreenOutcome {
 }
 
 impl Screen for ProfileScreen {
+    fn takes_letters(&self) -> bool {
+        self.is_typing
+    }
+
     fn key_hints(&self, cx: &ScreenCx<'_>) -> Vec<KeyHint> {
         let Some(content) = content(cx).filter(|content| !content.is_fixed) else { return Vec::new() };
         let mut items = vec![KeyHint::new("Up/Down", "choose", 2)];
