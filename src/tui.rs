@@ -285,18 +285,16 @@ impl Driver<'_, '_> {
                 self.planned = Some((at, intent));
                 Some(at.saturating_duration_since(now()))
             }
-            None => match pilot.next(self.engine.wizard()) {
-                Some(Move { after, caption, intent }) => {
+            None => {
+                if let Some(Move { after, caption, intent }) = pilot.next(self.engine.wizard()) {
                     self.engine.remark(Notice::info(caption).hint("you are watching; any key takes over"));
                     self.planned = Some((now() + after, intent));
-                    Some(Duration::ZERO)
-                }
-                None => {
+                } else {
                     self.pilot = None;
                     self.engine.remark(Notice::info("this was the whole calibration").hint("the keys are yours now"));
-                    Some(Duration::ZERO)
                 }
-            },
+                Some(Duration::ZERO)
+            }
         }
     }
 

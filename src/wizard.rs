@@ -414,13 +414,10 @@ impl Wizard {
             self.resumes = Some(folder);
             return self.end(cause);
         }
-        let intent = match self.everywhere(intent) {
-            Ok(actions) => {
-                self.actions.extend(actions);
-                return self.run();
-            }
-            Err(intent) => intent,
-        };
+        if let Some(actions) = self.everywhere(&intent) {
+            self.actions.extend(actions);
+            return self.run();
+        }
         if matches!(intent, Intent::Measure | Intent::MeasureAgain | Intent::Undo | Intent::Redo) {
             self.live.hold_until_moved();
         }
@@ -430,21 +427,21 @@ impl Wizard {
         self.run()
     }
 
-    /// Handles an intent that is the same in every step that offers it; gives back any other.
-    fn everywhere(&mut self, intent: Intent) -> Result<Vec<Action>, Intent> {
-        match intent {
-            Intent::DescribeCell(cell) => Ok(self.cells.state(*cell, &self.session)),
-            Intent::PlaceTracker(points) => Ok(self.cells.place(points, &self.session)),
-            Intent::PlaceTrackerByPoses => Ok(self.cells.place_by_poses(&self.session)),
-            Intent::LimitJoints(limits) => Ok(self.cells.limit(&limits, &self.session)),
-            Intent::AddBox(obstacle) => Ok(self.cells.add_box(obstacle, &self.session)),
-            Intent::TurnTracker => Ok(pointing::turn(&self.session, self.phase.shown_row())),
-            Intent::CheckFaces(pair) => Ok(faces::check(&pair, &self.session)),
-            Intent::WriteProgram(settings) => Ok(self.programs.write(settings, &self.session, self.now)),
-            Intent::ProgramDriven => Ok(vec![Action::Write(vec![Entry::ProgramDriven])]),
-            #[expect(clippy::wildcard_enum_match_arm, reason = "all others belong to the steps")]
-            intent => Err(intent),
-        }
+    /// Handles an intent that is the same in every step that offers it; `None` if it belongs to the step.
+    #[expect(clippy::wildcard_enum_match_arm, reason = "all others belong to the steps")]
+    fn everywhere(&mut self, intent: &Intent) -> Option<Vec<Action>> {
+        Some(match intent {
+            Intent::DescribeCell(cell) => self.cells.state((**cell).clone(), &self.session),
+            Intent::PlaceTracker(points) => self.cells.place(points.clone(), &self.session),
+            Intent::PlaceTrackerByPoses => self.cells.place_by_poses(&self.session),
+            Intent::LimitJoints(limits) => self.cells.limit(limits, &self.session),
+            Intent::AddBox(obstacle) => self.cells.add_box(obstacle.clone(), &self.session),
+            Intent::TurnTracker => pointing::turn(&self.session, self.phase.shown_row()),
+            Intent::CheckFaces(pair) => faces::check(pair, &self.session),
+            Intent::WriteProgram(settings) => self.programs.write(settings.clone(), &self.session, self.now),
+            Intent::ProgramDriven => vec![Action::Write(vec![Entry::ProgramDriven])],
+            _ => return None,
+        })
     }
 
     fn cancel(&mut self) -> Vec<Effect> {

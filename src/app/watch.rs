@@ -11,7 +11,7 @@ use crate::wizard::{Intent, Wizard};
 /// Time to read a page before something is done on it.
 const PAGE: Duration = Duration::from_millis(3500);
 /// Time to read the first measurements, and each of the others.
-const FIRST_POSES: Duration = Duration::from_millis(2000);
+const FIRST_POSES: Duration = Duration::from_secs(2);
 const POSE: Duration = Duration::from_millis(250);
 /// Measurements that are shown slowly.
 const SLOW_POSES: usize = 4;

@@ -199,10 +199,13 @@ impl fmt::Display for PayloadText {
     }
 }
 
+/// Coordinates of a point (mm).
+pub type PointMm = (f64, f64, f64);
+
 /// Points in the base and as the tracker sees them (mm).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct TrackerPoints(pub Vec<((f64, f64, f64), (f64, f64, f64))>);
+pub struct TrackerPoints(pub Vec<(PointMm, PointMm)>);
 
 /// One SMR as the instrument sees it in its two faces (mm).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -221,7 +221,7 @@ impl Dialog {
                 items.push(KeyHint::new("Ctrl-U", "clear the line", 4));
             }
             Self::Text { .. } | Self::Note { .. } | Self::Number { .. } => {
-                items.push(KeyHint::new("Ctrl-U", "clear the line", 4))
+                items.push(KeyHint::new("Ctrl-U", "clear the line", 4));
             }
         }
         items

@@ -80,7 +80,7 @@ impl KnownCells {
     }
 
     /// Takes over where the tracker is, by the poses measured so far.
-    pub(super) fn place_by_poses(&mut self, session: &Session) -> Vec<Action> {
+    pub(super) fn place_by_poses(&self, session: &Session) -> Vec<Action> {
         match place::from_poses(session) {
             Ok(found) => {
                 let Some(robot) = &session.robot else { return Vec::new() };

@@ -197,6 +197,46 @@ fn is_plausible(choice: &TargetChoice) -> bool {
     }
 }
 
+impl TargetStep {
+    /// The offer to measure circles of the last two joints, or of the whole arm.
+    fn start_of_circles(&self, of_whole_arm: bool, is_checking: bool, cx: &Cx<'_>) -> IntentInfo {
+        let session = cx.session;
+        let has_circles = !session.circle_points.is_empty();
+        let (intent, label) = match (of_whole_arm, has_circles) {
+            (false, false) => (Intent::StartCircles, "find it by circles"),
+            (false, true) => (Intent::StartCircles, "continue the circles"),
+            (true, false) => (Intent::StartWholeArm, "measure the whole arm"),
+            (true, true) => (Intent::StartWholeArm, "continue the whole arm"),
+        };
+        offer(
+            intent,
+            label,
+            [
+                require(
+                    session.samples.is_empty(),
+                    "samples were measured with this SMR; a different mounting needs a new session",
+                ),
+                require(
+                    !has_circles || is_whole(session) == of_whole_arm,
+                    "circles of another kind are measured: restart them first",
+                ),
+                require(self.plan.is_empty(), "the circles are already being measured"),
+                require(!is_checking, "the joint check is being measured"),
+                require(cx.connection.is_some(), "the instrument is not responding"),
+            ],
+        )
+    }
+
+    /// Whether the whole arm is measured.
+    fn has_arm(&self) -> Condition {
+        match &self.arm {
+            Some(Ok(_)) => Ok(()),
+            Some(Err(reason)) => Err(reason.clone()),
+            None => Err("the whole arm is not measured".to_owned()),
+        }
+    }
+}
+
 impl StepMachine for TargetStep {
     fn intents(&self, cx: &Cx<'_>) -> Vec<IntentInfo> {
         let session = cx.session;
@@ -217,19 +257,6 @@ impl StepMachine for TargetStep {
 
         let has_masses = cx.profile().is_some_and(|profile| profile.chain().loads().is_some());
 
-        let start = if has_circles { "continue the circles" } else { "find it by circles" };
-        let whole = if has_circles { "continue the whole arm" } else { "measure the whole arm" };
-        let is_other = |is_wanted: bool| {
-            require(
-                !has_circles || is_whole(session) == is_wanted,
-                "circles of another kind are measured: restart them first",
-            )
-        };
-        let has_arm = || match &self.arm {
-            Some(Ok(_)) => Ok(()),
-            Some(Err(reason)) => Err(reason.clone()),
-            None => Err("the whole arm is not measured".to_owned()),
-        };
         let as_profile = Intent::ChooseTarget(TargetChoice::Profile);
         let free = Intent::ChooseTarget(TargetChoice::Free { sigma_mm: to_mm(FREE_TARGET_UNCERTAINTY) });
         let type_in = Intent::TypeReading(String::new());
@@ -256,17 +283,7 @@ impl StepMachine for TargetStep {
                     ),
                 ],
             ),
-            offer(
-                Intent::StartCircles,
-                start,
-                [
-                    can_change(),
-                    is_other(false),
-                    require(self.plan.is_empty(), "the circles are already being measured"),
-                    require(!is_checking, "the joint check is being measured"),
-                    is_connected(),
-                ],
-            ),
+            self.start_of_circles(false, is_checking, cx),
             offer(
                 Intent::StartJointCheck,
                 check,
@@ -285,18 +302,8 @@ impl StepMachine for TargetStep {
                 "restart the joint check",
                 [require(!session.joint_check.is_empty(), "no joint has been checked")],
             ),
-            offer(
-                Intent::StartWholeArm,
-                whole,
-                [
-                    can_change(),
-                    is_other(true),
-                    require(self.plan.is_empty(), "the circles are already being measured"),
-                    require(!is_checking, "the joint check is being measured"),
-                    is_connected(),
-                ],
-            ),
-            offer(Intent::SaveArm, "save the measured arm as a profile", [has_arm()]),
+            self.start_of_circles(true, is_checking, cx),
+            offer(Intent::SaveArm, "save the measured arm as a profile", [self.has_arm()]),
             offer(
                 Intent::Measure,
                 "measure",

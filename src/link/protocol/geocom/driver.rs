@@ -61,7 +61,7 @@ const POSSIBLE_AIR: std::ops::RangeInclusive<f64> = -70.0..=150.0;
 const SUSPICIOUS_AIR: f64 = 25.0;
 
 /// Longest time to turn to a place and to search there.
-const TURNING: Duration = Duration::from_secs(60);
+const TURNING: Duration = Duration::from_mins(1);
 
 /// Note on the accuracy of total stations.
 const ACCURACY: &str = "total stations measure to about 0.5 to 1 mm per point: good for a coarse placement of the base, \
