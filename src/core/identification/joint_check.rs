@@ -32,8 +32,8 @@ const ZERO: (f64, f64) = (1.0 * DEGREE, 2.0 * MILLIMETRE);
 const ZERO_FAULT: (f64, f64) = (3.0 * DEGREE, 5.0 * MILLIMETRE);
 /// Zeros that joints have by other conventions (rad).
 const ZEROS: [f64; 3] = [90.0 * DEGREE, -90.0 * DEGREE, 180.0 * DEGREE];
-/// Factors between units of turning joints: radians and gons.
-const TURNS: [f64; 4] = [1.0 / DEGREE, DEGREE, 0.9, 1.0 / 0.9];
+/// Factors between units of turning joints: radians and degrees. Gons are left out: a zero that is off looks much the same.
+const TURNS: [f64; 2] = [1.0 / DEGREE, DEGREE];
 /// Factors between units of sliding joints: inches, centimetres and metres.
 const SLIDES: [f64; 6] = [INCH / MILLIMETRE, MILLIMETRE / INCH, 10.0, 0.1, 1000.0, 0.001];
 /// A move is right if it is as long as asked within this part, or within three standard deviations.
