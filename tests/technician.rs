@@ -165,6 +165,8 @@ fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
     fs::write(place.path("arm.ron"), profile.unwrap()).unwrap();
     let mut cell = Cell::start(place.0.path(), "127.0.0.1:0", None);
     technician.press("\u{1b}[B\u{1b}[B\u{1b}[B");
+    technician.does(ENTER, "the list of links", |shown| shown.has("(type to search)"));
+    technician.press("address as");
     technician.does(ENTER, "the form of the link", |shown| shown.has("An instrument on the network"));
     let address = cell.address.clone();
     technician.fill(&[Some(&address), Some("(measure_ms: 200)")]);

@@ -152,6 +152,9 @@ pub struct JointCheck {
     pub rms: f64,
 }
 
+/// A value with its standard deviation, if it is known.
+type WithSigma = Option<(f64, f64)>;
+
 /// A set of faults with what it leaves.
 #[derive(Clone, Debug)]
 struct Hypothesis {
@@ -354,7 +357,7 @@ impl Check<'_> {
     }
 
     /// Errors of the zeros of all joints but the first and the last, with their standard deviations, and the fit without them.
-    fn zeros(&self, best: &Hypothesis) -> Option<(Vec<Option<(f64, f64)>>, Fit)> {
+    fn zeros(&self, best: &Hypothesis) -> Option<(Vec<WithSigma>, Fit)> {
         let count = self.chain.dof();
         let free: Vec<usize> = (1..count.saturating_sub(1)).collect();
         let points = self.points(&best.faults);
@@ -364,7 +367,7 @@ impl Check<'_> {
         for _ in 0..STEPS {
             let with = |offsets: &[f64]| {
                 self.flanges(&best.faults, |_, q| {
-                    q.iter_mut().zip(offsets).for_each(|(value, offset)| *value += offset)
+                    q.iter_mut().zip(offsets).for_each(|(value, offset)| *value += offset);
                 })
             };
             let flanges = with(&offsets);
@@ -401,7 +404,7 @@ impl Check<'_> {
     }
 
     /// How far each joint was moved, with its standard deviation.
-    fn moves(&self, faults: &[JointFault], offsets: &[f64], fit: &Fit) -> Vec<Option<(f64, f64)>> {
+    fn moves(&self, faults: &[JointFault], offsets: &[f64], fit: &Fit) -> Vec<WithSigma> {
         let count = self.chain.dof();
         let shift = |q: &mut [f64]| q.iter_mut().zip(offsets).for_each(|(value, offset)| *value += offset);
         let flanges = self.flanges(faults, |_, q| shift(q));
@@ -430,7 +433,9 @@ impl Check<'_> {
             let of = |index: usize| {
                 let stop = self.stops.get(index)?;
                 let mut q = stop.configuration.clone();
-                faults.iter().for_each(|fault| fault.correct(&stop.configuration, &mut q));
+                for fault in faults {
+                    fault.correct(&stop.configuration, &mut q);
+                }
                 q.get(joint).copied()
             };
             let index = after(joint);
