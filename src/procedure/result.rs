@@ -101,8 +101,8 @@ pub(crate) fn result_warnings(
         );
         warnings.push(Warning::new(WarningCode::DoesNotFit, message, true));
     }
-    warnings.extend(joint_doubts(problem, found).iter().map(|doubt| doubt_warning(joints, doubt)));
     warnings.extend(run_away(found, settings));
+    warnings.extend(joint_doubts(problem, found).iter().map(|doubt| doubt_warning(joints, doubt)));
     if let Some(stated) = found.sigma.instrument.filter(|_| found.sigma.excess() > SIGMA_EXCESS) {
         let message = format!(
             "the residuals ({} mm per coordinate) are {} times the stated sigma ({} mm): something besides geometry and instrument moves the points (flexure, backlash, temperature, a moved SMR). The standard deviations below include it",
@@ -161,7 +161,7 @@ fn doubt_warning(joints: &[Joint], doubt: &JointDoubt) -> Warning {
                 JointType::Prismatic => ("the SMR hardly moves with it".to_owned(), "where it moves with the joint"),
             };
             let message = format!(
-                "joint {} was not tested: {why}, so all points would be the same if its sign, its zero or its scale were wrong. The figures are those of an SMR there, and say nothing about a tool elsewhere. Mount the SMR {beside}, or measure with a second place of the SMR as well",
+                "joint {} was not tested: {why}, so all points would fit as well if its sign, its zero or its scale were wrong. The figures are those of an SMR there, and say nothing about a tool elsewhere. Mount the SMR {beside}, or measure with a second place of the SMR as well",
                 joint.name
             );
             Warning::new(WarningCode::UntestedJoint, message, true)
