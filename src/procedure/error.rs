@@ -81,7 +81,7 @@ pub enum ProcedureError {
     UnknownTargets(Vec<String>),
     /// Samples and parameters that would take more memory than a computer should give.
     #[error(
-        "{samples} samples with {parameters} parameters would take about {gigabytes:.0} GB of memory, and at most {most:.0} GB are used: identify from fewer samples"
+        "{samples} samples with {parameters} parameters would take about {gigabytes:.0} GB of memory, and at most {most:.0} GB are used: identify from fewer samples, or the geometry alone"
     )]
     TooLarge {
         samples: usize,

@@ -12,7 +12,7 @@ use crate::units::{DEGREE, MICROMETRE};
 /// Alterations that make the residuals this many times larger would have been seen.
 const TELLS: f64 = 1.5;
 /// Residuals after an alteration up to this many times those before are looked into with all constants fitted again.
-const LOOK_INTO: f64 = 5.0;
+const LOOK_INTO: f64 = 20.0;
 /// Residuals below this (m) are alike.
 const ALIKE: f64 = MICROMETRE;
 /// A target this many of its standard deviations from where it was stated to be would have been seen.
@@ -96,11 +96,12 @@ impl<'a> Trial<'a> {
         let reversed = self.observations.at(|place| place.configuration[joint] *= -1.0);
         let turned = self.fit(&reversed).map_or(f64::INFINITY, |fit| fit.residual);
         if turned < LOOK_INTO * given.max(ALIKE) {
-            let best = turned.min(self.fit_all(&reversed));
-            if TELLS * best.max(ALIKE) < given {
-                return Some(JointDoubt::Reversed { joint, given, reversed: best });
+            // With errors of joints or without: each is compared with its like.
+            let (all, all_reversed) = (self.fit_all(self.observations), self.fit_all(&reversed));
+            if TELLS * all_reversed.max(ALIKE) < all {
+                return Some(JointDoubt::Reversed { joint, given: all, reversed: all_reversed });
             }
-            if best < TELLS * given.max(ALIKE) {
+            if turned < TELLS * given.max(ALIKE) || all_reversed < TELLS * all.max(ALIKE) {
                 return Some(JointDoubt::Unseen { joint, lever: self.lever(joint) });
             }
         }
