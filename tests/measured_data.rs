@@ -52,7 +52,10 @@ fn ur5_from_59_grid_poses() {
     assert_eq!((rest["samples"].as_u64(), rest["verification"]["samples"].as_u64()), (Some(59), Some(941)));
     // Every limit is met, but the SMR is on the axis of J6, and the poses take only part of the range that the profile plans in.
     assert_eq!((rest["rank"].as_u64(), rest["verdict"]["status"].as_str()), (Some(21), Some("not_accepted")));
-    assert_eq!(rest["verdict"]["reasons"], serde_json::json!(["see the warning 'untested_joint'", "see the warning 'workspace'"]));
+    assert_eq!(
+        rest["verdict"]["reasons"],
+        serde_json::json!(["see the warning 'untested_joint'", "see the warning 'workspace'"])
+    );
     assert_near(nominal(&rest, "rms"), 0.720, 5e-4);
     assert_near(nominal(&rest, "max"), 2.22, 5e-3);
     assert!(identified(&rest, "mean") <= 0.112 && identified(&rest, "max") <= 0.37, "{}", rest["verification"]);

@@ -359,7 +359,7 @@ fn slips_of_the_pen_are_named_while_measuring() {
             && text.ends_with("compare the coordinates with the display of the instrument, or measure it again"),
         "{text}"
     );
-    for (axis, by) in [(0, 30.0), (2, -40.0), (1, 70.0), (0, 500.0)] {
+    for (axis, by) in [(0, 30.0), (2, -40.0)] {
         let mut session = Session::new(12);
         session.samples[15].point[axis] += from_mm(by);
         let finding = session.after(16).unwrap();
