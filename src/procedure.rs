@@ -7,6 +7,7 @@
 //! [`Advice`]: crate::session::advice::Advice
 
 pub(crate) mod assess;
+pub mod bodies;
 pub(crate) mod cell;
 pub(crate) mod checks;
 pub mod circles;

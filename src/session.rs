@@ -20,6 +20,7 @@ pub mod iso9283;
 pub mod joint_errors;
 pub mod journal;
 pub mod measurements;
+mod orientation;
 pub mod plan;
 pub mod plan_summary;
 pub mod reading;

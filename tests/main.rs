@@ -45,6 +45,7 @@ mod pictures;
 mod plan_cli;
 mod planning_reference;
 mod plans;
+mod poses;
 mod procedure;
 mod profile_messages;
 mod program_files;

@@ -29,13 +29,15 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     let estimation = &args.estimation;
     let mut loaded = load::profile(&estimation.profile)?;
     let previous = previous(args, &mut loaded, console)?;
-    let profile = &loaded.profile;
     for diagnostic in &loaded.warnings {
         console.remark(&diagnostic.to_string());
     }
     args.record.record.as_deref().map_or(Ok(()), record::check_target)?;
-    let named = (profile, estimation.profile.as_str());
+    let named = (&loaded.profile, estimation.profile.as_str());
     let identification = load::measurements(&args.measurements, &args.layout, named, InputRole::Identification)?;
+    load::take_bodies(&mut loaded, &identification.table, console)?;
+    let profile = &loaded.profile;
+    let named = (profile, estimation.profile.as_str());
     let filter = load::filter(estimation.filter.as_deref(), &identification.table.columns)?;
     let (rows, rest) = load::split(&identification.table, filter.as_ref())?;
     let verification = args

@@ -18,7 +18,7 @@ use crate::session::measurements::{
 use crate::session::{TableErrors, TableProblem, workbook};
 use crate::store;
 use crate::text::{columns, counted, listed, shortened};
-use crate::units::to_mm;
+use crate::units::{from_deg, from_mm, to_mm};
 
 /// Columns of a terminal that a cell of the listing takes at most.
 const WIDEST: usize = 28;
@@ -30,12 +30,14 @@ const SHOWN_WARNINGS: usize = 5;
 const ENOUGH: usize = 8;
 
 pub(super) fn run<O: Write, E: Write>(args: &ImportArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
-    let loaded = load::profile(&args.profile)?;
+    let mut loaded = load::profile(&args.profile)?;
     let profile = &loaded.profile;
     let (layout, mut reading) = load::layout(&args.layout, &args.profile)?;
     reading.columns = args.columns.clone().or(reading.columns);
     reading.units = args.units.unwrap_or(reading.units);
     reading.skip_missing |= args.skip_missing;
+    reading.sigma = args.sigma_mm.map(from_mm).or(reading.sigma);
+    reading.sigma_rotation = args.sigma_rot_deg.map(from_deg).or(reading.sigma_rotation);
     let joints = joint_types(profile);
     let expected = Expected::of(profile, &joints);
     let table = match &args.joints {
@@ -68,6 +70,8 @@ pub(super) fn run<O: Write, E: Write>(args: &ImportArgs, console: &mut Console<O
         console.remark(&format!("note: and {more} more like these"));
     }
     console.say(&summary(&table, profile))?;
+    load::take_bodies(&mut loaded, &table, console)?;
+    let profile = &loaded.profile;
     if args.rows {
         console.say(&rows(&table, profile))?;
     }
@@ -84,6 +88,10 @@ pub(super) fn run<O: Write, E: Write>(args: &ImportArgs, console: &mut Console<O
         let text = simulated.as_deref().map_or_else(|| text.clone(), |said| marked_as_simulated(said, &text));
         let text = checksum::with_sum(&text, Syntax::Csv);
         store::replace(path, &text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+        console.say_written(path)?;
+    }
+    if let Some(path) = &args.out_profile {
+        store::replace(path, &loaded.text).map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
         console.say_written(path)?;
     }
     Ok(status)

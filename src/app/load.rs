@@ -8,6 +8,7 @@ use crate::checksum::{self, Finding};
 use crate::error::{ExitStatus, Failure};
 use crate::identification::PointSample;
 use crate::kinematics::Place;
+use crate::procedure::bodies::{BodyError, WithBodies, with_bodies};
 use crate::procedure::{input_file, joint_types};
 use crate::profile::{Diagnostic, Profile, builtin, builtin_names};
 use crate::session::calibration::{Calibration, Integrity};
@@ -171,6 +172,35 @@ pub(super) fn measurements(
         .map_err(|errors| refused(&errors))?;
     let simulated = simulation_of_table(&bytes).map(|said| Warning::simulated(&said));
     Ok(LoadedTable { table, input: input_file(role, file, &bytes), simulated })
+}
+
+/// Gives a robot the corners of the bodies that stand for poses measured with their orientation, where it does not have them.
+pub(super) fn take_bodies<O: Write, E: Write>(
+    loaded: &mut LoadedProfile,
+    table: &Measurements,
+    console: &mut Console<O, E>,
+) -> Result<(), Failure> {
+    for note in &table.understood.notes {
+        console.remark(&format!("note: {note}"));
+    }
+    let rows: Vec<&Row> = table.distinct_rows().collect();
+    let found = with_bodies(&loaded.profile, &loaded.text, &rows).map_err(|error| {
+        let failure = Failure::from_error(ExitStatus::Usage, &error);
+        match error {
+            BodyError::OneAxis { body, .. } => failure
+                .hint("measure with the wrist turned about two axes")
+                .hint(format!("or put the corners '{body}.a' to '{body}.d' into the targets of the profile")),
+            BodyError::Text | BodyError::Profile(_) => failure,
+        }
+    })?;
+    if let Some(WithBodies { profile, text, bodies }) = found {
+        console.remark(&format!(
+            "note: how {} mounted on the flange is estimated from the nominal arm and then identified",
+            if bodies.len() == 1 { format!("'{}' is", bodies[0]) } else { format!("'{}' are", bodies.join("', '")) }
+        ));
+        (loaded.profile, loaded.text) = (profile, text);
+    }
+    Ok(())
 }
 
 /// Parses a filter and checks it against the columns of a table.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::one_of;
+use super::{one_of, positive};
 use crate::session::measurements::{Columns, JoinBy, Units};
 
 /// Arguments of `import`.
@@ -43,6 +43,12 @@ pub struct ImportArgs {
     /// Leave out readings without a point (empty, 0 0 0) instead of refusing the table
     #[arg(long)]
     pub skip_missing: bool,
+    /// Error of measured orientations about each axis (standard deviation, degree), where the table has no column sigma_rot_deg; uses the orientation beside the point
+    #[arg(long, value_name = "DEG", value_parser = positive)]
+    pub sigma_rot_deg: Option<f64>,
+    /// Error of each coordinate (standard deviation, mm) for rows with an orientation, where the table has no column sigma_mm
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    pub sigma_mm: Option<f64>,
     /// Sheet of an .xlsx [default: the only one that has cells]
     #[arg(long, value_name = "NAME")]
     pub sheet: Option<String>,
@@ -52,4 +58,7 @@ pub struct ImportArgs {
     /// File for the table as 'identify' and the wizard read it [default: only show what was understood]
     #[arg(long, value_name = "CSV")]
     pub out: Option<PathBuf>,
+    /// File for the profile whose targets are the points that stand for measured orientations, for the wizard
+    #[arg(long, value_name = "RON")]
+    pub out_profile: Option<PathBuf>,
 }

@@ -66,6 +66,7 @@ pub mod predicted;
 mod problem;
 mod repetitions;
 mod result;
+pub mod rigid;
 mod robust;
 mod selection;
 mod settings;

@@ -16,6 +16,7 @@ mod diagnostic;
 mod expected;
 mod gaps;
 mod masses;
+mod retarget;
 mod schema;
 mod syntax;
 mod text;
@@ -31,6 +32,7 @@ pub use diagnostic::{Diagnostic, ProfileErrors, Severity};
 pub use expected::{ExpectedDeviation, ExpectedDeviations};
 pub use gaps::Gap;
 pub use masses::{Masses, Mounting};
+pub use retarget::with_targets;
 pub use text::{check_text, list_text, show_text};
 
 use wire::LinkSettings;

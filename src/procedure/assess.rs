@@ -30,6 +30,12 @@ fn statistics(statistics: &ErrorStatistics, intervals: Option<Intervals>) -> Sta
     }
 }
 
+/// Statistics of rotations, which are shown in mrad as lengths are in mm.
+fn in_mrad(errors: &ErrorStatistics, intervals: Option<Intervals>) -> StatisticsSummary {
+    // One thousandth of the unit of the inside, for both.
+    statistics(errors, intervals)
+}
+
 /// The poses of samples, counted from zero, and how many there are.
 struct Poses {
     of_samples: Vec<usize>,
@@ -69,11 +75,14 @@ fn model_summary(errors: &ModelErrors, poses: &Poses) -> ModelSummary {
     let of_positions = poses.intervals(vectors.map(|(index, vector)| ([index; 2], vector.norm())));
     let pairs = errors.distances.iter().map(|pair| (pair.samples.map(|index| index as usize), pair.error));
     let of_distances = poses.intervals(pairs);
+    let turns = errors.orientations.iter();
+    let of_orientations = poses.intervals(turns.map(|turn| ([turn.sample; 2], turn.vector.norm())));
     ModelSummary {
         position_mm: Some(statistics(&errors.position, of_positions)),
         axis_mm: Some(AxisSummary { mean: errors.axis_mean.map(to_mm), max: errors.axis_max.map(to_mm) }),
         distance_mm: errors.distance.as_ref().map(|errors| statistics(errors, of_distances)),
         seat_mm: None,
+        orientation_mrad: errors.orientation.as_ref().map(|errors| in_mrad(errors, of_orientations)),
     }
 }
 
@@ -90,6 +99,7 @@ fn direct_summary(errors: &DirectErrors) -> ModelSummary {
         axis_mm: None,
         distance_mm: errors.length.as_ref().map(|errors| statistics(errors, of_lengths)),
         seat_mm: errors.seat.as_ref().map(|errors| statistics(errors, of_seats)),
+        orientation_mrad: None,
     }
 }
 

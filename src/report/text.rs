@@ -5,8 +5,9 @@ use super::tables::{paragraph, push_line};
 use crate::identification::{Estimator, Shape, SigmaSource, TerminationReason};
 use crate::session::joint_errors::{CurveMarks, curve_drawn, curve_scale, shares_sentence, workspace_sentence};
 use crate::session::summary::{
-    FeatureSummary, IdentificationSummary, JointErrorSummary, JointSummary, ParameterSummary, Provenance,
-    SelectionSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationReport, VerificationSummary, Warning,
+    FeatureSummary, IdentificationSummary, JointErrorSummary, JointSummary, ORIENTATION_SENTENCE, ParameterSummary,
+    Provenance, SelectionSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationReport, VerificationSummary,
+    Warning,
 };
 use crate::text::{counted, decimals_for, fixed};
 
@@ -119,6 +120,10 @@ fn verification_tables(verification: &VerificationSummary) -> String {
             text.push_str(&statistics_rows(name, &nominal, &identified));
         }
     }
+    let orientations = nominal.orientation_mrad.zip(identified.orientation_mrad);
+    if let Some((nominal, identified)) = &orientations {
+        text.push_str(&statistics_rows("orientation (mrad)", nominal, identified));
+    }
     if let (Some(nominal), Some(identified)) = (&nominal.axis_mm, &identified.axis_mm) {
         for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
             row(
@@ -129,6 +134,9 @@ fn verification_tables(verification: &VerificationSummary) -> String {
             );
             row(&mut text, &format!("along {name}, largest"), nominal.max[axis], identified.max[axis]);
         }
+    }
+    if orientations.is_some() {
+        text.push_str(&paragraph("  ", &format!("{ORIENTATION_SENTENCE}.")));
     }
     if let Some(sentence) = verification.sample_sentence() {
         text.push_str(&paragraph("  ", &format!("{sentence}.")));

@@ -13,7 +13,8 @@
 //! - Any other column is kept as text for filters.
 //!
 //! Tables of others are read as well: with other names and separators, with units in brackets or in a row of their own, with several
-//! SMRs in one row. What they mean is found out before anything is read, and refused where it is not clear.
+//! SMRs in one row. An orientation beside the point, with its standard deviation in `sigma_rot_deg` or stated by a person, makes each
+//! row four points of a rigid body. What they mean is found out before anything is read, and refused where it is not clear.
 //!
 //! Nothing is dropped: copies of rows are kept and listed in [`Measurements::duplicates`].
 
@@ -24,6 +25,7 @@ mod imported;
 mod join;
 mod layout;
 mod names;
+mod rigid;
 mod saved;
 mod writer;
 
@@ -45,6 +47,7 @@ use super::table::{
 };
 use crate::kinematics::JointType;
 use foreign::{Foreign, Wanted, understand};
+use rigid::{Orientations, unused};
 
 /// The rows of a measurement table.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,31 +145,32 @@ pub fn read_for(
             return finished(Some(split), Understood::default(), layout, file, joints, problems, warnings);
         }
     };
-    read_understood(foreign, file, joints, problems, warnings)
+    read_understood(foreign, reading, expected, file, problems, warnings)
 }
 
 /// Reads the rows of a table whose columns are understood.
 fn read_understood(
     foreign: Result<Foreign, Understood>,
+    reading: &Reading,
+    expected: &Expected<'_>,
     file: &str,
-    joints: &[JointType],
     mut problems: Vec<TableProblem>,
     warnings: Vec<TableProblem>,
 ) -> Result<Measurements, TableErrors> {
     let (split, understood) = match foreign {
         Ok(mut foreign) => {
             let understood = mem::take(&mut foreign.understood);
-            (Some(split_named(foreign, joints, &mut problems)), understood)
+            (Some(split_named(foreign, reading, expected, &mut problems)), understood)
         }
         Err(understood) => (None, understood),
     };
-    finished(split, understood, Layout::Named, file, joints, problems, warnings)
+    finished(split, understood, Layout::Named, file, expected.joints, problems, warnings)
 }
 
 /// Reads the rows of a table that is split, and checks them against each other.
 fn finished(
     split: Option<Split>,
-    understood: Understood,
+    mut understood: Understood,
     layout: Layout,
     file: &str,
     joints: &[JointType],
@@ -187,8 +191,26 @@ fn finished(
     let mut numbers = Numbers::new(&shown, decimal_comma);
     let numbered = places.pose.is_none();
     let mut rows = Vec::with_capacity(records.len());
+    let mut turned = Vec::new();
     for (index, record) in records.into_iter().enumerate() {
-        rows.extend(row(index, record, &places, &mut numbers, &mut problems));
+        match &places.orientations {
+            Orientations::Used(used) => {
+                let row = row(index, record.clone(), &places, &mut numbers, &mut problems);
+                turned.extend(row.and_then(|row| used.read(row, &record, &mut numbers, &mut problems)));
+            }
+            Orientations::None | Orientations::Unused(_) => {
+                rows.extend(row(index, record, &places, &mut numbers, &mut problems));
+            }
+        }
+    }
+    match &places.orientations {
+        Orientations::Used(used) => {
+            let (corners, note) = used.corners(turned);
+            rows = corners;
+            understood.notes.extend(note);
+        }
+        Orientations::Unused(columns) => understood.notes.push(unused(columns)),
+        Orientations::None => {}
     }
     if layout == Layout::RoboDk {
         imported::name_targets(&mut rows);
@@ -251,6 +273,7 @@ struct Places {
     point: Vec<NumberColumn>,
     sigma: Option<NumberColumn>,
     temperature: Option<NumberColumn>,
+    orientations: Orientations,
 }
 
 /// A table before its cells are read: names, places and rows of text.
@@ -265,19 +288,25 @@ struct Split {
 }
 
 /// Finds the columns of the table's own layout.
-fn split_named(foreign: Foreign, joints: &[JointType], problems: &mut Vec<TableProblem>) -> Split {
+fn split_named(
+    foreign: Foreign,
+    reading: &Reading,
+    expected: &Expected<'_>,
+    problems: &mut Vec<TableProblem>,
+) -> Split {
     let Foreign { line, shown, canonical, records, decimal_comma, understood: _ } = foreign;
     let mut header = Header::renamed(line, shown, &canonical, problems);
     let places = Places {
         pose: header.text("pose"),
         target: header.text("target"),
-        joints: header.joints("", joints, problems),
+        joints: header.joints("", expected.joints, problems),
         point: ["x", "y", "z"]
             .into_iter()
             .filter_map(|name| header.required(name, Measure::Length, problems))
             .collect(),
         sigma: header.number("sigma", Measure::Length, problems),
         temperature: header.number("temperature", Measure::Temperature, problems),
+        orientations: Orientations::find(&mut header, reading, expected.targets.first(), problems),
     };
     let shown = header.finish(problems);
     Split { columns: canonical, shown, places, records, decimal_comma }

@@ -289,7 +289,13 @@ pub struct ModelSummary {
     /// Distance of the target from the mean of its shared point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seat_mm: Option<StatisticsSummary>,
+    /// Orientation error of the flange (mrad), from at least three points in one pose.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation_mrad: Option<StatisticsSummary>,
 }
+
+/// Why points can have an orientation error.
+pub const ORIENTATION_SENTENCE: &str = "The orientation error is that of the flange, from all points measured in one pose: the distances between points of a rigid body carry its orientation";
 
 impl ModelSummary {
     /// The kinds of error, each with its name.

@@ -6,15 +6,12 @@
 //! ```
 //!
 //! Roll, pitch and yaw turn about the fixed axes x, y and z, as in URDF; other forms of orientation are recognised by their names
-//! (see `orientation`), and without any the orientation is free. Joint values beside a Cartesian target say which branch (elbow, wrist)
+//! (see [`super::orientation`]), and without any the orientation is free. Joint values beside a Cartesian target say which branch (elbow, wrist)
 //! is meant. Other columns are kept. Units as in all tables: `mm`, `m`, `um`, `in`, `deg`, `rad`.
-
-mod orientation;
 
 use nalgebra::UnitQuaternion;
 
-use orientation::Orientation;
-
+use super::orientation::Orientation;
 use super::table::{self, Defect, Header, Measure, NumberColumn, Numbers, Shape, TableErrors, TableProblem, decode};
 use crate::kinematics::JointType;
 
@@ -86,7 +83,7 @@ fn rows(text: &str, joints: &[JointType], problems: &mut Vec<TableProblem>) -> O
     let mut header = Header::new(names, problems)?;
     let pose = header.text("pose");
     let axes = ["x", "y", "z"];
-    let orientation = Orientation::find(&mut header, problems);
+    let orientation = Orientation::find(&mut header, &[], problems);
     let is_cartesian = axes.iter().any(|name| header.has_quantity(name)) || orientation.is_some();
     let has_joints = !is_cartesian || header.has_quantity("q1");
     let point: Vec<NumberColumn> = axes

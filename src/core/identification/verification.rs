@@ -3,19 +3,25 @@
 //! Errors are measured − predicted. Position errors need the registration of the instrument, which comes from the identification
 //! set (or, for another set-up, is fitted again, which the result says); distance errors need none.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 
 use super::feature::Feature;
 use super::linearise::{PointResiduals, Weights, point_residuals};
 use super::problem::{LengthEnd, Observations, PointSample, Problem};
 use super::{Estimator, Identification, IdentificationError, Length, Places, Prior, Settings, Weighting, identify};
-use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, Joint, JointType};
+use crate::geometry::{principal_spread, register};
+use crate::kinematics::{Arm, ForwardKinematics, FreeParameter, Joint, JointType, Place};
 use crate::units::MILLIMETRE;
 
 /// Above this many points the distances are taken between evenly picked ones: 2000 points have two million pairs.
 const PAIRED_POINTS: usize = 2000;
 
-/// Statistics of a non-negative error (m).
+/// Points narrower than this part of their length are on a line, about which they do not show a rotation.
+const ON_A_LINE: f64 = 0.05;
+
+/// Statistics of a non-negative error ((m) or (rad)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorStatistics {
     /// How many values.
@@ -66,6 +72,20 @@ pub struct ModelErrors {
     pub distance: Option<ErrorStatistics>,
     /// The distance errors behind it.
     pub distances: Vec<DistanceError>,
+    /// Orientation errors (rad) of poses at which at least three points of the flange were measured that are on no line; `None`
+    /// without such a pose. Distances between points of a rigid body carry its orientation.
+    pub orientation: Option<ErrorStatistics>,
+    /// The orientation errors behind it.
+    pub orientations: Vec<OrientationError>,
+}
+
+/// Error of the orientation of the flange in one pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OrientationError {
+    /// Index of the first sample of the pose.
+    pub sample: usize,
+    /// Rotation from the predicted to the measured points, in the base (rad).
+    pub vector: Vector3<f64>,
 }
 
 /// Error of the distance between two samples.
@@ -94,8 +114,41 @@ impl ModelErrors {
         let axis_max = over_axes(&f64::max);
         let distances = distance_errors(arm.chain.joints(), samples, &predicted);
         let distance = ErrorStatistics::new(distances.iter().map(|distance| distance.error).collect());
-        Some(Self { vectors, position, axis_mean, axis_max, distance, distances })
+        let measured: Vec<Point3<f64>> =
+            predicted.iter().zip(&vectors).map(|(predicted, error)| predicted + error).collect();
+        let orientations = orientation_errors(arm.chain.joints(), samples, &predicted, &measured);
+        let orientation = ErrorStatistics::new(orientations.iter().map(|error| error.vector.norm()).collect());
+        Some(Self { vectors, position, axis_mean, axis_max, distance, distances, orientation, orientations })
     }
+}
+
+/// Rotations from the predicted to the measured points of each pose that shows its orientation.
+fn orientation_errors(
+    joints: &[Joint],
+    samples: &[PointSample],
+    predicted: &[Point3<f64>],
+    measured: &[Point3<f64>],
+) -> Vec<OrientationError> {
+    if predicted.len() != samples.len() || measured.len() != samples.len() {
+        return Vec::new();
+    }
+    let any_target: Vec<Place> = samples.iter().map(|sample| Place { target: 0, ..sample.at.clone() }).collect();
+    let first = Places::new(joints, &any_target).first_of_each();
+    let mut poses: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    for (index, (first, sample)) in first.into_iter().zip(samples).enumerate() {
+        poses.entry((first, sample.station)).or_default().push(index);
+    }
+    let turned = |members: Vec<usize>| {
+        let targets: BTreeSet<usize> = members.iter().map(|&index| samples[index].at.target).collect();
+        let [long, wide, _] = principal_spread(members.iter().map(|&index| &predicted[index]));
+        if targets.len() < 3 || wide <= ON_A_LINE * long {
+            return None;
+        }
+        let pairs = members.iter().map(|&index| (1.0, predicted[index], measured[index]));
+        let vector = register(pairs)?.to_from_from.rotation.scaled_axis();
+        Some(OrientationError { sample: *members.first()?, vector })
+    };
+    poses.into_values().filter_map(turned).collect()
 }
 
 /// Distance errors over all pairs of one station that are no repetitions; evenly picked samples where there are more than 2000.

@@ -9,8 +9,8 @@ use crate::report::document::{
 };
 use crate::session::joint_errors::workspace_sentence;
 use crate::session::summary::{
-    Figure, IdentificationSummary, LimitedQuantity, ModelSummary, StatisticsSummary, VerificationMode,
-    VerificationSummary, Warning, WorkspaceSummary,
+    Figure, IdentificationSummary, LimitedQuantity, ModelSummary, ORIENTATION_SENTENCE, StatisticsSummary,
+    VerificationMode, VerificationSummary, Warning, WorkspaceSummary,
 };
 use crate::text::{counted, counted_as, decimals_for};
 
@@ -366,6 +366,13 @@ fn positions(before: &ModelSummary, after: &ModelSummary) -> String {
     if let (Some(before), Some(after)) = (&before.position_mm, &after.position_mm) {
         let caption = format!("Position error (length of the vector), {}", counted(after.count, "pose"));
         html.push_str(&table(&caption, &COLUMNS, &statistics(before, after), true));
+    }
+    if let (Some(before), Some(after)) = (&before.orientation_mrad, &after.orientation_mrad) {
+        let caption = format!("Orientation error of the flange, {}", counted(after.count, "pose"));
+        let mut columns = COLUMNS;
+        columns[0].0 = "mrad";
+        html.push_str(&table(&caption, &columns, &statistics(before, after), true));
+        html.extend([format!("<p>{ORIENTATION_SENTENCE}.</p>\n")]);
     }
     html
 }

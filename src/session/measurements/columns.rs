@@ -6,6 +6,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::names::{self, Name};
+use crate::session::orientation;
 use crate::text::{printable, written_as_text};
 
 /// A column of a file: its name, or its place counted from 1.
@@ -126,7 +127,8 @@ fn source_of(text: &str) -> Source {
 /// The name of a column of a table as the table writes it, if it is one.
 fn canonical(name: &str) -> Option<String> {
     let lower = name.to_lowercase();
-    if matches!(lower.as_str(), "pose" | "target" | "time") {
+    let is_text = matches!(lower.as_str(), "pose" | "target" | "time");
+    if is_text || orientation::is_column(&lower) || matches!(lower.as_str(), "sigma_rot_deg" | "sigma_rot_rad") {
         return Some(lower);
     }
     let (base, unit) = lower.split_once('_')?;

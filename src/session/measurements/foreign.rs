@@ -11,6 +11,7 @@ use super::columns::{Columns, Source, Units, other_unit};
 use super::names::{self, Name, Place};
 use crate::kinematics::JointType;
 use crate::profile::Profile;
+use crate::session::orientation;
 use crate::session::table::{Defect, Measure, Record, Table, TableProblem, is_number};
 use crate::text::{counted, listed};
 
@@ -51,6 +52,10 @@ pub struct Reading {
     pub units: Units,
     /// Leave out readings without a point instead of refusing the table.
     pub skip_missing: bool,
+    /// Standard deviation of each coordinate (m) where a row with an orientation states none.
+    pub sigma: Option<f64>,
+    /// Standard deviation of the orientation about each axis (rad) where the row states none.
+    pub sigma_rotation: Option<f64>,
 }
 
 /// What was understood of a table.
@@ -570,6 +575,8 @@ impl Study<'_> {
     /// The final name of every column: that of others as in the file, unless it would be taken for one of ours.
     fn final_names(&self) -> Vec<String> {
         let takes_q = self.canonical.iter().flatten().any(|name| is_numbered_q(name));
+        let takes_orientation = self.reading.sigma_rotation.is_some()
+            || self.shown.iter().any(|name| name.to_lowercase().starts_with("sigma_rot"));
         let is_taken = |lower: &String| self.canonical.iter().flatten().any(|name| name == lower);
         let name = |(index, (canonical, shown)): (usize, (&Option<String>, &String))| {
             let lower = shown.to_lowercase();
@@ -581,6 +588,7 @@ impl Study<'_> {
                 {
                     format!("column {}", index + 1)
                 }
+                None if takes_orientation => as_orientation(&lower).unwrap_or_else(|| shown.clone()),
                 None => shown.clone(),
             }
         };
@@ -625,6 +633,13 @@ fn is_ours(lower: &str) -> bool {
         || ["x", "y", "z", "sigma", "temperature"].contains(&base)
         || lower == "target"
         || lower == "pose"
+}
+
+/// The name of a column of an orientation with its unit in brackets, as `A [deg]`, in the way of trupose.
+fn as_orientation(lower: &str) -> Option<String> {
+    let parts = lower.split(|c: char| c.is_whitespace() || "[]()_".contains(c)).filter(|part| !part.is_empty());
+    let name = parts.map(|part| if part == "°" { "deg" } else { part }).collect::<Vec<_>>().join("_");
+    orientation::is_column(&name).then_some(name)
 }
 
 fn counted_as_repeats(count: usize) -> String {

@@ -89,7 +89,7 @@ pub fn joined(
         return Err(of_joints.refused(Defect::Lacking("no file with points is given".to_owned())));
     };
     let names: Vec<&str> = std::iter::once(joints.0).chain(points.iter().map(|file| file.name.as_str())).collect();
-    read_understood(Ok(whole), &names.join("' and '"), expected.joints, Vec::new(), Vec::new())
+    read_understood(Ok(whole), reading.1, expected, &names.join("' and '"), Vec::new(), Vec::new())
 }
 
 /// Reads a file with points alone, each with its name if the file has names. Coordinates whose columns state no unit are in `unit`.

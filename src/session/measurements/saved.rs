@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::columns::{Columns, Units};
 use super::foreign::Reading;
+use crate::units::{from_deg, from_mm, to_deg, to_mm};
 
 /// End of the names of layout files.
 const ENDING: &str = ".layout.ron";
@@ -23,6 +24,12 @@ pub struct SavedLayout {
     /// Whether readings without a point are left out.
     #[serde(default)]
     skip_missing: bool,
+    /// Standard deviation of each coordinate where a pose states none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sigma_mm: Option<f64>,
+    /// Standard deviation of the orientation about each axis where a pose states none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sigma_rot_deg: Option<f64>,
 }
 
 impl SavedLayout {
@@ -31,9 +38,15 @@ impl SavedLayout {
 
     /// What a person said about a table.
     pub fn new(reading: &Reading) -> Self {
-        let Reading { columns, units, skip_missing } = reading.clone();
-        let units = Some(units).filter(|units| *units != Units::default());
-        Self { schema: Self::SCHEMA, columns, units, skip_missing }
+        let Reading { columns, units, skip_missing, sigma, sigma_rotation } = reading.clone();
+        Self {
+            schema: Self::SCHEMA,
+            columns,
+            units: Some(units).filter(|units| *units != Units::default()),
+            skip_missing,
+            sigma_mm: sigma.map(to_mm),
+            sigma_rot_deg: sigma_rotation.map(to_deg),
+        }
     }
 
     /// The name of the file of a layout.
@@ -59,7 +72,17 @@ impl SavedLayout {
         if saved.schema != Self::SCHEMA {
             return Err(format!("it is of version {}, and this program reads version {}", saved.schema, Self::SCHEMA));
         }
-        Ok(Reading { columns: saved.columns, units: saved.units.unwrap_or_default(), skip_missing: saved.skip_missing })
+        let positive = |value: Option<f64>| value.is_none_or(|value| value.is_finite() && value > 0.0);
+        if !positive(saved.sigma_mm) || !positive(saved.sigma_rot_deg) {
+            return Err("a standard deviation must be positive".to_owned());
+        }
+        Ok(Reading {
+            columns: saved.columns,
+            units: saved.units.unwrap_or_default(),
+            skip_missing: saved.skip_missing,
+            sigma: saved.sigma_mm.map(from_mm),
+            sigma_rotation: saved.sigma_rot_deg.map(from_deg),
+        })
     }
 }
 
@@ -73,6 +96,8 @@ mod tests {
             columns: Some("q1_deg=A1, x_mm=\"X, mm\"".parse().unwrap()),
             units: "deg,mm".parse().unwrap(),
             skip_missing: true,
+            sigma: Some(25e-6),
+            sigma_rotation: Some(0.5),
         };
         for reading in [reading, Reading::default()] {
             let text = SavedLayout::new(&reading).to_text().unwrap();

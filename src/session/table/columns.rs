@@ -61,7 +61,7 @@ impl NumberColumn {
 }
 
 /// The line of column names while a reader takes what it knows from it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(in crate::session) struct Header {
     /// 1-based line in the file.
     pub(in crate::session) line: usize,
@@ -105,6 +105,11 @@ impl Header {
             }
         }
         Self { line, names, lower, without_unit: Vec::new(), unit_example: None, missing: Vec::new() }
+    }
+
+    /// The names of all columns in lower case, as this program calls them.
+    pub(in crate::session) fn known(&self) -> &[String] {
+        &self.lower
     }
 
     /// Place of the text column `name`.

@@ -199,6 +199,18 @@ pub enum Defect {
         /// The forms that were found.
         forms: Vec<&'static str>,
     },
+    /// The error of an orientation without the orientation.
+    #[error("the error of an orientation is stated, but no orientation is found. Orientations are {}", read.join("; "))]
+    NoOrientation {
+        /// The forms that are read.
+        read: Vec<&'static str>,
+    },
+    /// A pose of which one of the two errors is not stated.
+    #[error("a pose needs the errors of its position and of its orientation; this row lacks '{lacking}'")]
+    NoSigma {
+        /// The column that is missing or empty.
+        lacking: &'static str,
+    },
     /// Numbers that are no rotation.
     #[error("{name} is no rotation: {reason}")]
     NoRotation {

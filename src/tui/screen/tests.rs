@@ -206,6 +206,7 @@ fn model(factor: f64) -> ModelSummary {
         axis_mm: Some(AxisSummary { mean: [0.003 * factor; 3], max: [0.01 * factor; 3] }),
         distance_mm: Some(statistics(190, 0.0072)),
         seat_mm: None,
+        orientation_mrad: None,
     }
 }
 

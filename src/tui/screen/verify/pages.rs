@@ -1,7 +1,7 @@
 //! Verdict and tables of the verification.
 
 use crate::session::joint_errors::workspace_sentence;
-use crate::session::summary::{Figure, Verdict, VerdictStatus, VerificationSummary};
+use crate::session::summary::{Figure, ORIENTATION_SENTENCE, Verdict, VerdictStatus, VerificationSummary};
 use crate::text::{self, counted, fixed};
 use crate::tui::screen::page::Page;
 use crate::tui::theme::Role;
@@ -121,6 +121,14 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
             row(page, name, before, after);
         }
     }
+    let orientations = nominal.orientation_mrad.zip(identified.orientation_mrad);
+    if let Some((before, after)) = orientations {
+        let name = format!("orientation (mrad), mean of {}", after.count);
+        let names = [name.as_str(), "  rms", "  95 %", "  max"].into_iter();
+        for ((name, before), after) in names.zip(before.figures()).zip(after.figures()) {
+            row(page, name, before, after);
+        }
+    }
     if let (Some(before), Some(after)) = (&nominal.axis_mm, &identified.axis_mm) {
         for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
             let [from, to] = [before, after].map(|model| (model.mean.get(axis), model.max.get(axis)));
@@ -139,6 +147,9 @@ fn tables(verification: &VerificationSummary, page: &mut Page) {
         if !intervals.is_empty() {
             page.paragraph(&format!("{name} after, 95 % intervals: {}.", text::listed(&intervals)), Role::Plain);
         }
+    }
+    if orientations.is_some() {
+        page.paragraph(&format!("{ORIENTATION_SENTENCE}."), Role::Dim);
     }
     if let Some(sentence) = verification.sample_sentence() {
         page.paragraph(&format!("{sentence}."), Role::Dim);

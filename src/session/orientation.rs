@@ -62,8 +62,10 @@ fn has_angles(lower: &[String], names: &[&str; 3]) -> bool {
 impl Orientation {
     /// Finds the orientation among the columns; `None` if there is none. What looks like one and is not read, or is given twice, is a
     /// problem: a tool must never turn freely by mistake.
-    pub(super) fn find(header: &mut Header, problems: &mut Vec<TableProblem>) -> Option<Self> {
-        let lower: Vec<String> = header.names.iter().map(|name| name.to_lowercase()).collect();
+    ///
+    /// `others` are columns with another meaning, which may look like one.
+    pub(super) fn find(header: &mut Header, others: &[&str], problems: &mut Vec<TableProblem>) -> Option<Self> {
+        let lower = header.known().to_vec();
         let mut found: Vec<(usize, Self)> = Vec::new();
         let angles = [
             (["roll", "pitch", "yaw"], Form::FixedXyz),
@@ -111,7 +113,9 @@ impl Orientation {
             .iter()
             .zip(&lower)
             .enumerate()
-            .filter(|(index, (_, lower))| !used(*index) && is_like_an_orientation(lower))
+            .filter(|(index, (_, lower))| {
+                !used(*index) && !others.contains(&lower.as_str()) && is_like_an_orientation(lower)
+            })
             .map(|(_, (name, _))| name.clone())
             .collect();
         // Beside joint values such a column is the user's own business.
@@ -141,6 +145,19 @@ impl Orientation {
         let form = if prefix == "fixed_" { Form::Fixed(axes) } else { Form::Moving(axes) };
         let columns = named.iter().filter_map(|(name, _)| header.required(name, Measure::Angle, problems));
         Some(Self { form, columns: columns.collect() })
+    }
+
+    /// The form in words, as messages name it.
+    pub(super) const fn form_read(&self) -> &'static str {
+        match self.form {
+            Form::FixedXyz => "angles about the fixed x, y and z",
+            Form::MovingZyx => "angles about z, the new y and the new x",
+            Form::RotationVector => "a rotation vector",
+            Form::Fixed(_) => "angles about fixed axes, in the order of the columns",
+            Form::Moving(_) => "angles about moving axes, in the order of the columns",
+            Form::Quaternion => "a quaternion",
+            Form::Matrix => "a matrix, row by row",
+        }
     }
 
     /// The rotation that the numbers of a row describe.
@@ -181,6 +198,23 @@ impl Orientation {
             _ => Ok(UnitQuaternion::identity()),
         }
     }
+}
+
+/// Whether an orientation can have a column of this name (in lower case).
+pub(super) fn is_column(lower: &str) -> bool {
+    let base = lower.strip_suffix("_deg").or_else(|| lower.strip_suffix("_rad"));
+    let angles = ["roll", "pitch", "yaw", "a", "b", "c", "w", "p", "r"];
+    let is_turn = |base: &str| {
+        let axis = base.strip_prefix("fixed_").or_else(|| base.strip_prefix("moving_"));
+        axis.is_some_and(|axis| ["x", "y", "z"].contains(&axis.trim_end_matches(|digit: char| digit.is_ascii_digit())))
+    };
+    let is_entry = |name: &str| {
+        let entry = name.strip_prefix('r').and_then(|digits| digits.parse::<u8>().ok());
+        entry.is_some_and(|entry| (1..=3).contains(&(entry / 10)) && (1..=3).contains(&(entry % 10)))
+    };
+    base.is_some_and(|base| angles.contains(&base) || is_turn(base))
+        || ["rx_rad", "ry_rad", "rz_rad", "qx", "qy", "qz", "qw"].contains(&lower)
+        || is_entry(lower)
 }
 
 /// Whether the name of a column that is not read looks like an orientation: an angle that is no joint value, or a known beginning.
