@@ -75,7 +75,7 @@ impl Cell {
     }
 
     fn configurations(&self, count: usize, seed: u64) -> Vec<Vec<f64>> {
-        let limits = self.nominal().joints().iter().map(|joint| joint.planning_limits).collect();
+        let limits = self.nominal().joints().iter().map(|joint| joint.planning_limits.unwrap()).collect();
         random(&JointBox::new(limits).unwrap(), seed).take(count).collect()
     }
 
@@ -230,6 +230,14 @@ fn poses_with_orientation_make_points_far_from_the_flange_accurate() {
 
     let calibration = "out-poses/calibration.ron";
     let verify = ["verify", "--calibration", calibration, "--measurements", "poses-verify.csv", "--json"];
+    let output = trupose_in(folder.path(), &verify);
+    let report: Value = serde_json::from_str(&text(&output.stdout)).unwrap();
+    let same = report["verification"]["identified"]["orientation_mrad"]["rms"].as_f64().unwrap();
+    assert!((same - rms).abs() < 1e-6, "{same} {rms}");
+    // Other errors make no other body: the corners are those of the calibration.
+    let table = fs::read_to_string(folder.path().join("poses-verify.csv")).unwrap();
+    let (ours, other) = (format!(",{}\n", SIGMA_ROTATION.to_degrees()), ",0.02\n");
+    fs::write(folder.path().join("poses-verify.csv"), table.replace(&ours, other)).unwrap();
     let output = trupose_in(folder.path(), &verify);
     let report: Value = serde_json::from_str(&text(&output.stdout)).unwrap();
     let same = report["verification"]["identified"]["orientation_mrad"]["rms"].as_f64().unwrap();

@@ -25,6 +25,7 @@ fn robot(targets: &[&str]) -> Expected<'static> {
         joints: &JOINTS,
         names: ["shoulder", "elbow", "wrist"].map(|name| vec![name.to_owned(), format!("{name}_joint")]).to_vec(),
         targets: targets.iter().map(|name| (*name).to_owned()).collect(),
+        ..Expected::joints(&JOINTS)
     }
 }
 

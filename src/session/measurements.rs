@@ -306,7 +306,7 @@ fn split_named(
             .collect(),
         sigma: header.number("sigma", Measure::Length, problems),
         temperature: header.number("temperature", Measure::Temperature, problems),
-        orientations: Orientations::find(&mut header, reading, expected.targets.first(), problems),
+        orientations: Orientations::find(&mut header, reading, expected, problems),
     };
     let shown = header.finish(problems);
     Split { columns: canonical, shown, places, records, decimal_comma }

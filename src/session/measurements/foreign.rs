@@ -9,8 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::columns::{Columns, Source, Units, other_unit};
 use super::names::{self, Name, Place};
+use crate::identification::rigid::{CORNERS, Tetrahedron};
 use crate::kinematics::JointType;
-use crate::profile::Profile;
+use crate::profile::{Profile, Target};
 use crate::session::orientation;
 use crate::session::table::{Defect, Measure, Record, Table, TableProblem, is_number};
 use crate::text::{counted, listed};
@@ -24,12 +25,14 @@ pub struct Expected<'a> {
     pub names: Vec<Vec<String>>,
     /// Names of the targets; none if they are not known.
     pub targets: Vec<String>,
+    /// Bodies whose corners are targets, by their names.
+    pub bodies: BTreeMap<String, Tetrahedron>,
 }
 
 impl<'a> Expected<'a> {
     /// Joints of which nothing but the type is known.
     pub fn joints(joints: &'a [JointType]) -> Self {
-        Self { joints, names: Vec::new(), targets: Vec::new() }
+        Self { joints, names: Vec::new(), targets: Vec::new(), bodies: BTreeMap::new() }
     }
 
     /// The robot of a profile, whose joint types are `joints`.
@@ -39,7 +42,24 @@ impl<'a> Expected<'a> {
             std::iter::once(&joint.name).chain(aliases).cloned().collect()
         });
         let targets = profile.targets().iter().map(|target| target.name.clone()).collect();
-        Self { joints, names: names.collect(), targets }
+        let place = |name: &str| {
+            let target = profile.targets().iter().find(|target| target.name == name)?;
+            Some(target.position_in_flange)
+        };
+        let body = |target: &Target| {
+            let name = target.name.strip_suffix(".a")?;
+            let [a, b, c, d] = CORNERS.map(|(letter, _)| place(&format!("{name}.{letter}")));
+            Some((name.to_owned(), Tetrahedron::of_points(&[a?, b?, c?, d?])?))
+        };
+        let bodies = profile.targets().iter().filter_map(body).collect();
+        Self { joints, names: names.collect(), targets, bodies }
+    }
+
+    /// The target of rows that name none.
+    pub(super) fn usual_target(&self) -> Option<&str> {
+        let first = self.targets.first()?;
+        let body = first.strip_suffix(".a").filter(|name| self.bodies.contains_key(*name));
+        Some(body.unwrap_or(first))
     }
 }
 

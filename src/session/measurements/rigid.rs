@@ -1,9 +1,11 @@
 //! Rows measured with their orientation: each becomes the four corners of a rigid body (see [`crate::identification::rigid`]).
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Translation3};
 
 use super::Row;
-use super::foreign::Reading;
+use super::foreign::{Expected, Reading};
 use crate::identification::rigid::{CORNERS, Tetrahedron};
 use crate::session::orientation::Orientation;
 use crate::session::table::{Defect, Header, Measure, NumberColumn, Numbers, Record, TableProblem};
@@ -25,6 +27,8 @@ pub(super) struct Turned {
     reading: Reading,
     /// The target of rows that name none.
     target: String,
+    /// Bodies of the robot: other readings of them must be put as points of the same size.
+    known: BTreeMap<String, Tetrahedron>,
 }
 
 /// A rotation that was read, with the row that it belongs to.
@@ -53,7 +57,7 @@ impl Orientations {
     pub(super) fn find(
         header: &mut Header,
         reading: &Reading,
-        target: Option<&String>,
+        expected: &Expected<'_>,
         problems: &mut Vec<TableProblem>,
     ) -> Self {
         let is_stated = header.has_quantity(SIGMA) || reading.sigma_rotation.is_some();
@@ -74,7 +78,8 @@ impl Orientations {
                 orientation,
                 sigma,
                 reading: reading.clone(),
-                target: target.map_or_else(|| NAMELESS.to_owned(), Clone::clone),
+                target: expected.usual_target().unwrap_or(NAMELESS).to_owned(),
+                known: expected.bodies.clone(),
             })),
             None if problems.len() > before => Self::None,
             None => {
@@ -124,13 +129,15 @@ impl Turned {
         let mut ratios: Vec<f64> = turned.iter().map(|row| row.sigmas.0 / row.sigmas.1).collect();
         ratios.sort_by(f64::total_cmp);
         let body = ratios.get(ratios.len() / 2).and_then(|ratio| Tetrahedron::of_sigmas(*ratio, 1.0));
-        let Some(body) = body else { return (Vec::new(), None) };
-        let mut largest: (f64, f64) = (0.0, 0.0);
+        let Some(of_errors) = body else { return (Vec::new(), None) };
+        let (mut largest, mut radius): ((f64, f64), f64) = ((0.0, 0.0), of_errors.radius);
         let mut rows = Vec::with_capacity(4 * turned.len());
         for TurnedRow { row, pose, sigmas } in turned {
             largest = (largest.0.max(sigmas.0), largest.1.max(sigmas.1));
-            let sigma = Some(body.corner_sigma(sigmas.0, sigmas.1));
             let name = row.target.as_deref().unwrap_or(&self.target).to_owned();
+            let body = self.known.get(&name).copied().unwrap_or(of_errors);
+            radius = body.radius;
+            let sigma = Some(body.corner_sigma(sigmas.0, sigmas.1));
             for ((letter, _), point) in CORNERS.into_iter().zip(body.points(&pose)) {
                 rows.push(Row { target: Some(format!("{name}.{letter}")), point, sigma, ..row.clone() });
             }
@@ -139,7 +146,7 @@ impl Turned {
         let note = format!(
             "orientations are read as {}: each pose becomes four points of a rigid body, {:.1} mm from the measured one, whose distances carry the orientation (sigma up to {} mm and {} deg)",
             self.orientation.form_read(),
-            to_mm(body.radius),
+            to_mm(radius),
             two_digits(to_mm(largest.0)),
             two_digits(to_deg(largest.1))
         );
@@ -162,7 +169,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::JointType;
-    use crate::session::measurements::{Expected, Layout, Measurements, read, read_for, write};
+    use crate::session::measurements::{Layout, Measurements, read, read_for, write};
     use crate::session::table::TableErrors;
 
     const JOINTS: [JointType; 1] = [JointType::Revolute];
