@@ -173,21 +173,26 @@ fn in_sigmas(cell: &Cell, report: &Value) -> Vec<f64> {
         .collect()
 }
 
+/// Writes the tables and profiles of a cell.
+fn written(cell: &mut Cell, folder: &Path) {
+    fs::write(folder.join("probe.ron"), &cell.profile).unwrap();
+    let smr = |name: &str| Target::beside_the_flange(name);
+    let body = with_targets(&cell.profile, &["s0", "s1", "s2"].map(smr)).unwrap();
+    let body = body.replace("uncertainty_mm: 50.0", "uncertainty_mm: 200.0");
+    fs::write(folder.join("body.ron"), body).unwrap();
+    for (suffix, count, seed) in [("", POSES, 1), ("-verify", 20, 2)] {
+        let tables = cell.tables(count, seed);
+        for (name, table) in ["poses", "points", "smrs"].iter().zip(tables) {
+            fs::write(folder.join(format!("{name}{suffix}.csv")), table).unwrap();
+        }
+    }
+}
+
 #[test]
 fn poses_with_orientation_make_points_far_from_the_flange_accurate() {
     let mut cell = Cell::new(11);
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("probe.ron"), &cell.profile).unwrap();
-    let smr = |name: &str| Target::beside_the_flange(name);
-    let body = with_targets(&cell.profile, &["s0", "s1", "s2"].map(smr)).unwrap();
-    let body = body.replace("uncertainty_mm: 50.0", "uncertainty_mm: 200.0");
-    fs::write(folder.path().join("body.ron"), body).unwrap();
-    for (suffix, count, seed) in [("", POSES, 1), ("-verify", 20, 2)] {
-        let tables = cell.tables(count, seed);
-        for (name, table) in ["poses", "points", "smrs"].iter().zip(tables) {
-            fs::write(folder.path().join(format!("{name}{suffix}.csv")), table).unwrap();
-        }
-    }
+    written(&mut cell, folder.path());
     let (of_poses, report) = identified(folder.path(), "probe.ron", "poses");
     let (of_points, alone) = identified(folder.path(), "probe.ron", "points");
     let (of_smrs, three) = identified(folder.path(), "body.ron", "smrs");
@@ -242,5 +247,51 @@ fn poses_with_orientation_make_points_far_from_the_flange_accurate() {
     let report: Value = serde_json::from_str(&text(&output.stdout)).unwrap();
     let same = report["verification"]["identified"]["orientation_mrad"]["rms"].as_f64().unwrap();
     assert!((same - rms).abs() < 1e-6, "{same} {rms}");
-    eprintln!("tool 300 mm away (rms, mm): poses {with:.4}, one SMR {without:.4}, three SMRs {smrs:.4}");
+}
+
+/// Measures what section 4 of `docs/engineer.md` says about orientations.
+#[test]
+fn figures_of_poses_with_orientation_are_those_of_the_document() {
+    let arms = 8;
+    let mut squares = [0.0; 3];
+    let mut parameters: Vec<(String, [f64; 2])> = Vec::new();
+    for seed in 0..arms {
+        let mut cell = Cell::new(100 + seed);
+        let folder = tempfile::tempdir().unwrap();
+        written(&mut cell, folder.path());
+        let (of_poses, report) = identified(folder.path(), "probe.ron", "poses");
+        let (of_points, alone) = identified(folder.path(), "probe.ron", "points");
+        let (of_smrs, _) = identified(folder.path(), "body.ron", "smrs");
+        for (sum, arm) in squares.iter_mut().zip([of_poses, of_points, of_smrs]) {
+            *sum += cell.tool_error(&arm).rms.powi(2) / arms as f64;
+        }
+        if seed == 0 {
+            for name in ["theta4", "theta5", "alpha4", "alpha5", "theta6"] {
+                let of = |report: &Value| sigma(report, name);
+                parameters.push((name.to_owned(), [of(&report), of(&alone)]));
+            }
+        }
+    }
+    let [with, without, smrs] = squares.map(|square| 1e3 * square.sqrt());
+    for (found, said) in [(with, 0.017), (without, 0.051), (smrs, 0.016)] {
+        assert!((found - said).abs() < 0.0011, "tool 300 mm away, mm: {with}, {without}, {smrs}");
+    }
+    for (name, [with, without]) in parameters {
+        let (with, without) = (1e3 * with, 1e3 * without);
+        let (said, alone) = match name.as_str() {
+            "theta4" => (0.66, 1.4),
+            "theta5" => (0.58, 5.3),
+            "alpha4" => (0.62, 2.4),
+            "alpha5" => (0.66, 6.0),
+            _ => (570.0, 573.0),
+        };
+        let is_said = (with - said).abs() < 0.05 * said && (without - alone).abs() < 0.05 * alone;
+        assert!(is_said, "{name}: {with} and {without} thousandths of a degree");
+    }
+}
+
+fn sigma(report: &Value, name: &str) -> f64 {
+    let parameters = report["parameters"].as_array().or_else(|| report["result"]["parameters"].as_array()).unwrap();
+    let found = parameters.iter().find(|parameter| parameter["name"] == name);
+    found.and_then(|found| found["sigma"].as_f64()).unwrap_or(f64::NAN)
 }

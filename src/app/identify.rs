@@ -35,6 +35,9 @@ pub(super) fn run<O: Write, E: Write>(args: &IdentifyArgs, console: &mut Console
     args.record.record.as_deref().map_or(Ok(()), record::check_target)?;
     let named = (&loaded.profile, estimation.profile.as_str());
     let identification = load::measurements(&args.measurements, &args.layout, named, InputRole::Identification)?;
+    if let Some(note) = &identification.table.understood.orientation {
+        console.remark(&format!("note: {note}"));
+    }
     load::take_bodies(&mut loaded, &identification.table, console)?;
     let profile = &loaded.profile;
     let named = (profile, estimation.profile.as_str());

@@ -70,6 +70,9 @@ pub(super) fn run<O: Write, E: Write>(args: &ImportArgs, console: &mut Console<O
         console.remark(&format!("note: and {more} more like these"));
     }
     console.say(&summary(&table, profile))?;
+    if table.understood.lacks_orientation_error {
+        console.remark("note: '--sigma-rot-deg' states the error of all orientations");
+    }
     load::take_bodies(&mut loaded, &table, console)?;
     let profile = &loaded.profile;
     if args.rows {
@@ -263,12 +266,12 @@ fn listing(understood: &Understood) -> String {
 
 /// What was read, in words.
 fn summary(table: &Measurements, profile: &Profile) -> String {
-    let Understood { separator, notes, .. } = &table.understood;
+    let Understood { separator, notes, orientation, .. } = &table.understood;
     let mut text = if table.understood.columns.is_empty() { String::new() } else { listing(&table.understood) };
     if !separator.is_empty() {
         text.extend([format!("cells are separated by {separator}\n")]);
     }
-    text.extend(notes.iter().map(|note| format!("{note}\n")));
+    text.extend(notes.iter().chain(orientation).map(|note| format!("{note}\n")));
     let distinct: Vec<&Row> = table.distinct_rows().collect();
     let poses: BTreeSet<&str> = distinct.iter().map(|row| row.pose.as_str()).collect();
     let targets: BTreeSet<&str> = distinct.iter().filter_map(|row| row.target.as_deref()).collect();

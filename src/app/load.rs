@@ -180,9 +180,6 @@ pub(super) fn take_bodies<O: Write, E: Write>(
     table: &Measurements,
     console: &mut Console<O, E>,
 ) -> Result<(), Failure> {
-    for note in &table.understood.notes {
-        console.remark(&format!("note: {note}"));
-    }
     let rows: Vec<&Row> = table.distinct_rows().collect();
     let found = with_bodies(&loaded.profile, &loaded.text, &rows).map_err(|error| {
         let failure = Failure::from_error(ExitStatus::Usage, &error);

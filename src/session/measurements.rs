@@ -207,9 +207,12 @@ fn finished(
         Orientations::Used(used) => {
             let (corners, note) = used.corners(turned);
             rows = corners;
-            understood.notes.extend(note);
+            understood.orientation = note;
         }
-        Orientations::Unused(columns) => understood.notes.push(unused(columns)),
+        Orientations::Unused(columns) => {
+            understood.orientation = Some(unused(columns));
+            understood.lacks_orientation_error = true;
+        }
         Orientations::None => {}
     }
     if layout == Layout::RoboDk {

@@ -87,6 +87,10 @@ pub struct Understood {
     pub columns: Vec<ColumnRead>,
     /// What else was noticed, one sentence each.
     pub notes: Vec<String>,
+    /// How orientations beside the points are used, or why they are not.
+    pub orientation: Option<String>,
+    /// Whether there are orientations that cannot be used, because their error is not stated.
+    pub lacks_orientation_error: bool,
     /// A list of columns that may be what is meant, to be confirmed.
     pub proposal: Option<String>,
 }

@@ -157,7 +157,7 @@ impl Turned {
 /// The remark about orientations that cannot be used.
 pub(super) fn unused(columns: &[String]) -> String {
     format!(
-        "the orientation in {} is not used, because its error is not stated; '--sigma-rot-deg', or a column sigma_rot_deg, states it",
+        "the orientation in {} is not used, because its error is not stated; a column sigma_rot_deg would state it",
         listed(columns)
     )
 }
@@ -242,7 +242,10 @@ mod tests {
             assert!(found.rotation.angle_to(&expected) < 1e-9, "{header}");
             assert!((found.translation.vector - Vector3::new(1.0, 0.2, -0.3)).norm() < 1e-12, "{header}");
             assert!(table.rows.iter().all(|row| row.sigma.is_some_and(|sigma| (sigma - 4e-5).abs() < 1e-12)));
-            assert!(table.understood.notes.iter().any(|note| note.contains("four points of a rigid body")), "{header}");
+            assert!(
+                table.understood.orientation.iter().any(|note| note.contains("four points of a rigid body")),
+                "{header}"
+            );
             // What is written is read as the same points.
             let again = read(write(&table.rows, &JOINTS), "points.csv", &JOINTS).unwrap();
             assert!(pose(&again).rotation.angle_to(&expected) < 1e-7, "{header}");
@@ -273,13 +276,15 @@ mod tests {
         let text = "pose,q1_deg,x_mm,y_mm,z_mm,qx,qy,qz,qw\n1,10,1000,200,-300,0,0,0,1\n";
         let table = read(text, "6d.csv", &JOINTS).unwrap();
         assert_eq!(table.rows.len(), 1);
-        assert!(table.understood.notes.iter().any(|note| note.contains("'qx'") && note.contains("--sigma-rot-deg")));
+        assert!(
+            table.understood.orientation.iter().any(|note| note.contains("'qx'") && note.contains("sigma_rot_deg"))
+        );
         let reading = Reading { sigma: Some(2e-5), sigma_rotation: Some(1e-4), ..Reading::default() };
         let expected = Expected { targets: vec!["ball".to_owned()], ..Expected::joints(&JOINTS) };
         let table = read_for(&expected, Layout::Named, &reading, text, "6d.csv").unwrap();
         assert_eq!(table.rows[3].target.as_deref(), Some("ball.d"));
         let plain = "pose,q1_deg,x_mm,y_mm,z_mm\n1,10,1000,200,-300\n";
-        assert!(read(plain, "3d.csv", &JOINTS).unwrap().understood.notes.is_empty());
+        assert!(read(plain, "3d.csv", &JOINTS).unwrap().understood.orientation.is_none());
     }
 
     proptest! {
