@@ -214,6 +214,9 @@ fn refused(errors: &TableErrors, args: &ImportArgs) -> Failure {
     if missing && !args.skip_missing {
         failure = failure.hint("'--skip-missing' leaves out the readings without a point");
     }
+    if errors.problems.iter().any(|problem| problem.to_string().contains("lacks 'sigma_")) {
+        failure = failure.hint("'--sigma-mm' and '--sigma-rot-deg' state the errors of all rows");
+    }
     if errors.problems.iter().any(TableProblem::is_about_sheets) {
         failure = failure.hint("'--sheet NAME' chooses one");
     }

@@ -46,7 +46,7 @@ use super::table::{
     self, Defect, Header, Measure, NumberColumn, Numbers, Record, Shape, TableErrors, TableProblem, decode,
 };
 use crate::kinematics::JointType;
-use foreign::{Foreign, Wanted, understand};
+use foreign::{Foreign, Wanted, as_orientation, understand};
 use rigid::{Orientations, unused};
 
 /// The rows of a measurement table.
@@ -208,6 +208,9 @@ fn finished(
             let (corners, note) = used.corners(turned);
             rows = corners;
             understood.orientation = note;
+            for column in understood.columns.iter_mut().filter(|column| column.read_as.is_none()) {
+                column.read_as = as_orientation(&column.name.to_lowercase());
+            }
         }
         Orientations::Unused(columns) => {
             understood.orientation = Some(unused(columns));

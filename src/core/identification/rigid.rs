@@ -122,8 +122,8 @@ fn rotation_near(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
+    use rand::SeedableRng as _;
+    use rand_distr::{Distribution as _, StandardNormal};
 
     use super::*;
 

@@ -16,16 +16,13 @@ pub fn with_targets(text: &str, targets: &[Target]) -> Option<String> {
     let tree = syntax::parse(text, &mut findings)?;
     let Node::Struct(fields) = &tree.node else { return None };
     let list = listed(targets);
-    let changed = match fields.iter().find(|field| field.name == "targets") {
-        Some(field) => {
-            let (before, after) = (text.get(..field.value.span.start)?, text.get(field.value.span.end..)?);
-            [before, &list, after].concat()
-        }
-        None => {
-            let first = fields.first()?.name_span.start;
-            let (before, after) = (text.get(..first)?, text.get(first..)?);
-            [before, "targets: ", &list, ",\n    ", after].concat()
-        }
+    let changed = if let Some(field) = fields.iter().find(|field| field.name == "targets") {
+        let (before, after) = (text.get(..field.value.span.start)?, text.get(field.value.span.end..)?);
+        [before, &list, after].concat()
+    } else {
+        let first = fields.first()?.name_span.start;
+        let (before, after) = (text.get(..first)?, text.get(first..)?);
+        [before, "targets: ", &list, ",\n    ", after].concat()
     };
     // The sum was that of the text before the change, which is no change by accident.
     match (checksum::check(text), checksum::place(&changed)) {

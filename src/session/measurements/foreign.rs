@@ -660,7 +660,7 @@ fn is_ours(lower: &str) -> bool {
 }
 
 /// The name of a column of an orientation with its unit in brackets, as `A [deg]`, in the way of trupose.
-fn as_orientation(lower: &str) -> Option<String> {
+pub(super) fn as_orientation(lower: &str) -> Option<String> {
     let parts = lower.split(|c: char| c.is_whitespace() || "[]()_".contains(c)).filter(|part| !part.is_empty());
     let name = parts.map(|part| if part == "°" { "deg" } else { part }).collect::<Vec<_>>().join("_");
     orientation::is_column(&name).then_some(name)

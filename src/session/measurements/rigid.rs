@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Translation3};
 
 use super::Row;
-use super::foreign::{Expected, Reading};
+use super::foreign::{Expected, Reading, as_orientation};
 use crate::identification::rigid::{CORNERS, Tetrahedron};
 use crate::session::orientation::Orientation;
 use crate::session::table::{Defect, Header, Measure, NumberColumn, Numbers, Record, TableProblem};
@@ -64,7 +64,9 @@ impl Orientations {
         if !is_stated {
             // Beside points without any such statement these may be columns of another meaning.
             let mut doubts = Vec::new();
-            let mut looked_at = header.clone();
+            let known = header.known().iter().map(|name| as_orientation(name).unwrap_or_else(|| name.clone()));
+            let known: Vec<String> = known.collect();
+            let mut looked_at = Header::renamed(header.line, header.names.clone(), &known, &mut doubts);
             let found = Orientation::find(&mut looked_at, &OTHERS, &mut doubts);
             let columns = found.iter().flat_map(|orientation| &orientation.columns);
             let names: Vec<String> =
@@ -169,7 +171,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::JointType;
-    use crate::session::measurements::{Layout, Measurements, read, read_for, write};
+    use crate::session::measurements::{Layout, Measurements, read, read_for, write_with_text};
     use crate::session::table::TableErrors;
 
     const JOINTS: [JointType; 1] = [JointType::Revolute];
@@ -247,7 +249,16 @@ mod tests {
                 "{header}"
             );
             // What is written is read as the same points.
-            let again = read(write(&table.rows, &JOINTS), "points.csv", &JOINTS).unwrap();
+            let again = read(write_with_text(&table, &JOINTS), "points.csv", &JOINTS).unwrap();
+            assert_eq!((again.rows.len(), &again.understood.orientation), (4, &None), "{header}");
+            assert!(
+                table
+                    .understood
+                    .columns
+                    .iter()
+                    .all(|column| column.read_as.is_some() || column.name.starts_with("sigma")),
+                "{header}"
+            );
             assert!(pose(&again).rotation.angle_to(&expected) < 1e-7, "{header}");
         }
     }

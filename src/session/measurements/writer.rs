@@ -3,6 +3,7 @@
 use super::names::{Name, Place};
 use super::{Measurements, Row, joint_names};
 use crate::kinematics::JointType;
+use crate::session::orientation::is_column;
 use crate::text::{decimal, printable};
 use crate::units::{Quantity, to_mm};
 
@@ -56,8 +57,13 @@ pub fn write_with_text(table: &Measurements, joints: &[JointType]) -> String {
         !name.is_of_tool() && matches!(name.place(), None | Some(Place::Time))
     };
     let is_ours = |name: &&String| name.starts_with("sigma") || name.starts_with("temperature");
+    // The points carry the orientation already.
+    let is_used = table.understood.orientation.is_some() && !table.understood.lacks_orientation_error;
+    let is_turn = |name: &&String| is_used && is_column(&name.to_lowercase());
     let kept: Vec<usize> = (0..table.columns.len())
-        .filter(|index| table.columns.get(*index).is_some_and(|name| is_text(&name) && !is_ours(&name)))
+        .filter(|index| {
+            table.columns.get(*index).is_some_and(|name| is_text(&name) && !is_ours(&name) && !is_turn(&name))
+        })
         .collect();
     if kept.is_empty() {
         return write(&rows, joints);

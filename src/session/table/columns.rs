@@ -61,7 +61,7 @@ impl NumberColumn {
 }
 
 /// The line of column names while a reader takes what it knows from it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(in crate::session) struct Header {
     /// 1-based line in the file.
     pub(in crate::session) line: usize,
