@@ -1,6 +1,6 @@
 //! The pictures of the documents. The screens in `docs/technician.md`: the program in a real terminal of 80×24, resumed from the first
 //! entries of the journal in `sessions/example`, shows exactly what is printed there. `docs/pictures/*.svg`: wider screens with their
-//! colours. `docs/pictures/report.png`: the first page of the example's report.
+//! colours. `docs/pictures/report.png`: the first page of the example's report. `docs/pictures/story.webp`: its recording.
 //!
 //! To write them again: `TRUPOSE_WRITE_PICTURES=1 cargo test --test main pictures`; the page needs Chromium on the path.
 
@@ -170,6 +170,20 @@ fn the_picture_of_the_report_is_of_the_example() {
     assert_eq!(fs::read_to_string(&beside).unwrap().trim(), sum, "docs/pictures/report.png is stale");
     let bytes = fs::read(&picture).unwrap();
     assert!(bytes.starts_with(b"\x89PNG") && bytes.len() as u64 > NOT_BLANK, "{} bytes: it is blank", bytes.len());
+}
+
+/// The animation of the recording, which a script with the viewer draws (`docs/pictures/story.py`).
+#[test]
+fn the_story_is_that_of_the_example() {
+    let recording = fs::read(root().join("sessions/example/recording.rrd")).unwrap();
+    let beside = fs::read_to_string(root().join("docs/pictures/story.sha256")).unwrap();
+    assert_eq!(beside.trim(), sha256(&recording), "docs/pictures/story.webp is stale: run docs/pictures/story.py");
+    let story = fs::read(root().join("docs/pictures/story.webp")).unwrap();
+    assert!(
+        story.starts_with(b"RIFF") && (NOT_BLANK..2_000_000).contains(&(story.len() as u64)),
+        "{} bytes",
+        story.len()
+    );
 }
 
 #[test]
