@@ -190,10 +190,14 @@ fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
     let (mut measured, mut has_dropped, mut exchanged) = (0, false, None::<String>);
     let mut corrected = 0;
     for _ in 0..200 {
-        technician.sees(LONG, "something to do", |shown| asked(shown).is_some());
-        let before = technician.terminal.look(Shown::text);
-        let samples = technician.terminal.look(Shown::samples);
-        match technician.terminal.look(asked).unwrap() {
+        // What is asked may change with the next frame: it is read together with the rest.
+        let mut read = None;
+        technician.sees(LONG, "something to do", |shown| {
+            read = asked(shown).map(|asked| (asked, shown.text(), shown.samples()));
+            read.is_some()
+        });
+        let (asks, before, samples) = read.unwrap();
+        match asks {
             Asked::Pass => technician.press(ENTER),
             Asked::Nothing => break,
             Asked::Question { has_remedy: true } => {
