@@ -108,9 +108,14 @@ fn instrument_connects_as_soon_as_it_is_chosen() {
             "Cancel",
             "Next -- the instrument is not responding: reconnect, or choose another",
             "ChooseInstrument -- connecting is still running",
+            "FindLinks -- connecting is still running",
             "Retry -- connecting is still running",
             "Back -- connecting is still running",
+            "PlaceTracker -- connecting is still running",
+            "LimitJoints -- connecting is still running",
+            "AddBox -- connecting is still running",
             "DescribeCell -- connecting is still running",
+            "CheckFaces -- connecting is still running",
             "Quit"
         ]
     );
