@@ -128,7 +128,7 @@ impl<'a> Trial<'a> {
         let direct = DirectErrors::new(&setup.arm, &setup.features, observations);
         let points = points.map_or_else(Vec::new, |errors| errors.vectors);
         let vectors = points.iter().chain(&direct.seats);
-        let sum = vectors.clone().map(|error| error.norm_squared()).sum::<f64>()
+        let sum = vectors.clone().map(nalgebra::Matrix::norm_squared).sum::<f64>()
             + direct.lengths.iter().map(|error| error * error).sum::<f64>();
         let count = 3 * vectors.count() + direct.lengths.len();
         (count > 0).then(|| Fit { residual: (sum / count as f64).sqrt(), targets })
